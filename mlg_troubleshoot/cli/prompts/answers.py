@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from types import MappingProxyType
@@ -51,6 +51,9 @@ DAY = {
 _DATES = {OUTCOME.name: "outcome_date", PLUNGER_DISPLACEMENT.name: "plunger_date"}
 _REPLACEABLE = (OUTCOME.name, *LENGTHS, *DAY.values(), "repair_date", *_DATES.values())
 MORE = (*_REPLACEABLE, *SIGN_OFF, SMALL_READINGS_TRUE.name)
+# What is asked of a new inspection once its joints are: the optional answers, then the sign-off.
+OPTIONAL = "optional"
+REST = (OPTIONAL, *SIGN_OFF)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +73,9 @@ NOT_MEASURED = JointAnswer(None)
 class Answers:
     """All answers of one inspection; None or a missing joint is still to be asked, `more` is
     optional, by column.
+
+    `todo` is asked next, joints before the others; `continues` is the hash of the kept inspection
+    that these answers go on with.
     """
 
     tail_no: str | None = None
@@ -79,9 +85,21 @@ class Answers:
     record_id: str | None = None
     joints: Mapping[int, JointAnswer] = field(default_factory=lambda: MappingProxyType({}))
     more: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    todo: tuple[int | str, ...] = REST
+    continues: str = ""
+
+    def reopened(self, joints: Collection[int]) -> Answers:
+        """Return the answers without those of some joints."""
+        left = {n: answer for n, answer in self.joints.items() if n not in joints}
+        return replace(self, joints=MappingProxyType(left))
+
+    def without(self, asked: int | str) -> Answers:
+        """Return the answers with one question less to come."""
+        return replace(self, todo=tuple(each for each in self.todo if each != asked))
 
     def with_joint(self, number: int, answer: JointAnswer) -> Answers:
-        return replace(self, joints=MappingProxyType({**self.joints, number: answer}))
+        joints = MappingProxyType({**self.joints, number: answer})
+        return replace(self, joints=joints).without(number)
 
     def with_each(self, change: Callable[[JointAnswer], JointAnswer]) -> Answers:
         return replace(
