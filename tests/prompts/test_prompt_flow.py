@@ -432,27 +432,27 @@ def test_a_tail_number_from_a_flag_must_be_readable(
 # The sign-off page.
 
 
-def test_technician_order_gauge_and_date_are_asked_once_and_reach_the_inspection(
+def test_order_date_landings_technician_and_gauge_are_asked_once_and_reach_the_inspection(
     gear: Gear, store: SessionStore
 ) -> None:
-    typed = ["N1", "l", "i", "r", *TEN, "", "A. Smith", "WO-7", "G-03", "2026-03-01", ""]
+    typed = ["N1", "l", "i", "r", *TEN, "", "WO-7", "2026-03-01", "2100", "A. Smith", "G-03", ""]
     found = inspect(gear, store, typed)
     assert (found.technician_id, found.carried["work_order"], found.gauge_id) == (
         "A. Smith",
         "WO-7",
         "G-03",
     )
-    assert str(found.inspection_date) == "2026-03-01"
+    assert (str(found.inspection_date), found.gear_landings) == ("2026-03-01", 2100.0)
 
 
 def test_a_date_that_is_none_is_asked_again(flow: Flow) -> None:
-    turn = play(flow, [*TEN, "", "", "", "", "some day"])
+    turn = play(flow, [*TEN, "", "", "some day"])
     assert (turn.state.ask, turn.state.at) == (Ask.DETAIL, "inspection_date")
     assert "is not taken" in said(turn)
 
 
 def test_a_line_of_the_sign_off_page_is_changed_from_the_review(flow: Flow) -> None:
-    turn = play(flow, [*TEN, "", "A. Smith", "", "", "", "name", "B. Jones"])
+    turn = play(flow, [*TEN, "", "", "", "", "A. Smith", "", "name", "B. Jones"])
     assert (turn.state.ask, turn.state.answers.more["technician_id"]) == (Ask.REVIEW, "B. Jones")
 
 

@@ -67,6 +67,8 @@ class JointAnswer:
 
 
 NOT_MEASURED = JointAnswer(None)
+# The note of an inspection that names the joints whose readings were confirmed.
+CONFIRMED = "asked again and confirmed: "
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +160,7 @@ class Answers:
 
         read = admit(self._row(gear, record_id), ReadOptions.of(gear, asks=True))
         confirmed = [f"#{n}" for n, answer in sorted(self.joints.items()) if answer.confirmed]
-        said = f"asked again and confirmed: {', '.join(confirmed)}"
+        said = CONFIRMED + ", ".join(confirmed)
         return replace(read, warnings=(*read.warnings, said)) if confirmed else read
 
     def unit_question(self, gear: Gear) -> str:

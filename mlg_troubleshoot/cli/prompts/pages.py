@@ -203,16 +203,15 @@ def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
 def next_page(visit: Visit) -> Page:
     """What can follow a result: each is one key."""
     pairs = [
-        ("y", "NEXT is done: enter what was found") if visit.todo else ("", ""),
-        ("r", "report to sign"),
+        ("y", "I did NEXT") if visit.todo else ("", ""),
+        ("r", "report"),
         ("c", "correct"),
-        ("u", "take back the last answer") if visit.before else ("", ""),
-        ("n 3 5", "joints restored"),
-        ("n", "new inspection"),
-        ("d", "details"),
+        ("u", "take back") if visit.before else ("", ""),
+        ("d", "all details"),
+        ("n", "new"),
     ]
     shown = keys(*(pair for pair in pairs if pair[0]))
-    return Page((shown,), " y, " * bool(visit.todo) + "a letter, or Enter = done > ")
+    return Page((shown,), " " + "y, " * bool(visit.todo) + "another letter, or Enter = done > ")
 
 
 def step_page(answers: Answers, column: str, advised: str) -> Page:

@@ -11,7 +11,7 @@ from datetime import date
 from types import MappingProxyType
 from typing import Any
 
-from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, Answers, JointAnswer
+from mlg_troubleshoot.cli.prompts.answers import CONFIRMED, MORE, NOT_MEASURED, Answers, JointAnswer
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.columns import BY_NAME, DATE, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Inspection, Side
@@ -179,11 +179,13 @@ def _answer(row: Inspection, joint: int) -> JointAnswer:
     if entered is not None:
         try:
             written = parse_length(entered.text)
-            return JointAnswer(replace(written, unit=entered.unit), confirmed=True)
+            said = next((each for each in row.warnings if each.startswith(CONFIRMED)), "")
+            named = said.removeprefix(CONFIRMED).split(", ")
+            return JointAnswer(replace(written, unit=entered.unit), f"#{joint}" in named)
         except UsageError:
             pass
     read_in = row.clearance_in[joint] * row.convention.per_radial
-    return JointAnswer(parse_length(f"{read_in:.6g} in"), confirmed=True)
+    return JointAnswer(parse_length(f"{read_in:.6g} in"))
 
 
 def _more(row: Inspection) -> dict[str, str]:
