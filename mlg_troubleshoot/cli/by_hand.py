@@ -18,7 +18,7 @@ from mlg_troubleshoot.decision.columns import (
     TAIL_NO,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.units import LengthUnit
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         SessionStore,
         Visit,
     )
+    from mlg_troubleshoot.store import Store
 
 
 def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
@@ -124,6 +125,18 @@ def unfinished(store: SessionStore, terminal: RichTerminal, gear: Gear, flags: F
         terminal.say(unfinished_lines(others))
         output.say("Go on with another one: mlg check --resume --tail TAIL --side LH|RH")
     return saved
+
+
+def kept_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
+    """The last visit to a gear; what cannot be read is said, and keeps nobody from a new one."""
+    from mlg_troubleshoot.cli.prompts import last_visit
+    from mlg_troubleshoot.store import StoreError
+
+    try:
+        return last_visit(store, gear, tail, side)
+    except (OutputError, StoreError) as error:
+        output.say(f"The records of {tail} {side} cannot be read: {error.message}. {error.remedy}")
+        return None
 
 
 def continued(

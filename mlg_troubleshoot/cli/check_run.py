@@ -109,7 +109,6 @@ class Run:
             RichTerminal,
             SessionStore,
             ask_inspection,
-            last_visit,
         )
 
         wanted = self._wanted
@@ -118,7 +117,7 @@ class Run:
         terminal = RichTerminal()
         saved = by_hand.unfinished(store, terminal, gear, self._flags) if wanted.resume else None
         given = by_hand.answers_of(self._flags, self._asked)
-        find = partial(last_visit, self._records, gear)
+        find = partial(by_hand.kept_visit, self._records, gear)
         ask = partial(
             ask_inspection, gear, terminal, store, advice=by_hand.advice_for(gear), find_visit=find
         )
@@ -149,7 +148,10 @@ class Run:
                     self._write_reports(result, _ASKED_FOR, self._seen(unit))
                 case _:
                     return result
-            entry = ask(given, visit=find(inspection.tail_no, inspection.side))
+            visit = find(inspection.tail_no, inspection.side)
+            if visit is None:
+                return result
+            entry = ask(given, visit=visit)
 
     def _seen(self, entered_in: LengthUnit) -> Settings:
         """Lengths are shown in the unit that a flag or the memory says, or else in that of the

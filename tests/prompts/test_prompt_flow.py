@@ -748,20 +748,20 @@ def test_a_confirmed_value_travels_as_a_warning(gear: Gear, store: SessionStore)
     assert asked == "asked again and confirmed: #1"
 
 
-def test_ten_joints_in_inches_take_69_keystrokes_with_the_enters(
+def test_ten_joints_in_inches_take_70_keystrokes_with_the_enters(
     gear: Gear, store: SessionStore
 ) -> None:
     terminal = ScriptedTerminal(["N123AB", "l", "i", "t", *TEN, *ENTERS, ""])
     ask_inspection(gear, terminal, store, Answers())
-    assert terminal.keystrokes == 69
+    assert terminal.keystrokes == 70
 
 
-def test_ten_joints_in_thou_take_39_keystrokes_with_the_enters(
+def test_ten_joints_in_thou_take_40_keystrokes_with_the_enters(
     gear: Gear, store: SessionStore
 ) -> None:
     terminal = ScriptedTerminal(["N123AB", "l", "t", "t", *["4"] * 10, *ENTERS, ""])
     ask_inspection(gear, terminal, store, Answers())
-    assert terminal.keystrokes == 39
+    assert terminal.keystrokes == 40
 
 
 # The sketch.
@@ -845,7 +845,7 @@ def in_millimetres(flow: Flow, *more: str) -> Turn:
     """
     return play(
         flow,
-        [*INCHES_AS_MILLIMETRES, "", "", "", "", "", "", *more],
+        [*INCHES_AS_MILLIMETRES, *ENTERS, "", *more],
         replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE),
     )
 

@@ -135,7 +135,9 @@ def ask_inspection(
         raise UsageError(
             f"{given.tail_no!r} is not a tail number", "Give for example --tail N123AB."
         )
-    session = saved or new_session(gear.id, now(), Answers())
+    session = (
+        new_session(gear.id, now(), Answers()) if saved is None else replace(saved, complete=False)
+    )
     saver = _Saver(gear, terminal, store, session)
     flow = Flow(gear, saver.find_saved, advice, now().date(), find_visit)
     try:

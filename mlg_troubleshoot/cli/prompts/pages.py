@@ -207,7 +207,7 @@ def next_page(visit: Visit) -> Page:
         ("r", "report"),
         ("c", "correct"),
         ("u", "take back") if visit.before else ("", ""),
-        ("d", "all details"),
+        ("d", "details"),
         ("n", "new"),
     ]
     shown = keys(*(pair for pair in pairs if pair[0]))
