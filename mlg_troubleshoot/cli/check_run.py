@@ -230,10 +230,11 @@ class Run:
         """Add what was found to the store; what continues a kept inspection takes its place."""
         if self._place is None:
             return
-        from mlg_troubleshoot.workflows.keep import keep, supersede
+        from mlg_troubleshoot.workflows.keep import is_same, keep, supersede
 
         if before is not None:
-            supersede(self._place, before, result, self._asked)
+            if not is_same(before, result):
+                supersede(self._place, before, result, self._asked)
             if not self._wanted.quiet:
                 output.say(
                     f"1 inspection kept in {self._place.place}; earlier versions stay there."

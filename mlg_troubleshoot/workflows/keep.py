@@ -106,6 +106,14 @@ def correct(store: Store, record_id: str, result: CheckResult, options: CheckOpt
     return supersede(store, wrong, result, options)
 
 
+def is_same(kept: Record, result: CheckResult) -> bool:
+    """Whether a check found what is kept already."""
+    return all(
+        isinstance(j, Assessment) and same_inspection(kept, inspection_record(j.inspection))
+        for j in result.judgements
+    )
+
+
 def supersede(store: Store, wrong: Record, result: CheckResult, options: CheckOptions) -> Record:
     """Append what takes the place of a kept inspection, with the repair that it states; one that
     only the former stated is void.

@@ -273,7 +273,7 @@ def test_a_computed_inspection_that_is_taken_up_again_is_unfinished_again(
 ) -> None:
     inspect(gear, store, [*HEADING, *TEN, *ENTERS, ""])
     session = read_session(drafts(store)[0])
-    interrupted(gear, store, ["b", ".005"], saved=session)
+    interrupted(gear, store, ["10", ".005"], saved=session)
     assert latest(store).answers.radial_in[10] == 0.005
 
 

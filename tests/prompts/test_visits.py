@@ -15,6 +15,7 @@ from mlg_troubleshoot.cli.options import Tables
 from mlg_troubleshoot.cli.prompts import EntryInterruptedError, SessionStore
 from mlg_troubleshoot.life.folding import GearLife, life_of
 from mlg_troubleshoot.store import RecordKind, Store
+from tests.cli.conftest import mlg
 from tests.prompts.scripted import ENTERS, ScriptedTerminal
 
 GEAR = ("N1", "l")
@@ -98,7 +99,7 @@ def test_a_continued_inspection_is_one_inspection_and_the_former_stays_in_the_ch
 
 
 def test_what_only_a_table_said_of_a_continued_inspection_stands(
-    visit: Visit, store: SessionStore, mlg, tmp_path: Path
+    visit: Visit, store: SessionStore, tmp_path: Path
 ) -> None:
     table = tmp_path / "one.csv"
     table.write_text(
@@ -136,7 +137,7 @@ def test_the_last_answer_is_taken_back_by_a_record_that_is_appended(
 
 def test_an_outcome_is_taken_back(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
-    visit(*GEAR, "c", "b", "r", "", "")
+    visit(*GEAR, "retracted")
     assert life(store).inspections[-1].inspection.outcome == "RETRACTED"
     visit(*GEAR, "u")
     assert life(store).inspections[-1].inspection.outcome == "FAILED"
@@ -155,7 +156,7 @@ def test_a_repair_is_recorded_and_taken_back_with_its_record(
 
 
 def test_a_repair_that_was_recorded_elsewhere_opens_its_joints(
-    visit: Visit, store: SessionStore, mlg
+    visit: Visit, store: SessionStore
 ) -> None:
     visit(*FIRST)
     day = date.today().isoformat()
@@ -267,3 +268,20 @@ def test_a_gear_is_followed_over_five_visits_to_done_with_half_the_keys(
     assert latest["next_action"]["action"] == "DONE", json.dumps(latest["plan"])[:600]
     # Typed anew at each visit, as before there was a second one: 5 visits of all that is known.
     assert keys <= 5 * visit(*GEAR, "q").keystrokes + 200
+
+
+def test_a_visit_that_changes_nothing_appends_nothing(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    records = len(life(store).records)
+    visit(*GEAR, "c", "")
+    assert len(life(store).records) == records
+
+
+@pytest.mark.parametrize("typed", ["8,5", "abc"])
+def test_what_is_said_of_a_reading_at_a_prompt_is_not_about_files(
+    visit: Visit, typed: str
+) -> None:
+    screen = visit(*GEAR, "t", "t", typed, *PLAY, *ENTERS, "").screen
+    assert "is not taken" in screen
+    assert "--decimal-comma" not in screen
+    assert "leave it blank" not in screen

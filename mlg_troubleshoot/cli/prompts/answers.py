@@ -229,11 +229,20 @@ def judge(
     read, problems = judge_length(CLEARANCE.header(number), typed, options)
     if problems or not isinstance(read, Inspection):
         return JudgedReading(
-            " ".join(f"expected {p.expected}. {p.remedy}" for p in problems), refused=True
+            " ".join(f"expected {p.expected}. {_at_prompt(p.remedy)}" for p in problems),
+            refused=True,
         )
     if number not in read.entered:
         return JudgedReading()
     return JudgedReading(Sentence.joined(read.warnings), parse_length(read.entered[number].text))
+
+
+# What a remedy says for the cells of a file only.
+_OF_FILES = re.compile(r",? or (?:pass --decimal-comma|leave it blank[^.]*)")
+
+
+def _at_prompt(remedy: str) -> str:
+    return _OF_FILES.sub("", remedy)
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:
@@ -246,7 +255,8 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
     read, problems = judge_length(column, typed, options)
     if problems or not isinstance(read, Inspection):
         raise UsageError(
-            f"{typed!r} is not taken: expected {problems[0].expected}", problems[0].remedy
+            f"{typed!r} is not taken: expected {problems[0].expected}",
+            _at_prompt(problems[0].remedy),
         )
     return read
 

@@ -196,7 +196,7 @@ def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
         note(f"Readings{kind}: ", "; ".join(rows)),
         *((note("; ".join(more)),) if more else ()),
         line((f"Last verdict: {visit.verdict}", Tone.STRONG)),
-        line((f"NEXT: {visit.next}", Tone.STRONG)),
+        line((f"NEXT: {said_in(visit.next, answers.unit or LengthUnit.INCH)}", Tone.STRONG)),
     )
 
 
@@ -458,14 +458,19 @@ def review_page(gear: Gear, answers: Answers, width: int) -> Page:
     units = _units_shown(answers.unit)
     numbers = "".join(f"{unit:>9}" for unit in units) * (2 if twice else 1)
     longest = max(len(joint.name) for joint in gear.joints)
-    name_width = max(min(longest, width - len(numbers) - 22), 0)
-    head = f"{'#':>3}  {'joint':<{name_width}}{'typed':>11}{numbers}"
+    # A name is never cut: where the screen is narrow, what was typed stands as read only.
+    as_typed = 11 if longest <= width - len(numbers) - 22 else 0
+    name_width = max(min(longest, width - len(numbers) - 11 - as_typed), 0)
+    head = f"{'#':>3}  {'joint':<{name_width}}{'typed':>{as_typed}.{as_typed}}{numbers}"
     across = 9 * len(units)
     above = (
-        " " * (name_width + 16) + f"{kind:>{across}}" + (f"{'radial':>{across}}" if twice else "")
+        " " * (name_width + 5 + as_typed)
+        + f"{kind:>{across}}"
+        + (f"{'radial':>{across}}" if twice else "")
     )
     rows = [
-        _review_row(gear, answers, number, name_width, twice=twice) for number in gear.joint_numbers
+        _review_row(gear, answers, number, (name_width, as_typed), twice=twice)
+        for number in gear.joint_numbers
     ]
     extras = [
         f"{column.replace('_id', '').replace('_', ' ')} {text}"
@@ -493,18 +498,21 @@ def review_page(gear: Gear, answers: Answers, width: int) -> Page:
     return Page(tuple(shown), " Enter computes > ")
 
 
-def _review_row(gear: Gear, answers: Answers, number: int, name_width: int, *, twice: bool) -> Line:
+def _review_row(
+    gear: Gear, answers: Answers, number: int, widths: tuple[int, int], *, twice: bool
+) -> Line:
+    name_width, as_typed = widths
     joint = gear.joint(number)
     start = f"{number:>3}  {joint.name[:name_width]:<{name_width}}"
     reading = answers.reading(number)
     if reading is None:
         return line(
             start,
-            (f"{'–':>11}  not measured", Tone.WARN if joint.critical else Tone.QUIET),
+            (f"{'–':>{as_typed or 9}}  not measured", Tone.WARN if joint.critical else Tone.QUIET),
             indent=0,
             rigid=True,
         )
-    values = f"{_as_typed(reading)[:10]:>11}"
+    values = f"{_as_typed(reading)[:10]:>11}"[:as_typed]
     for each in (reading.as_read_in, reading.radial_in)[: 1 + twice]:
         values += "".join(f"{unit.shown(each):>9}" for unit in _units_shown(answers.unit))
     flag = (

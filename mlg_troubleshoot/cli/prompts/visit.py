@@ -73,7 +73,8 @@ class Visit:
             and field.name not in ("clearance_in", "entered")
         }
         typed = PLUNGER_DISPLACEMENT.name
-        if self.answers.more.get(typed) == _more(read).get(typed):
+        unit = self.answers.unit or LengthUnit.INCH
+        if self.answers.more.get(typed) == _more(read, unit).get(typed):
             kept["readings_in"] = self.row.readings_in
         if not self.row.gauge_u_is_default:
             kept |= {"gauge_u_in": self.row.gauge_u_in, "gauge_u_is_default": False}
@@ -171,7 +172,7 @@ def answers_of(row: Inspection, gear: Gear, continues: str) -> Answers:
         joints=MappingProxyType(joints),
         todo=(),
         continues=continues,
-    ).with_more(**_more(row))
+    ).with_more(**_more(row, unit))
 
 
 def _answer(row: Inspection, joint: int) -> JointAnswer:
@@ -188,7 +189,8 @@ def _answer(row: Inspection, joint: int) -> JointAnswer:
     return JointAnswer(parse_length(f"{read_in:.6g} in"))
 
 
-def _more(row: Inspection) -> dict[str, str]:
+def _more(row: Inspection, unit: LengthUnit) -> dict[str, str]:
+    """The optional answers of an inspection, by column."""
     found = {}
     for name in MORE:
         column = BY_NAME[name]
@@ -198,7 +200,7 @@ def _more(row: Inspection) -> dict[str, str]:
         if value in (None, (), "", False):
             continue
         if column.is_length:
-            found[name] = f"{value!r} in"
+            found[name] = f"{unit.from_inches(value):.6g} {unit}"
         elif isinstance(value, tuple):
             found[name] = ("; " if isinstance(value[0], str) else " ").join(map(str, value))
         elif value is True:

@@ -39,10 +39,12 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
     row = judgement.row
     words = judgement.verdict.words + ", MEASURED" * measured_outside(judgement)
     title = Text(f"[{MARKS[judgement.verdict]}] {words} ", style=STYLES[judgement.verdict])
-    identity = f" {row.tail_no or 'tail ?'}  {row.side or 'side ?'}  {row.record_id or 'record ?'}"
+    identity = f" {row.tail_no or 'tail ?'}  {row.side or 'side ?'}"
+    record = f"  {row.record_id or 'record ?'}"
+    has_room = len(title) + len(identity) + len(record) + 6 <= screen.width
     panel = Panel(
         _body(judgement, screen, detail=detail),
-        title=title.append_text(word(identity, "not bold default")),
+        title=title.append_text(word(identity + record * has_room, "not bold default")),
         title_align="left",
         subtitle=word(gear.provenance, "dim"),
         subtitle_align="right",
@@ -60,6 +62,8 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
             f"{more} more notes; " * (more > 0) + "--detail: all joints, repairs, uncertainty",
             style="dim",
         )
+    if not has_room:
+        screen.print(word(f"Record{record}"))
     screen.print(_DISCLAIMER, style="dim")
     screen.print(panel)
 
