@@ -83,7 +83,7 @@ def _judged(
 
 def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
     """What the flags answer already of the questions on a terminal, judged as a row would be."""
-    from mlg_troubleshoot.cli.prompts.answers import LENGTHS, Answers
+    from mlg_troubleshoot.cli.prompts.answers import LENGTHS, REST, Answers
 
     typed = flags.typed
     unit = declared.unit or LengthUnit.INCH
@@ -100,6 +100,7 @@ def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
         unit=declared.unit,
         convention=declared.convention,
         record_id=typed.get(RECORD_ID.name),
+        todo=tuple(asked for asked in REST if asked not in typed),
     ).with_more(**{**typed, **with_unit, OUTCOME.name: judged.outcome})
 
 

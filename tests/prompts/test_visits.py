@@ -278,10 +278,26 @@ def test_a_visit_that_changes_nothing_appends_nothing(visit: Visit, store: Sessi
 
 
 @pytest.mark.parametrize("typed", ["8,5", "abc"])
-def test_what_is_said_of_a_reading_at_a_prompt_is_not_about_files(
-    visit: Visit, typed: str
-) -> None:
+def test_what_is_said_of_a_reading_at_a_prompt_is_not_about_files(visit: Visit, typed: str) -> None:
     screen = visit(*GEAR, "t", "t", typed, *PLAY, *ENTERS, "").screen
     assert "is not taken" in screen
     assert "--decimal-comma" not in screen
     assert "leave it blank" not in screen
+
+
+def test_landings_and_date_that_flags_give_are_not_asked(
+    visit: Visit, store: SessionStore
+) -> None:
+    given = {"gear_landings": "2100", "inspection_date": "2026-03-01"}
+    flags = Flags(typed={"tail_no": "N1", "side": "LH", **given})
+    visit("t", "t", *PLAY, *ENTERS[:-2], "", flags=flags)
+    found = life(store).inspections[-1].inspection
+    assert (found.gear_landings, str(found.inspection_date)) == (2100.0, "2026-03-01")
+
+
+def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36", "y", "yes", "y", "18")
+    screen = visit(*GEAR, "y", "", "3", "3", "y", "4", "y", "r").screen
+    assert "DONE. The repair is in the records. r writes the report to sign." in screen
+    assert life(store).repairs

@@ -132,6 +132,7 @@ class Answers:
             unit=self.unit or given.unit,
             convention=self.convention or given.convention,
             record_id=given.record_id or self.record_id,
+            todo=tuple(asked for asked in self.todo if asked not in given.more),
         ).with_more(**{**given.more, **self.more})
 
     def read(self, written: WrittenLength | None) -> Reading | None:

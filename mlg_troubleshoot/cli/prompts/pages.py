@@ -11,6 +11,7 @@ from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.cli.prompts.visit import Visit
 from mlg_troubleshoot.decision.columns import BY_NAME, DATE, MARGIN, PLUNGER_DISPLACEMENT
+from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, said_in
 
@@ -210,8 +211,11 @@ def next_page(visit: Visit) -> Page:
         ("d", "details"),
         ("n", "new"),
     ]
-    shown = keys(*(pair for pair in pairs if pair[0]))
-    return Page((shown,), " " + "y, " * bool(visit.todo) + "another letter, or Enter = done > ")
+    shown = [keys(*(pair for pair in pairs if pair[0]))]
+    if visit.action is Action.DONE:
+        end = "The repair is in the records. r writes the report to sign."
+        shown.insert(0, line(("DONE. ", Tone.GOOD), end))
+    return Page(tuple(shown), " " + "y, " * bool(visit.todo) + "another letter, or Enter = done > ")
 
 
 def step_page(answers: Answers, column: str, advised: str) -> Page:

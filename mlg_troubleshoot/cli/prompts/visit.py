@@ -200,7 +200,7 @@ def _more(row: Inspection, unit: LengthUnit) -> dict[str, str]:
         if value in (None, (), "", False):
             continue
         if column.is_length:
-            found[name] = f"{unit.from_inches(value):.6g} {unit}"
+            found[name] = f"{unit.from_inches(float(value)):.6g} {unit}"
         elif isinstance(value, tuple):
             found[name] = ("; " if isinstance(value[0], str) else " ").join(map(str, value))
         elif value is True:
