@@ -4,7 +4,7 @@ found.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, replace
 from functools import partial
 from pathlib import Path
@@ -230,33 +230,31 @@ class Run:
         """Add what was found to the store; what continues a kept inspection takes its place."""
         if self._place is None:
             return
-        from mlg_troubleshoot.workflows.keep import is_same, keep, supersede
+        from mlg_troubleshoot.life.folding import warnings_of
+        from mlg_troubleshoot.workflows.keep import Kept, is_same, keep, supersede
 
         if before is not None:
             if not is_same(before, result):
                 supersede(self._place, before, result, self._asked)
-            if not self._wanted.quiet:
-                output.say(
-                    f"1 inspection kept in {self._place.place}; earlier versions stay there."
-                )
-            return
+            added = Kept(1, 0, tuple(warnings_of(self._place, [(before.tail_no, before.side)])))
+        else:
+            added = keep(result, self._asked, self._place, self._same_tail())
+        if not self._wanted.quiet:
+            noun = "inspection" if added.new == 1 else "inspections"
+            known = f", {added.known} known already" if added.known else ""
+            output.say(f"{added.new} {noun} kept in {self._place.place}{known}.")
+        for warning in added.warnings:
+            output.say(f"Warning: {warning}")
+
+    def _same_tail(self) -> Callable[[str, str], bool] | None:
+        """Who says whether two spellings of a tail number are one aircraft."""
         tails = self._wanted.tails
         if tails not in (None, "same", "apart"):
             raise UsageError(
                 f"--tails {tails!r} is not same or apart",
                 "Give same (one aircraft) or apart (two).",
             )
+        if tails is not None:
+            return lambda _new, _kept: tails == "same"
         # A command with a FILE never waits for a key.
-        asked = history.ask_tail if self._asks else None
-        added = keep(
-            result,
-            self._asked,
-            self._place,
-            asked if tails is None else lambda _new, _kept: tails == "same",
-        )
-        if not self._wanted.quiet:
-            noun = "inspection" if added.inspections == 1 else "inspections"
-            known = f", {added.known} known already" if added.known else ""
-            output.say(f"{added.inspections} {noun} kept in {self._place.place}{known}.")
-        for warning in added.warnings:
-            output.say(f"Warning: {warning}")
+        return history.ask_tail if self._asks else None

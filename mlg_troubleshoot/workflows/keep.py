@@ -14,7 +14,6 @@ from mlg_troubleshoot.life.folding import GearKey, find, life_of, warnings_of, w
 from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
 from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
-    Added,
     Record,
     RecordKind,
     Store,
@@ -30,12 +29,13 @@ _ENTERED = (RecordKind.INSPECTION, RecordKind.CORRECTION, RecordKind.ASSESSMENT)
 
 
 @dataclass(frozen=True, slots=True)
-class Kept(Added):
-    """What was added: records, and inspections among them; and which records of these gears now
-    disagree in dates and landings.
+class Kept:
+    """How many inspections were new, and how many stood there already; and which records of these
+    gears now disagree in dates and landings.
     """
 
-    inspections: int
+    new: int
+    known: int
     warnings: tuple[str, ...]
 
 
@@ -66,12 +66,13 @@ def keep(
         # Wherever an inspection was entered again, it is the first entry that was assessed.
         first = known.setdefault(record.identity_hash, record)
         records += [record, assessment_record(result.gear, options, assessment, record, first)]
-    added = store.add(
+    store.add(
         records,
         lambda kept, new: new.kind is not RecordKind.INSPECTION or _agrees(store, kept, new),
     )
     gears = {(record.tail_no, record.side) for record in records}
-    return Kept(added.new, stood, len(known) - stood, tuple(warnings_of(store, gears)))
+    new = len(known) - stood
+    return Kept(new, len(inspections) - new, tuple(warnings_of(store, gears)))
 
 
 def _repairs_of(row: Inspection, store: Store) -> list[Record]:
