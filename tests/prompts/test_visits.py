@@ -286,9 +286,7 @@ def test_what_is_said_of_a_reading_at_a_prompt_is_not_about_files(visit: Visit, 
     assert "leave it blank" not in screen
 
 
-def test_landings_and_date_that_flags_give_are_not_asked(
-    visit: Visit, store: SessionStore
-) -> None:
+def test_landings_and_date_that_flags_give_are_not_asked(visit: Visit, store: SessionStore) -> None:
     given = {"gear_landings": "2100", "inspection_date": "2026-03-01"}
     flags = Flags(typed={"tail_no": "N1", "side": "LH", **given})
     visit("t", "t", *PLAY, *ENTERS[:-2], "", flags=flags)

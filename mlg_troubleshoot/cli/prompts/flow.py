@@ -492,7 +492,7 @@ class Flow:
         return self._go_on(answers, told=(line(told, self._heading(saved.answers)),))
 
     def _offer_visit(self, answers: Answers) -> Turn[State]:
-        """Show what is kept of the gear, if anything is."""
+        """Show the last inspection of the gear, if there is one."""
         visit = self._visit(answers)
         if visit is None:
             return self._go_on(answers)
