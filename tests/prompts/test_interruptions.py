@@ -86,7 +86,7 @@ class Trial:
         prompt = child.before.rpartition("\n")[2].strip()
         if _RESULT in prompt:
             return _RESULT
-        return next(each for each in _ANSWERS if prompt.startswith(each.strip()))
+        return next(each for each in _ANSWERS if f"{prompt} ".startswith(each))
 
     def run(self) -> None:
         """One start of the program, and its end at a random moment."""
