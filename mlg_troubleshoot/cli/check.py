@@ -28,7 +28,7 @@ EPILOG = (
 # Flags of one gear entered by hand: what each gives to its column as it is typed, and its help.
 _OF_ONE_GEAR: options.ColumnFlags = {
     TAIL_NO.name: ("--tail", None, "Tail number, with --set or the prompts."),
-    SIDE.name: ("--side", "LH|RH", "Which gear."),
+    SIDE.name: ("--side", "LH|RH", "Which gear; with FILE, where it has no column of sides."),
     RECORD_ID.name: ("--record-id", None, "Identifier of the record."),
     OUTCOME.name: ("--outcome", "RETRACTED|FAILED", "What the gear did."),
     PLUNGER_DISPLACEMENT.name: (

@@ -269,6 +269,8 @@ class Inspection:
 class InvalidRow:
     """A data row that cannot be judged, with the columns to correct; its problems stand in the list
     of problems.
+
+    cells: what a spreadsheet program calls what is to be corrected, as far as it has cells.
     """
 
     record_id: str | None
@@ -277,3 +279,4 @@ class InvalidRow:
     correct: tuple[str, ...]
     warnings: tuple[str, ...] = ()
     source: RowSource = RowSource()
+    cells: tuple[str, ...] = ()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 from mlg_troubleshoot.decision.columns import CLEARANCE, PLUNGER_DISPLACEMENT, Column
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records.cells import Cell, column_letters, quote
@@ -45,6 +45,9 @@ class TableOptions:
     dates : DateOrder or None
         Order of day, month and year in dates that are written as numbers; None takes it from the
         column.
+    side : Side or None
+        Side of every row of a table without a column of sides; None takes it from the name of the
+        sheet or the file.
     """
 
     unit: LengthUnit | None = None
@@ -55,6 +58,7 @@ class TableOptions:
     decimal_comma: bool = False
     small_readings_true: bool = False
     dates: DateOrder | None = None
+    side: Side | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,6 +155,8 @@ NOWHERE = CellPlace()
 class TableInHand:
     """The table or form that is being read: how, where it stands, and who is told of its
     problems.
+
+    side: of every row of a table that has no column of sides.
     """
 
     options: ReadOptions
@@ -158,6 +164,7 @@ class TableInHand:
     sheet: str | None
     report: Callable[[Problem], None]
     decimal_comma: bool
+    side: Side | None = None
 
     def source(self, row: int) -> RowSource:
         return RowSource(self.file, self.sheet, row)
@@ -176,7 +183,8 @@ def to_correct(row: Inspection | InvalidRow, *headers: str) -> InvalidRow:
     """A row that cannot be judged before these columns of it are corrected."""
     known = row.correct if isinstance(row, InvalidRow) else ()
     named = tuple(dict.fromkeys((*headers, *known)))
-    return InvalidRow(row.record_id, row.tail_no, row.side, named, row.warnings, row.source)
+    cells = row.cells if isinstance(row, InvalidRow) else ()
+    return InvalidRow(row.record_id, row.tail_no, row.side, named, row.warnings, row.source, cells)
 
 
 @dataclass(frozen=True, slots=True)

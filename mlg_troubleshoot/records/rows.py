@@ -24,6 +24,7 @@ from mlg_troubleshoot.decision.columns import (
     OUTCOME,
     PLUNGER_DISPLACEMENT,
     RECORD_ID,
+    SIDE,
     SMALL_READINGS_TRUE,
     STROKE,
     UNIT,
@@ -232,8 +233,19 @@ class RowReader:
             else:
                 self._tell(place, fault)
         record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
+        if SIDE not in self._at:
+            side = self._table.side
         if self._bad or record_id is None or tail_no is None or side is None or convention is None:
-            return InvalidRow(record_id, tail_no, side, self._correct(), tuple(warnings), source)
+            cells = [self._place(index).cell for index in sorted(self._bad) if index >= 0]
+            return InvalidRow(
+                record_id,
+                tail_no,
+                side,
+                self._correct(),
+                tuple(warnings),
+                source,
+                tuple(filter(None, cells)),
+            )
         self._warn(found, warnings)
         lengths = found.lengths
         clearance = lengths.pop(CLEARANCE, {})
@@ -641,7 +653,8 @@ class RowReader:
         named = [self._placed[index].header for index in sorted(self._bad) if index >= 0]
         for column in IDENTITY:
             made = column is RECORD_ID and self._makes_ids
-            if column not in self._at and column.name not in named and not made:
+            given = made or (column is SIDE and self._table.side is not None)
+            if column not in self._at and column.name not in named and not given:
                 named.append(column.name)
         if -1 in self._bad:
             named.append(CONVENTION.name)
