@@ -236,7 +236,7 @@ class RowReader:
         if SIDE not in self._at:
             side = self._table.side
         if self._bad or record_id is None or tail_no is None or side is None or convention is None:
-            cells = [self._place(index).cell for index in sorted(self._bad) if index >= 0]
+            named = [self._place(index).cell for index in sorted(self._bad) if index >= 0]
             return InvalidRow(
                 record_id,
                 tail_no,
@@ -244,7 +244,7 @@ class RowReader:
                 self._correct(),
                 tuple(warnings),
                 source,
-                tuple(filter(None, cells)),
+                tuple(cell for cell in named if cell is not None),
             )
         self._warn(found, warnings)
         lengths = found.lengths

@@ -12,8 +12,9 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice, side_by_side
-from mlg_troubleshoot.life.outlook import fleet_lines, outlook_sentence
+from mlg_troubleshoot.life.outlook import Order, fleet_lines, outlook_sentence, work_sentence
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
+from mlg_troubleshoot.reporting.fleet_figures import Place, fleet_picture, wear_figure
 from mlg_troubleshoot.reporting.formats import ABSENT, Lengths, landings
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.life_json import life_as_json
@@ -84,11 +85,13 @@ def fleet_document(
     gear: Gear,
     provenance: ReportProvenance,
     unit: LengthUnit = LengthUnit.INCH,
+    order: Order = Order.WORST,
 ) -> Document:
     """Make one page: one line per gear, worst first, with its landings left and the worst case over
     its inspections.
     """
     lengths = Lengths(unit)
+    gears = fleet_lines(lives, forecasts, order)
     lines = [
         (
             line,
@@ -96,15 +99,30 @@ def fleet_document(
             _worst_cases(line.life, lengths),
             f"{safe_stem('life', *line.life.key)}.html",
         )
-        for line in fleet_lines(lives, forecasts)
+        for line in gears
+    ]
+    places = [
+        Place(
+            line.life.name,
+            line.verdict,
+            _share(line.predicted_displacement_in, line.margin_in),
+            line.next_inspection_landings,
+        )
+        for line in gears
     ]
     context = {
         **head("Fleet", "Fleet", gear, provenance, lengths),
         "lines_of": lines,
+        "picture": fleet_picture(places),
+        "work": work_sentence(gears),
         "advice": Advice.of(lives).sentence,
         "notes": [warning for life in lives for warning in life.warnings],
     }
-    return Document("fleet.html.j2", context, "fleet", landscape=True)
+    return Document("fleet.html.j2", context, "fleet", landscape=True, script="table.js")
+
+
+def _share(value: float | None, of: float | None) -> float | None:
+    return None if value is None or not of else value / of
 
 
 def _worst_cases(life: GearLife, lengths: Lengths) -> Markup:
@@ -127,6 +145,7 @@ def life_document(
         "life": life_as_json(life, ahead, gear),
         "outlook": outlook_sentence(life, ahead, gear),
         "steps": side_by_side(life),
+        "figure": wear_figure(life, ahead, gear, Lengths(unit)),
     }
     context = {**head(f"Life of {life.name}", life.name, gear, provenance, Lengths(unit)), **shown}
     return Document("life.html.j2", context, safe_stem("life", *life.key))

@@ -23,6 +23,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.looking_back import PastInspection
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.reporting import inspection_figures as drawn
+from mlg_troubleshoot.reporting.fleet_figures import Place, fleet_picture
 from mlg_troubleshoot.reporting.formats import Lengths, short
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
@@ -219,6 +220,11 @@ def batch_document(
     counted = Counter(j.verdict for j in judgements)
     latest, earlier = latest_of_each_gear(judgements)
     judged = [j for j in judgements if isinstance(j, Assessment)]
+
+    def linked(places: Iterable[int]) -> list[tuple[Assessment, tuple[str, str]]]:
+        rows = ((judgements[place], place) for place in places)
+        return [(j, (links or {}).get(p, ("", ""))) for j, p in rows if isinstance(j, Assessment)]
+
     context = {
         **head(
             f"Batch summary – {source}",
@@ -234,13 +240,21 @@ def batch_document(
         "over_limit": sum(any(f.over_limit for f in j.joints) for j in judged),
         "failed": sum(j.inspection.outcome is Outcome.FAILED for j in judged),
         "counts": [(v, counted[v]) for v in WORST_FIRST],
-        "latest": [(judgements[i], (links or {}).get(i, ("", ""))) for i in latest],
-        "earlier": [(judgements[i], (links or {}).get(i, ("", ""))) for i in earlier],
+        "latest": linked(latest),
+        "earlier": linked(earlier),
+        "rejected": [j for j in judgements if isinstance(j, Rejected)],
+        "picture": fleet_picture([_place_of(j) for j, _links in linked(latest)]),
         "problems": problems,
         "notes": notes,
     }
     stem = safe_stem("batch", *(Path(name).name for name in provenance.input_sha256))
-    return Document("batch.html.j2", context, stem, landscape=True)
+    return Document("batch.html.j2", context, stem, landscape=True, script="table.js")
+
+
+def _place_of(a: Assessment) -> Place:
+    inspection, worst_in = a.inspection, a.predicted_displacement_in
+    name = f"{inspection.tail_no} {inspection.side}"
+    return Place(name, a.verdict.value, None if worst_in is None else worst_in / a.margin_in)
 
 
 def write_form(
