@@ -62,7 +62,7 @@ def fleet_picture(places: Sequence[Place]) -> Markup:
     high = max(*cases, 110.0) * 1.08
     canvas = Canvas(
         _WIDE,
-        330 if due else 200,
+        350 if due else 200,
         "Worst case of each gear against its margin",
         f"{sum(case > 100.0 for case in cases)} of {len(places)} gears are beyond their margin.",
     )
@@ -79,7 +79,7 @@ def fleet_picture(places: Sequence[Place]) -> Markup:
         canvas.text(x + 9, 13.5, verdict.replace("_", " ").lower(), size=9.5)
         x += 125
     if due:
-        axis = Axis("next due, landings", 0.0, max(*due, 1.0) * 1.08)
+        axis = Axis("due in, landings", 0.0, max(*due, 1.0) * 1.08)
         left = Plot(canvas, order, axis, top=214, right=18)
         left.draw_axes()
         for number, place in enumerate(places, 1):

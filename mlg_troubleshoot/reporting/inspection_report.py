@@ -7,11 +7,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
@@ -124,6 +126,7 @@ def _inspection(
         "wrong": chance_wrong_sentence(a),
         "no_repair": no_repair_set(a),
         "rigging": None if a.rigging is None else lengths.said(rigging_sentence(a.rigging)),
+        "areas": partial(_areas, gear),
         "rows": _joints(gear, a, lengths),
         "curve": drawn.plunger_curve(gear, a, lengths),
         "cases": _sequence(gear, a, lengths),
@@ -165,6 +168,12 @@ def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]
         }
         for f in a.ranked
     ]
+
+
+def _areas(gear: Gear, step: Step) -> str:
+    """The areas to open for a step, in the order of the gear file."""
+    names = {gear.joint(number).area for number in step.joints}
+    return ", ".join(area.name for area in gear.areas if area.name in names)
 
 
 def _allowance(finding: JointFinding) -> float | None:
