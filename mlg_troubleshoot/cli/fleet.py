@@ -114,7 +114,8 @@ def _show(found: Lives) -> None:
         " margin by the worst-case bound. 'look at' is the joint to look at first today."
     )
     history.show_warnings(console, found.lives)
-    for shown in lines_of(console, headings, rows, "", "last look to"):
+    spare = ("look at", "last seen", "to limit", "to margin")
+    for shown in lines_of(console, headings, rows, "", spare):
         console.print(shown, no_wrap=True, overflow="ellipsis")
     if len(lines) > _LINES:
         console.print(f"… and {len(lines) - _LINES} more; --json lists all of them.")

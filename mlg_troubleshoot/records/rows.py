@@ -439,7 +439,10 @@ class RowReader:
                 self._fault(placed.index, CellFaultError("outcome_elsewhere", expected, remedy))
 
     def _made_id(self) -> str:
-        content = zlib.crc32("\x1f".join(map(show, self._cells)).encode("utf-8", "replace"))
+        cells = [show(cell) for cell in self._cells]
+        # Sheets of both sides may hold the same row.
+        cells += [] if self._table.side is None else [self._table.side.value]
+        content = zlib.crc32("\x1f".join(cells).encode("utf-8", "replace"))
         name = PurePath(self._table.file or "-").stem
         return f"{'stdin' if name == '-' else name}-{self._row}-{content:08x}"
 

@@ -74,7 +74,7 @@ def read_table(
     )
     read, carried = columns.notes()
     about = "; ".join([*table.notes(), *_hidden_notes(sheet, columns, header.row)])
-    out.notes += filter(None, ("; ".join(filter(None, (placed, read))), said, carried, about))
+    out.notes += filter(None, ("; ".join(filter(None, (placed, read, said))), carried, about))
     kind = "long" if columns.is_long else "wide"
     readings = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
     out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, len(header.texts), readings))

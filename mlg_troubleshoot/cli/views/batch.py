@@ -49,7 +49,7 @@ def show(result: CheckResult, screen: DataConsole, *, every: bool) -> None:
     for judgement in ordered[:_LINES]:
         cells = _cells(judgement, screen)
         rows.append([cells[heading.split(" ")[0]] for heading in headings])
-    for line in lines_of(screen, headings, rows, "chance", "chance date record"):
+    for line in lines_of(screen, headings, rows, "chance", ("chance", "date", "record")):
         screen.print(line, no_wrap=True, overflow="ellipsis")
     if len(ordered) > _LINES:
         screen.print(f"… and {len(ordered) - _LINES} more; --csv or --json lists all of them.")

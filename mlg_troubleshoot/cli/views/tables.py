@@ -67,7 +67,7 @@ def lines_of(
     headings: Sequence[str],
     rows: Sequence[Sequence[Cell]],
     right: str,
-    spare: str = "",
+    spare: Sequence[str],
 ) -> Iterator[Text]:
     """Set rows in columns, `right` names right-aligned ones. On a narrow screen the columns of
     `spare` are left out, the first first, and then the last column is folded: nothing is cut.
@@ -77,7 +77,7 @@ def lines_of(
     ]
     taken = {h: max(row[k].cell_len for row in cells) + 1 for k, h in enumerate(headings)}
     last = taken.pop(headings[-1])
-    for heading in spare.split():
+    for heading in spare:
         if sum(taken.values()) + min(last, _LEAST) > screen.width:
             taken.pop(heading, None)
     room = max(screen.width - sum(taken.values()), 12)
