@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import history, options, output
-from mlg_troubleshoot.cli.views.tables import STYLES, Cell, lines_of
-from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.life.outlook import Order
 from mlg_troubleshoot.outputs import OutputFile
 
 if TYPE_CHECKING:
@@ -24,6 +21,18 @@ EPILOG = (
 _LINES = 60
 
 
+def _verdict(text: str) -> str:
+    from mlg_troubleshoot.decision.assessment import Verdict
+
+    return options.one_of(Verdict, text.upper(), "--only")
+
+
+def _order(text: str) -> str:
+    from mlg_troubleshoot.life.outlook import Order
+
+    return options.one_of(Order, text, "--sort")
+
+
 @options.flat
 def fleet(
     *,
@@ -31,10 +40,17 @@ def fleet(
     no_forecast: options.NoForecast = False,
     tail: Annotated[str | None, typer.Option("--tail", help="Only this aircraft.")] = None,
     only: Annotated[
-        list[Verdict] | None,
-        typer.Option("--only", metavar="VERDICT", help="Only gears with this verdict; may repeat."),
+        list[str] | None,
+        typer.Option(
+            metavar="VERDICT",
+            parser=_verdict,
+            help="Only gears with this verdict, e.g. OUTSIDE_MARGIN; may repeat.",
+        ),
     ] = None,
-    sort: Annotated[Order, typer.Option(help="What stands first.")] = Order.WORST,
+    sort: Annotated[
+        str,
+        typer.Option(metavar="worst|due|tail|minutes", parser=_order, help="What stands first."),
+    ] = "worst",
     csv: Annotated[
         Path | None, typer.Option(metavar="OUT.csv", help="The gears as CSV, one line per gear.")
     ] = None,
@@ -52,6 +68,7 @@ def fleet(
     """
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.life.outlook import Order
     from mlg_troubleshoot.life.unrecorded_work import suggestions
     from mlg_troubleshoot.reporting.life_json import FLEET_CSV, fleet_as_json
     from mlg_troubleshoot.workflows.history import show_fleet
@@ -65,12 +82,13 @@ def fleet(
     settings = shown.begin(records.gear, (), outputs, store=records.store)
     with stages(quiet=shown.quiet) as bar:
         everything = show_fleet(records.kept, known, ahead=not no_forecast, progress=bar)
-    found = everything.chosen(tail, only or (), sort)
+    order = Order(sort)
+    found = everything.chosen(tail, only or (), order)
     if not shown.quiet:
         for line in suggestions(found.lives, found.model, known):
             output.say(f"Note: {line}")
     if shown.as_json:
-        output.write_json(fleet_as_json(found.lives, found.forecasts, sort))
+        output.write_json(fleet_as_json(found.lives, found.forecasts, order))
     else:
         _show(found)
     if csv is not None:
@@ -81,6 +99,7 @@ def fleet(
 
 
 def _show(found: Lives) -> None:
+    from mlg_troubleshoot.cli.views.tables import STYLES, Cell, lines_of
     from mlg_troubleshoot.life.outlook import fleet_lines, landings_shown, work_sentence
 
     console = output.console()
@@ -90,6 +109,7 @@ def _show(found: Lives) -> None:
         *("tail", "side", "last seen", "verdict", "look at"),
         *("to limit", "to margin", "next due", "next action"),
     )
+    styles = {each.value: style for each, style in STYLES.items()}
     rows: list[list[Cell]] = []
     for line in lines[:_LINES]:
         first = "" if line.limit_joint is None else f" #{line.limit_joint}"
@@ -100,7 +120,7 @@ def _show(found: Lives) -> None:
                 output.word(line.tail_no),
                 line.side,
                 line.inspection_date or "no date",
-                output.text(verdict.removesuffix("_MARGIN"), STYLES.get(Verdict(verdict), "")),
+                output.text(verdict.removesuffix("_MARGIN"), styles.get(verdict, "")),
                 output.joint(line.worst_joint),
                 _left(line.landings_to_limit, gear) + first,
                 _left(line.landings_to_margin, gear),

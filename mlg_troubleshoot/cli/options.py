@@ -36,6 +36,16 @@ def report_format(text: str) -> ReportFormat:
         raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
 
 
+def one_of(kind: type[StrEnum], text: str, flag: str) -> str:
+    """Judge a word that must be one of a few."""
+    try:
+        return kind(text).value
+    except ValueError:
+        raise UsageError(
+            f"{flag} {text!r} is not known", f"Give one of {', '.join(kind)}."
+        ) from None
+
+
 class PaperSize(StrEnum):
     A4 = "A4"
     LETTER = "Letter"

@@ -1,4 +1,4 @@
-"""``mlg fleet`` as it is asked and passed on: chosen gears, CSV, workbook, pages, one gear's plot."""
+"""``mlg fleet`` as it is asked and passed on: chosen gears, CSV, workbook, pages, a plot of wear."""
 
 from __future__ import annotations
 
