@@ -331,12 +331,12 @@ def test_the_sign_off_stands_last_and_with_the_provenance(failure: Made) -> None
 def test_no_label_of_the_sketch_covers_another(
     pair: tuple[int, int], judge: Judge, gear: Gear, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    placed: dict[int, list[schematic_of.Box]] = {}
+    placed: dict[str, list[schematic_of.Box]] = {}
     write = schematic_of._callout
 
     def kept(canvas: Canvas, joint: complex, lines: Any, boxes: Any, *more: Any) -> None:
         write(canvas, joint, lines, boxes, *more)
-        placed.setdefault(id(canvas), []).append(boxes[-1])
+        placed.setdefault(canvas.title, []).append(boxes[-1])
 
     monkeypatch.setattr(schematic_of, "_callout", kept)
     over = {n: 0.009 if n in pair else 0.002 for n in range(1, 11)}

@@ -1,4 +1,4 @@
-"""``mlg fleet`` as it is asked and passed on: chosen gears, CSV, workbook, pages, a plot of wear."""
+"""``mlg fleet`` as it is asked and passed on: chosen gears, CSV, workbook, pages and plots."""
 
 from __future__ import annotations
 
