@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from enum import IntEnum
+from pathlib import PurePath
+
+# Cells, rows or values that are named one by one; of more, how many.
+_FEW = 6
 
 
 class ExitCode(IntEnum):
@@ -108,3 +114,58 @@ class Problem:
         if self.column is not None:
             parts.append(f"column {self.column!r}")
         return ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class ProblemGroup:
+    """Problems of one table that are one mistake: the same column, expectation and remedy."""
+
+    problems: tuple[Problem, ...]
+
+    @property
+    def first(self) -> Problem:
+        return self.problems[0]
+
+    @property
+    def file(self) -> str:
+        """The table, without the folders that lead to it."""
+        name = self.first.file or "command line"
+        sheet = "" if self.first.sheet is None else f", sheet {self.first.sheet!r}"
+        return PurePath(name).name + sheet
+
+    @property
+    def where(self) -> str:
+        """The cells or, without any, the rows: ``rows 6–65``; empty for a table as a whole."""
+        cells = [problem.cell for problem in self.problems if problem.cell is not None]
+        rows = sorted({problem.row for problem in self.problems if problem.row is not None})
+        if len(cells) == 1:
+            return f"cell {cells[0]}"
+        if cells and len(cells) <= _FEW:
+            return f"cells {', '.join(cells)}"
+        runs: list[list[int]] = []
+        for row in rows:
+            if runs and row == runs[-1][-1] + 1:
+                runs[-1].append(row)
+            else:
+                runs.append([row])
+        said = [f"{run[0]}–{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
+        more = f" and {len(said) - _FEW} more" if len(said) > _FEW else ""
+        return f"{'rows' if len(rows) > 1 else 'row'} {', '.join(said[:_FEW])}{more}" * bool(rows)
+
+    @property
+    def found(self) -> str | None:
+        """What stood there, the first few; None where nothing did."""
+        values = [*dict.fromkeys(p.value for p in self.problems if p.value is not None)]
+        more = f" and {len(values) - _FEW} more" if len(values) > _FEW else ""
+        return ", ".join(values[:_FEW]) + more if values else None
+
+
+def grouped(problems: Iterable[Problem]) -> list[ProblemGroup]:
+    """Put together what one correction would answer, in the order of the first of each."""
+    groups: dict[tuple[str | None, ...], list[Problem]] = {}
+    for each in problems:
+        # Counts and lists in it differ from row to row.
+        remedy = re.sub(r"\([^)]*\)|\d+", "", each.remedy)
+        same = each.code, each.file, each.sheet, each.column, each.expected, remedy
+        groups.setdefault(same, []).append(each)
+    return [ProblemGroup(tuple(group)) for group in groups.values()]

@@ -81,7 +81,8 @@ class CheckedInspection(TypedDict):
     prediction over the ensemble. explained_at_most_in, unexplained_in: of a measured displacement,
     by the joints' worst case; null without a reading. basis: MEASURED only with OUTSIDE_MARGIN,
     when the mean reading is beyond the margin. next_action: the first step of the plan, of which
-    only that binds. open_question: what the day does not allow to settle. repair_sets: null where
+    only that binds. in_brief: the same in words that stand alone, as on screen, in CSV and on
+    paper. open_question: what the day does not allow to settle. repair_sets: null where
     the linkage does not close. measuring, confidence: null in a batch. posterior: null in a batch
     or where nothing was measured.
     """
@@ -109,6 +110,7 @@ class CheckedInspection(TypedDict):
     joints: list[CheckedJoint]
     basis: Basis | None
     next_action: Step
+    in_brief: str
     plan: Annotated[list[Step], Meta(min_length=1)]
     end: End
     open_question: str | None
@@ -465,13 +467,24 @@ class FleetGear(TypedDict):
     next_inspection_landings: float | None
     due_date: str | None
     repairs: Count
+    predicted_displacement_in: float | None
+    margin_in: float | None
+    next_action: str | None
+    minutes: float
+    restore: list[JointNumber]
 
 
 class FleetOutput(TypedDict):
-    """Output of mlg fleet --json and, without forecasts, mlg history --json: worst gear first."""
+    """Output of mlg fleet --json and, without forecasts, mlg history --json: worst gear first.
+
+    Of each gear: predicted_displacement_in: worst case, a bound, and margin_in: of its last
+    inspection. next_action: in words that stand alone. minutes, restore: work and joints that the
+    plan of that inspection expects. work: both summed over the fleet, in words.
+    """
 
     schema_version: Version
     gears: list[FleetGear]
+    work: str
     advice: HitRate
     warnings: list[str]
 

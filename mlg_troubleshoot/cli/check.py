@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import typer
 
@@ -30,7 +30,7 @@ EPILOG = (
 # Flags of one gear entered by hand: what each gives to its column as it is typed, and its help.
 _OF_ONE_GEAR: options.ColumnFlags = {
     TAIL_NO.name: ("--tail", None, "Tail number, with --set or the prompts."),
-    SIDE.name: ("--side", "LH|RH", "Which gear."),
+    SIDE.name: ("--side", "LH|RH", "Which gear; with FILE, where it has no column of sides."),
     RECORD_ID.name: ("--record-id", None, "Identifier of the record."),
     OUTCOME.name: ("--outcome", "RETRACTED|FAILED", "What the gear did."),
     PLUNGER_DISPLACEMENT.name: (
@@ -62,6 +62,11 @@ _OF_ONE_GEAR: options.ColumnFlags = {
 class Flags:
     """What the flags say of one gear, as it was typed: clearances by joint, the rest by column."""
 
+    panels: ClassVar[Mapping[str, str]] = {
+        "values": "One gear by hand",
+        "typed": "One gear by hand",
+    }
+
     values: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="JOINT=VALUE", help="One clearance, e.g. 3=0.013in."),
@@ -78,6 +83,15 @@ class Flags:
 @dataclass(frozen=True, slots=True)
 class Wanted(options.OutputOptions):
     """What ``mlg check`` predicts with, shows, writes and keeps."""
+
+    panels: ClassVar[Mapping[str, str]] = {
+        **options.OutputOptions.panels,
+        **dict.fromkeys(("formats", "annotate", "csv", "detail", "every"), "Output"),
+        **dict.fromkeys(
+            ("extension", "causes", "resume", "keep", "store", "tails", "remember", "seed"),
+            "This run",
+        ),
+    }
 
     formats: Annotated[
         list[ReportFormat] | None,

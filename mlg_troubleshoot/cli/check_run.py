@@ -5,7 +5,7 @@ found.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,8 @@ from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
+from mlg_troubleshoot.decision.columns import SIDE
+from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import OutputFile
@@ -55,7 +57,9 @@ class Run:
         self._shown = written.begin(
             tables.gear, inputs, outputs, store=wanted.store, tables=tables, keep=wanted.remember
         )
+        typed_side = flags.typed.get(SIDE.name) if files else None
         self._asked = task.CheckOptions(
+            side=None if typed_side is None else Side.parse(typed_side),
             **tables.declared(self._shown.headers),
             remembered=self._shown.note or None,
             seed=wanted.seed,
@@ -80,9 +84,11 @@ class Run:
         return result.exit_code
 
     def _judged(self) -> task.CheckResult:
-        if self._files and any(astuple(self._flags)):
+        # The side of a FILE is that of a table without a column of sides.
+        of_one_gear = self._flags.values, self._flags.typed.keys() - {SIDE.name}
+        if self._files and any(of_one_gear):
             raise UsageError(
-                "--set, --tail, --side, --record-id, --outcome, --measured, --margin and the flags"
+                "--set, --tail, --record-id, --outcome, --measured, --margin and the flags"
                 " of repairs and of the day (--restored … --minutes) describe one gear entered by"
                 " hand, and a FILE was given as well",
                 "Give either a FILE or the values of one gear.",

@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from mlg_troubleshoot.cli import history, options, output
+from mlg_troubleshoot.outputs import OutputFile
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.life.forecast import Quantiles
     from mlg_troubleshoot.workflows.history import Lives
 
-EPILOG = "Example: [b]mlg fleet[/b] · [b]mlg fleet --json[/b]"
+EPILOG = (
+    "Example: [b]mlg fleet[/b] · [b]mlg fleet --only OUTSIDE_MARGIN --sort due --csv due.csv[/b]"
+)
 _LINES = 60
+
+
+def _verdict(text: str) -> str:
+    from mlg_troubleshoot.decision.assessment import Verdict
+
+    return options.one_of(Verdict, text.upper(), "--only")
+
+
+def _order(text: str) -> str:
+    from mlg_troubleshoot.life.outlook import Order
+
+    return options.one_of(Order, text, "--sort")
 
 
 @options.flat
@@ -20,58 +38,95 @@ def fleet(
     *,
     records: options.Records,
     no_forecast: options.NoForecast = False,
+    tail: Annotated[str | None, typer.Option("--tail", help="Only this aircraft.")] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="VERDICT",
+            parser=_verdict,
+            help="Only gears with this verdict, e.g. OUTSIDE_MARGIN; may repeat.",
+        ),
+    ] = None,
+    sort: Annotated[
+        str,
+        typer.Option(metavar="worst|due|tail|minutes", parser=_order, help="What stands first."),
+    ] = "worst",
+    csv: Annotated[
+        Path | None, typer.Option(metavar="OUT.csv", help="The gears as CSV, one line per gear.")
+    ] = None,
+    xlsx: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OUT.xlsx", help="A workbook of gears, readings, landings left and records."
+        ),
+    ] = None,
     shown: options.OutputOptions,
 ) -> None:
-    """Show every gear in the store: verdict, landings left, next inspection due; worst first."""
+    """Show every gear in the store: verdict, landings left, next inspection due; worst first.
+
+    Exit code 0, whatever the verdicts.
+    """
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.life.outlook import Order
     from mlg_troubleshoot.life.unrecorded_work import suggestions
-    from mlg_troubleshoot.reporting.life_json import fleet_as_json
+    from mlg_troubleshoot.reporting.life_json import FLEET_CSV, fleet_as_json
     from mlg_troubleshoot.workflows.history import show_fleet
 
     known = load_gear(records.gear)
-    settings = shown.begin(records.gear, store=records.store)
+    outputs = [OutputFile("--csv", csv, FLEET_CSV)]
+    if xlsx is not None:
+        from mlg_troubleshoot.records import template
+
+        outputs.append(OutputFile("--xlsx", xlsx, template.SHEETS))
+    settings = shown.begin(records.gear, (), outputs, store=records.store)
     with stages(quiet=shown.quiet) as bar:
-        found = show_fleet(records.kept, known, ahead=not no_forecast, progress=bar)
+        everything = show_fleet(records.kept, known, ahead=not no_forecast, progress=bar)
+    order = Order(sort)
+    found = everything.chosen(tail, only or (), order)
     if not shown.quiet:
         for line in suggestions(found.lives, found.model, known):
             output.say(f"Note: {line}")
     if shown.as_json:
-        output.write_json(fleet_as_json(found.lives, found.forecasts))
+        output.write_json(fleet_as_json(found.lives, found.forecasts, order))
     else:
         _show(found)
+    if csv is not None:
+        found.write_csv(csv)
+    if xlsx is not None:
+        found.write_workbook(xlsx)
     history.write_pages(found, shown, settings, fleet=True)
 
 
 def _show(found: Lives) -> None:
-    from mlg_troubleshoot.life.outlook import fleet_lines, landings_shown
+    from mlg_troubleshoot.cli.views.tables import STYLES, Cell, lines_of
+    from mlg_troubleshoot.life.outlook import fleet_lines, landings_shown, work_sentence
 
     console = output.console()
     gear = found.gear
-    lines = fleet_lines(found.lives, found.forecasts)
+    lines = fleet_lines(found.lives, found.forecasts, found.order)
     headings = (
-        "tail",
-        "side",
-        "last seen",
-        "verdict",
-        "look at",
-        "to limit",
-        "to margin",
-        "next due",
+        *("tail", "side", "last seen", "verdict", "look at"),
+        *("to limit", "to margin", "next due", "next action"),
     )
-    table = output.plain_table(console, *headings, right=("to limit", "to margin", "next due"))
+    styles = {each.value: style for each, style in STYLES.items()}
+    rows: list[list[Cell]] = []
     for line in lines[:_LINES]:
         first = "" if line.limit_joint is None else f" #{line.limit_joint}"
-        due = line.next_inspection_landings
-        table.add_row(
-            output.word(line.tail_no),
-            line.side,
-            line.inspection_date or "no date",
-            str(line.verdict),
-            output.joint(line.worst_joint),
-            _left(line.landings_to_limit, gear) + first,
-            _left(line.landings_to_margin, gear),
-            "-" if due is None else landings_shown(due, gear),
+        due = line.landings_to_limit
+        verdict = "-" if line.verdict is None else line.verdict
+        rows.append(
+            [
+                output.word(line.tail_no),
+                line.side,
+                line.inspection_date or "no date",
+                output.text(verdict.removesuffix("_MARGIN"), styles.get(verdict, "")),
+                output.joint(line.worst_joint),
+                _left(line.landings_to_limit, gear) + first,
+                _left(line.landings_to_margin, gear),
+                "-" if due is None else landings_shown(line.next_inspection_landings, gear),
+                line.next_action or "-",
+            ]
         )
     console.print(
         f"{len(lines)} gears; landings left are those from the last inspection, median (5 %): to"
@@ -79,9 +134,12 @@ def _show(found: Lives) -> None:
         " margin by the worst-case bound. 'look at' is the joint to look at first today."
     )
     history.show_warnings(console, found.lives)
-    console.print(table)
+    spare = ("look at", "last seen", "to limit", "to margin")
+    for shown in lines_of(console, headings, rows, "", spare):
+        console.print(shown, no_wrap=True, overflow="ellipsis")
     if len(lines) > _LINES:
         console.print(f"… and {len(lines) - _LINES} more; --json lists all of them.")
+    console.print(work_sentence(lines))
 
 
 def _left(ends: Quantiles | None, gear: Gear) -> str:

@@ -192,14 +192,20 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     show_warnings(console, [life])
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
-    _show_joints(console, told["joints"], ahead, gear)
+    _show_joints(console, life, told["joints"], ahead, gear)
     _show_advice(console, Advice.of([life]))
 
 
 def _show_joints(
-    console: output.DataConsole, joints: Sequence[dict[str, Any]], ahead: Forecast, gear: Gear
+    console: output.DataConsole,
+    life: GearLife,
+    joints: Sequence[dict[str, Any]],
+    ahead: Forecast,
+    gear: Gear,
 ) -> None:
+    from mlg_troubleshoot.decision.sentences import joint_list
     from mlg_troubleshoot.life.outlook import span
+    from mlg_troubleshoot.life.wear_paths import stretches
 
     table = output.plain_table(
         console,
@@ -220,10 +226,19 @@ def _show_joints(
             span(joint["landings_to_limit"], gear),
         )
     console.print(table)
-    unread = [f"#{joint['joint']}" for joint in joints if not joint["readings"]]
-    if unread:
+    ever = {n for kept in life.inspections for n in kept.inspection.clearance_in}
+    since = stretches(life, gear.joint_numbers)
+    unread = [n for n, of in since.items() if not of[-1].readings]
+    for said, which in (
+        ("Never read", [n for n in unread if n not in ever]),
+        ("Not read since restored", [n for n in unread if n in ever]),
+    ):
+        if which:
+            console.print(f"{said}: {joint_list(which)}; they count as 0 above.")
+    placeless = [n for n, of in since.items() if of[-1].readings and not of[-1].placed]
+    if placeless:
         console.print(
-            f"Not read since new or restored: {', '.join(unread)}; unread joints count as 0 above."
+            f"Read, but without landings (gear_landings): {joint_list(placeless)}; no forecast."
         )
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_type_hints
 
 import typer
 
@@ -33,6 +34,16 @@ def report_format(text: str) -> ReportFormat:
     except ValueError:
         remedy = "Give html or pdf; the HTML report is the accessible form."
         raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
+
+
+def one_of(kind: type[StrEnum], text: str, flag: str) -> str:
+    """Judge a word that must be one of a few."""
+    try:
+        return kind(text).value
+    except ValueError:
+        raise UsageError(
+            f"{flag} {text!r} is not known", f"Give one of {', '.join(kind)}."
+        ) from None
 
 
 class PaperSize(StrEnum):
@@ -163,6 +174,10 @@ NoForecast = Annotated[
 class OutputOptions:
     """What a command writes in addition to its screen, and how it shows lengths."""
 
+    panels: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("report", "page", "force", "show", "as_json", "quiet"), "Output"
+    )
+
     report: Report = None
     page: Paper = None
     force: Force = False
@@ -212,6 +227,14 @@ class Records:
 class Tables:
     """The gear, and what is declared about the tables that are read."""
 
+    panels: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        (
+            *("gear", "unit", "convention", "sheet", "column_map", "decimal_comma"),
+            *("small_readings_true", "dates"),
+        ),
+        "Input",
+    )
+
     gear: Gear = DEFAULT_GEAR
     unit: Unit = None
     convention: Convention = None
@@ -244,6 +267,15 @@ class Tables:
         return mapped
 
 
+def _in_panel(hint: Any, panel: str | None) -> Any:
+    """An option in a panel of the help."""
+    if panel is None:
+        return hint
+    kind, option = hint.__origin__, copy(hint.__metadata__[0])
+    option.rich_help_panel = panel
+    return Annotated[kind, option]
+
+
 def flat(command: Callable[..., None]) -> Callable[..., None]:
     """Let a command take options as dataclasses: on the command line each field of one is an
     option, and a field with flags of columns is one option per column.
@@ -261,15 +293,18 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
             show(name, parameter.default, hints[name])
             continue
         own = get_type_hints(groups[name], include_extras=True)
+        panels = getattr(groups[name], "panels", None) or {}
         # What all commands share stands last.
         for each in sorted(fields(groups[name]), key=lambda each: each in fields(OutputOptions)):
             (flags, *_) = getattr(own[each.name], "__metadata__", ((),))
             if not isinstance(flags, Mapping):
-                show(each.name, each.default, own[each.name])
+                show(each.name, each.default, _in_panel(own[each.name], panels.get(each.name)))
                 continue
             columns[each.name] = flags
             for column, (flag, takes, said) in flags.items():
-                option = typer.Option(flag, metavar=takes, help=said)
+                option = typer.Option(
+                    flag, metavar=takes, help=said, rich_help_panel=panels.get(each.name)
+                )
                 show(column, None, Annotated[str | None, option])
 
     @wraps(command)

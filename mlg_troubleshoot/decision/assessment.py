@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.decision.plan import Basis, End, Plan, Step
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.decision.plan import Basis, End, Plan, Step, in_brief
 from mlg_troubleshoot.results import Result
 
 
@@ -354,6 +354,12 @@ class Assessment(_Planned, Result):
         return self.inspection
 
     @property
+    def in_brief(self) -> str:
+        """The next action in words that stand alone."""
+        step, retracted = self.next_action, self.inspection.outcome is Outcome.RETRACTED
+        return in_brief(step.action, step.joints, self.end, retracted=retracted)
+
+    @property
     def as_loaded(self) -> bool:
         """True where the prediction is the displacement as loaded: an expectation, with the bound
         also given.
@@ -392,6 +398,14 @@ class Rejected(_Planned, Result):
     @property
     def verdict(self) -> Verdict:
         return Verdict.INVALID
+
+    @property
+    def in_brief(self) -> str:
+        """What to correct: the cells where each has one, else the columns."""
+        row = self.row
+        if row.cells and len(row.cells) == len(row.correct):
+            return f"Correct {'cell' if len(row.cells) == 1 else 'cells'} {', '.join(row.cells)}"
+        return f"Correct {', '.join(row.correct)}" if row.correct else "Correct: see the problems"
 
 
 Judgement = Assessment | Rejected

@@ -271,7 +271,8 @@ class InvalidRow:
     """A data row that cannot be judged, with the columns to correct; its problems stand in the list
     of problems.
 
-    understood: what could be read of it, None if nothing; what it lacks is None there.
+    understood: what could be read of it, None if nothing; what it lacks is None there. cells: what
+    a spreadsheet program calls what is to be corrected, as far as it has cells.
     """
 
     record_id: str | None
@@ -281,3 +282,4 @@ class InvalidRow:
     warnings: tuple[str, ...] = ()
     source: RowSource = RowSource()
     understood: Inspection | None = None
+    cells: tuple[str, ...] = ()

@@ -43,6 +43,27 @@ class End(StrEnum):
     CORRECT = "CORRECT"
 
 
+# Where a plan ends, in words that stand alone; the whole sentence is the text of its last step.
+_ENDS = {
+    End.WITHIN: "Go on with fault isolation: within its margin",
+    End.NOT_EXPLAINED: "Look elsewhere: the joints do not explain it",
+    End.TOO_CLOSE: "Go on: too close to the margin to decide",
+    End.OUTSIDE_NO_COMPLAINT: "Engineering decides: outside its bound, no failure recorded",
+    End.CANNOT_CLEAR: "Engineering decides: no set of repairs brings it within",
+}
+_RETRACTED = "Engineering decides: outside its bound, retracted normally"
+_DONE = "Done: joints within their limits"
+
+
+def in_brief(action: Action, joints: Sequence[int], end: End, *, retracted: bool) -> str:
+    """Say the next action in words that stand alone: the same on screen, in files and on paper."""
+    if action is Action.DONE:
+        return _DONE
+    if action is Action.CONTINUE:
+        return _RETRACTED if retracted and end is End.OUTSIDE_NO_COMPLAINT else _ENDS[end]
+    return f"{action.words} {', '.join(f'#{joint}' for joint in joints)}".rstrip().capitalize()
+
+
 class Basis(StrEnum):
     MEASURED = "MEASURED"
     PREDICTED = "PREDICTED"

@@ -38,12 +38,14 @@ class Forecast:
     """Landings that remain from a gear's last inspection, of the joints ever read; infinite beyond
     the horizon.
 
+    bands: 5, 50 and 95 % quantiles of the clearance of each joint, after `landings_of_bands`. [in]
     limit_joint: the joint that most often is the first at its limit.
     due_now: why nothing remains, in words; empty where something may.
     due_date: the day of the next inspection, None where it is not known.
     """
 
     joints: Mapping[int, Samples] = field(default_factory=dict)
+    bands: Mapping[int, Array] = field(default_factory=dict)
     limit: Samples | None = None
     limit_joint: int | None = None
     margin: Samples | None = None
@@ -69,6 +71,12 @@ def quantiles(samples: Samples | None) -> Quantiles | None:
         name: float(end) if np.isfinite(end) else None
         for name, end in zip(("p05", "p50", "p95"), ends, strict=True)
     }
+
+
+def landings_of_bands(gear: Gear) -> Array:
+    """Landings after the last inspection at which the bands of a forecast are known."""
+    landings: Array = gear.horizon.value * _AHEAD[_ASKED]
+    return landings
 
 
 def fit_fleet(lives: Iterable[GearLife], gear: Gear) -> WearModel | None:
@@ -147,7 +155,7 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
     nothing = Samples(np.zeros(1))
     worst = max(over, key=lambda n: over[n] / gear.joint(n).limit.value, default=None)
     why = ", and ".join(reasons)
-    return Forecast(dict.fromkeys(over, nothing), nothing, worst, nothing, 0.0, why)
+    return Forecast(dict.fromkeys(over, nothing), {}, nothing, worst, nothing, 0.0, why)
 
 
 def _due_date(life: GearLife, ahead: Forecast) -> str | None:
@@ -200,9 +208,11 @@ def _forecast_part(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
             ahead, displacement[g], gear.margin.value if margin is None else margin
         )
         due = float(Samples(np.minimum(to_any, to_margin)).quantile(gear.accepted_chance.value))
+        bands = np.quantile(wear[g][:, _ASKED], [0.05, 0.5, 0.95], axis=2)
         first = to_limit.argmin(axis=0)[np.isfinite(to_any)]
         yield Forecast(
             {number: Samples(to_limit[j]) for j, number in enumerate(numbers) if read[g, j]},
+            {number: bands[:, j] for j, number in enumerate(numbers) if read[g, j]},
             Samples(to_any),
             numbers[int(np.bincount(first).argmax())] if len(first) else None,
             Samples(to_margin),

@@ -4,9 +4,15 @@ comes first.
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
 
+from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.plan import Action, End, in_brief
 from mlg_troubleshoot.decision.ranking import WORST_FIRST
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection
@@ -31,9 +37,16 @@ class FleetLine:
     landings_to_margin: Quantiles | None
     next_inspection_landings: float | None
     due_date: str | None
+    predicted_displacement_in: float | None
+    margin_in: float | None
+    next_action: str | None
+    minutes: float
+    restore: tuple[int, ...]
 
     @classmethod
     def of(cls, life: GearLife, latest: KeptInspection, ahead: Forecast) -> FleetLine:
+        result = latest.result
+        plan = result.get("plan", ())
         return cls(
             life,
             *life.key,
@@ -48,6 +61,11 @@ class FleetLine:
             ahead.landings_to_margin,
             ahead.next_inspection_landings,
             ahead.due_date,
+            result.get("predicted_displacement_in"),
+            result.get("margin_in"),
+            _in_brief(latest),
+            sum(step["minutes"] for step in plan),
+            tuple(n for step in plan if step["action"] == Action.RESTORE for n in step["joints"]),
         )
 
     @property
@@ -59,16 +77,59 @@ class FleetLine:
         return rank, float("inf") if due is None else due, self.life.key
 
 
+def _in_brief(kept: KeptInspection) -> str | None:
+    """Say the next action as the check of today says it; None if the inspection was not judged."""
+    step, end = kept.result.get("next_action"), kept.result.get("end")
+    if step is None or end is None:
+        return None if step is None else str(step["text"])
+    retracted = kept.inspection.outcome is Outcome.RETRACTED
+    return in_brief(Action(step["action"]), step["joints"], End(end), retracted=retracted)
+
+
+class Order(StrEnum):
+    """What a fleet is sorted by."""
+
+    WORST = "worst"
+    DUE = "due"
+    TAIL = "tail"
+    MINUTES = "minutes"
+
+
+def _place_in(order: Order, line: FleetLine) -> tuple[float, tuple[int, float, GearKey]]:
+    due = line.next_inspection_landings
+    first = {
+        Order.WORST: 0.0,
+        Order.DUE: math.inf if due is None else due,
+        Order.TAIL: 0.0,
+        Order.MINUTES: -line.minutes,
+    }[order]
+    return first, (0, 0.0, line.life.key) if order is Order.TAIL else line.urgency
+
+
 def fleet_lines(
-    lives: Sequence[GearLife], forecasts: Mapping[GearKey, Forecast]
+    lives: Sequence[GearLife],
+    forecasts: Mapping[GearKey, Forecast],
+    order: Order = Order.WORST,
 ) -> list[FleetLine]:
-    """One line per gear, worst first."""
+    """One line per gear, worst first unless another order is asked for."""
     lines = [
         FleetLine.of(life, life.latest, forecasts.get(life.key, Forecast()))
         for life in lives
         if life.latest is not None
     ]
-    return sorted(lines, key=lambda line: line.urgency)
+    return sorted(lines, key=partial(_place_in, order))
+
+
+def work_sentence(lines: Sequence[FleetLine]) -> str:
+    """Sum the minutes and the parts that the plans of a fleet expect."""
+    parts = Counter(joint for line in lines for joint in line.restore)
+    restored = ", ".join(f"#{joint} on {count}" for joint, count in sorted(parts.items()))
+    minutes = sum(line.minutes for line in lines)
+    return (
+        f"Work that the plans expect: {minutes:.0f} min on"
+        f" {sum(line.minutes > 0.0 for line in lines)} of {len(lines)} gears; joints to restore:"
+        f" {restored or 'none'}."
+    )
 
 
 def span(ends: Quantiles | None, gear: Gear) -> str:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import io
 import re
 import warnings
-import zlib
 from collections import Counter
 from collections.abc import Mapping
 from functools import partial
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
-from typing import BinaryIO
 from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile
 
 from openpyxl import Workbook, load_workbook
@@ -31,7 +29,7 @@ from mlg_troubleshoot.outputs import OutputKind, write_bytes
 from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
 from mlg_troubleshoot.records.source import FileRefusedError
-from mlg_troubleshoot.records.template import BOLD, HEADER_FILL
+from mlg_troubleshoot.records.template import BOLD, HEADER_FILL, saved_by
 from mlg_troubleshoot.records.xlsx import XlsxFile, XlsxSheet
 from mlg_troubleshoot.units import LengthUnit
 
@@ -48,30 +46,12 @@ _LANDSCAPE_SCALE = 55
 
 # Who saved a workbook last: another program puts its own user here.
 _SAVED_BY = "mlg check --annotate"
-_SAVED = f"<cp:lastModifiedBy>{_SAVED_BY}</cp:lastModifiedBy>".encode()
-_PROPERTIES, _MOST_BYTES = "docProps/core.xml", 100_000
 
 VerdictColumns = Mapping[RowSource, Mapping[str, str | float | None]]
 OverLimit = Mapping[RowSource, Mapping[int, float]]
 
 
-def _is_annotated(file: BinaryIO) -> bool:
-    try:
-        with ZipFile(file) as package, package.open(_PROPERTIES) as properties:
-            return _SAVED in properties.read(_MOST_BYTES)
-    except (
-        BadZipFile,
-        KeyError,
-        ValueError,
-        RuntimeError,
-        NotImplementedError,
-        EOFError,
-        zlib.error,
-    ):
-        return False
-
-
-ANNOTATED = OutputKind("is not an annotated workbook as it was written", _is_annotated)
+ANNOTATED = OutputKind("is not an annotated workbook as it was written", saved_by(_SAVED_BY))
 
 
 def annotate_workbook(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Set
+from collections.abc import Collection, Set
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -433,7 +433,30 @@ def parse_target(name: str, joints: Joints) -> Field | None:
     if field is None:
         raise UsageError(
             f"--map: {name!r} is not a column of the inspection table",
-            "Give a column such as clearance_3_mm, tail_no or margin_in, or carry to leave the"
-            " column unread.",
+            "Give a column, or carry to leave it unread."
+            f"{nearest(text, _columns_like(text, joints))}",
         )
     return field
+
+
+def _columns_like(text: str, joints: Joints) -> list[str]:
+    """Name every column, with the joint and the unit that a text states."""
+    number, unit = re.search(r"\d+", text), re.search(r"(in|thou|mm)$", text)
+    joint = int(number[0]) if number else joints.numbers[0]
+    said = None if unit is None else LengthUnit(unit[1])
+    return [
+        column.header(joint if column.needs_joint else None, said if column.is_length else None)
+        for column in COLUMNS
+    ]
+
+
+def nearest(name: str, names: Collection[str]) -> str:
+    """Say which names come nearest to one that is not among them: those that share a word with it
+    or are spelt like it.
+    """
+    by_shape = {_snake(each): each for each in reversed([*names])}
+    words = _snake(name).split("_")
+    alike = difflib.get_close_matches(_snake(name), by_shape, 4, 0.5)
+    sharing = [each for each in by_shape if words[0] in each.split("_")]
+    found = [by_shape[each] for each in dict.fromkeys((*alike, *sorted(sharing)))][:6]
+    return f" The nearest are: {', '.join(found)}." if found else ""

@@ -22,6 +22,7 @@ from mlg_troubleshoot.records.headers import (
     UNKNOWN,
     Recognition,
     near_miss,
+    nearest,
     parse_target,
     recognise,
     tidy,
@@ -359,7 +360,7 @@ class ColumnReader:
         missing = [
             (column.name, f"a column {column.name}")
             for column in (TAIL_NO, SIDE)
-            if column not in fields
+            if column not in fields and not (column is SIDE and self._table.side)
         ]
         if RECORD_ID not in fields and columns.is_long:
             missing.insert(
@@ -392,5 +393,6 @@ class ColumnReader:
             if not any(_names(key, p.header, p.index) for p in columns.placed):
                 headers = ", ".join(p.header for p in columns.placed if p.header)
                 expected = f"one of the headers of the table: {headers[:200]}"
-                remedy = "Correct the header named in --map."
+                near = nearest(key, [p.header for p in columns.placed if p.header])
+                remedy = f"Correct the header named in --map.{near}"
                 self._table.tell("map_header_unknown", key, expected, remedy, CellPlace(row, key))

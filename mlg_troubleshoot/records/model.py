@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 from mlg_troubleshoot.decision.columns import CLEARANCE, PLUNGER_DISPLACEMENT, Column
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records.cells import Cell, column_letters, quote
@@ -51,6 +51,9 @@ class TableOptions:
     dates : DateOrder or None
         Order of day, month and year in dates that are written as numbers; None takes it from the
         column.
+    side : Side or None
+        Side of every row of a table without a column of sides; None takes it from the name of the
+        sheet or the file.
     """
 
     unit: LengthUnit | None = None
@@ -61,6 +64,7 @@ class TableOptions:
     decimal_comma: bool = False
     small_readings_true: bool = False
     dates: DateOrder | None = None
+    side: Side | None = None
 
     def __post_init__(self) -> None:
         """Take a unit, a convention and an order of dates as people write them."""
@@ -164,6 +168,8 @@ NOWHERE = CellPlace()
 class TableInHand:
     """The table or form that is being read: how, where it stands, and who is told of its
     problems.
+
+    side: of every row of a table that has no column of sides.
     """
 
     options: ReadOptions
@@ -171,6 +177,7 @@ class TableInHand:
     sheet: str | None
     report: Callable[[Problem], None]
     decimal_comma: bool
+    side: Side | None = None
 
     def source(self, row: int) -> RowSource:
         return RowSource(self.file, self.sheet, row)
@@ -190,8 +197,9 @@ def to_correct(row: Inspection | InvalidRow, *headers: str) -> InvalidRow:
     known = row.correct if isinstance(row, InvalidRow) else ()
     understood = row.understood if isinstance(row, InvalidRow) else row
     named = tuple(dict.fromkeys((*headers, *known)))
+    cells = row.cells if isinstance(row, InvalidRow) else ()
     identity = row.record_id, row.tail_no, row.side
-    return InvalidRow(*identity, named, row.warnings, row.source, understood)
+    return InvalidRow(*identity, named, row.warnings, row.source, understood, cells)
 
 
 @dataclass(frozen=True, slots=True)

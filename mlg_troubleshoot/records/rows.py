@@ -23,6 +23,7 @@ from mlg_troubleshoot.decision.columns import (
     OUTCOME,
     PLUNGER_DISPLACEMENT,
     RECORD_ID,
+    SIDE,
     SMALL_READINGS_TRUE,
     STROKE,
     UNIT,
@@ -230,10 +231,13 @@ class RowReader:
             else:
                 self._tell(place, fault)
         record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
+        if SIDE not in self._at:
+            side = self._table.side
         identity = {"record_id": record_id, "tail_no": tail_no, "side": side}
         told: dict[str, Any] = {**identity, "convention": convention, "source": source}
         if self._bad or None in told.values():
             said = tuple(warnings)
+            named = [self._place(index).cell for index in sorted(self._bad) if index >= 0]
             understood = self._inspection(found, **told)
             return InvalidRow(
                 **identity,
@@ -241,6 +245,7 @@ class RowReader:
                 warnings=said,
                 source=source,
                 understood=understood,
+                cells=tuple(cell for cell in named if cell is not None),
             )
         self._warn(found, warnings)
         return self._inspection(found, **told, unit_question=question, warnings=tuple(warnings))
@@ -435,7 +440,10 @@ class RowReader:
                 self._fault(placed.index, CellFaultError("outcome_elsewhere", expected, remedy))
 
     def _made_id(self) -> str:
-        content = zlib.crc32("\x1f".join(map(show, self._cells)).encode("utf-8", "replace"))
+        cells = [show(cell) for cell in self._cells]
+        # Sheets of both sides may hold the same row.
+        cells += [] if self._table.side is None else [self._table.side.value]
+        content = zlib.crc32("\x1f".join(cells).encode("utf-8", "replace"))
         name = PurePath(self._table.file or "-").stem
         return f"{'stdin' if name == '-' else name}-{self._row}-{content:08x}"
 
@@ -649,7 +657,8 @@ class RowReader:
         named = [self._placed[index].header for index in sorted(self._bad) if index >= 0]
         for column in IDENTITY:
             made = column is RECORD_ID and self._makes_ids
-            if column not in self._at and column.name not in named and not made:
+            given = made or (column is SIDE and self._table.side is not None)
+            if column not in self._at and column.name not in named and not given:
                 named.append(column.name)
         if -1 in self._bad:
             named.append(CONVENTION.name)

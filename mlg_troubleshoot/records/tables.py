@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import chain, islice
+from pathlib import PurePath
 
 from mlg_troubleshoot.decision.columns import CLEARANCE, SIDE, TAIL_NO
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cells, column_letters, quote
+from mlg_troubleshoot.records.headers import recognise, tidy
 from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header
 from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
@@ -17,6 +20,9 @@ from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.source import NumberedRow, Sheet
 
 _PROGRESS_ROWS = 500
+# Rows by which a column is known that holds sides, whatever its header says.
+_LOOKED_AT = 50
+_GEARS = frozenset(("gear", "mlg", "main gear", "landing gear", "leg", "hand", "l/r"))
 
 
 @dataclass(slots=True)
@@ -46,7 +52,10 @@ def read_table(
 ) -> Collected:
     out = Collected()
     comma = options.decimal_comma or delimiter == ";"
-    in_hand = TableInHand(options, file, sheet.name, out.problems.append, comma)
+    first = list(islice(rows, _LOOKED_AT))
+    rows = chain(first, rows)
+    options, side, said = _sides(sheet.name, header, first, options, file)
+    in_hand = TableInHand(options, file, sheet.name, out.problems.append, comma, side)
     columns = ColumnReader(in_hand).place(header.texts, header.row, units=header.units)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
     taken = 0
@@ -65,11 +74,50 @@ def read_table(
     )
     read, carried = columns.notes()
     about = "; ".join([*table.notes(), *_hidden_notes(sheet, columns, header.row)])
-    out.notes += filter(None, ("; ".join(filter(None, (placed, read))), carried, about))
+    out.notes += filter(None, ("; ".join(filter(None, (placed, read, said))), carried, about))
     kind = "long" if columns.is_long else "wide"
     readings = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
     out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, len(header.texts), readings))
     return out
+
+
+def _sides(
+    sheet: str | None,
+    header: Header,
+    rows: Sequence[NumberedRow],
+    options: ReadOptions,
+    file: str | None,
+) -> tuple[ReadOptions, Side | None, str]:
+    """Find the sides of a table without a column of them: in a column of gears that holds nothing
+    else, as declared, or in the name of the sheet or the file. What was done is said in words.
+    """
+    known = [recognise(text, options.joints).field for text in header.texts]
+    columns = {field.column for field in known if field is not None}
+    mapped = {*options.column_map.values(), *options.remembered_map.values()}
+    if SIDE in columns or SIDE.name in mapped:
+        return options, None, ""
+    for index, text in enumerate(header.texts):
+        cells = [row[index] for number, row in rows if number > header.row and index < len(row)]
+        words = [cell for cell in cells if cell is not None]
+        if (
+            tidy(text) in _GEARS
+            and text not in options.column_map
+            and words
+            and all(isinstance(word, str) and Side.spelt(word) for word in words)
+        ):
+            mapping = {**options.column_map, text: SIDE.name}
+            return replace(options, column_map=mapping), None, ""
+    for name, place in ((sheet, "sheet"), (PurePath(file or "").stem, "file")):
+        whole = name or ""
+        found = (
+            {Side.spelt(whole)}
+            if Side.spelt(whole)
+            else {Side.spelt(word) for word in re.findall(r"(?<![^\W_])[LR]H(?![^\W_])", whole)}
+        )
+        if options.side is None and len(found) == 1:
+            (side,) = found
+            return options, side, f"every row is {side}, as the name of the {place} says"
+    return options, options.side, "" if options.side is None else f"every row is {options.side}"
 
 
 # First words of rows that people write below or between inspections.

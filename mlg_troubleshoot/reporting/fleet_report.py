@@ -12,8 +12,9 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice, side_by_side
-from mlg_troubleshoot.life.outlook import fleet_lines, outlook_sentence
-from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Axis, Canvas, Plot, Series
+from mlg_troubleshoot.life.outlook import Order, fleet_lines, outlook_sentence, work_sentence
+from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
+from mlg_troubleshoot.reporting.fleet_figures import Place, fleet_picture, wear_figure
 from mlg_troubleshoot.reporting.formats import ABSENT, Lengths, landings
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.life_json import life_as_json
@@ -84,11 +85,13 @@ def fleet_document(
     gear: Gear,
     provenance: ReportProvenance,
     unit: LengthUnit = LengthUnit.INCH,
+    order: Order = Order.WORST,
 ) -> Document:
     """Make one page: one line per gear, worst first, with its landings left and the worst case over
     its inspections.
     """
     lengths = Lengths(unit)
+    gears = fleet_lines(lives, forecasts, order)
     lines = [
         (
             line,
@@ -96,61 +99,36 @@ def fleet_document(
             _worst_cases(line.life, lengths),
             f"{safe_stem('life', *line.life.key)}.html",
         )
-        for line in fleet_lines(lives, forecasts)
+        for line in gears
+    ]
+    places = [
+        Place(
+            line.life.name,
+            line.verdict,
+            _share(line.predicted_displacement_in, line.margin_in),
+            line.next_inspection_landings,
+        )
+        for line in gears
     ]
     context = {
         **head("Fleet", "Fleet", gear, provenance, lengths),
         "lines_of": lines,
+        "picture": fleet_picture(places),
+        "work": work_sentence(gears),
         "advice": Advice.of(lives).sentence,
         "notes": [warning for life in lives for warning in life.warnings],
     }
-    return Document("fleet.html.j2", context, "fleet", landscape=True)
+    return Document("fleet.html.j2", context, "fleet", landscape=True, script="table.js")
+
+
+def _share(value: float | None, of: float | None) -> float | None:
+    return None if value is None or not of else value / of
 
 
 def _worst_cases(life: GearLife, lengths: Lengths) -> Markup:
     results = [kept.result for kept in life.inspections]
     worst_in = [result.get("predicted_displacement_in") for result in results]
     return sparkline(worst_in, results[-1].get("margin_in"), lengths)
-
-
-def worst_case_ahead(life: GearLife, ahead: Forecast, lengths: Lengths) -> Markup:
-    """Draw the worst case of a gear over its landings, its margin, and when it is expected to
-    reach it: median and 90 % interval.
-    """
-    unit = lengths.unit
-    read = [
-        (kept.inspection.gear_landings, kept.result["predicted_displacement_in"])
-        for kept in life.inspections
-        if kept.inspection.gear_landings is not None
-        and kept.result.get("predicted_displacement_in") is not None
-    ]
-    landed = [landings for landings, _ in read]
-    worst = [value * unit.per_inch for _, value in read]
-    margin = life.inspections[-1].result["margin_in"] * unit.per_inch
-    ends = {} if ahead.landings_to_margin is None or not read else ahead.landings_to_margin
-    reached = {name: landed[-1] + end for name, end in ends.items() if end is not None}
-    title = f"Worst case of {life.name} over its landings"
-    canvas = Canvas(440, 250, title, "with the margin and when it is expected to be reached")
-    plot = Plot(
-        canvas,
-        Axis.around("landings", [0.0, *landed, *reached.values()], 0.03),
-        Axis.around(f"worst case, {unit}", [0.0, *worst, margin], 0.08),
-        top=24,
-    )
-    plot.draw_axes()
-    canvas.text(plot.area[0], 12, title, size=11, bold=True)
-    canvas.line(*plot.at(plot.x.low, margin), *plot.at(plot.x.high, margin), dash="4 3")
-    if len(read) > 1:
-        plot.draw(Series("worst case", tuple(landed), tuple(worst)))
-    for place in zip(landed, worst, strict=True):
-        canvas.marker("circle", *plot.at(*place), 3.0)
-    if "p05" in reached:
-        # An interval that ends beyond the horizon runs to the edge.
-        end = plot.at(reached.get("p95", plot.x.high), margin)
-        canvas.line(*plot.at(reached["p05"], margin), *end, colour=ACCENT, width=4.0)
-    if "p50" in reached:
-        canvas.marker("diamond", *plot.at(reached["p50"], margin), 5.0, colour=ACCENT)
-    return canvas.svg()
 
 
 def life_document(
@@ -167,6 +145,7 @@ def life_document(
         "life": life_as_json(life, ahead, gear),
         "outlook": outlook_sentence(life, ahead, gear),
         "steps": side_by_side(life),
+        "figure": wear_figure(life, ahead, gear, Lengths(unit)),
     }
     context = {**head(f"Life of {life.name}", life.name, gear, provenance, Lengths(unit)), **shown}
     return Document("life.html.j2", context, safe_stem("life", *life.key))

@@ -82,9 +82,13 @@ def landings(ends: Mapping[str, float | None] | None) -> str:
     """Write the quantiles of a forecast, to two digits: it has no more."""
     if ends is None:
         return ABSENT
-    return ", ".join(
-        "beyond" if end is None else f"{float(f'{end:.2g}'):.0f}" for end in ends.values()
-    )
+    said = ["beyond" if end is None else landings_count(end) for end in ends.values()]
+    return said[0] if len({*said}) == 1 else ", ".join(said)
+
+
+def landings_count(count: float | None) -> str:
+    """Write landings that remain, to two digits: a forecast has no more."""
+    return ABSENT if count is None else f"{float(f'{count:.2g}'):.0f}"
 
 
 def minutes(value: float) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
+from pathlib import PurePath
 from typing import Any
 from urllib.parse import quote
 
@@ -14,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context,
 from jinja2.runtime import Context
 from markupsafe import Markup
 
+from mlg_troubleshoot.errors import grouped
 from mlg_troubleshoot.reporting import formats
 from mlg_troubleshoot.reporting.glyphs import breakable, font_faces, templates_folder
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
@@ -24,12 +28,15 @@ from mlg_troubleshoot.visible import visible
 class Document:
     """A document of a template that extends ``base.html.j2``; its context holds at least what
     `common.head` says.
+
+    script: of the templates' folder, for the HTML alone; what it adds is never needed to read it.
     """
 
     template: str
     context: Mapping[str, Any]
     stem: str
     landscape: bool = False
+    script: str | None = None
 
     @property
     def created(self) -> datetime:
@@ -64,6 +71,9 @@ def environment() -> Environment:
         several=formats.several,
         landings=formats.landings,
         minutes=formats.minutes,
+        landings_count=formats.landings_count,
+        grouped=grouped,
+        file_name=lambda name: PurePath(name).name,
         moment=formats.moment,
     )
     return made
@@ -110,6 +120,13 @@ def _stylesheet() -> str:
     return (templates_folder() / "report.css").read_text(encoding="utf-8")
 
 
+def _scripted(name: str | None) -> dict[str, Markup]:
+    """The script of a page, and the hash by which its policy lets it run and no other."""
+    text = "" if name is None else (templates_folder() / name).read_text(encoding="utf-8")
+    mark = base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+    return {"script": Markup(text), "script_hash": Markup(mark)}
+
+
 def render(document: Document, page: str, *, for_pdf: bool = False, glyph_note: str = "") -> str:
     return (
         environment()
@@ -120,6 +137,7 @@ def render(document: Document, page: str, *, for_pdf: bool = False, glyph_note: 
             orientation="landscape" if document.landscape else "portrait",
             for_pdf=for_pdf,
             glyph_note=glyph_note,
+            **_scripted(None if for_pdf else document.script),
             font_faces=Markup(font_faces()) if for_pdf else Markup(""),
             stylesheet=Markup(_stylesheet()),
         )

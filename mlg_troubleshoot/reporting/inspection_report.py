@@ -7,11 +7,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
@@ -23,6 +25,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.looking_back import PastInspection
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.reporting import inspection_figures as drawn
+from mlg_troubleshoot.reporting.fleet_figures import Place, fleet_picture
 from mlg_troubleshoot.reporting.formats import Lengths, short
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
@@ -123,6 +126,7 @@ def _inspection(
         "wrong": chance_wrong_sentence(a),
         "no_repair": no_repair_set(a),
         "rigging": None if a.rigging is None else lengths.said(rigging_sentence(a.rigging)),
+        "areas": partial(_areas, gear),
         "rows": _joints(gear, a, lengths),
         "curve": drawn.plunger_curve(gear, a, lengths),
         "cases": _sequence(gear, a, lengths),
@@ -164,6 +168,12 @@ def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]
         }
         for f in a.ranked
     ]
+
+
+def _areas(gear: Gear, step: Step) -> str:
+    """The areas to open for a step, in the order of the gear file."""
+    names = {gear.joint(number).area for number in step.joints}
+    return ", ".join(area.name for area in gear.areas if area.name in names)
 
 
 def _allowance(finding: JointFinding) -> float | None:
@@ -219,6 +229,11 @@ def batch_document(
     counted = Counter(j.verdict for j in judgements)
     latest, earlier = latest_of_each_gear(judgements)
     judged = [j for j in judgements if isinstance(j, Assessment)]
+
+    def linked(places: Iterable[int]) -> list[tuple[Assessment, tuple[str, str]]]:
+        rows = ((judgements[place], place) for place in places)
+        return [(j, (links or {}).get(p, ("", ""))) for j, p in rows if isinstance(j, Assessment)]
+
     context = {
         **head(
             f"Batch summary – {source}",
@@ -234,13 +249,21 @@ def batch_document(
         "over_limit": sum(any(f.over_limit for f in j.joints) for j in judged),
         "failed": sum(j.inspection.outcome is Outcome.FAILED for j in judged),
         "counts": [(v, counted[v]) for v in WORST_FIRST],
-        "latest": [(judgements[i], (links or {}).get(i, ("", ""))) for i in latest],
-        "earlier": [(judgements[i], (links or {}).get(i, ("", ""))) for i in earlier],
+        "latest": linked(latest),
+        "earlier": linked(earlier),
+        "rejected": [j for j in judgements if isinstance(j, Rejected)],
+        "picture": fleet_picture([_place_of(j) for j, _links in linked(latest)]),
         "problems": problems,
         "notes": notes,
     }
     stem = safe_stem("batch", *(Path(name).name for name in provenance.input_sha256))
-    return Document("batch.html.j2", context, stem, landscape=True)
+    return Document("batch.html.j2", context, stem, landscape=True, script="table.js")
+
+
+def _place_of(a: Assessment) -> Place:
+    inspection, worst_in = a.inspection, a.predicted_displacement_in
+    name = f"{inspection.tail_no} {inspection.side}"
+    return Place(name, a.verdict.value, None if worst_in is None else worst_in / a.margin_in)
 
 
 def write_form(

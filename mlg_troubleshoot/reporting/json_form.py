@@ -93,8 +93,9 @@ def kept_as_json(assessment: Assessment) -> dict[str, Any]:
     """
     joints = [_joint(finding) for finding in assessment.joints]
     kept = [{n: each for n, each in j.items() if n not in _OF_GEOMETRY} for j in joints]
-    # What the gear did is kept with the inspection.
-    return {n: each for n, each in assessment_as_json(assessment, kept).items() if n != "outcome"}
+    # What the gear did is kept with the inspection; words follow from what is kept.
+    told = assessment_as_json(assessment, kept)
+    return {n: each for n, each in told.items() if n not in ("outcome", "in_brief")}
 
 
 def check_json_pieces(
@@ -164,6 +165,7 @@ def _course(row: Any, judgement: Judgement) -> dict[str, Any]:
         "outcome": plain(getattr(row, "outcome", None)),
         "verdict": judgement.verdict.value,
         "next_action": steps[0],
+        "in_brief": judgement.in_brief,
         "plan": steps,
         "end": judgement.end.value,
         "open_question": judgement.plan.open_question,

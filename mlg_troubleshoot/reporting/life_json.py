@@ -5,27 +5,83 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast, quantiles
 from mlg_troubleshoot.life.looking_back import Advice
-from mlg_troubleshoot.life.outlook import fleet_lines
+from mlg_troubleshoot.life.outlook import Order, fleet_lines, work_sentence
 from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.output_types import FleetGear, FleetOutput, LifeOutput
+from mlg_troubleshoot.outputs import OutputKind, csv_text
 from mlg_troubleshoot.reporting.json_form import written
 from mlg_troubleshoot.store import Record, RecordKind
 
 
 def fleet_as_json(
-    lives: Sequence[GearLife], forecasts: Mapping[GearKey, Forecast]
+    lives: Sequence[GearLife],
+    forecasts: Mapping[GearKey, Forecast],
+    order: Order = Order.WORST,
 ) -> dict[str, Any]:
-    """One line per gear, worst first: verdict, then landings to its next inspection."""
+    """One line per gear, worst first unless another order is asked for."""
+    lines = fleet_lines(lives, forecasts, order)
     return written(
         FleetOutput,
-        gears=[written(FleetGear, line) for line in fleet_lines(lives, forecasts)],
+        gears=[written(FleetGear, line) for line in lines],
+        work=work_sentence(lines),
         advice=_advice(lives),
         warnings=[warning for life in lives for warning in life.warnings],
     )
+
+
+def fleet_table(gears: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:
+    """The gears of a fleet as a table: each quantile in a column of its own."""
+
+    def flat(name: str, value: Any) -> dict[str, Any]:
+        if name.startswith("landings_to_"):
+            return {f"{name}_{end}": (value or {}).get(end) for end in ("p05", "p50", "p95")}
+        return {name: joint_list(value) if isinstance(value, list) else value}
+
+    rows = [
+        {k: v for name, value in gear.items() for k, v in flat(name, value).items()}
+        for gear in gears
+    ]
+    unknown = dict.fromkeys(FleetGear.__annotations__)
+    header = [column for name in unknown for column in flat(name, None)]
+    return header, [[*row.values()] for row in rows]
+
+
+FLEET_CSV = OutputKind.marked("is not a table of a fleet", csv_text(fleet_table(())[0], ()))
+
+
+def fleet_sheets(
+    lives: Sequence[GearLife],
+    forecasts: Mapping[GearKey, Forecast],
+    gear: Gear,
+    order: Order = Order.WORST,
+) -> dict[str, tuple[list[str], list[list[Any]]]]:
+    """The sheets of a fleet's workbook: gears, readings, landings left of each joint, records."""
+    lines = fleet_lines(lives, forecasts, order)
+    told = [life_as_json(line.life, forecasts[line.life.key], gear) for line in lines]
+    readings: list[list[Any]] = []
+    left: list[list[Any]] = []
+    events: list[list[Any]] = []
+    kept = ("date", "gear_landings", "kind", "record_id", "verdict", "predicted_displacement_in")
+    for life in told:
+        whose = [life["tail_no"], life["side"]]
+        for joint in life["joints"]:
+            named = [*whose, joint["joint"], joint["limit_in"]]
+            readings += [[*named, *reading] for reading in joint["readings"]]
+            ends = joint["landings_to_limit"] or {}
+            left += [[*named, *ends.values()]] if ends else []
+        events += [[*whose, *(event.get(name) for name in kept)] for event in life["events"]]
+    identity = ["tail_no", "side", "joint", "limit_in"]
+    return {
+        "Gears": fleet_table(fleet_as_json(lives, forecasts, order)["gears"]),
+        "Readings": ([*identity, "gear_landings", "clearance_in"], readings),
+        "Landings left": ([*identity, "p05", "p50", "p95"], left),
+        "Records": ([*identity[:2], *kept], events),
+    }
 
 
 def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:

@@ -70,7 +70,7 @@ _BELOW = 40
 _TURNS = np.arange(24) * np.pi / 12 + 1e-6
 _COSINES = np.cos(_TURNS)
 _SINES = np.sin(_TURNS)
-_RINGS = np.array([0, 5, 10, 16, 24, 34, 46], float)
+_RINGS = np.array([0, 5, 10, 16, 24, 34, 46, 60, 76, 94], float)
 
 # Points and directions of a drawing are complex numbers: x to the right, y downward. [canvas units]
 Segment = tuple[complex, complex]
@@ -501,7 +501,8 @@ def _callout(
         + 2000.0 * outside
     )
     box: Box = tuple(tried[int(np.argmin(np.round(cost, 6)))].tolist())
-    boxes.append(box)
+    # A label under another cannot be read at all.
+    boxes += [box] * 16
     edge = complex(
         min(max(joint.real, box[0]), box[2]),
         min(max(joint.imag, box[1]), box[3]),

@@ -383,7 +383,8 @@ def write_reports(
     unit: LengthUnit = LengthUnit.INCH,
     before: Sequence[Sequence[PastInspection]] = (),
 ) -> tuple[WrittenReport, ...]:
-    """Write a report for each inspection and, for a batch, its summary.
+    """Write a report for each inspection that was judged and, for a batch, its summary, in which
+    rows that cannot be judged are listed.
 
     Parameters
     ----------
@@ -429,19 +430,21 @@ def write_reports(
     made = provenance_of(
         gear, result.inputs_sha256, extension=extension, remembered=options.remembered
     )
+    alone = len(judgements) == 1
+    steps = before or [()] * len(judgements)
+    places = [k for k, j in enumerate(judgements) if alone or isinstance(j, Assessment)]
     documents = (
-        inspection_document(j, gear, made, problems, unit, steps)
-        for j, steps in zip(judgements, before or [()] * len(judgements), strict=True)
+        inspection_document(judgements[k], gear, made, problems, unit, steps[k]) for k in places
     )
     reports = publish_all(
-        documents, len(judgements), directory, formats=formats, page=page, progress=on_written
+        documents, len(places), directory, formats=formats, page=page, progress=on_written
     )
-    if len(reports) == 1:
+    if alone:
         return tuple(reports)
     names = ((report.html, report.pdf) for report in reports)
     links = {
         place: (html.name if html else "", pdf.name if pdf else "")
-        for place, (html, pdf) in enumerate(names)
+        for place, (html, pdf) in zip(places, names, strict=True)
     }
     summary = batch_document(judgements, problems, gear, made, result.notes, links, unit)
     return (publish(summary, directory, formats=formats, page=page), *reports)
@@ -480,7 +483,7 @@ _NUMBERS = (
 )
 _VERDICT_HEADER = (
     *("record_id", "tail_no", "side"),
-    *("verdict", "basis", *_NUMBERS, "joints_over_limit", "next_action", "end"),
+    *("verdict", "basis", *_NUMBERS, "joints_over_limit", "next_action", "in_brief", "end"),
     *("file", "sheet", "row"),
 )
 VERDICTS = OutputKind.marked("is not a table of verdicts", csv_text(_VERDICT_HEADER, ()))
@@ -499,6 +502,7 @@ def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:
             None if a is None else ", ".join(f"#{f.joint}" for f in a.joints if f.over_limit)
         ),
         "next_action": judgement.next_action.text,
+        "in_brief": judgement.in_brief,
         "end": str(judgement.end),
     }
 

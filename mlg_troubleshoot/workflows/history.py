@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from functools import partial
@@ -24,6 +24,8 @@ from mlg_troubleshoot.life.folding import (
     life_of,
     lives,
 )
+from mlg_troubleshoot.life.outlook import Order
+from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.records import ReadOptions, admit
 from mlg_troubleshoot.records.gate import judge_text
 from mlg_troubleshoot.results import Result
@@ -65,6 +67,39 @@ class Lives(Result):
     forecasts: Mapping[GearKey, Forecast]
     model: WearModel | None
     problems: tuple[Problem, ...] = ()
+    order: Order = Order.WORST
+
+    def chosen(self, tail: str | None, verdicts: Collection[str], order: Order) -> Lives:
+        """The gears of one aircraft, and those of which the last verdict is one of these; all of
+        them where nothing is asked.
+        """
+        asked = None if tail is None else key_of(tail, "LH")[0]
+        if asked is not None and all(life.key[0] != asked for life in self.lives):
+            raise UsageError(f"no records of {asked}", "See which gears are kept: mlg history")
+        found = tuple(
+            life
+            for life in self.lives
+            if asked in (None, life.key[0])
+            and (
+                not verdicts
+                or (life.latest is not None and life.latest.result.get("verdict") in verdicts)
+            )
+        )
+        return replace(self, lives=found, order=order)
+
+    def write_csv(self, file: Path) -> None:
+        """Write the fleet as CSV, one line per gear."""
+        from mlg_troubleshoot.reporting.life_json import fleet_as_json, fleet_table
+
+        gears = fleet_as_json(self.lives, self.forecasts, self.order)["gears"]
+        write_csv(file, *fleet_table(gears))
+
+    def write_workbook(self, file: Path) -> None:
+        """Write the fleet, its readings, forecasts and records as a workbook."""
+        from mlg_troubleshoot.records import template
+        from mlg_troubleshoot.reporting.life_json import fleet_sheets
+
+        template.write_sheets(file, fleet_sheets(self.lives, self.forecasts, self.gear, self.order))
 
 
 def show_fleet(
@@ -124,7 +159,9 @@ def write_pages(
     )
     if not fleet:
         return [publish(document, directory, page=page) for document in documents]
-    sheet = fleet_report.fleet_document(shown.lives, shown.forecasts, shown.gear, made, unit)
+    sheet = fleet_report.fleet_document(
+        shown.lives, shown.forecasts, shown.gear, made, unit, shown.order
+    )
     written = [publish(sheet, directory, page=page)]
     # The pages behind the lines of a fleet are for the screen.
     return written + [publish(each, directory, formats=("html",), page=page) for each in documents]

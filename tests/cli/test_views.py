@@ -194,12 +194,12 @@ def test_an_unmeasured_joint_is_called_so_and_not_zero(failure: Run) -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"clearance_3_in": "0.013"}, "measure again #3"),
-        ({"clearance_3_in": "0.013", "measured_again": "3"}, "restore #3"),
-        ({"clearance_4_in": ""}, "measure #4"),
-        ({"side": ""}, "correct: side"),
-        ({"outcome": "FAILED"}, "read the plunger"),
-        ({}, "go on: within its margin"),
+        ({"clearance_3_in": "0.013"}, "Measure again #3"),
+        ({"clearance_3_in": "0.013", "measured_again": "3"}, "Restore #3"),
+        ({"clearance_4_in": ""}, "Measure #4"),
+        ({"side": ""}, "Correct cell C3"),
+        ({"outcome": "FAILED"}, "Read the plunger"),
+        ({}, "Go on with fault isolation: within its margin"),
     ],
 )
 def test_a_line_of_a_batch_ends_with_its_next_action(

@@ -569,7 +569,7 @@ def test_a_gear_is_one_line_however_many_joints_are_worn(tmp_path):
     (tmp_path / "t.csv").write_text(as_csv([*HEADER, "outcome"], worn, sound("GOOD", outcome=None)))
     lines = in_a_terminal("check", tmp_path / "t.csv").splitlines()
     at = next(n for n, line in enumerate(lines) if "WORN" in line)
-    assert "read the plunger" in lines[at]
+    assert "Read the plunger" in lines[at]
     assert "GOOD" in lines[at + 1]
 
 

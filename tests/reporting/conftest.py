@@ -152,7 +152,7 @@ class Made:
 
 def readable(html: str) -> str:
     """Text of a document without markup, titles of figures included."""
-    body = re.sub(r"<style>.*?</style>", " ", html, flags=re.DOTALL)
+    body = re.sub(r"<(style|script)>.*?</\1>", " ", html, flags=re.DOTALL)
     return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]*>", " ", body)))
 
 

@@ -12,7 +12,6 @@ from mlg_troubleshoot.cli.views.tables import (
     MARKS,
     STYLES,
     Cell,
-    few_words,
     lines_of,
     measured_outside,
 )
@@ -50,7 +49,7 @@ def show(result: CheckResult, screen: DataConsole, *, every: bool) -> None:
     for judgement in ordered[:_LINES]:
         cells = _cells(judgement, screen)
         rows.append([cells[heading.split(" ")[0]] for heading in headings])
-    for line in lines_of(headings, rows, "worst margin chance"):
+    for line in lines_of(screen, headings, rows, "chance", ("chance", "date", "record")):
         screen.print(line, no_wrap=True, overflow="ellipsis")
     if len(ordered) > _LINES:
         screen.print(f"… and {len(ordered) - _LINES} more; --csv or --json lists all of them.")
@@ -83,7 +82,7 @@ def _cells(judgement: Judgement, screen: DataConsole) -> dict[str, Cell]:
         "tail": word(row.tail_no),
         "side": str(row.side or "?"),
         "record": word(row.record_id),
-        "next": few_words(judgement),
+        "next": judgement.in_brief,
         **dict.fromkeys(("date", "worst", "margin", "chance"), "-"),
     }
     if isinstance(judgement, Assessment):

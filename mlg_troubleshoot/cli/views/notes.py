@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.padding import Padding
 
 from mlg_troubleshoot.cli import output
-from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.errors import Problem, ProblemGroup, grouped
 
 _LINES_OF_PROBLEMS = 40
 _PROBLEM_COLUMN = 22
@@ -28,13 +28,14 @@ def show_problems(problems: Sequence[Problem]) -> None:
     console = output.console(to_stderr=True)
     noun = "problem" if len(problems) == 1 else "problems"
     console.print(f"{len(problems)} {noun} in the input:", style="bold")
-    shown = problems[:_LINES_OF_PROBLEMS]
+    groups = grouped(problems)
+    shown = groups[:_LINES_OF_PROBLEMS]
     if console.is_terminal and len(problems) > 1:
         _show_problem_tables(console, shown)
     else:
-        for problem in shown:
-            _show_problem(console, problem)
-    rest = len(problems) - len(shown)
+        for group in shown:
+            _show_problem(console, group)
+    rest = len(problems) - sum(len(group.problems) for group in shown)
     if rest:
         more = (
             f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook."
@@ -42,7 +43,8 @@ def show_problems(problems: Sequence[Problem]) -> None:
         _message(console, more, indent=2)
 
 
-def _show_problem(console: Console, problem: Problem) -> None:
+def _show_problem(console: Console, group: ProblemGroup) -> None:
+    problem = group.first
     about_all = problem.row is None and problem.column is None
     found = (
         ""
@@ -51,18 +53,23 @@ def _show_problem(console: Console, problem: Problem) -> None:
         if about_all
         else f"found {problem.value!r}; "
     )
-    _message(console, f"{problem.place()}: {found}expected {problem.expected}.", indent=2)
+    place = problem.place()
+    if len(group.problems) > 1:
+        column = "" if problem.column is None else f", column {problem.column!r}"
+        place = f"{group.file}, {group.where}{column}"
+        found = "" if group.found is None else f"found {group.found}; "
+    _message(console, f"{place}: {found}expected {problem.expected}.", indent=2)
     _message(console, f"What to do: {problem.remedy}", indent=4)
 
 
-def _show_problem_tables(console: Console, problems: Sequence[Problem]) -> None:
+def _show_problem_tables(console: Console, groups: Sequence[ProblemGroup]) -> None:
     """One table for each sheet; what is wrong with a file as a whole stands before its tables."""
-    for (file, sheet), found in groupby(problems, key=lambda p: (p.file, p.sheet)):
-        group = list(found)
-        placed = [problem for problem in group if problem.row is not None]
-        for problem in group:
-            if problem.row is None:
-                _show_problem(console, problem)
+    for (file, sheet), found in groupby(groups, key=lambda g: (g.first.file, g.first.sheet)):
+        of_sheet = list(found)
+        placed = [group for group in of_sheet if group.first.row is not None]
+        for group in of_sheet:
+            if group.first.row is None:
+                _show_problem(console, group)
         if not placed:
             continue
         place = ", ".join(
@@ -75,11 +82,12 @@ def _show_problem_tables(console: Console, problems: Sequence[Problem]) -> None:
         for heading in ("cell", "column", "found"):
             table.add_column(heading, overflow="fold", max_width=_PROBLEM_COLUMN)
         table.add_column("expected, and what to do", ratio=1)
-        for problem in placed:
+        for group in placed:
+            problem = group.first
             table.add_row(
-                output.word(problem.cell or f"row {problem.row}"),
+                output.word(group.where.removeprefix("cell ")),
                 output.word(problem.column or "-"),
-                output.text("nothing" if problem.value is None else problem.value),
+                output.text("nothing" if group.found is None else group.found),
                 output.text(f"{problem.expected}.\n{problem.remedy}"),
             )
         console.print(table)

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 from rich.text import Text
 
-from mlg_troubleshoot.cli.output import word
+from mlg_troubleshoot.cli.output import DataConsole, word
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
-from mlg_troubleshoot.decision.plan import Action, Basis, End, Step
+from mlg_troubleshoot.decision.plan import Action, Basis, Step
 from mlg_troubleshoot.units import Sentence
 
 STYLES = {
@@ -27,17 +27,8 @@ MARKS = {
     Verdict.INCONCLUSIVE: "~",
 }
 Cell = str | Text
-
-
-# Where a plan ends, in the width of a column; the whole sentence stands in the view of one gear.
-_ENDS = {
-    End.WITHIN: "go on: within its margin",
-    End.NOT_EXPLAINED: "go on: look elsewhere",
-    End.TOO_CLOSE: "go on: too close to say",
-    End.OUTSIDE_NO_COMPLAINT: "go on: engineering decides",
-    End.CANNOT_CLEAR: "engineering: cannot clear",
-    End.DONE: "done: record the repair",
-}
+# Room that the last column of a table gets before other columns are left out for it.
+_LEAST = 30
 
 
 def next_words(judgement: Judgement) -> str:
@@ -45,16 +36,6 @@ def next_words(judgement: Judgement) -> str:
     step = judgement.next_action
     minutes = f" ({step.minutes:.0f} min)" if step.minutes else ""
     return Sentence.of("NEXT{}: {}", minutes, step.text)
-
-
-def few_words(judgement: Judgement) -> str:
-    """Say the next action in a few words: the whole sentence stands in the view of one gear and in
-    --csv.
-    """
-    step = judgement.next_action
-    if step.action is Action.CORRECT:
-        return step.text.removeprefix("Do not use. ").rstrip(".").lower()
-    return _ENDS[judgement.end] if step.action is Action.CONTINUE else step.words
 
 
 def what_follows(a: Assessment) -> str | None:
@@ -81,18 +62,31 @@ def measured_outside(judgement: Judgement) -> bool:
     return isinstance(judgement, Assessment) and judgement.basis is Basis.MEASURED
 
 
-def lines_of(headings: Sequence[str], rows: Sequence[Sequence[Cell]], right: str) -> Iterator[Text]:
-    """Set rows in columns of which only the last one gives way to a narrow screen; `right` names
-    right-aligned ones.
+def lines_of(
+    screen: DataConsole,
+    headings: Sequence[str],
+    rows: Sequence[Sequence[Cell]],
+    right: str,
+    spare: Sequence[str],
+) -> Iterator[Text]:
+    """Set rows in columns, `right` names right-aligned ones. On a narrow screen the columns of
+    `spare` are left out, the first first, and then the last column is folded: nothing is cut.
     """
     cells = [
         [word(each) if isinstance(each, str) else each for each in row] for row in (headings, *rows)
     ]
-    widths = [max(row[k].cell_len for row in cells) for k in range(len(headings) - 1)]
+    taken = {h: max(row[k].cell_len for row in cells) + 1 for k, h in enumerate(headings)}
+    last = taken.pop(headings[-1])
+    for heading in spare:
+        if sum(taken.values()) + min(last, _LEAST) > screen.width:
+            taken.pop(heading, None)
+    room = max(screen.width - sum(taken.values()), 12)
     for number, row in enumerate(cells):
         line = Text(style="bold" if number == 0 else "", no_wrap=True, overflow="ellipsis")
-        for heading, cell, width in zip(headings, row, widths, strict=False):
-            gap = " " * (width - cell.cell_len)
-            line.append(gap if heading in right.split() else "").append_text(cell)
-            line.append(" " if heading in right.split() else gap + " ")
-        yield line.append_text(row[-1])
+        for heading, cell in zip(headings, row, strict=True):
+            if heading in taken:
+                gap = " " * (taken[heading] - 1 - cell.cell_len)
+                line.append(gap if heading in right.split() else "").append_text(cell)
+                line.append(" " if heading in right.split() else gap + " ")
+        indent = "\n" + " " * sum(taken.values())
+        yield line.append_text(Text(indent).join(row[-1].wrap(screen, room)))

@@ -1,0 +1,173 @@
+"""Figures of a fleet and of one gear's life: how bad, how long still, and how each joint wears."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.folding import GearLife
+from mlg_troubleshoot.life.forecast import Forecast, landings_of_bands
+from mlg_troubleshoot.life.wear_paths import Stretch, stretches
+from mlg_troubleshoot.reporting.figures import (
+    ACCENT,
+    INK,
+    PALE,
+    SOFT,
+    Axis,
+    Canvas,
+    Marker,
+    Plot,
+    Series,
+)
+from mlg_troubleshoot.reporting.formats import Lengths
+
+# The colours and shapes of the signs that stand beside the verdicts in templates/signs.html.j2.
+_RED = "#a3131a"
+_MARKS: dict[str, tuple[Marker, str]] = {
+    "OUTSIDE_MARGIN": ("square", _RED),
+    "INCONCLUSIVE": ("diamond", "#8a4b00"),
+    "INCOMPLETE": ("triangle", "#0b4f8a"),
+    "WITHIN_MARGIN": ("ring", "#1d6b2a"),
+}
+_WIDE = 940
+_WORST_SHOWN = 4.0
+_PANEL_WIDE, _PANEL_HIGH = 350, 132
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """One gear of a fleet in its picture.
+
+    case: worst case as a multiple of the margin, None where the linkage does not close. [1]
+    due: landings to the next inspection, None where they are not known. [landings]
+    """
+
+    name: str
+    verdict: str | None
+    case: float | None
+    due: float | None = None
+
+
+def fleet_picture(places: Sequence[Place]) -> Markup:
+    """Draw each gear's worst case against its margin and, where any is known, its landings left."""
+    if not places:
+        return Markup("")
+    due = [place.due for place in places if place.due is not None]
+    order = Axis("gears in the order of the table", 0.5, len(places) + 0.5)
+    cases = [min(p.case or _WORST_SHOWN, _WORST_SHOWN) * 100.0 for p in places]
+    high = max(*cases, 110.0) * 1.08
+    canvas = Canvas(
+        _WIDE,
+        350 if due else 200,
+        "Worst case of each gear against its margin",
+        f"{sum(case > 100.0 for case in cases)} of {len(places)} gears are beyond their margin.",
+    )
+    top = Plot(canvas, order, Axis("worst case, % of margin", 0.0, high), top=22, right=18)
+    top.area = (*top.area[:3], 160.0)
+    top.draw_axes()
+    top.draw(Series("", (order.low, order.high), (100.0, 100.0), "5 3", _RED))
+    for number, (place, case) in enumerate(zip(places, cases, strict=True), 1):
+        shape, colour = _MARKS.get(place.verdict or "", ("cross", INK))
+        canvas.marker(shape, *top.at(number, case), 3.4, colour=colour)
+    x = 60.0
+    for verdict, (shape, colour) in _MARKS.items():
+        canvas.marker(shape, x, 10, 4.5, colour=colour)
+        canvas.text(x + 9, 13.5, verdict.replace("_", " ").lower(), size=9.5)
+        x += 125
+    if due:
+        axis = Axis("due in, landings", 0.0, max(*due, 1.0) * 1.08)
+        left = Plot(canvas, order, axis, top=214, right=18)
+        left.draw_axes()
+        for number, place in enumerate(places, 1):
+            if place.due is not None:
+                x, y = left.at(number, place.due)
+                wide = min(0.7 * (left.area[2] - left.area[0]) / len(places), 14.0)
+                base = left.area[3]
+                canvas.rectangle(
+                    x - wide / 2, min(y, base - 2.0), wide, max(base - y, 2.0), fill=ACCENT
+                )
+    return canvas.svg()
+
+
+def wear_figure(life: GearLife, ahead: Forecast, gear: Gear, lengths: Lengths) -> Markup:
+    """Draw the clearance of each joint over the landings: readings, limit, restorations and, from
+    the last inspection on, the forecast with its 90 % band.
+    """
+    drawn = {
+        n: s for n, s in stretches(life, gear.joint_numbers).items() if any(e.placed for e in s)
+    }
+    if not drawn:
+        return Markup("")
+    last = max(at for of in drawn.values() for each in of for at, *_ in each.placed)
+    end = max(last * 1.4, last + 2.0 * (ahead.next_inspection_landings or 0.0), 1.0)
+    rows = -(-len(drawn) // 2)
+    canvas = Canvas(
+        2 * _PANEL_WIDE,
+        rows * _PANEL_HIGH + 18,
+        f"Clearance of each joint of {life.name} over landings",
+    )
+    for place, (number, between) in enumerate(drawn.items()):
+        _panel(canvas, place, gear, number, between, (ahead, last, end), lengths)
+    base = rows * _PANEL_HIGH + 10
+    shown = [
+        Series("limit", (), (), "5 3", _RED),
+        Series("forecast, median", (), (), "2 2", ACCENT),
+    ]
+    legend = Plot(canvas, Axis("", 0, 1), Axis("", 0, 1))
+    legend.draw_legend(
+        shown,
+        50,
+        base,
+        [("circle", "reading"), ("square", "over its limit"), ("triangle", "restored")],
+    )
+    return canvas.svg()
+
+
+def _panel(
+    canvas: Canvas,
+    place: int,
+    gear: Gear,
+    number: int,
+    between: Sequence[Stretch],
+    time: tuple[Forecast, float, float],
+    lengths: Lengths,
+) -> None:
+    ahead, last, end = time
+    joint = gear.joint(number)
+    shown = lengths.unit.from_inches
+    limit = shown(joint.limit.value)
+    most = max(shown(value) for each in between for _at, value, _u in each.placed)
+    x, y = _PANEL_WIDE * (place % 2), _PANEL_HIGH * (place // 2)
+    plot = Plot(canvas, Axis("landings", 0.0, end), Axis("", 0.0, 1.15 * max(limit, most)))
+    plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
+    canvas.text(x + 52, y + 13, f"#{number} {joint.name}, {lengths.unit}", bold=True)
+    band = ahead.bands.get(number)
+    if band is not None:
+        passed = np.linspace(0.0, min(end - last, gear.horizon.value), 25)
+        low, middle, high = (
+            np.minimum(shown(np.interp(passed, landings_of_bands(gear), edge)), plot.y.high)
+            for edge in band
+        )
+        ahead_at = last + passed
+        around = [
+            *zip(ahead_at, low, strict=True),
+            *zip(ahead_at[::-1], high[::-1], strict=True),
+        ]
+        edges = [plot.at(float(a), float(v)) for a, v in around]
+        canvas.polyline(edges, fill=PALE, colour=None, closed=True)
+        plot.draw(Series("", tuple(ahead_at), tuple(middle), "2 2", ACCENT))
+    plot.draw_axes(5)
+    plot.draw(Series("", (0.0, end), (limit, limit), "5 3", _RED))
+    for each in between:
+        placed = [(at, shown(value)) for at, value, _u in each.placed]
+        if each.begun:
+            base, top_y = plot.at(each.begun, 0.0), plot.at(each.begun, plot.y.high)
+            canvas.line(*base, *top_y, colour=SOFT, dash="1 3")
+            canvas.marker("triangle", *base, 4.5)
+        plot.draw(Series("", tuple(at for at, _ in placed), tuple(value for _, value in placed)))
+        for at, value in placed:
+            canvas.marker("square" if value > limit else "circle", *plot.at(at, value), 3.2)

@@ -1,0 +1,155 @@
+"""``mlg fleet`` as it is asked and passed on: chosen gears, CSV, workbook, pages and plots."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import openpyxl
+import pytest
+
+from tests.cli.conftest import mlg
+
+from .test_history_commands import keep, visit
+
+ALL_READ = {f"clearance_{n}_in": "0.0010" for n in range(1, 11) if n != 3}
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One gear that wears within its margin, one that is outside it, one of another aircraft."""
+    folder = tmp_path_factory.mktemp("fleet")
+    file = folder / "store.sqlite"
+    rows = [
+        *(visit(n, 0.0010 + 0.0004 * n, **ALL_READ) for n in range(3)),
+        *(visit(n, 0.0020 + 0.0060 * n, side="RH", **ALL_READ) for n in range(3)),
+        *(visit(n, 0.0010, "N777", **ALL_READ) for n in range(3)),
+    ]
+    assert keep(folder, *rows, more=("--store", str(file), "-q")).code == 1
+    return file
+
+
+def gears(store: Path, *more: str) -> list[dict[str, object]]:
+    found = mlg("fleet", "--store", store, "--json", "-q", *more)
+    assert found.code == 0
+    return list(json.loads(found.out)["gears"])
+
+
+def names(found: list[dict[str, object]]) -> list[str]:
+    return [f"{gear['tail_no']} {gear['side']}" for gear in found]
+
+
+def test_one_aircraft_is_shown_alone(store: Path) -> None:
+    assert names(gears(store, "--tail", "N777", "--no-forecast")) == ["N777 LH"]
+
+
+def test_an_aircraft_that_is_not_kept_is_refused(store: Path) -> None:
+    found = mlg("fleet", "--store", store, "--tail", "N9", "--no-forecast")
+    assert (found.code, "no records of N9" in found.err) == (2, True)
+
+
+def test_only_gears_with_a_verdict_are_shown(store: Path) -> None:
+    assert names(gears(store, "--only", "OUTSIDE_MARGIN", "--no-forecast")) == ["N123 RH"]
+
+
+def test_what_is_due_first_stands_first(store: Path) -> None:
+    due = [gear["next_inspection_landings"] for gear in gears(store, "--sort", "due")]
+    known = [each for each in due if each is not None]
+    assert due[: len(known)] == sorted(known)
+    assert len(known) > 1
+
+
+def test_history_and_fleet_agree_on_the_next_inspection(store: Path) -> None:
+    for gear in gears(store):
+        shown = mlg("history", gear["tail_no"], gear["side"], "--store", store, "--json", "-q")
+        life = json.loads(shown.out)
+        for name in ("next_inspection_landings", "due_date", "landings_to_limit"):
+            assert life[name] == gear[name]
+
+
+def test_the_csv_holds_what_the_json_holds(store: Path, tmp_path: Path) -> None:
+    out = tmp_path / "due.csv"
+    found = gears(store, "--csv", str(out))
+    with out.open(encoding="utf-8", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    assert [row["next_action"] for row in rows] == [gear["next_action"] for gear in found]
+    assert [float(row["margin_in"]) for row in rows] == [gear["margin_in"] for gear in found]
+
+
+def test_the_workbook_has_gears_readings_forecasts_and_records(store: Path, tmp_path: Path) -> None:
+    out = tmp_path / "fleet.xlsx"
+    gears(store, "--xlsx", str(out))
+    book = openpyxl.load_workbook(out)
+    assert book.sheetnames == ["Gears", "Readings", "Landings left", "Records"]
+    assert book["Gears"].max_row == 1 + 3
+    assert book["Readings"].max_row == 1 + 3 * 3 * 10
+
+
+def test_a_workbook_of_somebody_else_is_not_replaced(store: Path, tmp_path: Path) -> None:
+    out = tmp_path / "fleet.xlsx"
+    openpyxl.Workbook().save(out)
+    assert mlg("fleet", "--store", store, "--xlsx", out, "--no-forecast").code == 2
+    gears(store, "--xlsx", str(out), "--force", "--no-forecast")
+    gears(store, "--xlsx", str(out), "--no-forecast")
+
+
+def test_minutes_and_parts_are_summed_over_the_fleet(store: Path) -> None:
+    shown = mlg("fleet", "--store", store, "--json", "-q", "--no-forecast")
+    told = json.loads(shown.out)
+    minutes = sum(gear["minutes"] for gear in told["gears"])
+    assert minutes > 0
+    assert f"{minutes:.0f} min" in told["work"]
+    assert [gear["restore"] for gear in told["gears"] if gear["restore"]] == [[3]]
+    assert "#3 on 1" in told["work"]
+
+
+def test_the_action_has_the_same_words_on_screen_in_json_and_on_paper(
+    store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    screen = mlg("fleet", "--store", store, "-q", "--no-forecast", "--report", tmp_path).out
+    page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
+    for gear in gears(store, "--no-forecast"):
+        assert str(gear["next_action"]) in screen
+        assert str(gear["next_action"]) in re.sub(r"\s+", " ", page)
+
+
+def test_no_action_is_cut_on_a_narrow_screen(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    screen = mlg("fleet", "--store", store, "-q", "--no-forecast").out
+    assert "…" not in screen
+    said = " ".join(line.split()[-1] for line in screen.splitlines() if line.strip())
+    for gear in gears(store, "--no-forecast"):
+        assert str(gear["next_action"]).split()[-1] in said
+
+
+def test_the_page_of_a_gear_plots_each_joint_with_limit_and_forecast(
+    store: Path, tmp_path: Path
+) -> None:
+    assert mlg("history", "N777", "LH", "--store", store, "--report", tmp_path).code == 0
+    (file,) = tmp_path.glob("*.html")
+    page = file.read_text(encoding="utf-8")
+    (drawn,) = re.findall(r'<svg[^>]*aria-label="Clearance of each joint.*?</svg>', page, re.DOTALL)
+    assert drawn.count("<polygon") == 10 + 1
+    assert "#10 plunger pin" in drawn
+
+
+def test_the_page_of_a_fleet_may_run_its_own_script_alone(store: Path, tmp_path: Path) -> None:
+    mlg("fleet", "--store", store, "-q", "--no-forecast", "--report", tmp_path)
+    page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
+    assert re.search(r"default-src 'none'; script-src 'sha256-[\w+/]{43}='; style-src", page)
+    assert page.count("<script>") == 1
+    assert "src=" not in page
+
+
+def test_a_joint_without_landings_is_not_called_unread(tmp_path: Path) -> None:
+    file = tmp_path / "store.sqlite"
+    undated = visit(1, 0.001, **ALL_READ)
+    undated["gear_landings"] = ""
+    keep(tmp_path, undated, more=("--store", str(file), "-q"))
+    shown = " ".join(mlg("history", "N123", "LH", "--store", file).out.split())
+    assert "Never read" not in shown
+    assert "Not read since" not in shown
+    assert "Read, but without landings (gear_landings): #1, #2, #3" in shown
