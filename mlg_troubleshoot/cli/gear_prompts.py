@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +18,7 @@ from mlg_troubleshoot.cli.prompts.conversation import (
     again,
 )
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line, note
+from mlg_troubleshoot.datafile import read_toml
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.gear.short_form import short_form
 from mlg_troubleshoot.outputs import write_text
@@ -103,7 +103,13 @@ class _Course:
     values: dict[str, Any] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.values = tomllib.loads(self.file.read_text("utf-8")) if self.file.exists() else {}
+        kept = read_toml(self.file, dict).values if self.file.exists() else {}
+        # What somebody wrote in the place of a table is asked for again.
+        self.values = {
+            key: value
+            for key, value in kept.items()
+            if key not in _TABLES or isinstance(value, dict)
+        }
 
     @property
     def first_open(self) -> int:

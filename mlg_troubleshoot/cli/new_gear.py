@@ -9,10 +9,12 @@ import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.outputs import OutputKind
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
 
+DRAWING = OutputKind.marked("is not a drawing", '<svg xmlns="http://www.w3.org/2000/svg" viewBox')
 EPILOG = "Example: [b]mlg gear new my-gear.toml --from short-form.toml[/b]"
 
 
@@ -40,12 +42,17 @@ def new(
 ) -> None:
     """Make a gear file from points, links and joints: ground, crank, coupler, rocker, guide."""
     from mlg_troubleshoot.cli.claims import claim
+    from mlg_troubleshoot.indices.index_table import INDEX_TABLE
     from mlg_troubleshoot.outputs import CONTINUED, OutputFile
     from mlg_troubleshoot.units import LengthUnit
     from mlg_troubleshoot.workflows.new_gear import NEW_GEAR, from_pylinkage, new_gear
 
     asked = file.with_name(f"{file.stem}-short.toml")
-    outputs = [OutputFile("the gear", file, NEW_GEAR)]
+    outputs = [
+        OutputFile("the gear", file, NEW_GEAR),
+        OutputFile("its table", file.with_name(f"{file.stem}-indices.json"), INDEX_TABLE),
+        OutputFile("its drawing", file.with_suffix(".svg"), DRAWING),
+    ]
     if source is None:
         outputs.append(OutputFile("the answers", asked, CONTINUED))
     claim(None, [source], outputs, force=force)
@@ -97,8 +104,7 @@ def draw(
     """Draw the linkage of a gear: links, supports, guides, joints with their numbers and names."""
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.outputs import OutputFile, OutputKind
+    from mlg_troubleshoot.outputs import OutputFile
 
-    own = OutputKind.marked("is not a drawing", '<svg xmlns="http://www.w3.org/2000/svg" viewBox')
-    claim(context.obj, (), [OutputFile("the drawing", file, own)], force=force)
+    claim(context.obj, (), [OutputFile("the drawing", file, DRAWING)], force=force)
     output.write(f"Drawn: {load_gear(context.obj).plot().save(file)}")

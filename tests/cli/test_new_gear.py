@@ -12,6 +12,7 @@ import pytest
 
 from mlg_troubleshoot.cli.gear_prompts import ask_gear
 from mlg_troubleshoot.cli.prompts import Line
+from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.short_form import read_short_form
 from mlg_troubleshoot.indices.index_table import load_index_table
@@ -116,11 +117,21 @@ def test_without_a_terminal_a_new_gear_needs_a_short_form(tmp_path: Path) -> Non
     assert "--from" in found.err
 
 
-def test_a_gear_file_that_somebody_wrote_is_not_replaced(tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_text("schema = 1\n")
-    assert mlg("gear", "new", file, "--from", SHORT).code == 2
-    assert file.read_text() == "schema = 1\n"
+@pytest.mark.parametrize("name", ["mine.toml", "mine.svg", "mine-indices.json"])
+def test_a_file_that_somebody_wrote_is_not_replaced(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("schema = 1\n")
+    assert mlg("gear", "new", tmp_path / "mine.toml", "--from", SHORT).code == 2
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "schema = 1\n"
+
+
+@pytest.mark.parametrize("kept", ["ground = 3\n", "name = [\n"])
+def test_kept_answers_that_were_spoilt_end_in_no_internal_error(kept: str, tmp_path: Path) -> None:
+    (tmp_path / "short.toml").write_text(kept)
+    try:
+        assert not ask_gear(tmp_path / "short.toml", Typed("door linkage", "O 0 0", "q"))
+    except GearFileError as error:
+        assert "short.toml: cannot be read as TOML" in error.message
 
 
 def test_a_linkage_that_does_not_close_leaves_no_file(tmp_path: Path) -> None:
