@@ -156,7 +156,9 @@ def test_read_inspections_loses_nothing_of_a_sheet(seed: int) -> None:
     verdicts, again = judged(as_csv(frame))[0], judged(as_csv(read))[0]
     assert [v[0] for v in again] == [v[0] for v in verdicts]
     assert [v[1] for v in again] == pytest.approx([v[1] for v in verdicts], abs=1e-15)
-    assert read["Bay"].fillna("").tolist() == frame["Bay"].tolist()
+    # A column without a value is left out.
+    bays = read["Bay"].fillna("") if "Bay" in read else frame["Bay"].where(frame["Bay"] == "")
+    assert bays.tolist() == frame["Bay"].tolist()
 
 
 def test_a_wrong_cell_is_missing_and_its_row_keeps_the_others() -> None:
