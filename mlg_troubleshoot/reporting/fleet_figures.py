@@ -39,7 +39,7 @@ _PANEL_WIDE, _PANEL_HIGH = 350, 132
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class GearInPicture:
     """One gear of a fleet in its picture.
 
     case: worst case as a multiple of the margin, None where the linkage does not close. [1]
@@ -52,7 +52,7 @@ class Place:
     due: float | None = None
 
 
-def fleet_picture(places: Sequence[Place]) -> Markup:
+def fleet_picture(places: Sequence[GearInPicture]) -> Markup:
     """Draw each gear's worst case against its margin and, where any is known, its landings left."""
     if not places:
         return Markup("")

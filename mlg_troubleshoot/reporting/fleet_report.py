@@ -14,7 +14,7 @@ from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice, side_by_side
 from mlg_troubleshoot.life.outlook import Order, fleet_lines, outlook_sentence, work_sentence
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
-from mlg_troubleshoot.reporting.fleet_figures import Place, fleet_picture, wear_figure
+from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture, wear_figure
 from mlg_troubleshoot.reporting.formats import ABSENT, Lengths, landings
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.life_json import life_as_json
@@ -102,7 +102,7 @@ def fleet_document(
         for line in gears
     ]
     places = [
-        Place(
+        GearInPicture(
             line.life.name,
             line.verdict,
             _share(line.predicted_displacement_in, line.margin_in),

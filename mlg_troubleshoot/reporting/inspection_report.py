@@ -25,7 +25,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.looking_back import PastInspection
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.reporting import inspection_figures as drawn
-from mlg_troubleshoot.reporting.fleet_figures import Place, fleet_picture
+from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture
 from mlg_troubleshoot.reporting.formats import Lengths, short
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
@@ -260,10 +260,12 @@ def batch_document(
     return Document("batch.html.j2", context, stem, landscape=True, script="table.js")
 
 
-def _place_of(a: Assessment) -> Place:
+def _place_of(a: Assessment) -> GearInPicture:
     inspection, worst_in = a.inspection, a.predicted_displacement_in
     name = f"{inspection.tail_no} {inspection.side}"
-    return Place(name, a.verdict.value, None if worst_in is None else worst_in / a.margin_in)
+    return GearInPicture(
+        name, a.verdict.value, None if worst_in is None else worst_in / a.margin_in
+    )
 
 
 def write_form(

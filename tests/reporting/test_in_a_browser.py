@@ -18,6 +18,8 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Rejected
 from mlg_troubleshoot.gear.gear import Gear
+from tests.cli.conftest import mlg
+from tests.store.test_history_commands import keep, visit
 
 from .conftest import FAILURE, SOUND, WORN, Judge, Made, write_reports
 
@@ -125,3 +127,12 @@ def test_axe_finds_nothing_in_a_batch_summary(
 def test_axe_would_find_a_missing_language(worn: Made, tmp_path: Path) -> None:
     spoiled = worn.html.replace('lang="en"', "", 1)
     assert [found[0] for found in violations(spoiled, tmp_path)] == ["html-has-lang"]
+
+
+def test_axe_finds_nothing_in_the_pages_of_a_fleet_and_of_a_life(tmp_path: Path) -> None:
+    store = ("--store", tmp_path / "store.sqlite", "-q", "--no-forecast")
+    rows = [visit(n, 0.0010 + 0.0004 * n) for n in range(3)]
+    keep(tmp_path, *rows, more=("--store", str(tmp_path / "store.sqlite")))
+    mlg("fleet", *store, "--report", tmp_path / "out")
+    for file in (tmp_path / "out").glob("*.html"):
+        assert violations(file.read_text(encoding="utf-8"), tmp_path) == []
