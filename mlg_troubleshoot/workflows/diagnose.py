@@ -19,6 +19,7 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
     from mlg_troubleshoot.diagnosis.faults import DataFault
+    from mlg_troubleshoot.misfit.beliefs import Beliefs
     from mlg_troubleshoot.records.read import Source
     from mlg_troubleshoot.reporting.publish import WrittenReport
 
@@ -103,7 +104,6 @@ def diagnose_files(
     )
     from mlg_troubleshoot.diagnosis import diagnose as diagnosed
     from mlg_troubleshoot.diagnosis.causes import in_own_cause, with_own
-    from mlg_troubleshoot.diagnosis.causes.together import OtherGeometry
     from mlg_troubleshoot.misfit.beliefs import Beliefs
     from mlg_troubleshoot.records import ReadOptions, read_many
     from mlg_troubleshoot.workflows.beliefs_file import load_beliefs
@@ -115,9 +115,6 @@ def diagnose_files(
     if options.beliefs_file is not None:
         names = {cause.name for cause in with_own(own)}
         beliefs = load_beliefs(options.beliefs_file, options.sure, names)
-    if gear.linkage_known:
-        rarer = {OtherGeometry.name: beliefs.surveyed, **beliefs.rarer}
-        beliefs = replace(beliefs, rarer=rarer)
     reading = replace(
         ReadOptions.of(gear, options),
         clearance_hard_max_in=_ANY_LENGTH_IN,
@@ -147,7 +144,7 @@ def diagnose_files(
             gear.discrepancies,
             own_causes=own,
             ensemble=gear.ensemble_models[1:],
-            beliefs=beliefs,
+            beliefs=_about(gear, beliefs),
             progress=progress,
         )
     by_record = {inspection.record_id: inspection for inspection in once}
@@ -198,6 +195,15 @@ def diagnose(
         If the table cannot answer the question.
     """
     return diagnose_files([source], DiagnoseOptions(gear=gear, **declared))
+
+
+def _about(gear: Gear, beliefs: Beliefs) -> Beliefs:
+    """What is believed of a gear: another linkage is rarer where the drawn one was measured."""
+    from mlg_troubleshoot.diagnosis.causes.together import OtherGeometry
+
+    if not gear.linkage_known:
+        return beliefs
+    return replace(beliefs, rarer={OtherGeometry.name: beliefs.surveyed, **beliefs.rarer})
 
 
 def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
