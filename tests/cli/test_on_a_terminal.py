@@ -97,7 +97,7 @@ def test_a_shown_result_is_reported_and_corrected_and_shown_in_the_unit_of_entry
     )
     answer(child, "13", "done", *ENTERS, "")
     child.expect_exact(" thou")
-    child.expect_exact("contri-")
+    child.expect_exact("butes")
     answer(child, "c")
     child.expect_exact("check before computing")
     answer(child, "1", "1", "", "r")

@@ -105,7 +105,8 @@ class Trial:
             child.sendline(_ANSWERS[question].format(gear=self.gear))
         time.sleep(self.chance.choice((0.0, 0.002, 0.01, 0.05, 0.2)))
         child.kill(self.chance.choice(_ENDS))
-        child.expect(pexpect.EOF)
+        # Ctrl-C between a prompt and the wait for a key is seen with the next key only.
+        child.expect([pexpect.EOF, pexpect.TIMEOUT], timeout=5)
         child.close(force=True)
         self.interruptions += 1
 
