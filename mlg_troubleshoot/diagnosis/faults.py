@@ -34,6 +34,9 @@ _WRONG, _SURE = 0.005, 0.9
 _FREEDOM = 8.0
 # No clearance, reading or misfit is expected more sharply than this. [in]
 _LEAST_SPREAD_IN = 0.0005
+# Supposed: no joint of a gear that still moves has a radial clearance as large as this, four times
+# its limit. [in]
+_WORN_OUT_IN = 0.0325
 # Log-density of the logarithm of a value that means nothing: anywhere in four decades. [1]
 _ANYTHING = -float(np.log(4.0 * np.log(10.0)))
 # Neither plunger nor actuator goes further than this beyond mid-position. [1]
@@ -120,7 +123,7 @@ class _Meant:
 
 
 def _surprise(off: Array) -> Array:
-    """Minus the log-density of Student's t over that of its middle, 0 where there is nothing. [1]"""
+    """Minus the log-density of Student's t over its middle, 0 where there is nothing. [1]"""
     return np.nan_to_num(0.5 * (_FREEDOM + 1.0) * np.log1p(off**2 / _FREEDOM))
 
 
@@ -190,6 +193,10 @@ class _Screen:
         clearance = np.array([row.clearance for row in meant])
         readings = np.array([row.readings for row in meant])
         wear = _density(self.usual.off(clearance, place), self.usual.spread[place])
+        # One of the joints may be worn out, as rarely as there is an entry error of one kind.
+        rare = np.log(_WRONG / _KINDS / clearance.shape[1] / _WORN_OUT_IN)
+        worn_out = np.where(clearance < _WORN_OUT_IN, rare, -np.inf)
+        wear = np.where(np.isfinite(clearance), np.logaddexp(wear, worn_out), 0.0)
         again = _density(np.diff(np.sort(readings)), self.repeat_in)
         return wear.sum(axis=1) + again.sum(axis=1) + [row.evidence for row in meant]
 
@@ -234,7 +241,8 @@ class _Screen:
             for kind, factor in _FACTORS if len(joints) == 1 else _TOO_LARGE:
                 size = len(joints) * min(float(np.log(factor)), 0.0)
                 yield clearances(kind, joints, written[joints] * factor, size)
-        for j in known:
+        # A value that means nothing is large: a small one is what a restored joint has.
+        for j in [j for j in known if written[j] > self.usual.expected[place, j]]:
             nothing = _ANYTHING - float(np.log(written[j]))
             yield clearances("implausible", [j], np.full(1, np.nan), nothing)
         known = [int(j) for j in np.flatnonzero(np.isfinite(written))]
@@ -355,6 +363,7 @@ def _suspects(
     lost += _surprise((rest - np.nanmedian(rest)) / scale)
     lost += _surprise(np.diff(np.sort(table.readings_in)) / screen.repeat_in).sum(axis=1)
     suspects = (lost > np.log(_KINDS / _WRONG)) | ~np.isfinite(rest)
+    suspects &= np.isfinite(table.readings_in).any(axis=1)
     return replace(screen, usual=_usual(table, ~suspects)), suspects
 
 
