@@ -38,16 +38,16 @@ _LEAST_SPREAD_IN = 0.0005
 # its limit. [in]
 _WORN_OUT_IN = 0.0325
 # Log-density of the logarithm of a value that means nothing: anywhere in four decades. [1]
-_ANYTHING = -float(np.log(4.0 * np.log(10.0)))
+_ANYTHING = -float(np.log(4 * np.log(10)))
 # Neither plunger nor actuator goes further than this beyond mid-position. [1]
 _REACH = 1.3
 # The kinds of entry errors in a row, and what their cells are to be multiplied by.
 _FACTORS = tuple(
     (kind, factor)
     for kind, slip in (("mm_as_in", SLIPS["unit"]), ("factor_10", SLIPS["point"]))
-    for factor in (1.0 / slip.factor, slip.factor)
+    for factor in (1 / slip.factor, slip.factor)
 )
-_TOO_LARGE = tuple((kind, factor) for kind, factor in _FACTORS if factor < 1.0)
+_TOO_LARGE = tuple((kind, factor) for kind, factor in _FACTORS if factor < 1)
 _KINDS = 4
 
 
@@ -130,6 +130,16 @@ def _surprise(off: Array) -> Array:
 def _density(off: Array, spread: Array | float) -> Array:
     """Log-density of Student's t without its constant, 0 where there is nothing. [1]"""
     return np.where(np.isnan(off), 0.0, -_surprise(off / spread) - np.log(spread))
+
+
+def _cells(
+    column: list[str], written: Array, meant: Array
+) -> tuple[tuple[str, float, float | None], ...]:
+    """Cells that are not what was meant."""
+    return tuple(
+        (column[k], float(written[k]), float(meant[k]) if np.isfinite(meant[k]) else None)
+        for k in np.flatnonzero(np.isfinite(written) & (written != meant))
+    )
 
 
 @dataclass(frozen=True)
@@ -230,10 +240,7 @@ class _Screen:
         def clearances(kind: str, joints: list[int], right: Array, evidence: float) -> _Meant:
             meant = written.copy()
             meant[joints] = right
-            cells = tuple(
-                (column[j], float(written[j]), float(meant[j]) if np.isfinite(meant[j]) else None)
-                for j in joints
-            )
+            cells = _cells(column, written, meant)
             return replace(row, clearance=meant, kind=kind, cells=cells, evidence=evidence)
 
         for joints in [*([j] for j in known), *([known] if len(known) > 1 else [])]:
@@ -266,10 +273,7 @@ class _Screen:
         def readings(kind: str, places: list[int], right: Array, evidence: float) -> _Meant:
             meant = written.copy()
             meant[places] = right
-            cells = tuple(
-                (column[k], float(written[k]), float(meant[k]) if np.isfinite(meant[k]) else None)
-                for k in places
-            )
+            cells = _cells(column, written, meant)
             return replace(row, readings=meant - at_rest, kind=kind, cells=cells, evidence=evidence)
 
         end = _REACH * float(self.model.plunger(self.model.stroke[1]))
