@@ -120,6 +120,20 @@ def test_a_further_effect_makes_a_set_as_likely_as_both_together(members: tuple[
         assert further[k] == pytest.approx(marginal.explanation(1, both).log_posterior, abs=1e-8)
 
 
+@pytest.mark.parametrize("members", SETS)
+def test_a_further_effect_of_only_one_size_is_expected_as_large_as_both_together_say(
+    members: tuple[int, ...],
+) -> None:
+    given = replace(effects(mean=0.7), sign=np.zeros(P))
+    marginal = Marginal(Products(NOISE, COLUMNS, DATA), given, CONTEXTS[1], BELIEFS)
+    further, values = marginal.further(members)
+    for k in {0, 3} - set(members):
+        both = tuple(sorted({*members, k}))
+        whole = marginal.explanation(1, both)
+        assert further[k] == pytest.approx(whole.log_posterior, abs=1e-8)
+        assert values[k] == pytest.approx(whole.values[both.index(k)], abs=1e-8)
+
+
 def test_a_sign_that_an_effect_has_makes_it_twice_as_likely_and_the_other_impossible() -> None:
     right, wrong = effects(), replace(effects(), sign=-SIGN)
     bare = alone((1,), 0, FREE)
@@ -155,6 +169,22 @@ def test_probabilities_are_sums_over_all_sets_each_counted_once() -> None:
     assert found.nothing == pytest.approx(nothing, abs=2e-3)
     assert found.names["b", None] == pytest.approx(second, abs=2e-3)
     assert found.unlisted == pytest.approx(free, abs=2e-3)
+
+
+def test_odds_of_an_effect_alone_are_those_against_nothing_at_all() -> None:
+    found = search()
+    for k in range(P):
+        assert found.over_nothing[k] == pytest.approx(alone((k,), 0, FREE) - alone((), 0, FREE))
+
+
+def test_four_that_act_together_are_found() -> None:
+    rng, n = np.random.default_rng(5), 60
+    columns = rng.standard_normal((n, 6))
+    names: list[Key | None] = [(name, None) for name in "abcdef"]
+    data = columns[:, :4] @ np.full(4, 5.0) + rng.standard_normal(n)
+    listed = Effects.free(columns, names, -3.0, 5.0)
+    found = posterior(NoiseModel.white(n), data, listed, (Context.none(n),), Beliefs())
+    assert found.likeliest[0].members == (0, 1, 2, 3)
 
 
 def test_no_set_within_one_step_is_likelier_than_the_one_that_is_found() -> None:

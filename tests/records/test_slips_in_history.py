@@ -54,6 +54,14 @@ def test_the_slip_that_explains_a_jump_is_suggested(read, table, odd, words):
     assert tuple(row.clearance_in.values()) == pytest.approx(odd)
 
 
+def test_a_slip_beside_a_slip_in_another_joint_is_suggested(read, table):
+    rows = [("ODD", "N1", "LH", "RADIAL", *LEFT[:4], LEFT[4] * 10)]
+    rows.append(("NEXT", "N1", "LH", "RADIAL", *LEFT[:3], LEFT[3] * 10, LEFT[4]))
+    rows.extend((f"L{n}", "N1", "LH", "RADIAL", *LEFT) for n in range(4))
+    found = warnings(read(table(HEADER, rows)))
+    assert any("joint 5 is 10 times" in text for text in found["ODD"]), found
+
+
 def test_only_the_odd_row_is_warned_of(read, table):
     assert set(warnings(read(table(HEADER, history(RIGHT))))) == {"ODD"}
 

@@ -127,6 +127,11 @@ def test_readings_in_thou_are_not_asked_about_as_those_of_a_smaller_unit(gear):
     assert not [warning for warning in row.warnings if "were they read in" in warning]
 
 
+def test_millimetres_mostly_over_the_limit_are_asked_about_as_thou(gear):
+    row, _ = judged(gear, [0.0125] * 10, *2 * [LengthUnit.MILLIMETRE])
+    assert any("were they read in thou," in warning for warning in row.warnings), row.warnings
+
+
 def test_the_play_of_new_parts_is_stated_in_the_convention_of_the_row(gear):
     diametral = [2 * value for value in (0.0004, 0.0004, 0.0004)]
     row, _ = judged(
