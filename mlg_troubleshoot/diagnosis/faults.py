@@ -171,11 +171,13 @@ class _Screen:
         """Misfit beyond what is explained, if the row was meant so. [in]"""
         rows = self.table.take(np.full(len(meant), place))
         extension = np.array([row.extension for row in meant])
-        rows = replace(rows, quantities={**rows.quantities, ALONG: extension})
+        readings = np.array([row.readings for row in meant])
+        quantities = {**rows.quantities, ALONG: extension}
+        rows = replace(rows, readings_in=readings, quantities=quantities)
         clearance = np.array([row.clearance for row in meant])
         clearance = np.where(np.isfinite(clearance), clearance, self.usual.expected[place])
         over = predicted(self.model, rows, clearance)[0]
-        return _middle(np.array([row.readings for row in meant])) - over - self.explained[place]
+        return np.asarray(rows.measured_in - over - self.explained[place])
 
     def near(self, place: int, misfit: Array) -> Array:
         """Log-density of misfits by the other rows of the tail, gauge, technician and fleet. [1]"""
@@ -194,7 +196,7 @@ class _Screen:
             return np.zeros(len(misfit))
         density = _density(misfit[:, None] - self.rest[kept], self.scale_in)
         density = logsumexp(density, b=weight[kept] / weight.sum(), axis=1)
-        return np.where(np.isfinite(misfit), density, -np.inf)
+        return np.asarray(np.where(np.isfinite(misfit), density, -np.inf))
 
     def evidence(self, place: int, meant: list[_Meant]) -> Array:
         """Log-likelihood of a row but its misfit under each of what it may have been meant to be.
@@ -208,7 +210,8 @@ class _Screen:
         worn_out = np.where(clearance < _WORN_OUT_IN, rare, -np.inf)
         wear = np.where(np.isfinite(clearance), np.logaddexp(wear, worn_out), 0.0)
         again = _density(np.diff(np.sort(readings)), self.repeat_in)
-        return wear.sum(axis=1) + again.sum(axis=1) + [row.evidence for row in meant]
+        own = np.array([row.evidence for row in meant])
+        return np.asarray(own + wear.sum(axis=1) + again.sum(axis=1))
 
     def best(self, place: int) -> _Meant | None:
         """The likeliest entry error of a row, if one is likely."""
@@ -283,11 +286,10 @@ class _Screen:
             for kind, factor in _FACTORS:
                 size = len(places) * min(float(np.log(factor)), 0.0)
                 yield readings(kind, places, written[places] * factor, size)
-        middle = float(_middle(written[None])[0])
         for k in present if len(present) > 1 else []:
             nothing = _ANYTHING - float(np.log(abs(written[k]) + _LEAST_SPREAD_IN))
             yield readings("implausible", [k], np.full(1, np.nan), nothing)
-        nothing = _ANYTHING - float(np.log(abs(middle) + _LEAST_SPREAD_IN))
+        nothing = _ANYTHING - float(np.log(abs(float(np.nanmean(written))) + _LEAST_SPREAD_IN))
         nothing += float(_density(np.diff(np.sort(row.readings)), self.repeat_in).sum())
         wrong = readings("implausible", present, np.full(len(present), np.nan), nothing)
         if along:
@@ -331,7 +333,7 @@ def screen_faults(
             )
             for column, written, right in meant.cells
         ]
-    usable = np.isfinite(readings).any(axis=1)
+    usable = np.asarray(np.isfinite(readings).any(axis=1))
     quantities = (
         {**table.quantities, ALONG: extension} if ALONG in table.quantities else table.quantities
     )
@@ -355,7 +357,7 @@ def _suspects(
     """
     usual = _usual(table, np.ones(len(table), bool))
     clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, usual.expected)
-    misfit = _middle(table.readings_in) - predicted(model, table, clearance)[0]
+    misfit = table.measured_in - predicted(model, table, clearance)[0]
     named = np.zeros(len(table)) if explained is None else explained
     named = named + _bend(table, misfit - named)
     rest = misfit - named
@@ -368,12 +370,7 @@ def _suspects(
     lost += _surprise(np.diff(np.sort(table.readings_in)) / screen.repeat_in).sum(axis=1)
     suspects = (lost > np.log(_KINDS / _WRONG)) | ~np.isfinite(rest)
     suspects &= np.isfinite(table.readings_in).any(axis=1)
-    return replace(screen, usual=_usual(table, ~suspects)), suspects
-
-
-def _middle(readings: Array) -> Array:
-    """Median reading of each row, NaN where there is none. [in]"""
-    return np.asarray(np.ma.median(np.ma.masked_invalid(readings), axis=1).filled(np.nan))
+    return replace(screen, usual=_usual(table, ~suspects)), np.asarray(suspects)
 
 
 def _scale(values: Array) -> float:
