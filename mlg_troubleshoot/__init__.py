@@ -18,11 +18,16 @@ reading taken as bore minus pin or as total play is divided by ``ClearanceConven
 
 =======================  ==============================================================
 load_gear, Gear          a shipped gear, or a gear file of your own
+new_gear, from_pylinkage a gear file from points and links, or from a linkage of pylinkage
 predict                  worst displacement of the plunger, for one gear or a batch
-Inspection, check        one inspection, and what the decision rule says about it
+Inspection, check        one inspection or a DataFrame, and what the decision rule says about it
+read_inspections         a table as the reader of files understands it, as a DataFrame
 check_files              whole tables: CSV, xlsx, xls, ods
 write_reports            printable reports of a checked table
-diagnose_files           measured against predicted: cause, extension, gain
+diagnose, diagnose_files measured against predicted: cause, extension, gain
+diagnose_simulation      the same question for a simulation of yours
+survey                   a geometry from readings of a real gear
+forecast, Store          landings that gears have left; the records that are kept
 write_extension          the extension of a diagnosis, for `load_model_extension`
 load_index_table         precomputed sensitivity and amplification indices of a gear
 run_study                the same computed again, by the design and for the clearances you choose
@@ -40,13 +45,20 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mlg_troubleshoot.decision.assessment import Assessment, Verdict
     from mlg_troubleshoot.decision.inspection import Inspection, Outcome, Side
+    from mlg_troubleshoot.diagnosis.causes.base import Cause
     from mlg_troubleshoot.diagnosis.extension import write_extension
-    from mlg_troubleshoot.errors import TroubleshootError
+    from mlg_troubleshoot.errors import Problem, TroubleshootError
+    from mlg_troubleshoot.gear.directions import WorstCase
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
-    from mlg_troubleshoot.indices.index_table import load_index_table
+    from mlg_troubleshoot.indices.index_table import IndexTable, load_index_table
+    from mlg_troubleshoot.misfit.simulation import diagnose_simulation
+    from mlg_troubleshoot.misfit.simulation_result import SimulationDiagnosis, Suspect
     from mlg_troubleshoot.paper.study import StudyFindings, StudyOptions
+    from mlg_troubleshoot.reporting.picture import Picture
     from mlg_troubleshoot.schemas import schema
+    from mlg_troubleshoot.store.database import Store
+    from mlg_troubleshoot.surveying.result import SurveyResult
     from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length
     from mlg_troubleshoot.workflows.check import (
         CheckOptions,
@@ -54,60 +66,99 @@ if TYPE_CHECKING:
         check,
         check_files,
         predict,
+        read_inspections,
         write_reports,
     )
     from mlg_troubleshoot.workflows.diagnose import (
         DiagnoseOptions,
         DiagnoseResult,
+        diagnose,
         diagnose_files,
         load_model_extension,
     )
+    from mlg_troubleshoot.workflows.forecast import forecast
+    from mlg_troubleshoot.workflows.history import Lives
+    from mlg_troubleshoot.workflows.new_gear import WrittenGear, from_pylinkage, new_gear
     from mlg_troubleshoot.workflows.study import run_study
+    from mlg_troubleshoot.workflows.survey import survey
 
 _HOME = {
     "decision.assessment": "Assessment Verdict",
     "decision.inspection": "Inspection Outcome Side",
+    "diagnosis.causes.base": "Cause",
     "diagnosis.extension": "write_extension",
-    "errors": "TroubleshootError",
+    "errors": "Problem TroubleshootError",
     "gear.gear": "Gear",
+    "gear.directions": "WorstCase",
     "gear.gear_file": "load_gear shipped_gears",
-    "schemas": "schema",
-    "indices.index_table": "load_index_table",
+    "indices.index_table": "IndexTable load_index_table",
+    "misfit.simulation": "diagnose_simulation",
+    "misfit.simulation_result": "SimulationDiagnosis Suspect",
     "paper.study": "StudyFindings StudyOptions",
+    "reporting.picture": "Picture",
+    "schemas": "schema",
+    "store.database": "Store",
+    "surveying.result": "SurveyResult",
     "units": "ClearanceConvention LengthUnit parse_length",
-    "workflows.check": "CheckOptions CheckResult check check_files predict write_reports",
-    "workflows.diagnose": "DiagnoseOptions DiagnoseResult diagnose_files load_model_extension",
+    "workflows.check": (
+        "CheckOptions CheckResult check check_files predict read_inspections write_reports"
+    ),
+    "workflows.diagnose": (
+        "DiagnoseOptions DiagnoseResult diagnose diagnose_files load_model_extension"
+    ),
+    "workflows.forecast": "forecast",
+    "workflows.history": "Lives",
+    "workflows.new_gear": "WrittenGear from_pylinkage new_gear",
     "workflows.study": "run_study",
+    "workflows.survey": "survey",
 }
 _MODULES = {name: module for module, names in _HOME.items() for name in names.split()}
 
 __all__ = [
     "Assessment",
+    "Cause",
     "CheckOptions",
     "CheckResult",
     "ClearanceConvention",
     "DiagnoseOptions",
     "DiagnoseResult",
     "Gear",
+    "IndexTable",
     "Inspection",
     "LengthUnit",
+    "Lives",
     "Outcome",
+    "Picture",
+    "Problem",
     "Side",
+    "SimulationDiagnosis",
+    "Store",
     "StudyFindings",
     "StudyOptions",
+    "SurveyResult",
+    "Suspect",
     "TroubleshootError",
     "Verdict",
+    "WorstCase",
+    "WrittenGear",
     "check",
     "check_files",
+    "diagnose",
     "diagnose_files",
+    "diagnose_simulation",
+    "forecast",
+    "from_pylinkage",
     "load_gear",
     "load_index_table",
     "load_model_extension",
+    "new_gear",
     "parse_length",
     "predict",
+    "read_inspections",
     "run_study",
     "schema",
     "shipped_gears",
+    "survey",
     "write_extension",
     "write_reports",
 ]

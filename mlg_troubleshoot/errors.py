@@ -63,10 +63,23 @@ class InconclusiveDataError(TroubleshootError):
 class Problem:
     """One thing that is wrong with the input, with its place and its remedy.
 
-    code: stable name of the kind of problem, for example ``clearance_out_of_range``.
-    file: as the user named it; None for values given on the command line.
-    row: counted from 1 with the header included.
-    column, cell: its header, and as a spreadsheet program names it, for example ``F7``.
+    Parameters
+    ----------
+    code : str
+        Stable name of the kind of problem, for example ``clearance_out_of_range``.
+    file : str or None
+        As the user named it, or ``DataFrame``; None for values given on the command line.
+    sheet : str or None
+        Its worksheet.
+    row : int or None
+        Counted from 1 with the header included. [1]
+    column, cell : str or None
+        Its header, and as a spreadsheet program names it, for example ``F7``; of a DataFrame
+        ``loc[label, column]``.
+    value : str or None
+        What stands there.
+    expected, remedy : str
+        What should stand there, and what to do.
     """
 
     code: str

@@ -169,7 +169,13 @@ class TargetedCause(TypedDict):
     target: str | None
 
 
-class PossibleCause(TargetedCause):
+class DescribedCause(TargetedCause):
+    """A cause in a sentence, as whoever wrote it says what it is."""
+
+    sentence: str
+
+
+class PossibleCause(DescribedCause):
     """A cause that the data do not rule out, and the reading that would."""
 
     separating_reading: str
@@ -190,7 +196,7 @@ class RivalTenTimesLikelier(TargetedCause):
     probability_of_first: Probability
 
 
-class NamedCauseOutput(TargetedCause):
+class NamedCauseOutput(DescribedCause):
     """A cause that the data name; aliases: what these rows cannot tell from it."""
 
     effect_rms_in: Size
@@ -208,7 +214,7 @@ class NotTestable(TypedDict):
     missing_column: str
 
 
-class FittedTerm(TargetedCause):
+class FittedTerm(DescribedCause):
     """One named cause with its fitted parameter."""
 
     parameter: str

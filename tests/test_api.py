@@ -23,7 +23,7 @@ FAILURE = {3: 0.013, 5: 0.007}
 ROOMS = ("diagnosis", "wear")
 # Names of a room that the page describes with the package.
 ALSO_ABOVE = {
-    "mlg_troubleshoot": set(),
+    "mlg_troubleshoot": {"Cause", "SimulationDiagnosis", "Suspect", "diagnose_simulation"},
     "mlg_troubleshoot.diagnosis": {"write_extension"},
     "mlg_troubleshoot.wear": set(),
 }

@@ -41,7 +41,7 @@ def test_every_door_leads_into_its_room(room: str) -> None:
 
 
 # Rooms that scripts use, whose names nobody in the package needs to take.
-FOR_SCRIPTS = {"diagnosis", "records", "schemas", "wear", "cli"}
+FOR_SCRIPTS = {"diagnosis", "notebook", "records", "schemas", "wear", "cli"}
 
 
 @pytest.mark.parametrize("room", sorted({*house.rooms()} - FOR_SCRIPTS))

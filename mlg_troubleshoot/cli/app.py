@@ -16,6 +16,7 @@ from mlg_troubleshoot.cli import (
     fleet,
     gear,
     history,
+    new_gear,
     options,
     reconstruct,
     separable,
@@ -78,6 +79,8 @@ app.add_typer(history.history_app())
 app.add_typer(gear_app)
 gear_app.callback(epilog="Example: [b]mlg gear verify[/b]")(gear.show)
 gear_app.command(epilog="Example: [b]mlg gear verify[/b]")(gear.verify)
+gear_app.command(epilog=new_gear.EPILOG)(new_gear.new)
+gear_app.command(epilog="Example: [b]mlg gear draw gear.svg[/b]")(new_gear.draw)
 gear_app.command(epilog=reconstruct.EPILOG)(reconstruct.reconstruct)
 gear_app.command(epilog=separable.EPILOG)(separable.separable)
 gear_app.command(epilog=survey.EPILOG)(survey.survey)

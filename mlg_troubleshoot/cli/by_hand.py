@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
+from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
@@ -16,15 +17,22 @@ from mlg_troubleshoot.decision.columns import (
     SIDE,
     TAIL_NO,
 )
-from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.cli.prompts import Answers, RichTerminal
+    from mlg_troubleshoot.cli.prompts import (
+        Answers,
+        RichTerminal,
+        Session,
+        SessionStore,
+        Visit,
+    )
+    from mlg_troubleshoot.store import Store
 
 
 def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
@@ -75,7 +83,7 @@ def _judged(
 
 def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
     """What the flags answer already of the questions on a terminal, judged as a row would be."""
-    from mlg_troubleshoot.cli.prompts.answers import LENGTHS, Answers
+    from mlg_troubleshoot.cli.prompts.answers import LENGTHS, REST, Answers
 
     typed = flags.typed
     unit = declared.unit or LengthUnit.INCH
@@ -92,19 +100,61 @@ def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
         unit=declared.unit,
         convention=declared.convention,
         record_id=typed.get(RECORD_ID.name),
+        todo=tuple(asked for asked in REST if asked not in typed),
     ).with_more(**{**typed, **with_unit, OUTCOME.name: judged.outcome})
 
 
-def what_now(terminal: RichTerminal) -> str:
-    """Ask what is to follow a result: its report, a correction, or nothing."""
-    typed = None
-    while typed not in ("", "r", "c"):
-        try:
-            asked = terminal.ask(" r = write the report, c = correct an answer, Enter = done > ")
-        except EOFError:
-            return ""
-        typed = asked.strip().lower()
-    return typed
+def unfinished(store: SessionStore, terminal: RichTerminal, gear: Gear, flags: Flags) -> Session:
+    """The unfinished entry to go on with: the last one, or the one of the gear that flags name."""
+    from mlg_troubleshoot.cli.prompts.pages import unfinished_lines
+
+    found, damaged = store.unfinished(gear.id)
+    for message in damaged:
+        output.say(message)
+    tail, side = (flags.typed.get(column.name) for column in (TAIL_NO, SIDE))
+    named = [
+        each
+        for each in found
+        if tail in (None, each.answers.tail_no)
+        and Side.spelt(side or "") in (None, each.answers.side)
+    ]
+    saved = next(iter(named), None) or (None if tail else store.latest())
+    if saved is None:
+        raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
+    others = tuple(each for each in found if each.id != saved.id)
+    if others:
+        terminal.say(unfinished_lines(others))
+        output.say("Go on with another one: mlg check --resume --tail TAIL --side LH|RH")
+    return saved
+
+
+def kept_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
+    """The last visit to a gear; what cannot be read is said, and keeps nobody from a new one."""
+    from mlg_troubleshoot.cli.prompts import last_visit
+    from mlg_troubleshoot.store import StoreError
+
+    try:
+        return last_visit(store, gear, tail, side)
+    except (OutputError, StoreError) as error:
+        output.say(f"The records of {tail} {side} cannot be read: {error.message}. {error.remedy}")
+        return None
+
+
+def continued(
+    read: Inspection, continues: str, visit: Visit | None
+) -> tuple[Inspection, Visit | None]:
+    """An entry that goes on with a kept inspection, and that one; if it was changed meanwhile, the
+    entry is one of its own.
+    """
+    if visit is not None and visit.record.digest == continues:
+        return visit.completed(read), visit
+    from mlg_troubleshoot.records import made_record_id
+
+    output.say(
+        "Note: the inspection that this entry goes on with was changed meanwhile: the entry is kept"
+        " as one of its own."
+    )
+    return replace(read, record_id=made_record_id(read.tail_no, read.side, datetime.now())), None
 
 
 def advice_for(

@@ -12,6 +12,8 @@ import typer
 from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.options import ReportFormat
 from mlg_troubleshoot.decision.columns import (
+    DATE,
+    LANDINGS,
     MARGIN,
     OUTCOME,
     PLUNGER_DISPLACEMENT,
@@ -37,6 +39,8 @@ _OF_ONE_GEAR: options.ColumnFlags = {
         "Measured plunger displacement at mid-position, e.g. 0.041in.",
     ),
     MARGIN.name: ("--margin", "VALUE", "This gear's own margin, e.g. 0.028in."),
+    DATE.name: ("--date", "DATE", "Day of the inspection, e.g. 2026-03-04."),
+    LANDINGS.name: ("--landings", "N", "Landings since overhaul."),
     "restored_joints": ("--restored", "JOINTS", "Joints restored since, e.g. 3,5."),
     "repair_date": ("--repair-date", "DATE", "When, e.g. '2026-03-04 14:30'."),
     "plunger_date": ("--plunger-date", "DATE", "When the plunger was read."),

@@ -4,10 +4,11 @@ found.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli import by_hand, history, options, output
 from mlg_troubleshoot.cli.check import Flags, Wanted
@@ -20,6 +21,10 @@ from mlg_troubleshoot.outputs import OutputFile
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
+from mlg_troubleshoot.workflows.index_tables import renew_index_table
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.store import Record
 
 # Where the prompts write a report that was not asked for by a flag.
 _ASKED_FOR = Path("report")
@@ -56,12 +61,14 @@ class Run:
             seed=wanted.seed,
             extension=load_model_extension(extensions, tables.gear, causes),
         )
-        self._place = (
-            options.Records(wanted.store, tables.gear).kept if wanted.keep or self._asks else None
-        )
+        self._records = options.Records(wanted.store, tables.gear).kept
+        self._place = self._records if wanted.keep or self._asks else None
 
     def run(self) -> int:
         """Judge, show and keep; the exit code is returned."""
+        renewed = renew_index_table(load_gear(self._asked.gear))
+        if renewed is not None:
+            output.say(f"Note: {renewed}")
         if self._asks:
             result = self._ask()
         else:
@@ -101,35 +108,54 @@ class Run:
                 " --convention.",
             )
 
-        from mlg_troubleshoot.cli.prompts import RichTerminal, SessionStore, ask_inspection
+        from mlg_troubleshoot.cli.prompts import (
+            Effect,
+            RichTerminal,
+            SessionStore,
+            ask_inspection,
+        )
 
         wanted = self._wanted
         gear = load_gear(self._asked.gear)
         store = SessionStore(wanted.store)
         terminal = RichTerminal()
-        saved = store.latest() if wanted.resume else None
-        if wanted.resume and saved is None:
-            raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
+        saved = by_hand.unfinished(store, terminal, gear, self._flags) if wanted.resume else None
         given = by_hand.answers_of(self._flags, self._asked)
-        advice = by_hand.advice_for(gear)
-        entry = ask_inspection(gear, terminal, store, given, saved=saved, advice=advice)
-        # The entry stays open until its result was shown and kept.
+        find = partial(by_hand.kept_visit, self._records, gear)
+        ask = partial(
+            ask_inspection, gear, terminal, store, advice=by_hand.advice_for(gear), find_visit=find
+        )
+        entry = ask(given, saved=saved)
         while True:
-            unit = entry.session.answers.unit or self._asked.unit or LengthUnit.INCH
-            result = task.check_inspection(entry.inspection, self._asked, self._place)
-            self._publish(result, unit)
-            is_asked_for = wanted.report is not None or wanted.as_json
-            now = "" if is_asked_for else by_hand.what_now(terminal)
-            if now == "c":
-                entry = ask_inspection(
-                    gear, terminal, store, given, saved=entry.session, correct=True
-                )
-                continue
-            if now == "r":
-                self._write_reports(result, _ASKED_FOR, self._seen(unit))
-            self._keep(result)
-            store.finish(entry.session)
-            return result
+            inspection, visit = entry.inspection, entry.visit
+            answers = entry.session.answers if visit is None else visit.answers
+            before = None
+            if visit is None and answers.continues:
+                before = find(inspection.tail_no, inspection.side)
+                inspection, before = by_hand.continued(inspection, answers.continues, before)
+            unit = answers.unit or self._asked.unit or LengthUnit.INCH
+            result = task.check_inspection(inspection, self._asked, self._place)
+            match entry.effect:
+                case Effect.COMPUTE:
+                    # The verdict is shown whatever becomes of the records, and stands last.
+                    try:
+                        self._keep(result, None if before is None else before.record)
+                    finally:
+                        self._publish(result, unit)
+                    # The entry stays open until its result was kept and shown.
+                    store.finish(entry.session)
+                    if wanted.report is not None or wanted.as_json:
+                        return result
+                case Effect.SHOW:
+                    self._show(result, self._seen(unit).show, detail=True)
+                case Effect.REPORT:
+                    self._write_reports(result, _ASKED_FOR, self._seen(unit))
+                case _:
+                    return result
+            visit = find(inspection.tail_no, inspection.side)
+            if visit is None:
+                return result
+            entry = ask(given, visit=visit)
 
     def _seen(self, entered_in: LengthUnit) -> Settings:
         """Lengths are shown in the unit that a flag or the memory says, or else in that of the
@@ -150,7 +176,7 @@ class Run:
                 check_json_pieces(*found) if len(result.judgements) > 1 else check_as_json(*found)
             )
         else:
-            self._show(result, seen.show)
+            self._show(result, seen.show, detail=wanted.detail)
         if wanted.csv is not None:
             task.write_verdicts(result, wanted.csv)
         if wanted.annotate is not None:
@@ -158,13 +184,13 @@ class Run:
         if wanted.report is not None:
             self._write_reports(result, wanted.report, seen)
 
-    def _show(self, result: task.CheckResult, unit: LengthUnit) -> None:
+    def _show(self, result: task.CheckResult, unit: LengthUnit, *, detail: bool) -> None:
         if not self._wanted.quiet:
             notes.show_notes(result.notes)
         notes.show_problems(result.problems)
         screen = output.console(unit=unit)
         if len(result.judgements) == 1:
-            one_gear.show(result.judgements[0], result.gear, screen, detail=self._wanted.detail)
+            one_gear.show(result.judgements[0], result.gear, screen, detail=detail)
         elif result.judgements:
             batch.show(result, screen, every=self._wanted.every)
             both = task.before_and_after(result.judgements)
@@ -204,28 +230,35 @@ class Run:
             )
         output.say_written(written, quiet=self._wanted.quiet)
 
-    def _keep(self, result: task.CheckResult) -> None:
+    def _keep(self, result: task.CheckResult, before: Record | None = None) -> None:
+        """Add what was found to the store; what continues a kept inspection takes its place."""
         if self._place is None:
             return
-        from mlg_troubleshoot.workflows.keep import keep
+        from mlg_troubleshoot.life.folding import warnings_of
+        from mlg_troubleshoot.workflows.keep import Kept, is_same, keep, supersede
 
+        if before is not None:
+            if not is_same(before, result):
+                supersede(self._place, before, result, self._asked)
+            added = Kept(1, 0, tuple(warnings_of(self._place, [(before.tail_no, before.side)])))
+        else:
+            added = keep(result, self._asked, self._place, self._same_tail())
+        if not self._wanted.quiet:
+            noun = "inspection" if added.new == 1 else "inspections"
+            known = f", {added.known} known already" if added.known else ""
+            output.say(f"{added.new} {noun} kept in {self._place.place}{known}.")
+        for warning in added.warnings:
+            output.say(f"Warning: {warning}")
+
+    def _same_tail(self) -> Callable[[str, str], bool] | None:
+        """Who says whether two spellings of a tail number are one aircraft."""
         tails = self._wanted.tails
         if tails not in (None, "same", "apart"):
             raise UsageError(
                 f"--tails {tails!r} is not same or apart",
                 "Give same (one aircraft) or apart (two).",
             )
-        asked = history.ask_tail if output.can_ask() else None
-        added = keep(
-            result,
-            self._asked,
-            self._place,
-            asked if tails is None else lambda _new, _kept: tails == "same",
-        )
-        if not self._wanted.quiet:
-            output.say(
-                f"Kept in {self._place.place}: {added.new} new records, {added.known} known"
-                " already."
-            )
-        for warning in added.warnings:
-            output.say(f"Warning: {warning}")
+        if tails is not None:
+            return lambda _new, _kept: tails == "same"
+        # A command with a FILE never waits for a key.
+        return history.ask_tail if self._asks else None

@@ -116,8 +116,8 @@ def diagnose(
 
 
 def _unwritten(diagnosis: Diagnosis) -> str:
-    if diagnosis.gain is not None and not diagnosis.gain.likelier:
-        return "No extension written: held-out aircraft are not likelier with it than without."
+    if diagnosis.gain is not None and not diagnosis.gain.better:
+        return "No extension written: held-out aircraft are not predicted better with it."
     return (
         f"No extension written: the verdict is {diagnosis.verdict}, no cause of the model is named"
         " alone."

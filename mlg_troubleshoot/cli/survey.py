@@ -93,7 +93,7 @@ def survey(
     outputs = () if write is None else task.written_with(write)
     claim(gear, [file, inspections], outputs, wanted.report, force=wanted.force)
     with stages(quiet=wanted.quiet) as bar:
-        result = task.survey_gear(
+        result = task.survey(
             file,
             gear,
             write=write,

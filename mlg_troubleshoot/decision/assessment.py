@@ -9,6 +9,7 @@ from enum import StrEnum
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.decision.plan import Basis, End, Plan, Step
+from mlg_troubleshoot.results import Result
 
 
 class Verdict(StrEnum):
@@ -222,7 +223,6 @@ class Posterior:
     no_joint_worn: chance that no joint is worn beyond its limit. [1]
     not_clearance: chance that something other than clearance displaced the plunger. [1]
     called_worn: groups that are more likely worn than not.
-    effective_draws: independent draws that the result is worth. [1]
     """
 
     groups: tuple[GroupChance, ...]
@@ -230,7 +230,6 @@ class Posterior:
     not_clearance: float
     intervals: tuple[ClearanceInterval, ...]
     called_worn: tuple[tuple[int, ...], ...]
-    effective_draws: float
     text: str
 
 
@@ -251,8 +250,8 @@ class _Planned:
         return self.plan.end
 
 
-@dataclass(frozen=True, slots=True)
-class Assessment(_Planned):
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Assessment(_Planned, Result):
     """The decision about one gear.
 
     Parameters
@@ -382,8 +381,8 @@ class Assessment(_Planned):
         return tuple(sorted(self.joints, key=lambda finding: finding.rank))
 
 
-@dataclass(frozen=True, slots=True)
-class Rejected(_Planned):
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Rejected(_Planned, Result):
     """A row that cannot be judged: verdict INVALID, its numbers absent."""
 
     row: InvalidRow

@@ -12,6 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 # Standard uncertainty of a clearance reading that states none. [in]
@@ -106,8 +107,8 @@ class RowSource:
     row: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Inspection:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Inspection(Result):
     """One valid inspection of one gear.
 
     Parameters
@@ -269,6 +270,8 @@ class Inspection:
 class InvalidRow:
     """A data row that cannot be judged, with the columns to correct; its problems stand in the list
     of problems.
+
+    understood: what could be read of it, None if nothing; what it lacks is None there.
     """
 
     record_id: str | None
@@ -277,3 +280,4 @@ class InvalidRow:
     correct: tuple[str, ...]
     warnings: tuple[str, ...] = ()
     source: RowSource = RowSource()
+    understood: Inspection | None = None

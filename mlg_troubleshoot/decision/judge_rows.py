@@ -243,7 +243,7 @@ def _detail(
         detail["confidence"] = check_probability(one, worst_in, budget, rng)
         if found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
             detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    detail["posterior"] = explain(one, rng, causes=causes)
+    detail["posterior"] = explain(one, causes)
     return detail
 
 

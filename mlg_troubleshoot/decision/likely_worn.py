@@ -1,14 +1,15 @@
-"""Which joints explain a measured plunger displacement: importance sampling over wear, clearances
-and directions.
+"""Which joints explain a measured plunger displacement, by the same densities as the plan.
 
-Wear before the plunger is read, and the chance that rigging moved it, are those of the plan
-(`causes`). Measured joints have their reading with its uncertainty. Every clearance takes a
-uniformly random direction.
+Wear before the plunger is read, and the chances that rigging moved it or that loads hold the pins,
+are those of `causes`. Measured joints have their reading with its uncertainty. The density of a sum
+of clearances is the product of their characteristic functions; that of one clearance, given the
+sum, follows from the product of all others.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,115 +17,119 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import Causes, believed
-from mlg_troubleshoot.decision.prediction import model_uncertainty
+from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
-from mlg_troubleshoot.decision.wear_levels import BEYOND, DENSITIES, SHARE, SHARES, level_chances
-from mlg_troubleshoot.gear.gear import Gear
-
-_QUANTILES = (0.05, 0.5, 0.95)
-# Below this chance no joint is named as likely worn. [1]
-_WORTH_SAYING = 0.05
-# Standard deviation of what a wrong rigging adds, in units of the gear's margin. [1]
-_OFFSET_U = 2.0
-# A worn joint is drawn at least this often, and weighed accordingly. [1]
-_DRAWN_WORN = 0.1
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
+from mlg_troubleshoot.decision.waves import FREQUENCIES, bessel, blur
+from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, level_chances
 
 
-def explain(
-    one: Cases, rng: np.random.Generator, draws: int = 32768, causes: Causes | None = None
-) -> Posterior | None:
-    gear, reading = one.gear, float(one.mean_in[0])
+def explain(one: Cases, causes: Causes | None = None) -> Posterior | None:
+    gear, reading = one.gear, abs(float(one.mean_in[0]))
     if not np.isfinite(reading):
         return None
-    drawn, log_weight = _draw_clearances(one, rng, draws)
-    turns = rng.uniform(0.0, 2.0 * np.pi, drawn.shape)
-    links = np.empty((draws, 2 * drawn.shape[1]))
-    links[:, 0::2], links[:, 1::2] = drawn * np.cos(turns), drawn * np.sin(turns)
-    predicted = responses(gear)[0].displacement(links)
-    u = np.hypot(model_uncertainty(predicted, one.residual_u_in), one.mean_u_in[0])
-    wide = np.hypot(u, _OFFSET_U * gear.margin.value)
-    plain = log_weight - np.log(u) - 0.5 * ((reading - predicted) / u) ** 2
-    other = log_weight - np.log(wide) - 0.5 * ((reading - predicted) / wide) ** 2
-    by_joints, by_rigging = (np.exp(each - each.max()) for each in (plain, other))
-    rigging = float((causes or believed(one)).rigging[0])
-    weight = (1.0 - rigging) * by_joints / by_joints.sum() + rigging * by_rigging / by_rigging.sum()
-    worn = drawn > gear.limits_in
-    return _summary(gear, drawn, worn, weight, rigging)
-
-
-def _draw_clearances(one: Cases, rng: np.random.Generator, n: int) -> tuple[Array, Array]:
-    """Clearances, and the log of prior over proposal: worn joints are drawn more often than they
-    occur. [in, 1]
-    """
-    found, limits = one.clearance_in[0], one.gear.limits_in
-    level = rng.choice(len(DENSITIES), n, p=level_chances(one)[0])
-    chance = BEYOND.sum(axis=1)[level]
-    often = np.maximum(chance, _DRAWN_WORN)
-    drawn, log_weight = np.empty((n, len(found))), np.zeros(n)
-    for j in range(len(found)):
-        if np.isfinite(found[j]):
-            drawn[:, j] = _reading_with_error(float(found[j]), float(one.gauge_u_in[0, j]), rng, n)
-            continue
-        is_worn = rng.random(n) < often
-        log_weight += np.where(is_worn, np.log(chance / often), np.log((1 - chance) / (1 - often)))
-        for k in range(len(DENSITIES)):
-            for part, rows in ((BEYOND[k], is_worn), (DENSITIES[k] - BEYOND[k], ~is_worn)):
-                here = np.flatnonzero(rows & (level == k))
-                drawn[here, j] = rng.choice(SHARES, len(here), p=part / part.sum())
-                drawn[here, j] += SHARE * (rng.random(len(here)) - 0.5)
-        drawn[:, j] *= limits[j]
-    return drawn, log_weight
-
-
-def _reading_with_error(found: float, u: float, rng: np.random.Generator, n: int) -> Array:
-    """Clearances that a reading allows: normal, cut off at 0. [in]"""
-    drawn = rng.normal(found, u, n)
-    for _ in range(60):
-        below = drawn < 0.0
-        if not below.any():
-            break
-        drawn[below] = rng.normal(found, u, int(below.sum()))
-    return np.maximum(drawn, 0.0)
-
-
-def _summary(
-    gear: Gear, drawn: Array, worn: Mask, weight: Array, not_clearance: float
-) -> Posterior:
-    index = {number: j for j, number in enumerate(gear.joint_numbers)}
-    chances = [
-        GroupChance(
-            group, min(float(weight[worn[:, [index[n] for n in group]].any(axis=1)].sum()), 1.0)
+    found = causes or believed(one)
+    rigging = float(found.rigging[0])
+    loaded = float(found.joints[0] * found.loaded[0])
+    clearance = _clearances(one)
+    turns = FREQUENCIES * (responses(gear)[0].amplification[:, None] * clearance.at_in)[..., None]
+    random, (mean, spread) = bessel(turns), PRIORS.cosine
+    aligned = np.exp(1j * mean * turns - 0.5 * (spread * turns) ** 2)
+    u = np.hypot(found.u_in[0], PRIORS.linkage_u_in)
+    # As wide as what a wrong rigging adds, which is about even.
+    wide = np.hypot(u, PRIORS.offset * one.margin_in[0] / np.sqrt(3.0))
+    given = [
+        (chance, _Given(clearance, waves, reading, scatter))
+        for chance, waves, scatter in (
+            (1.0 - rigging - loaded, random, u),
+            (rigging, random, wide),
+            (loaded, aligned, u),
         )
-        for group in gear.link_groups
     ]
+    density = sum(chance * each.density for chance, each in given)
+
+    def chance_of_none(joints: Sequence[int]) -> float:
+        places = [gear.joint_numbers.index(number) for number in joints]
+        sound = sum(chance * each.none_worn(places) for chance, each in given)
+        # Readings are followed to four standard uncertainties: nothing is surer than that.
+        return float(np.clip(sound, 1e-4, 1.0 - 1e-4))
+
+    chances = [GroupChance(group, 1.0 - chance_of_none(group)) for group in gear.link_groups]
     chances.sort(key=lambda chance: -chance.probability)
-    intervals = []
-    for number, j in index.items():
-        low, median, high = _weighted_quantiles(drawn[:, j], weight)
-        intervals.append(
-            ClearanceInterval(number, low, median, high, min(float(weight[worn[:, j]].sum()), 1.0))
-        )
-    called = tuple(chance.joints for chance in chances if chance.probability > 0.5)
-    # A sum of weights may pass 1 by rounding.
-    none = min(float(weight[~worn.any(axis=1)].sum()), 1.0)
-    effective = float(1.0 / np.sum(weight**2))
-    return Posterior(
-        tuple(chances),
-        none,
-        not_clearance,
-        tuple(intervals),
-        called,
-        effective,
-        _text(chances, called, none, not_clearance),
+    intervals = tuple(
+        ClearanceInterval(number, *_quantiles(at, share), 1.0 - chance_of_none([number]))
+        for number, at, share in zip(gear.joint_numbers, clearance.at_in, density, strict=True)
     )
+    called = tuple(chance.joints for chance in chances if chance.probability > 0.5)
+    none = chance_of_none(gear.joint_numbers)
+    said = _text(chances, called, none, rigging)
+    return Posterior(tuple(chances), none, rigging, intervals, called, said)
 
 
-def _weighted_quantiles(values: Array, weight: Array) -> tuple[float, float, float]:
-    order = np.argsort(values)
-    steps = np.cumsum(weight[order])
-    at = np.minimum(np.searchsorted(steps, np.array(_QUANTILES) * steps[-1]), len(values) - 1)
-    low, median, high = values[order][at].tolist()
+@dataclass(frozen=True, slots=True, eq=False)
+class _Clearances:
+    """What the joints of one gear may be worn to before its plunger is read.
+
+    at_in: possible clearances, (joints, places). [in]
+    chances: of each at each level of wear, (levels, joints, places); sound: which are within their
+    limit. levels: chances of the levels. [1]
+    """
+
+    at_in: Array
+    chances: Array
+    sound: Mask
+    levels: Array
+
+
+def _clearances(one: Cases) -> _Clearances:
+    read, limits = one.measured[0, :, None], one.gear.limits_in[:, None]
+    # Clearances that a reading allows: normal, cut off at 0.
+    scores = np.linspace(-4, 4, len(SHARES))
+    near = one.filled(0.0)[0, :, None] + one.gauge_u_in[0, :, None] * scores
+    allowed = np.exp(-0.5 * scores**2) * (near >= 0)
+    allowed /= allowed.sum(axis=1, keepdims=True)
+    at = np.where(read, np.maximum(near, 0.0), SHARES * limits)
+    chances = np.where(read, allowed, DENSITIES[:, None, :])
+    return _Clearances(at, chances, at <= limits, level_chances(one)[0])
+
+
+class _Given:
+    """The clearances given the plunger's reading, where pins rest in one way.
+
+    waves: characteristic function of each clearance, (joints, places, terms). density: chance of
+    each clearance, (joints, places). [1]
+    """
+
+    def __init__(self, before: _Clearances, waves: Array, reading_in: float, u_in: float) -> None:
+        self.seen = blur(u_in) * np.exp(-1j * FREQUENCIES * reading_in)
+        self.whole = np.einsum("kjs,jst->kjt", before.chances, waves)
+        sound = np.where(before.sound, before.chances, 0.0)
+        self.sound, self.sound_mass = np.einsum("kjs,jst->kjt", sound, waves), sound.sum(axis=2)
+        fits = np.maximum(self._fits(self.whole), 1e-12)
+        self.levels = before.levels / (before.levels @ fits)
+        joints = range(len(waves))
+        rest = np.stack([np.delete(self.whole, j, axis=1).prod(axis=1) for j in joints], axis=1)
+        of_each = 0.5 + np.einsum("kjt,jst->kjs", rest * self.seen, waves).real
+        density = np.einsum("k,kjs->js", self.levels, before.chances * np.maximum(of_each, 1e-12))
+        self.density = density / density.sum(axis=1, keepdims=True)
+
+    def _fits(self, waves: Array, mass: Array | float = 1.0) -> Array:
+        """How well each level of wear fits the reading, some clearances left out. [1]"""
+        return np.asarray(0.5 * mass + (waves.prod(axis=1) @ self.seen).real)
+
+    def none_worn(self, places: Sequence[int]) -> float:
+        """Chance that none of some joints is beyond its limit. [1]"""
+        waves = self.whole.copy()
+        waves[:, places] = self.sound[:, places]
+        return float(self.levels @ self._fits(waves, self.sound_mass[:, places].prod(axis=1)))
+
+
+def _quantiles(at: Array, density: Array) -> tuple[float, float, float]:
+    """Lower end, median and upper end of the central 90 % interval."""
+    edges = np.r_[at[0], 0.5 * (at[1:] + at[:-1]), at[-1]]
+    steps = np.r_[0.0, np.cumsum(density)]
+    low, median, high = np.interp((1.0 - CONFORMANCE, 0.5, CONFORMANCE), steps, edges).tolist()
     return low, median, high
 
 
@@ -134,7 +139,7 @@ def _text(
     none: float,
     not_clearance: float,
 ) -> str:
-    likely = [chance for chance in chances[:2] if chance.probability >= _WORTH_SAYING]
+    likely = [chance for chance in chances[:2] if chance.probability >= 1.0 - CONFORMANCE]
     ranked = ", then ".join(
         f"{' or '.join(f'#{n}' for n in chance.joints)} ({percent(chance.probability)})"
         for chance in likely

@@ -29,9 +29,10 @@ from mlg_troubleshoot.decision.plan import (
 )
 from mlg_troubleshoot.decision.plunger_reading import Compared
 from mlg_troubleshoot.decision.prediction import BatchPrediction
+from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.repair import removable
 from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.verdict_rule import SCORE, tabled_normal_cdf, verdict
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, tabled_normal_cdf, verdict
 from mlg_troubleshoot.decision.wear_levels import TOO_CLOSE, Unread
 
 # Standard uncertainties that a better gauge can reach: those of bore gauges and micrometers. [in]
@@ -39,7 +40,7 @@ BETTER_GAUGES_IN = (0.0004, 0.0003)
 # Readings of one round are read together until the verdict is settled with this chance. [1]
 _SETTLED = 0.2
 # A cause counts as excluded below this chance. [1]
-_EXCLUDED = 0.05
+_EXCLUDED = 1 - CONFORMANCE
 # Joints read in one round of a gear that failed: until this share of what may be worn in the area
 # is read, two at least. [1]
 _TOGETHER = 0.6
@@ -47,20 +48,19 @@ _TOGETHER = 0.6
 _MOST_EXTRA = 2
 # They are chosen among as many joints, those that move the plunger most.
 _MOST_TRIED = 6
-# A repair that leaves the plunger outside with more than this chance is not worth its minutes. [1]
-_HOPELESS = 0.5
-# Chance that the joints are the cause from which a sound one is restored. [1]
-_SURE_ENOUGH = 0.75
 # What one repair may be above the chance that the shop accepts over all: most are far below it. [1]
 _FOR_ONE_REPAIR = 3.0
 
 
+def _correction(text: str) -> Plan:
+    return Plan((Step(Action.CORRECT, (), 0.0, None, text),), End.CORRECT)
+
+
 def correct(row: InvalidRow) -> Plan:
-    return Plan((Step(Action.CORRECT, (), 0.0, None, sentences.correct(row.correct)),), End.CORRECT)
+    return _correction(sentences.correct(row.correct))
 
 
-CONFIRM = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CONFIRM),), End.CORRECT)
-NOT_CLOSING = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CHECK_ENTRIES),), End.CORRECT)
+CONFIRM, NOT_CLOSING = map(_correction, (sentences.CONFIRM, sentences.CHECK_ENTRIES))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -246,9 +246,10 @@ class _PlanBuilder:
                 self._check_rigging()
                 if rigging > 0.5:
                     return self._restore_over_limit()._end(End.NOT_EXPLAINED)
+                joints /= 1.0 - (1.0 - PRIORS.overlooked) * rigging
         if following:
             return self._read_and_restore(following)
-        if best is not None and (joints >= _SURE_ENOUGH or set(best.joints) <= set(self.over)):
+        if best is not None and (joints >= PRIORS.usual or set(best.joints) <= set(self.over)):
             return self._try(best.joints, best)
         if best is not None:
             return self._elsewhere()
@@ -305,7 +306,7 @@ class _PlanBuilder:
         else:
             # Nothing is left to read: what is over its limit is restored, and the plunger decides.
             best = 0
-        if second[best] > _HOPELESS and not len(over):
+        if second[best] > 0.5 and not len(over):
             return None
         tried = self._try_set(members[best], float(second[best]))
         quicker = [s for s in sure if s.minutes < tried.minutes]
@@ -329,7 +330,8 @@ class _PlanBuilder:
         """The joints to read next; none where a repair is quicker than what reading may save."""
         f, i = self.facts, self.row
         # A worn joint that hardly moves the plunger is hardly the cause.
-        worn = f.causes.worn[i] * f.causes.leverage
+        # Rounded: both ends of one link are worth the same, and noise must not order them.
+        worn = np.round(f.causes.worn[i] * f.causes.leverage, 9)
         chosen: tuple[int, ...] = ()
         most = -1.0
         for area in self.gear.areas:
@@ -523,9 +525,8 @@ class _PlanBuilder:
                 )
                 return replace(found, steps=(step, *found.steps[1:]))
         question = sentences.does_not_fit(first, left, found.open_question)
-        self.steps = []
-        ended = self._end(End.CANNOT_CLEAR)
-        return replace(ended, open_question=question)
+        stop = Step(Action.CONTINUE, (), 0.0, None, sentences.STOP_FOR_TODAY)
+        return Plan((stop,), End.CANNOT_CLEAR, question)
 
     @property
     def _at_first(self) -> frozenset[str]:

@@ -28,7 +28,7 @@ CHECK_ENTRIES = (
     "Do not use. Correct: the linkage does not close with these clearances; check the entries."
 )
 _SET_THAT_HOLDS = (
-    "set of joints, restored to new, brings the worst case within the margin with"
+    "set of joints that can be restored brings the worst case within the margin with"
     f" {100.0 * CONFORMANCE:.0f} % probability."
 )
 GO_ON = {
@@ -65,6 +65,10 @@ _BEYOND_AND_LOOKED = (
     " to engineering."
 )
 _REPAIRED_DONE = "Joints are within limits; record the repair. This is not a release to service."
+STOP_FOR_TODAY = (
+    "Stop for today: what would decide takes longer than the minutes that are left. Hand over what"
+    " stays open."
+)
 RETRACT = "Retract the gear (trial retraction). Enter the outcome with its date and time."
 
 

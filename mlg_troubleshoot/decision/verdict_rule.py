@@ -25,7 +25,7 @@ def normal_cdf(z: Array) -> Array:
     return np.reshape(np.array(flat), np.shape(z))
 
 
-_SCORES = np.linspace(-8.0, 8.0, 6401)
+_SCORES = np.linspace(-8, 8, 6401)
 _TABLE = normal_cdf(_SCORES)
 
 

@@ -13,37 +13,32 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
+from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import SCORE, tabled_normal_cdf
 
 # Levels of wear of one gear, in units of the limit, each as likely. [1]
-LEVELS = np.geomspace(0.06, 1.2, 7)
-# Chance that a joint is worn out for a reason of its own, at any level: between its limit and twice
-# its limit. [1]
-_WORN_OUT = 0.02
+LEVELS = np.geomspace(*PRIORS.levels, 7)
 # Shares of its limit that a joint may be worn to, and how wide each is. [1]
-SHARES = (np.arange(50) + 0.5) / 25.0
 SHARE = 0.04
+SHARES = (np.arange(50) + 0.5) * SHARE
 
 # Chance from which a gear counts as too close to its margin for any reading of a joint to settle
 # it. [1]
 TOO_CLOSE = 0.8
-# What a reading may be wrong beside its stated uncertainty: standard deviation of the scale of a
-# gauge, and chance that it is the total play where the radial clearance is stated; assumed. [1]
-_SCALE, _SLIP = 0.1, 0.1
 
 
 def _densities() -> Array:
     even = np.exp(-SHARES / LEVELS[:, None])
     even /= even.sum(axis=1, keepdims=True)
     out = np.where(SHARES > 1.0, 1.0, 0.0)
-    return np.asarray((1.0 - _WORN_OUT) * even + _WORN_OUT * out / out.sum())
+    return np.asarray((1.0 - PRIORS.worn_out) * even + PRIORS.worn_out * out / out.sum())
 
 
 # Chance of each share at each level, (levels, shares); of those beyond the limit; mean and variance
 # of the share, by level. [1]
 DENSITIES = _densities()
-BEYOND = np.where(SHARES > 1.0, DENSITIES, 0.0)
+BEYOND = DENSITIES * (SHARES > 1)
 MEAN = DENSITIES @ SHARES
 VARIANCE = DENSITIES @ SHARES**2 - MEAN**2
 
@@ -69,9 +64,9 @@ def surely_worn(cases: Cases, levels: Array) -> Array:
     read = (cases.clearance_in[rows, joints] / limits[joints])[:, None]
     u = (cases.gauge_u_in[rows, joints] / limits[joints])[:, None]
     again = cases.own_gauge[rows, joints][:, None]
-    logs = []
-    for factor, share in ((1.0, 1.0 - _SLIP), (2.0, _SLIP)):
-        spread = np.hypot(u, np.where(again, 0.0, _SCALE * factor * SHARES))
+    logs, slip = [], -np.expm1(-PRIORS.wrong_readings / len(limits))
+    for factor, share in ((1.0, 1.0 - slip), (2.0, slip)):
+        spread = np.hypot(u, np.where(again, 0.0, PRIORS.gauge_scale * factor * SHARES))
         log = -0.5 * ((read - factor * SHARES) / spread) ** 2 - np.log(spread)
         logs.append(np.where(again & (factor > 1.0), -np.inf, log + np.log(share)))
     # The level by the other readings: this one is in doubt.

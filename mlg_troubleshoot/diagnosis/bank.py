@@ -48,8 +48,9 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
     }
     for name, z in smooth.items():
         shapes += [(z, (name,)), (z**2, (name,)), (z**3, (name,))]
-        bends = (0.15, 0.3, 0.5, 0.7, 0.85) if name in main else (0.5,)
-        shapes += [(np.maximum(z - np.quantile(z, q), 0.0), (name,)) for q in bends]
+        bends = np.linspace(0.1, 0.9, 9) if name in main else (0.5,)
+        for kink in np.quantile(z, bends):
+            shapes += [(np.maximum(z - kink, 0.0), (name,)), (np.abs(z - kink), (name,))]
     if "day" in scene.table.quantities:
         day = np.nan_to_num(scene.table.quantities["day"])
         for period in _PERIODS_DAYS:
@@ -58,6 +59,16 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
                 (np.cos(phase - turn), ("day",))
                 for turn in (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4)
             ]
+    # What one of two directions or sides does, the other may undo.
+    either = {
+        name: np.sign((texts == known[0]).astype(float) - (texts == known[1]))
+        for name, texts in scene.table.factors.items()
+        if name != "tail_no" and len(known := levels(texts)) == 2
+    }
+    # Where one group begins to move with a quantity is not known.
+    begins = [(z - at, n) for n, z in main.items() for at in np.quantile(z, (0.25, 0.5, 0.75))]
+    begins += [(change, name) for name, change in either.items()]
+    main = either | main
     names = list(main)
     for i, a in enumerate(names):
         shapes += [(main[a] * main[b], (a, b)) for b in names[i + 1 :]]
@@ -66,7 +77,7 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
         shapes += [(smooth[a] * smooth[b], (a, b)) for b in joint[i + 1 :]]
     keys = list(classes)
     for i, key in enumerate(keys):
-        shapes += [(classes[key] * main[b], (key[0], b)) for b in names]
+        shapes += [(classes[key] * z, (key[0], b)) for z, b in begins if b != key[0]]
         shapes += [
             (classes[key] * classes[other], (key[0], other[0]))
             for other in keys[i + 1 :]

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.bank import build_bank
-from mlg_troubleshoot.diagnosis.causes import CATALOGUE
+from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
@@ -39,6 +39,7 @@ from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.explanation import Key
 from mlg_troubleshoot.misfit.fitting import shrunk
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import MM_PER_IN
 
 LEAST_ROWS = 20
@@ -60,7 +61,7 @@ _SIGN_SLIP, _BY_CHANCE = -0.75, 0.05
 _NO_SCALE, _SURELY = 0.3, 0.001
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class NamedCause(Term):
     """A cause that the data name, or cannot rule out: a term of the extension with what speaks for
     it.
@@ -123,8 +124,8 @@ class NamedCause(Term):
         return {name: (min(low[name], high[name]), max(low[name], high[name])) for name in low}
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False, eq=False)
+class Diagnosis(Result):
     """What the measured data say about the model.
 
     Parameters
@@ -279,7 +280,7 @@ def diagnose(
         read = len(table)
         table = _answerable(table)
         (scene, rows), faults = _without_faults(model, table, where, None)
-        catalogue = (*CATALOGUE, *own_causes)
+        catalogue = with_own(own_causes)
         # What never varies cannot be distinguished from a linkage of other dimensions.
         same = {
             name
@@ -614,10 +615,10 @@ def _report(
         repeatability_source=source,
         smallest_rms_in=finding.smallest_rms_in,
         gain=gain,
-        # What makes aircraft that it was not fitted to no likelier is not written.
+        # What predicts aircraft that it was not fitted to no better is not written.
         terms=(
             tuple(cause for cause in causes if cause.predicts)
-            if gain is not None and gain.likelier
+            if gain is not None and gain.better
             else ()
         ),
         residual_u_in=float(np.std(left)),

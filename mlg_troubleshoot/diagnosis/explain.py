@@ -102,7 +102,8 @@ class MisfitProblem:
             np.sum(shapes**2, axis=0) / np.maximum(np.sum(shapes != 0.0, axis=0), 1)
         )
         named = [(UNLISTED, _BY.join(names)) for names in (*self.bank.variables, ("all rows",))]
-        share = float(np.log(shares[UNLISTED] / shapes.shape[1]))
+        alike = Counter(named)
+        share = np.log([shares[UNLISTED] / (len(alike) * alike[name]) for name in named])
         free = Effects.free(shapes, named, share, beliefs.shape_size * scale)
         slip = float(np.log(beliefs.slips / n))
         slips = Effects.free(np.eye(n), [None] * n, slip, beliefs.slip_size * scale)

@@ -27,7 +27,7 @@ from mlg_troubleshoot.datafile import (
     read_toml,
 )
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.diagnosis.causes import CATALOGUE
+from mlg_troubleshoot.diagnosis.causes import in_own_cause, with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.scene import scene_at
 from mlg_troubleshoot.diagnosis.table import (
@@ -41,6 +41,7 @@ from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies, Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.outputs import OutputKind, write_text
+from mlg_troubleshoot.results import Result
 
 _HEADING = "# Extension of the model by a diagnosis of measured displacements.\n"
 EXTENSION = OutputKind.marked("is not an extension of the model", _HEADING)
@@ -79,8 +80,8 @@ class ExtensionFile(Table):
     unread_joints: tuple[Whole, ...] = ()
 
 
-@dataclass(frozen=True)
-class Term:
+@dataclass(frozen=True, repr=False, eq=False)
+class Term(Result):
     """One named cause with its fitted parameter.
 
     Parameters
@@ -102,8 +103,8 @@ class Term:
         return self.candidate.cause.words(self.candidate.target)
 
 
-@dataclass(frozen=True)
-class ModelExtension:
+@dataclass(frozen=True, repr=False, eq=False)
+class ModelExtension(Result):
     """Terms that are added to the model of one geometry.
 
     Parameters
@@ -179,7 +180,9 @@ def adjustment_of(
         cause = term.candidate.cause
         if not set(cause.needs) <= set(table.columns):
             continue
-        own = cause.adjust(scene_at(model, table, where, clearance), term.candidate, term.value)
+        scene = scene_at(model, table, where, clearance)
+        with in_own_cause([cause], table.columns):
+            own = cause.adjust(scene, term.candidate, term.value)
         clearance = own.clearance_in
         for name, values in own.changed.items():
             changed[name] = changed.get(name, np.zeros(len(clearance))) + values
@@ -260,7 +263,7 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
     terms: list[Term] = []
     hashes: list[str] = []
     rows, residual, unread = 0, float("nan"), set[int]()
-    known = {cause.name: cause for cause in (*CATALOGUE, *own)}
+    known = {cause.name: cause for cause in with_own(own)}
     for file in files:
         read = read_toml(file, ExtensionFile, "Give a file that mlg diagnose wrote.")
         found = read.content

@@ -26,8 +26,8 @@ class Gain:
     false_within_before, false_within_after: rows predicted within whose measured displacement is
     outside. false_outside_before, false_outside_after: rows predicted outside whose measured
     displacement is within. verdicts_changed: records whose predicted side of the margin changes.
-    held_out_by: what was held out together: ``tail`` or ``row``. likelier: True if held-out rows
-        are likelier with the extension than without.
+    held_out_by: what was held out together: ``tail`` or ``row``. better: True if held-out rows
+        are likelier with the extension than without, and their misfit is smaller.
     """
 
     rms_before_in: float
@@ -39,7 +39,7 @@ class Gain:
     false_outside_after: int
     verdicts_changed: tuple[str, ...]
     held_out_by: str
-    likelier: bool
+    better: bool
 
 
 def folds(noise: NoiseModel, columns: Array) -> tuple[Wholes, str]:
@@ -84,7 +84,8 @@ def measure_gain(
             table.record_id[int(i)] for i in np.flatnonzero(said_before != said_after)
         ),
         held_out_by="tail" if held_out_by == "group" else "row",
-        likelier=likelier(noise, expected, expected - correction, fold),
+        better=bool(np.mean(after**2) < np.mean(before**2))
+        and likelier(noise, expected, expected - correction, fold),
     )
 
 

@@ -27,9 +27,8 @@ from mlg_troubleshoot.misfit.covariance import NoiseModel
 # bound by this share. [1]
 EXPECTED_SLOPE = -0.0045
 # Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the
-# slope [1]; and what comes on top where clearances are read no better than the plunger.
-BIAS_IN, READ_BIAS_IN = 0.0001, 0.0001
-SLOPE, READ_SLOPE = 0.003, 0.003
+# slope [1]; twice that where clearances are read no better than the plunger.
+BIAS_IN, SLOPE = 0.0001, 0.003
 # Doubt about how well clearances were really read: share of the drawing that may be too much or too
 # little. [1]
 DRAWN = 0.3
@@ -40,9 +39,8 @@ LEAST_SCATTER = 0.01
 # reading leave in the level of wear of each.
 GEAR_RATIO, READ_GEAR_RATIO = 0.08, 0.28
 # Trends over a quantity, and habits of a side or an approach, that are not a cause yet, in the same
-# units.
-TREND, READ_TREND = 0.03, 0.03
-HABIT, READ_HABIT = 0.04, 0.04
+# units; twice that likewise.
+TREND, HABIT = 0.03, 0.04
 # Scatter between gauges, and between technicians, over that of a row, before the data are looked
 # at: median, and spread of its logarithm; the spread for gears; and the ratios that are tried.
 HABIT_OF_ONE, HABIT_SPREAD = 0.1, 0.7
@@ -207,13 +205,13 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     # Clearances cannot scatter more than the misfit does beyond the plunger gauge.
     room = np.sqrt(max(scale**2 - rows.u_measured_in**2, 0.0))
     read = min(rows.u_read_in, room) / scale
+    small = 1.0 + read
     bias = [
-        np.full(len(rest), (BIAS_IN + read * READ_BIAS_IN) / scale),
-        (SLOPE + read * READ_SLOPE) * predicted / scale,
+        np.full(len(rest), small * BIAS_IN / scale),
+        small * SLOPE * predicted / scale,
         DRAWN * rows.drawn_in / scale,
     ]
-    trends = (TREND + read * READ_TREND) * rows.trends
-    habits = (HABIT + read * READ_HABIT) * rows.habits
+    trends, habits = small * TREND * rows.trends, small * HABIT * rows.habits
     gear_ratio = float(np.hypot(GEAR_RATIO, read * READ_GEAR_RATIO))
     ratios = _tail_ratios(rest / (scale * relative), numbers, gear_ratio)
     loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, trends, habits, shared])

@@ -22,6 +22,7 @@ from mlg_troubleshoot.decision.columns import (
 )
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.results import Result
 
 Texts = NDArray[np.str_]
 
@@ -31,8 +32,8 @@ FACTORS = tuple(column.variable for column in _TEXTS)
 QUANTITIES = tuple(c.variable for c in COVARIATES if c not in (*_TEXTS, ACTUATOR_EXTENSION))
 
 
-@dataclass(frozen=True)
-class DiagnosisTable:
+@dataclass(frozen=True, repr=False, eq=False)
+class DiagnosisTable(Result):
     """Rows of measured output with the inputs of the model, as columns.
 
     A column that the source does not have is absent; a missing cell is NaN or an empty text.

@@ -5,9 +5,11 @@ __all__ = [
     "adjustment",
     "design",
     "directions",
+    "from_pylinkage",
     "gear",
     "gear_file",
     "model",
+    "short_form",
 ]
 
 DEFAULT_GEAR = "hawker-800xp"

@@ -17,6 +17,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import STEP, Array
 from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.results import Result
 
 # Directions around a joint among which the worst one is bracketed. [rad]
 _ANGLES = 2.0 * np.pi * np.arange(8) / 8
@@ -28,14 +29,17 @@ _ROWS = 512
 IN_CACHE = 4096
 
 
-@dataclass(frozen=True)
-class WorstCase:
+@dataclass(frozen=True, repr=False, eq=False)
+class WorstCase(Result):
     """Worst displacement of each gear in both senses, with the directions that give it.
 
-    over_in, under_in, shape (n,): signed displacement in the worst directions for over-travel and
-    under-travel; NaN
-      where the linkage does not close. [in]
-    over_directions, under_directions, shape (n, n_joints): directions of the virtual links. [rad]
+    Parameters
+    ----------
+    over_in, under_in : ndarray, shape (n,)
+        Signed displacement in the worst directions for over-travel and under-travel; NaN where the
+        linkage does not close. [in]
+    over_directions, under_directions : ndarray, shape (n, n_joints)
+        Directions of the virtual links. [rad]
     """
 
     over_in: Array

@@ -17,6 +17,7 @@ from mlg_troubleshoot.datafile import Table, Whole
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
 from mlg_troubleshoot.geometry.mechanism import Mechanism
+from mlg_troubleshoot.results import Result
 
 # 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
 ROUNDING_IN = 1e-9
@@ -171,8 +172,8 @@ class RetractionCycle(Table):
         return self.beyond if displacement_in > 0 else self.short
 
 
-@dataclass(frozen=True)
-class Gear:
+@dataclass(frozen=True, repr=False)
+class Gear(Result):
     """A gear type as its gear file describes it.
 
     Parameters
@@ -213,6 +214,8 @@ class Gear:
         it.
     numbers : tuple of Sourced
         Every number behind a prediction, with its source.
+    linkage_known : bool
+        True if every number of the linkage was measured or is from a technical order.
     geometry_sha256, ensemble_sha256 : str
         Hash of the reference geometry with its calibration, and of the ensemble.
     path : Path
@@ -245,6 +248,7 @@ class Gear:
     discrepancies: Discrepancies
     cycle: RetractionCycle | None
     numbers: tuple[Sourced, ...]
+    linkage_known: bool
     geometry_sha256: str
     ensemble_sha256: str
     path: Path

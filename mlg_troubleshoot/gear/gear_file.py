@@ -349,9 +349,12 @@ _STEPS: dict[type[StepTable], type[Step]] = {
 
 
 def shipped_gears() -> tuple[str, ...]:
-    """Return the names of the gears that ship with the program, for :func:`load_gear`."""
+    """Return the names of the gears that ship with the program, the default one first, for
+    :func:`load_gear`.
+    """
     names = {p.stem for p in _DATA.glob("*.toml")}
-    return tuple(sorted(n for n in names if not n.endswith(("-ensemble", "-targets"))))
+    gears = (n for n in names if not n.endswith(("-ensemble", "-targets")))
+    return tuple(sorted(gears, key=lambda name: (name != DEFAULT_GEAR, name)))
 
 
 def load_gear(name_or_path: str | Path | Gear = DEFAULT_GEAR) -> Gear:
@@ -401,7 +404,9 @@ def _read(path: Path) -> Gear:
     found = file.content
     numbers = _Numbers(found.sources)
     _add_numbers(found, numbers)
-    reference = _linkage(found, "A")
+    surely = {SourceKind.MEASURED, SourceKind.TECHNICAL_ORDER}
+    linkage_known = {number.kind for number in numbers.found} <= surely
+    reference = linkage_of(found, "A")
     members: dict[str, dict[str, Any]] = {}
     ensemble_path = path
     if found.ensemble is not None:
@@ -418,7 +423,7 @@ def _read(path: Path) -> Gear:
         ensemble=(
             reference,
             *(
-                _linkage(decode(ensemble_path, member, GeometryTable), name)
+                linkage_of(decode(ensemble_path, member, GeometryTable), name)
                 for name, member in members.items()
             ),
         ),
@@ -437,6 +442,7 @@ def _read(path: Path) -> Gear:
         discrepancies=_discrepancies(file, reference.mechanism),
         cycle=found.cycle,
         numbers=tuple(numbers.found),
+        linkage_known=linkage_known,
         geometry_sha256=_sha256({k: file.values.get(k) for k in _GEOMETRY_KEYS}),
         ensemble_sha256=_sha256(members),
         path=path,
@@ -513,7 +519,8 @@ def _add_numbers(table: GeometryTable, numbers: _Numbers) -> None:
             numbers.add(step.axis_deg, "deg", step.source)
 
 
-def _linkage(table: GeometryTable, name: str) -> Linkage:
+def linkage_of(table: GeometryTable, name: str) -> Linkage:
+    """The linkage that the tables of a gear file describe."""
     drive = table.input
     points = (Point(p.name, p.plane, *p.at, p.fixed, p.virtual_link) for p in table.points)
     read = table.output

@@ -26,6 +26,7 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
 from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputKind, write_text
+from mlg_troubleshoot.results import Result
 
 # A sampled index may lie a little outside 0 to 1, its interval further.
 Index = Annotated[float, Meta(ge=-2, le=3)]
@@ -33,6 +34,10 @@ Growth = Annotated[float, Meta(ge=0, le=1e6)]
 Rank = Annotated[int, Meta(ge=1, le=MOST_ENTRIES)]
 # First-order indices closer than this are one rank: both ends of a link differ by less.
 _SAME_RANK = 1e-4
+
+
+class StaleTableError(GearFileError):
+    """A table of indices that is missing, or was computed for another geometry or other limits."""
 
 
 class JointIndices(Table):
@@ -82,7 +87,7 @@ class TableGear(Table):
     provenance: str
 
 
-class IndexTable(Table):
+class IndexTable(Result, Table):
     """Precomputed indices of a gear, as the file holds them."""
 
     schema_version: Literal[1]
@@ -144,7 +149,7 @@ def load_index_table(gear: Gear) -> IndexTable:
     """
     path = gear.indices_file
     if not path.exists():
-        raise GearFileError(f"{path.name}: the table of indices is missing", _remedy(gear))
+        raise StaleTableError(f"{path.name}: the table of indices is missing", _remedy(gear))
     try:
         state = path.stat()
         table = _read_once(path, state.st_mtime_ns, state.st_size)
@@ -156,7 +161,7 @@ def load_index_table(gear: Gear) -> IndexTable:
         ("ensemble", table.gear.ensemble_sha256, gear.ensemble_sha256),
     ):
         if found != wanted:
-            raise GearFileError(
+            raise StaleTableError(
                 f"{path.name}: was computed for another {what}: {found[:16]}, not {wanted[:16]}",
                 _remedy(gear),
             )
@@ -165,7 +170,7 @@ def load_index_table(gear: Gear) -> IndexTable:
     if limits != wanted_limits:
         gone = sorted(set(limits) ^ set(wanted_limits))
         named = ", ".join(f"joint {number} at {limit:g} in" for number, limit in gone)
-        raise GearFileError(
+        raise StaleTableError(
             f"{path.name}: was computed for other joints or limits: {named}", _remedy(gear)
         )
     return table

@@ -36,6 +36,8 @@ class Beliefs:
     rarer : mapping of str to float
         How often a cause is what is wrong, over how often any other one is; 1 where it is not
         named. [1]
+    surveyed : float
+        The same of another linkage than the drawn one, where the drawn one was measured. [1]
     sure : float
         Probability from which something is said: of ten causes named at 0.9 nine are right. [1]
     alike : float
@@ -51,6 +53,7 @@ class Beliefs:
     form: float = 0.1
     exact: float = 0.1
     rarer: Mapping[str, float] = field(default_factory=dict)
+    surveyed: float = 0.1
     sure: float = 0.9
     alike: float = 0.985
 

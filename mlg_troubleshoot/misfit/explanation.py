@@ -51,8 +51,10 @@ class Effects:
         )
 
     @staticmethod
-    def free(columns: Array, names: Sequence[Key | None], log_prior: float, size: float) -> Effects:
-        """Effects that are on no list and may have any sign, each equally likely."""
+    def free(
+        columns: Array, names: Sequence[Key | None], log_prior: Array | float, size: float
+    ) -> Effects:
+        """Effects that are on no list and may have any sign."""
         p = columns.shape[1]
         none = np.zeros(p)
         return Effects(

@@ -211,8 +211,8 @@ class Study:
             mean=none,
         )
         far = self._far(point.rest / unit, noise.relative)
-        slip = float(np.log(beliefs.slips / len(unit)))
         slips = np.eye(len(unit))[:, far]
+        slip = float(np.log(beliefs.slips / len(unit)))
         errors = Effects.free(slips, [None] * slips.shape[1], slip, beliefs.slip_size)
         return Effects.joined([suspects, errors])
 

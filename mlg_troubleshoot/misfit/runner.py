@@ -50,9 +50,13 @@ class Runner:
     def everything(self, values: Array) -> Array:
         """Predict all rows and outputs, shape (n, m)."""
         self.calls += 1
-        predicted = np.asarray(
-            self.predict(dict(zip(self.names, values.tolist(), strict=True))), float
-        )
+        try:
+            predicted = np.asarray(
+                self.predict(dict(zip(self.names, values.tolist(), strict=True))), float
+            )
+        except LookupError as error:
+            error.add_note(f"The simulation is given: {', '.join(self.names)}.")
+            raise
         if predicted.ndim == 1 and self.shape == (len(predicted), 1):
             predicted = predicted[:, None]
         if predicted.shape != self.shape:

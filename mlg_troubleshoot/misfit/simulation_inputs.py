@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,6 +64,11 @@ def _suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect]) -> None:
             "name each once",
         )
     for s in [*suspects, *nuisance]:
+        values: tuple[object, ...] = (s.nominal, s.trial)
+        if not all(isinstance(value, Real) for value in values):
+            raise UsageError(
+                f"{s.name}: nominal {s.nominal!r}, trial {s.trial!r}", "both must be numbers"
+            )
         if not (np.isfinite(s.nominal) and np.isfinite(s.trial)) or s.trial == 0.0:
             raise UsageError(
                 f"{s.name}: nominal {s.nominal:g}, trial {s.trial:g} {s.unit}".rstrip(),

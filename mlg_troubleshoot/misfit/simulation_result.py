@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
+from mlg_troubleshoot.results import Result
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +45,8 @@ class Suspect:
     prior_sd: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class SuspectFound:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class SuspectFound(Result):
     """A cause that earned its place, or that the data cannot rule out.
 
     Parameters
@@ -104,8 +105,8 @@ class HeldOutGain:
     held_out_by: str
 
 
-@dataclass(frozen=True, slots=True)
-class SimulationDiagnosis:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class SimulationDiagnosis(Result):
     """What measured data say about a simulation.
 
     Parameters

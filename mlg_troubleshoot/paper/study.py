@@ -38,6 +38,7 @@ from mlg_troubleshoot.indices.inputs import (
 from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.outputs import SCHEMA_VERSION
+from mlg_troubleshoot.results import Result
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.replicated import PaperDesign, ReplicatedIndices
@@ -65,8 +66,8 @@ class Directions(StrEnum):
     FIXED = "fixed"
 
 
-@dataclass(frozen=True, slots=True)
-class StudyOptions:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class StudyOptions(Result):
     """What a study is asked for.
 
     Parameters
@@ -127,8 +128,8 @@ class StudyOptions:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class StudyResult:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class StudyResult(Result):
     """What a study found.
 
     table: indices of every joint with their spread over the ensemble.
@@ -147,8 +148,8 @@ class StudyResult:
     finished: bool
 
 
-@dataclass(frozen=True, slots=True)
-class StudyFindings:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class StudyFindings(Result):
     """A study and what was found with it.
 
     Parameters

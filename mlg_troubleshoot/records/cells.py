@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from enum import StrEnum
+from numbers import Real
 
 MAX_ROWS = 100_000
 MAX_COLUMNS = 200
@@ -206,6 +207,21 @@ def date_cell(serial: float, *, epoch_1904: bool) -> OddCell:
         day = None
     text = f"{show_number(serial)} shown as a date or time" if day is None else day.isoformat()
     return OddCell(OddKind.DATE, text, day, serial)
+
+
+def typed(value: object) -> Cell:
+    """Return a value of Python as the cell of a spreadsheet would hold it."""
+    if value is None or (isinstance(value, str) and not value.strip()):
+        return None
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, tuple | list):
+        return "; ".join(map(str, value)) or None
+    if isinstance(value, datetime):
+        return value.isoformat(sep=" ")
+    if isinstance(value, bool) or not isinstance(value, Real | date):
+        return OddCell(OddKind.BOOLEAN, str(value))
+    return iso_date_cell(value.isoformat()) if isinstance(value, date) else float(value)
 
 
 def iso_date_cell(text: str) -> OddCell:

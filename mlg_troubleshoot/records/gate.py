@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from datetime import date, datetime
+from datetime import datetime
 from numbers import Real
 
 from mlg_troubleshoot.decision.columns import (
@@ -28,7 +28,8 @@ from mlg_troubleshoot.decision.inspection import (
     Side,
 )
 from mlg_troubleshoot.errors import Problem, UsageError
-from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, iso_date_cell
+from mlg_troubleshoot.records.cells import typed
+from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.records.layout import ColumnReader
 from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
@@ -70,7 +71,7 @@ def judge_row(
         if p.field is None and not p.refused
     ]
     reader = RowReader(columns.placed, table)
-    rows = [reader.read(1, [_cell(value) for value in values.values()])]
+    rows = [reader.read(1, [typed(value) for value in values.values()])]
     reader.settle_dates(rows)
     return replace(rows[0], source=RowSource()), problems
 
@@ -119,28 +120,7 @@ def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:
     """
     given = inspection
     factor = given.convention.per_radial if given.entered and given.convention is not None else 1.0
-    values: dict[str, object] = {}
-    for column in COLUMNS:
-        scale = factor if column.scales else 1.0
-        if column is PLUNGER_DISPLACEMENT:
-            for place, value in enumerate(given.readings_in, 1):
-                values[column.header(place, LengthUnit.INCH)] = value
-            continue
-        unit = LengthUnit.INCH if column.is_length else None
-        by_joint = getattr(given, column.joint_fills) if column.joint_fills else {}
-        for joint, value in by_joint.items():
-            name = column.header(joint, unit)
-            if isinstance(joint, bool) or joint not in options.joints.numbers:
-                said = f"{name}: expected a joint from {options.joints.span}"
-                raise UsageError(said, f"T{options.joints.lack(joint)[1:]}.")
-            values[name] = _times(value, scale)
-        assumed = (
-            column is GAUGE_U
-            and given.gauge_u_is_default
-            and given.gauge_u_in == DEFAULT_GAUGE_U_IN
-        )
-        if not (column.carried or column.needs_joint or assumed):
-            values[column.header(unit=unit)] = _times(given.value(column.filled), scale)
+    values = cells_of(given, options.joints, factor)
     required = [column.name for column in IDENTITY]
     read = admit(
         {name: value for name, value in values.items() if value is not None or name in required},
@@ -160,22 +140,37 @@ def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:
     )
 
 
+def cells_of(inspection: Inspection, joints: Joints, factor: float) -> dict[str, object]:
+    """The values of an inspection by canonical column, in inches; `factor` makes readings of the
+    lengths that a convention scales.
+    """
+    values: dict[str, object] = {}
+    for column in COLUMNS:
+        scale = factor if column.scales else 1.0
+        if column is PLUNGER_DISPLACEMENT:
+            for place, value in enumerate(inspection.readings_in, 1):
+                values[column.header(place, LengthUnit.INCH)] = value
+            continue
+        unit = LengthUnit.INCH if column.is_length else None
+        by_joint = getattr(inspection, column.joint_fills) if column.joint_fills else {}
+        for joint, value in by_joint.items():
+            name = column.header(joint, unit)
+            if isinstance(joint, bool) or joint not in joints.numbers:
+                said = f"{name}: expected a joint from {joints.span}"
+                raise UsageError(said, f"T{joints.lack(joint)[1:]}.")
+            values[name] = _times(value, scale)
+        assumed = (
+            column is GAUGE_U
+            and inspection.gauge_u_is_default
+            and inspection.gauge_u_in == DEFAULT_GAUGE_U_IN
+        )
+        if not (column.carried or column.needs_joint or assumed):
+            values[column.header(unit=unit)] = _times(inspection.value(column.filled), scale)
+    return values
+
+
 def _times(value: object, factor: float) -> object:
     return float(value) * factor if factor != 1.0 and isinstance(value, Real) else value
-
-
-def _cell(value: object) -> Cell:
-    if value is None or (isinstance(value, str) and not value.strip()):
-        return None
-    if isinstance(value, str):
-        return str(value)
-    if isinstance(value, tuple | list):
-        return "; ".join(map(str, value)) or None
-    if isinstance(value, datetime):
-        return value.isoformat(sep=" ")
-    if isinstance(value, bool) or not isinstance(value, Real | date):
-        return OddCell(OddKind.BOOLEAN, str(value))
-    return iso_date_cell(value.isoformat()) if isinstance(value, date) else float(value)
 
 
 def _label(problem: Problem, labels: Mapping[str, str]) -> str:

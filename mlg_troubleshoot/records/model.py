@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
@@ -15,9 +15,15 @@ from mlg_troubleshoot.records.cells import Cell, column_letters, quote
 from mlg_troubleshoot.records.dates import DateOrder
 from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.records.values import CellFaultError
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 Progress = Callable[[int, int | None], None]
+_WORDS: Mapping[str, Callable[[str], object]] = {
+    "unit": LengthUnit.parse,
+    "convention": ClearanceConvention.parse,
+    "dates": DateOrder,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,9 +62,16 @@ class TableOptions:
     small_readings_true: bool = False
     dates: DateOrder | None = None
 
+    def __post_init__(self) -> None:
+        """Take a unit, a convention and an order of dates as people write them."""
+        for name, read in _WORDS.items():
+            said = getattr(self, name)
+            if isinstance(said, str):
+                object.__setattr__(self, name, read(said))
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TableResult:
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class TableResult(Result):
     """What a task tells of the tables that it read.
 
     Parameters
@@ -175,8 +188,10 @@ class TableInHand:
 def to_correct(row: Inspection | InvalidRow, *headers: str) -> InvalidRow:
     """A row that cannot be judged before these columns of it are corrected."""
     known = row.correct if isinstance(row, InvalidRow) else ()
+    understood = row.understood if isinstance(row, InvalidRow) else row
     named = tuple(dict.fromkeys((*headers, *known)))
-    return InvalidRow(row.record_id, row.tail_no, row.side, named, row.warnings, row.source)
+    identity = row.record_id, row.tail_no, row.side
+    return InvalidRow(*identity, named, row.warnings, row.source, understood)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,10 +232,13 @@ class SheetLayout:
 
 @dataclass(frozen=True, slots=True)
 class FileRead:
+    """One file as read; a DataFrame has the labels of its rows, whatever they are."""
+
     name: str
     kind: str
     sha256: str | None
     rows: int
+    labels: Sequence[object] = ()
 
 
 @dataclass(frozen=True, slots=True)

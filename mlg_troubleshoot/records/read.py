@@ -10,12 +10,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, cast
 
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import writable
 from mlg_troubleshoot.records.csvfile import csv_book
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
+from mlg_troubleshoot.records.frames import FRAME, FrameSheet, as_frame, in_frame, is_frame
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
 from mlg_troubleshoot.records.model import FileRead, Progress, ReadOptions, ReadResult
 from mlg_troubleshoot.records.row_consistency import (
@@ -25,6 +26,13 @@ from mlg_troubleshoot.records.row_consistency import (
 )
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.tables import Collected, read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from mlg_troubleshoot.records.frames import Frame
+
+    Source = str | Path | BinaryIO | Frame
 
 MAX_FILE_BYTES = 50_000_000
 STDIN_NAME = "-"
@@ -48,7 +56,7 @@ _OTHERS: tuple[tuple[bytes, str], ...] = (
     (b"MZ", "a program"),
 )
 
-Source = str | Path | BinaryIO
+File = str | Path | BinaryIO
 _Found = tuple[FileRead, Collected]
 
 
@@ -76,9 +84,7 @@ def read_many(
         if progress is not None:
             progress(done, None)
 
-    read = _finish(
-        [_read_file(item, options, ticker) for source in given for item in expand(source)]
-    )
+    read = _finish([_read(item, options, ticker) for source in given for item in expand(source)])
     passed_over = [note for source in given if (note := _subfolders_note(source))]
     return replace(read, notes=(*passed_over, *read.notes))
 
@@ -127,7 +133,13 @@ def _is_scratch(path: Path) -> bool:
     return path.name.startswith(("~$", ".~lock", "."))
 
 
-def _read_file(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
+def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
+    if is_frame(source):
+        return _read_frame(as_frame(source), options, ticker)
+    return _read_file(cast("File", source), options, ticker)
+
+
+def _read_file(source: File, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
     label = writable(
         str(source if isinstance(source, str | Path) else getattr(source, "name", STDIN_NAME))
     )
@@ -154,7 +166,20 @@ def _read_file(source: Source, options: ReadOptions, ticker: Callable[[int], Non
     return FileRead(label, kind, digest, len(found.rows)), found
 
 
-def load_bytes(source: Source) -> bytes:
+def _read_frame(frame: pd.DataFrame, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
+    sheet = FrameSheet(frame)
+    found = read_table(
+        sheet, sheet.header, sheet.rows(), options, file=FRAME, delimiter=None, tick=ticker
+    )
+    if not found.rows and not found.problems:
+        found.problems.append(
+            replace(FileRefusedError("no_rows", "it is empty").problem, file=FRAME)
+        )
+    found.notes[:] = [f"{FRAME}: {note}" for note in found.notes]
+    return FileRead(FRAME, "frame", None, len(found.rows), sheet.labels), found
+
+
+def load_bytes(source: File) -> bytes:
     """The bytes of a file, at most so many; one that cannot be read is refused."""
     try:
         if isinstance(source, str | Path) and str(source) != STDIN_NAME:
@@ -405,6 +430,8 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         said = filter(None, (slips.get(place), backwards.get(place)))
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *said))
     problems.sort(key=_places(results))
+    frames = {file.name: file.labels for file, _ in results if file.labels}
+    problems = [in_frame(p, frames[p.file]) if p.file in frames else p for p in problems]
     return ReadResult(
         tuple(rows),
         tuple(problems),

@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 import zlib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import date, timedelta
 from functools import lru_cache
 from pathlib import PurePath
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from mlg_troubleshoot.decision.columns import (
@@ -74,7 +73,6 @@ from mlg_troubleshoot.records.values import (
 from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence
 
 _REMEMBERED = 20_000
-_NO_FLOATS: Mapping[int, float] = MappingProxyType({})
 _MISSING_CONVENTION = (
     "RADIAL, DIAMETRAL or TOTAL_PLAY",
     (
@@ -232,39 +230,49 @@ class RowReader:
             else:
                 self._tell(place, fault)
         record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
-        if self._bad or record_id is None or tail_no is None or side is None or convention is None:
-            return InvalidRow(record_id, tail_no, side, self._correct(), tuple(warnings), source)
+        identity = {"record_id": record_id, "tail_no": tail_no, "side": side}
+        told: dict[str, Any] = {**identity, "convention": convention, "source": source}
+        if self._bad or None in told.values():
+            said = tuple(warnings)
+            understood = self._inspection(found, **told)
+            return InvalidRow(
+                **identity,
+                correct=self._correct(),
+                warnings=said,
+                source=source,
+                understood=understood,
+            )
         self._warn(found, warnings)
+        return self._inspection(found, **told, unit_question=question, warnings=tuple(warnings))
+
+    @staticmethod
+    def _inspection(found: _Found, **told: Any) -> Inspection:
+        """What was read of a row; of one that cannot be judged, as far as it could be read."""
+        scale: ClearanceConvention = told["convention"] or ClearanceConvention.TOTAL_PLAY
         lengths = found.lengths
         clearance = lengths.pop(CLEARANCE, {})
         gauge_u = {
-            joint: value / convention.per_radial
+            joint: value / scale.per_radial
             for joint, value in lengths.pop(GAUGE_U, {}).items()
             if joint in (0, *clearance)
         }
         readings = sorted(lengths.pop(PLUNGER_DISPLACEMENT, {}).items())
-        floats = lengths.pop(AXIAL_FLOAT, None)
-        said = {column.filled: value for column, value in found.values.items()}
+        floats = lengths.pop(AXIAL_FLOAT, {})
+        said: dict[str, Any] = {column.filled: value for column, value in found.values.items()}
         said.update({column.filled: value[0] for column, value in lengths.items()})
         other = {name: said.pop(name) for name in [*said] if name not in _FIELDS}
         return Inspection(
-            record_id=record_id,
-            tail_no=tail_no,
-            side=side,
-            convention=convention,
             clearance_in=clearance,
             entered=found.entered,
             gauge_u_is_default=0 not in gauge_u,
             gauge_u_in=gauge_u.pop(0, DEFAULT_GAUGE_U_IN),
             gauge_u_by_joint_in=gauge_u,
             readings_in=tuple(value for _, value in readings),
-            axial_float_in=floats or _NO_FLOATS,
-            unit_question=question,
+            axial_float_in=floats,
             other_columns=other,
             carried=found.carried,
-            warnings=tuple(warnings),
-            source=source,
             **said,
+            **told,
         )
 
     def _read_cells(

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from openpyxl import Workbook
@@ -21,9 +22,10 @@ from mlg_troubleshoot.decision.columns import Column, Holds
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.records.cells import Cells, Filled, column_letters, stored
+from mlg_troubleshoot.records.frames import FrameSheet, as_frame, in_frame, is_frame, source_label
 from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
 from mlg_troubleshoot.records.read import load_bytes, open_book
-from mlg_troubleshoot.records.source import FileRefusedError
+from mlg_troubleshoot.records.source import FileRefusedError, Sheet
 from mlg_troubleshoot.records.template import write_book
 from mlg_troubleshoot.records.values import CellFaultError, read_number, read_text, read_value
 from mlg_troubleshoot.surveying.readings import (
@@ -33,6 +35,9 @@ from mlg_troubleshoot.surveying.readings import (
     default_u,
 )
 from mlg_troubleshoot.units import LengthUnit
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.records.read import File, Source
 
 _UNITS = ("in", "mm", "deg")
 COLUMNS = (
@@ -156,15 +161,22 @@ def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:
 
 
 def read_survey(
-    path: Path, linkage: SurveyedLinkage
+    table: Source, linkage: SurveyedLinkage
 ) -> tuple[tuple[SurveyReading, ...], tuple[Problem, ...], str]:
     """Read the rows that have a value, the cells that are wrong, and the file's SHA-256."""
-    label = str(path)
+    label = source_label(table)
+    labels: Sequence[object] = ()
     try:
-        data = load_bytes(path)
-        digest = hashlib.sha256(data).hexdigest()
-        book = open_book(data, label, ReadOptions())
-        for sheet in book.sheets:
+        if is_frame(table):
+            framed = FrameSheet(as_frame(table))
+            sheets: Sequence[Sheet] = (framed,)
+            labels, digest, delimiter = framed.labels, "", None
+        else:
+            data = load_bytes(cast("File", table))
+            digest = hashlib.sha256(data).hexdigest()
+            book = open_book(data, label, ReadOptions())
+            sheets, delimiter = book.sheets, book.delimiter
+        for sheet in sheets:
             rows = list(sheet.rows())
             header = next(
                 (
@@ -176,11 +188,12 @@ def read_survey(
             )
             if header is not None:
                 problems: list[Problem] = []
-                comma = book.delimiter == ";"
-                table = TableInHand(ReadOptions(), label, sheet.name, problems.append, comma)
-                reader = _Rows(table, _names(rows[header][1]), linkage)
+                comma = delimiter == ";"
+                in_hand = TableInHand(ReadOptions(), label, sheet.name, problems.append, comma)
+                reader = _Rows(in_hand, _names(rows[header][1]), linkage)
                 found = [reader.read(*row) for row in rows[header + 1 :]]
-                return tuple(r for r in found if r is not None), tuple(problems), digest
+                named = tuple(in_frame(p, labels) if labels else p for p in problems)
+                return tuple(r for r in found if r is not None), named, digest
         raise FileRefusedError(
             "header_missing",
             "no header of a survey was found",

@@ -431,7 +431,7 @@ def read_date(cell: Filled, order: DateOrder | None = None, latest: date = date.
             raise odd_cell_fault(cell, expected)
         day = cell.day
     else:
-        day = _written_day(plain_text(cell), order, expected)
+        day = _written_day(plain_text(cell), order, expected, latest)
     if day is None or not 1950 <= day.year <= 2100:
         raise CellFaultError("date_out_of_range", expected)
     if day > latest:
@@ -482,7 +482,7 @@ def read_areas(cell: Filled, areas: Collection[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(by_name[part.casefold()] for part in found))
 
 
-def _written_day(text: str, order: DateOrder | None, expected: str) -> date:
+def _written_day(text: str, order: DateOrder | None, expected: str, latest: date) -> date:
     no_such_day = "There is no such day in the calendar."
     try:
         day = written_day(text)
@@ -498,6 +498,8 @@ def _written_day(text: str, order: DateOrder | None, expected: str) -> date:
     if not days or order is not None:
         in_order = "" if order is None else f" in the order {order.words}"
         raise CellFaultError("date_invalid", f"{expected}{in_order}", no_such_day)
+    # A day to come is not one that was meant, where another reading is.
+    days = {order: day for order, day in days.items() if day <= latest} or days
     if len(set(days.values())) > 1:
         raise AmbiguousDateError(days, expected)
     return next(iter(days.values()))

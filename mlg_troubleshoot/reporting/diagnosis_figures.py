@@ -51,6 +51,13 @@ class Residuals:
         return Axis.around(f"measured − predicted, {self.unit}", both.tolist())
 
     @property
+    def columns(self) -> tuple[str, ...]:
+        """What residuals can be drawn against."""
+        table = self.diagnosis.used
+        clearances = (CLEARANCE.header(joint) for joint in self.joints)
+        return ("predicted", *table.quantities, *table.factors, *clearances)
+
+    @property
     def before_in(self) -> Array:
         """Measured less predicted, shape (n,). [in]"""
         return self.diagnosis.misfit_in

@@ -42,14 +42,20 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         job = json.loads(line)
         html = requests.read(job["length"]).decode("utf-8")
         try:
-            book = plutoprint.Book(getattr(plutoprint, f"PAGE_SIZE_{job['page'].upper()}"))
+            size = getattr(plutoprint, f"PAGE_SIZE_{job['page'].upper()}")
+            book = plutoprint.Book(size)
             book.custom_resource_fetcher = Refuse()
             # Links within the document become named destinations only where the document has an
             # address.
             book.load_html(html, base_url=_HERE)
             stream = io.BytesIO()
-            book.write_to_pdf_stream(stream)
-            pdf, boxes = finished(stream.getvalue(), job["sections"], job["title"], job["created"])
+            if job["kind"] == "png":
+                book.write_to_png_stream(stream, int(2 * job["width"]))
+                pdf, boxes = stream.getvalue(), False
+            else:
+                book.write_to_pdf_stream(stream)
+                about = job["sections"], job["title"], job["created"]
+                pdf, boxes = finished(stream.getvalue(), *about)
         except (plutoprint.Error, PyPdfError, OSError, ValueError) as error:
             answer = {"error": str(error) or type(error).__name__, "length": 0}
             pdf = b""

@@ -13,7 +13,7 @@ from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice, side_by_side
 from mlg_troubleshoot.life.outlook import fleet_lines, outlook_sentence
-from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
+from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Axis, Canvas, Plot, Series
 from mlg_troubleshoot.reporting.formats import ABSENT, Lengths, landings
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.life_json import life_as_json
@@ -111,6 +111,46 @@ def _worst_cases(life: GearLife, lengths: Lengths) -> Markup:
     results = [kept.result for kept in life.inspections]
     worst_in = [result.get("predicted_displacement_in") for result in results]
     return sparkline(worst_in, results[-1].get("margin_in"), lengths)
+
+
+def worst_case_ahead(life: GearLife, ahead: Forecast, lengths: Lengths) -> Markup:
+    """Draw the worst case of a gear over its landings, its margin, and when it is expected to
+    reach it: median and 90 % interval.
+    """
+    unit = lengths.unit
+    read = [
+        (kept.inspection.gear_landings, kept.result["predicted_displacement_in"])
+        for kept in life.inspections
+        if kept.inspection.gear_landings is not None
+        and kept.result.get("predicted_displacement_in") is not None
+    ]
+    landed = [landings for landings, _ in read]
+    worst = [value * unit.per_inch for _, value in read]
+    margin = life.inspections[-1].result["margin_in"] * unit.per_inch
+    ends = {} if ahead.landings_to_margin is None or not read else ahead.landings_to_margin
+    reached = {name: landed[-1] + end for name, end in ends.items() if end is not None}
+    title = f"Worst case of {life.name} over its landings"
+    canvas = Canvas(440, 250, title, "with the margin and when it is expected to be reached")
+    plot = Plot(
+        canvas,
+        Axis.around("landings", [0.0, *landed, *reached.values()], 0.03),
+        Axis.around(f"worst case, {unit}", [0.0, *worst, margin], 0.08),
+        top=24,
+    )
+    plot.draw_axes()
+    canvas.text(plot.area[0], 12, title, size=11, bold=True)
+    canvas.line(*plot.at(plot.x.low, margin), *plot.at(plot.x.high, margin), dash="4 3")
+    if len(read) > 1:
+        plot.draw(Series("worst case", tuple(landed), tuple(worst)))
+    for place in zip(landed, worst, strict=True):
+        canvas.marker("circle", *plot.at(*place), 3.0)
+    if "p05" in reached:
+        # An interval that ends beyond the horizon runs to the edge.
+        end = plot.at(reached.get("p95", plot.x.high), margin)
+        canvas.line(*plot.at(reached["p05"], margin), *end, colour=ACCENT, width=4.0)
+    if "p50" in reached:
+        canvas.marker("diamond", *plot.at(reached["p50"], margin), 5.0, colour=ACCENT)
+    return canvas.svg()
 
 
 def life_document(

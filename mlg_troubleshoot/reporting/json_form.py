@@ -94,7 +94,7 @@ def kept_as_json(assessment: Assessment) -> dict[str, Any]:
     joints = [_joint(finding) for finding in assessment.joints]
     kept = [{n: each for n, each in j.items() if n not in _OF_GEOMETRY} for j in joints]
     # What the gear did is kept with the inspection.
-    return {n: each for n, each in _assessment(assessment, kept).items() if n != "outcome"}
+    return {n: each for n, each in assessment_as_json(assessment, kept).items() if n != "outcome"}
 
 
 def check_json_pieces(
@@ -134,7 +134,7 @@ def _tail(problems: Sequence[Problem], warnings: Sequence[str]) -> dict[str, Any
 def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:
     """One row of the input; of a row that cannot be judged every number is null."""
     if isinstance(judgement, Assessment):
-        return _assessment(judgement, [_joint(finding) for finding in judgement.joints])
+        return assessment_as_json(judgement)
     unknown = dict.fromkeys(_JOINT)
     return {
         **dict.fromkeys(CheckedInspection.__annotations__),
@@ -145,11 +145,12 @@ def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:
     }
 
 
-def _assessment(a: Assessment, joints: list[dict[str, Any]]) -> dict[str, Any]:
+def assessment_as_json(a: Assessment, joints: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+    """One gear of a check; `joints` as they are kept, else all that is known of each."""
     said = [a.measured_statement] if a.measured_statement else []
     own = {
         "measured_displacement_in": a.inspection.measured_displacement_in,
-        "joints": joints,
+        "joints": [_joint(finding) for finding in a.joints] if joints is None else joints,
         "warnings": [*said, *a.warnings],
     }
     return written(CheckedInspection, a, **_course(a.inspection, a), **own)
@@ -211,7 +212,8 @@ def diagnosis_as_json(
 
 
 def _named(candidate: Any) -> dict[str, Any]:
-    return {"cause": candidate.cause.name, "target": candidate.target}
+    name = {"cause": candidate.cause.name, "target": candidate.target}
+    return {**name, "sentence": candidate.cause.words(candidate.target)}
 
 
 def _possible(candidate: Any) -> dict[str, Any]:

@@ -17,13 +17,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sql
 from sqlalchemy.exc import DBAPIError, NoSuchModuleError, SQLAlchemyError
 
 from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.results import notebook
 from mlg_troubleshoot.store.place import Place
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCHEMA_VERSION = 1
 # What SQLite writes into the head of a file so that it can be told from another program's: "mlg1".
@@ -243,7 +247,14 @@ def files_of(place: str | Path | None = None) -> tuple[Path, ...]:
 class Store:
     """The store at a path (SQLite) or a URL (``postgresql+psycopg://…``).
 
-    ``judge`` says what is wrong with the content of a record whenever it is read.
+    Parameters
+    ----------
+    place : str or Path, optional
+        Where it is; else ``MLG_STORE``, or the user's own file.
+    patience_s : int
+        How long a writer waits for others. [s]
+    judge : callable, optional
+        Says what is wrong with the content of a record whenever it is read.
     """
 
     def __init__(
@@ -276,6 +287,16 @@ class Store:
         if not self._postgres:
             sql.event.listen(self._engine, "connect", _as_bytes_are)
         self._ready = False
+
+    def inspections(self) -> pd.DataFrame:
+        """Return the inspections that stand, as a table of canonical columns."""
+        frame: pd.DataFrame = notebook().store_frame(self, "inspections")
+        return frame
+
+    def lives(self) -> pd.DataFrame:
+        """Return one line per gear, the worst first."""
+        frame: pd.DataFrame = notebook().store_frame(self, "lives")
+        return frame
 
     @property
     def place(self) -> str:

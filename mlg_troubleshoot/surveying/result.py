@@ -8,6 +8,7 @@ from pathlib import Path
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import ExitCode, Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.surveying.plan import Suggested
 from mlg_troubleshoot.surveying.survey import Survey
 from mlg_troubleshoot.units import Length, Sentence
@@ -38,17 +39,34 @@ class InspectedGear:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class SurveyResult:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class SurveyResult(Result):
     """What a survey gave.
 
-    gear: the gear as it was before. survey: the fit; None if nothing was read. problems: cells that
-    are wrong; their rows were not used. before, interval, shape (n_joints, 2): 90 % intervals of
-    the amplification indices, before and after. [1] amplification, shape (n_joints,): indices of
-    the surveyed linkage. [1] suggestion: the reading to take next; None if none would narrow
-    anything. inspections: joints that given inspections leave open. warnings: assemblies, published
-    numbers that this gear leaves, and what else a reader must know. gear_file: the gear file that
-    was written. input_sha256: hash of the table.
+    Parameters
+    ----------
+    gear : Gear
+        The gear as it was before.
+    survey : Survey or None
+        The fit; None if nothing was read.
+    problems : tuple of Problem
+        Cells that are wrong; their rows were not used.
+    before, interval : ndarray, shape (n_joints, 2)
+        90 % intervals of the amplification indices, before and after. [1]
+    amplification : ndarray, shape (n_joints,)
+        Indices of the surveyed linkage. [1]
+    suggestion : Suggested or None
+        The reading to take next; None if none would narrow anything.
+    inspections : tuple of InspectedGear
+        What the geometry leaves open of given inspections.
+    warnings : tuple of str
+        Assemblies, published numbers that this gear leaves, and what else a reader must know.
+    gear_file : Path or None
+        The gear file that was written.
+    input_sha256 : str
+        Hash of the table.
+    seed : int
+        Seed of the draws.
     """
 
     gear: Gear

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.wear.filtering import Draws, FilterState, clock, follow
 from mlg_troubleshoot.wear.paths import Scale, WearPath, lay_out, scale_of
 from mlg_troubleshoot.wear.posterior import members, posterior
@@ -36,8 +37,8 @@ _SLOWEST = 0.1
 _LEAST_DRIFT = 1e-3
 
 
-@dataclass(frozen=True, slots=True)
-class Samples:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Samples(Result):
     """Samples of what was asked, with infinity for what never happens.
 
     Parameters
@@ -62,8 +63,8 @@ class Samples:
             return np.where((share == 0.0) | (low == high), low, low + share * (high - low))
 
 
-@dataclass(frozen=True, slots=True)
-class WearModel:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class WearModel(Result):
     """Wear of units from one population.
 
     Parameters

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.arrays import Array, Mask, frozen
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.results import Result
 
 # Decimals beyond which a difference between two readings is taken for rounding in the computer. [1]
 _DECIMALS = 9
@@ -22,8 +23,8 @@ _MOST_STEPS = 2000
 _FALLING = 0.75
 
 
-@dataclass(frozen=True, slots=True)
-class WearPath:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class WearPath(Result):
     """Readings of one part between two restorations.
 
     Parameters

@@ -31,6 +31,7 @@ class BeliefsFile(Table):
     form: AboveZero = _OWN.form
     exact: AboveZero = _OWN.exact
     alike: _Share = _OWN.alike
+    surveyed: AboveZero = _OWN.surveyed
     rarer: dict[Name, AboveZero] = msgspec.field(default_factory=dict)
 
 

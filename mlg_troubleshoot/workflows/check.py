@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,15 +19,20 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.workflows.index_tables import index_table
 
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from mlg_troubleshoot.arrays import Array
     from mlg_troubleshoot.life.looking_back import PastInspection
     from mlg_troubleshoot.records import ReadResult
+    from mlg_troubleshoot.records.frames import Frame
+    from mlg_troubleshoot.records.read import Source
     from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.store import Store
 
@@ -39,8 +44,8 @@ class CheckOptions(TableOptions):
 
     Parameters
     ----------
-    gear : str
-        Shipped gear or gear file.
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
     remembered : str or None
         What was remembered, in words for the report.
     advice : bool or None
@@ -52,14 +57,14 @@ class CheckOptions(TableOptions):
         An extension of the model.
     """
 
-    gear: str = DEFAULT_GEAR
+    gear: Gear | str | Path = DEFAULT_GEAR
     remembered: str | None = None
     advice: bool | None = None
     seed: int = 1
     extension: Extension | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class CheckResult(TableResult):
     """What a check found, in addition to what :class:`TableResult` tells of its tables.
 
@@ -100,8 +105,8 @@ class CheckResult(TableResult):
 
 
 def check_files(
-    sources: Sequence[Path | BinaryIO],
-    options: CheckOptions,
+    sources: Sequence[Source],
+    options: CheckOptions | None = None,
     on_read: Callable[[int, int | None], None] | None = None,
     on_judged: Callable[[int, int], None] | None = None,
     store: Store | None = None,
@@ -110,9 +115,9 @@ def check_files(
 
     Parameters
     ----------
-    sources : sequence of Path or binary file
+    sources : sequence of Path, binary file or DataFrame
         Tables; a folder stands for the tables in it.
-    options : CheckOptions
+    options : CheckOptions, optional
         What the user declared.
     on_read : callable, optional
         Called with rows read and, if known, their number.
@@ -133,6 +138,7 @@ def check_files(
     """
     from mlg_troubleshoot.records import ReadOptions, read_many
 
+    options = options or CheckOptions()
     gear = load_gear(options.gear)
     read = read_many(sources, ReadOptions.of(gear, options), progress=on_read)
     told = {
@@ -150,61 +156,95 @@ def check_inspection(
     return _judge(load_gear(options.gear), (inspection,), options, store=store)
 
 
+@overload
 def check(
     inspection: Inspection,
+    gear: Gear | str | Path = ...,
+    *,
+    advice: bool | None = ...,
+    extension: Extension | None = ...,
+) -> Assessment: ...
+
+
+@overload
+def check(
+    inspection: Source,
+    gear: Gear | str | Path = ...,
+    *,
+    advice: bool | None = ...,
+    extension: Extension | None = ...,
+    **declared: Any,
+) -> CheckResult: ...
+
+
+def check(
+    inspection: Inspection | Source,
     gear: Gear | str | Path = DEFAULT_GEAR,
     *,
-    advice: bool = True,
+    advice: bool | None = None,
     extension: Extension | None = None,
-) -> Assessment:
-    """Judge one inspection, from Python.
+    **declared: Any,
+) -> Assessment | CheckResult:
+    """Judge one inspection or a table of them, from Python.
 
     Parameters
     ----------
-    inspection : Inspection
-        What was measured. It is judged as a row of a table is: without `entered` its clearances and
-        their uncertainties are readings in its convention; with `entered` they were read before and
-        are radial. [in]
+    inspection : Inspection, DataFrame, Series, mapping or file
+        What was measured. A table has the columns of a file, and a Series or a mapping is one row
+        of it. An `Inspection` is judged as a row is: without `entered` its clearances and their
+        uncertainties are readings in its convention; with `entered` they were read before and are
+        radial. [in]
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
-    advice : bool
+    advice : bool, optional
         Check the probability by Monte Carlo, find worn joints, and say what further measuring and
-        re-rigging are worth.
+        re-rigging are worth; for a single gear unless it is False.
     extension : Extension, optional
         An extension of the model.
+    **declared
+        What `CheckOptions` declares about a table: ``unit="mm"``, ``convention="RADIAL"``.
 
     Returns
     -------
-    Assessment
-        Verdict, prediction, ranked joints and next action.
+    Assessment or CheckResult
+        Of an `Inspection` its assessment; of a table one judgement per row, and its problems.
 
     Raises
     ------
     UsageError
-        If a table with these values would be refused, with the same words.
+        If a table with the values of an `Inspection` would be refused, with the same words.
     """
     from mlg_troubleshoot.records import ReadOptions, judge_again
 
+    if not isinstance(inspection, Inspection):
+        asked = CheckOptions(gear=gear, advice=advice, extension=extension, **declared)
+        return check_files([inspection], asked)
     known = load_gear(gear)
     row = judge_again(inspection, ReadOptions.of(known))
-    (judged,) = assess([row], known, load_index_table(known), advice=advice, extension=extension)
+    table = index_table(known)
+    (judged,) = assess([row], known, table, advice=advice is not False, extension=extension)
     if not isinstance(judged, Assessment):
         raise TypeError(f"{type(inspection).__name__} is not an Inspection")
     return judged
 
 
 def predict(
-    clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Path = DEFAULT_GEAR
+    clearance_in: Mapping[int, float] | ArrayLike | Frame,
+    gear: Gear | str | Path = DEFAULT_GEAR,
+    **declared: Any,
 ) -> WorstCase:
     """Predict the plunger displacement in the worst directions, from Python.
 
     Parameters
     ----------
-    clearance_in : mapping of int to float, or array_like of shape (n_joints,) or (n, n_joints)
+    clearance_in : mapping, DataFrame or array_like of shape (n_joints,) or (n, n_joints)
         Radial clearances: of one gear by joint number, joints that are not named being tight, or of
-        n gears in the order of the joints. [in]
+        n gears in the order of the joints. Or the columns of a file, such as ``clearance_3_mm``:
+        radial unless they say their convention; blank is tight. [in]
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
+    **declared
+        What `CheckOptions` declares about a table: ``unit="mm"``, ``convention="TOTAL_PLAY"``.
 
     Returns
     -------
@@ -219,10 +259,13 @@ def predict(
     """
     known = load_gear(gear)
     numbers = known.joint_numbers
-    if isinstance(clearance_in, Mapping):
-        known.require_joints(clearance_in)
-        clearance_in = [clearance_in.get(number, 0.0) for number in numbers]
-    rows = np.atleast_2d(np.asarray(clearance_in, float))
+    given: Any = clearance_in
+    if hasattr(given, "iloc") or _has_columns(given):
+        given = _clearances_of(given, known, **declared)
+    if isinstance(given, Mapping):
+        known.require_joints(given)
+        given = [given.get(number, 0.0) for number in numbers]
+    rows = np.atleast_2d(np.asarray(given, float))
     if rows.ndim != 2 or rows.shape[1] != len(numbers):
         raise UsageError(
             f"clearances of shape {rows.shape} do not fit {len(numbers)} joints",
@@ -235,10 +278,63 @@ def predict(
     return worst_case(known.model, rows)
 
 
+def _has_columns(clearance_in: object) -> bool:
+    """Whether a mapping names columns, not joints."""
+    return isinstance(clearance_in, Mapping) and any(isinstance(key, str) for key in clearance_in)
+
+
+def _clearances_of(table: Frame, gear: Gear, **declared: Any) -> Array:
+    """Radial clearances of the rows of a frame, shape (n, n_joints), 0 where blank. [in]"""
+    from mlg_troubleshoot.records import ReadOptions, read_many
+    from mlg_troubleshoot.records.frames import clearances_alone
+
+    declared = {"convention": ClearanceConvention.RADIAL, "small_readings_true": True, **declared}
+    options = ReadOptions.of(gear, CheckOptions(**declared))
+    read = read_many([clearances_alone(table, options.joints)], options)
+    if read.problems:
+        shown = read.problems[:_MOST_SAID]
+        said = [f"{p.place()}: {p.value or 'nothing'}: expected {p.expected}" for p in shown]
+        remedies = dict.fromkeys(problem.remedy for problem in shown)
+        raise UsageError("; ".join(said), " ".join(remedies))
+    numbers = gear.joint_numbers
+    return np.array([[row.clearance_in.get(n, 0.0) for n in numbers] for row in read.inspections])
+
+
+def read_inspections(
+    source: Source, gear: Gear | str | Path = DEFAULT_GEAR, **declared: Any
+) -> pd.DataFrame:
+    """Read a table of inspections as the reader of files understands it.
+
+    Parameters
+    ----------
+    source : str, Path, binary file or DataFrame
+        The table.
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
+    **declared
+        What `CheckOptions` declares about a table: ``unit="mm"``, ``sheet="Fleet"``.
+
+    Returns
+    -------
+    DataFrame
+        One row per row of the table, with canonical columns: lengths in inches, clearances in the
+        convention of the row, dates, categories; a cell that is wrong is missing. Its ``attrs``
+        hold the ``problems``, a tuple, and the ``notes``.
+    """
+    from mlg_troubleshoot.records import ReadOptions, read_many
+    from mlg_troubleshoot.records.frames import frame_of
+
+    options = ReadOptions.of(load_gear(gear), CheckOptions(**declared))
+    read = read_many([source], options)
+    frame = frame_of(read.rows, options.joints)
+    frame.attrs.update(problems=read.problems, notes=read.notes)
+    return frame
+
+
 def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice | None:
     """Say which joint's reading is most useful next, and whether one may stop measuring."""
     row = replace(trial_inspection(gear), clearance_in=dict(measured))
-    (judged,) = assess([row], gear, load_index_table(gear), advice=True)
+    (judged,) = assess([row], gear, index_table(gear), advice=True)
     return judged.measuring if isinstance(judged, Assessment) else None
 
 
@@ -264,7 +360,7 @@ def _judge(
     advice = len(rows) == 1 if options.advice is None else options.advice
     asked: dict[str, Any] = {"advice": advice, "seed": options.seed, "extension": options.extension}
     as_they_count = since_repairs(rows, gear, store)
-    judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
+    judgements = assess(as_they_count, gear, index_table(gear), **asked, progress=on_judged)
     if as_they_count is not rows:
         # What is shown and kept of an inspection is what was found, whatever counts no more.
         judgements = tuple(
@@ -368,6 +464,8 @@ def write_template(
     write(file, loaded, unit=unit)
 
 
+# Wrong cells that an error names at most.
+_MOST_SAID = 20
 # Columns of the verdicts that bear the names of what an assessment holds; margin_used_in is its
 # margin.
 _NUMBERS = (

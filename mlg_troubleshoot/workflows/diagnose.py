@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.sentences import joint_list
@@ -19,6 +19,7 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
     from mlg_troubleshoot.diagnosis.faults import DataFault
+    from mlg_troubleshoot.records.read import Source
     from mlg_troubleshoot.reporting.publish import WrittenReport
 
 
@@ -29,8 +30,8 @@ class DiagnoseOptions(TableOptions):
 
     Parameters
     ----------
-    gear : str
-        Shipped gear or gear file.
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
     remembered : str or None
         What was remembered, in words for the report.
     cause_files : tuple of Path
@@ -41,14 +42,14 @@ class DiagnoseOptions(TableOptions):
         TOML file of what is believed beforehand; None for what the program believes.
     """
 
-    gear: str = DEFAULT_GEAR
+    gear: Gear | str | Path = DEFAULT_GEAR
     remembered: str | None = None
     cause_files: tuple[Path, ...] = ()
     sure: float = 0.9
     beliefs_file: Path | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class DiagnoseResult(TableResult):
     """What a diagnosis found, in addition to what :class:`TableResult` tells of its tables.
 
@@ -70,17 +71,17 @@ _ANY_LENGTH_IN = 10
 
 
 def diagnose_files(
-    sources: Sequence[Path | BinaryIO],
-    options: DiagnoseOptions,
+    sources: Sequence[Source],
+    options: DiagnoseOptions | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> DiagnoseResult:
     """Compare the measured displacements of tables with the model's predictions.
 
     Parameters
     ----------
-    sources : sequence of Path or binary file
+    sources : sequence of Path, binary file or DataFrame
         Tables.
-    options : DiagnoseOptions
+    options : DiagnoseOptions, optional
         What the user declared.
     progress : callable, optional
         Called with the share that is done.
@@ -96,22 +97,27 @@ def diagnose_files(
         If the tables cannot answer the question.
     """
     from mlg_troubleshoot.diagnosis import (
-        CATALOGUE,
         ModelExtension,
-        diagnose,
         load_causes,
         table_from_inspections,
     )
+    from mlg_troubleshoot.diagnosis import diagnose as diagnosed
+    from mlg_troubleshoot.diagnosis.causes import in_own_cause, with_own
+    from mlg_troubleshoot.diagnosis.causes.together import OtherGeometry
     from mlg_troubleshoot.misfit.beliefs import Beliefs
     from mlg_troubleshoot.records import ReadOptions, read_many
     from mlg_troubleshoot.workflows.beliefs_file import load_beliefs
 
+    options = options or DiagnoseOptions()
     gear = load_gear(options.gear)
     own = tuple(cause for file in options.cause_files for cause in load_causes(file))
     beliefs = Beliefs(sure=options.sure)
     if options.beliefs_file is not None:
-        names = {cause.name for cause in (*CATALOGUE, *own)}
+        names = {cause.name for cause in with_own(own)}
         beliefs = load_beliefs(options.beliefs_file, options.sure, names)
+    if gear.linkage_known:
+        rarer = {OtherGeometry.name: beliefs.surveyed, **beliefs.rarer}
+        beliefs = replace(beliefs, rarer=rarer)
     reading = replace(
         ReadOptions.of(gear, options),
         clearance_hard_max_in=_ANY_LENGTH_IN,
@@ -133,15 +139,17 @@ def diagnose_files(
     # refused.
     once = list({(i.source.file, i.record_id): i for i in reversed(valid)}.values())[::-1]
     notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
-    diagnosis = diagnose(
-        gear.model,
-        table_from_inspections(once, gear, along=True),
-        gear.discrepancies,
-        own_causes=own,
-        ensemble=gear.ensemble_models[1:],
-        beliefs=beliefs,
-        progress=progress,
-    )
+    table = table_from_inspections(once, gear, along=True)
+    with in_own_cause(own, table.columns):
+        diagnosis = diagnosed(
+            gear.model,
+            table,
+            gear.discrepancies,
+            own_causes=own,
+            ensemble=gear.ensemble_models[1:],
+            beliefs=beliefs,
+            progress=progress,
+        )
     by_record = {inspection.record_id: inspection for inspection in once}
     faults = tuple(_as_written(fault, by_record[fault.record_id]) for fault in diagnosis.faults)
     diagnosis = replace(diagnosis, rows_read=len(read.rows), faults=faults)
@@ -163,6 +171,33 @@ def diagnose_files(
         notes=notes,
         inputs_sha256=read.inputs_sha256,
     )
+
+
+def diagnose(
+    source: Source, gear: Gear | str | Path = DEFAULT_GEAR, **declared: Any
+) -> DiagnoseResult:
+    """Compare the measured displacements of one table with the model's predictions, from Python.
+
+    Parameters
+    ----------
+    source : DataFrame or file
+        The table, with the columns of a file.
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
+    **declared
+        What `DiagnoseOptions` declares: ``convention="RADIAL"``, ``cause_files=("own.py",)``.
+
+    Returns
+    -------
+    DiagnoseResult
+        Verdict, causes, extension and gain.
+
+    Raises
+    ------
+    InconclusiveDataError
+        If the table cannot answer the question.
+    """
+    return diagnose_files([source], DiagnoseOptions(gear=gear, **declared))
 
 
 def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
@@ -232,8 +267,8 @@ def load_model_extension(
     ----------
     files : sequence of Path
         Extension files; several are stacked.
-    gear : str
-        Shipped gear or gear file.
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
     cause_files : sequence of Path
         Python files with the user's own causes.
 

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import (
     LEAST_OF_A_HASH,
@@ -26,6 +26,7 @@ from mlg_troubleshoot.life.folding import (
 )
 from mlg_troubleshoot.records import ReadOptions, admit
 from mlg_troubleshoot.records.gate import judge_text
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.store import Added, Broken, Record, RecordKind, Store, StoreError, packed
 from mlg_troubleshoot.units import LengthUnit
 
@@ -41,14 +42,29 @@ _LONGEST_LINE = 4_000_000
 _ANY_ROW = {"record_id": "-", "tail_no": "-", "side": "LH", "clearance_convention": "RADIAL"}
 
 
-@dataclass(frozen=True, slots=True)
-class Lives:
-    """Lives of gears, and what the wear of the whole fleet says of each."""
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Lives(Result):
+    """Lives of gears, and what the wear of the whole fleet says of each.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear type.
+    lives : tuple of GearLife
+        What is known of each gear.
+    forecasts : mapping of tail and side to Forecast
+        Landings that each has left. [landings]
+    model : WearModel or None
+        How joints wear; None if nothing can be learnt.
+    problems : tuple of Problem
+        Wrong cells of the table that they were read from, if it was one.
+    """
 
     gear: Gear
     lives: tuple[GearLife, ...]
     forecasts: Mapping[GearKey, Forecast]
     model: WearModel | None
+    problems: tuple[Problem, ...] = ()
 
 
 def show_fleet(
@@ -57,6 +73,7 @@ def show_fleet(
     *,
     ahead: bool,
     progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
+    problems: tuple[Problem, ...] = (),
 ) -> Lives:
     """Every gear's life, with its forecast unless nobody wants to look ahead."""
     from mlg_troubleshoot.life.forecast import fit_fleet, forecast
@@ -65,7 +82,7 @@ def show_fleet(
     found = tuple(lives(store).values())
     progress("Learning how joints wear", 0, None)
     model = fit_fleet(found, gear) if ahead else None
-    return Lives(gear, found, forecast(found, model, gear, progress), model)
+    return Lives(gear, found, forecast(found, model, gear, progress), model, problems)
 
 
 def show_lives(store: Store, gear: Gear, tail: str, side: str | None, *, ahead: bool) -> Lives:

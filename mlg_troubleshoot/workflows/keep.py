@@ -10,26 +10,32 @@ from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearKey, find, warnings_of, without_dashes
+from mlg_troubleshoot.life.folding import GearKey, find, life_of, warnings_of, without_dashes
 from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
 from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
-    Added,
     Record,
     RecordKind,
     Store,
     StoreError,
+    inspection_from,
     inspection_record,
     packed,
     same_inspection,
 )
 from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult
 
+_ENTERED = (RecordKind.INSPECTION, RecordKind.CORRECTION, RecordKind.ASSESSMENT)
+
 
 @dataclass(frozen=True, slots=True)
-class Kept(Added):
-    """What was added, and which records of these gears now disagree in dates and landings."""
+class Kept:
+    """How many inspections were new, and how many stood there already; and which records of these
+    gears now disagree in dates and landings.
+    """
 
+    new: int
+    known: int
     warnings: tuple[str, ...]
 
 
@@ -52,6 +58,7 @@ def keep(
     ]
     inspections = [inspection_record(each) for each in _under_first_ids(written, store)]
     known = store.known([record.identity_hash for record in inspections])
+    stood = len(known)
     records: list[Record] = []
     for assessment, row, record in zip(judged, written, inspections, strict=True):
         # Before what was read after it.
@@ -59,12 +66,13 @@ def keep(
         # Wherever an inspection was entered again, it is the first entry that was assessed.
         first = known.setdefault(record.identity_hash, record)
         records += [record, assessment_record(result.gear, options, assessment, record, first)]
-    added = store.add(
+    store.add(
         records,
         lambda kept, new: new.kind is not RecordKind.INSPECTION or _agrees(store, kept, new),
     )
     gears = {(record.tail_no, record.side) for record in records}
-    return Kept(added.new, added.known, tuple(warnings_of(store, gears)))
+    new = len(known) - stood
+    return Kept(new, len(inspections) - new, tuple(warnings_of(store, gears)))
 
 
 def _repairs_of(row: Inspection, store: Store) -> list[Record]:
@@ -96,7 +104,23 @@ def correct(store: Store, record_id: str, result: CheckResult, options: CheckOpt
             f" ({len(judged)} sound)",
             "Give a file with the one right row.",
         )
-    right = judged[0].inspection
+    return supersede(store, wrong, result, options)
+
+
+def is_same(kept: Record, result: CheckResult) -> bool:
+    """Whether a check found what is kept already."""
+    return all(
+        isinstance(j, Assessment) and same_inspection(kept, inspection_record(j.inspection))
+        for j in result.judgements
+    )
+
+
+def supersede(store: Store, wrong: Record, result: CheckResult, options: CheckOptions) -> Record:
+    """Append what takes the place of a kept inspection, with the repair that it states; one that
+    only the former stated is void.
+    """
+    (judged,) = (j for j in result.judgements if isinstance(j, Assessment))
+    right = judged.inspection
     if (right.tail_no, right.side.value) != (wrong.tail_no, wrong.side):
         raise UsageError(
             f"the correction is of {right.tail_no} {right.side}, the record of {wrong.tail_no}"
@@ -104,8 +128,33 @@ def correct(store: Store, record_id: str, result: CheckResult, options: CheckOpt
             "Void the record (mlg history void) and keep the right one: mlg check FILE --keep",
         )
     record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.digest)
-    store.add([record, assessment_record(result.gear, options, judged[0], record, record)])
+    repairs = [*_repairs_taken_back(store, wrong, right), *_repairs_of(right, store)]
+    judgement = assessment_record(result.gear, options, judged, record, record)
+    store.add([*repairs, record, judgement])
     return record
+
+
+def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[Record]:
+    """Void the repair that came with an inspection which states it no longer."""
+    was, stands = (stated_repair(row) for row in (inspection_from(wrong), right))
+    if was is None or (stands and (was.day, was.joints) == (stands.day, stands.joints)):
+        return []
+    life = life_of(store, wrong.tail_no, wrong.side)
+    before = max(
+        (r.seq for r in life.records if r.kind in _ENTERED and r.seq < wrong.seq), default=0
+    )
+    return [
+        Record(
+            RecordKind.VOID,
+            "",
+            wrong.tail_no,
+            wrong.side,
+            "",
+            packed({"voids": repair.digest, "why": "taken back with the answer that stated it"}),
+        )
+        for repair in life.repairs
+        if before < repair.seq < wrong.seq
+    ]
 
 
 def assessment_record(

@@ -22,6 +22,7 @@ from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
+    from mlg_troubleshoot.records.read import Source
     from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.surveying.result import SurveyResult
     from mlg_troubleshoot.surveying.survey import Survey
@@ -51,21 +52,46 @@ def write_survey_template(
     write(file, SurveyedLinkage(known), planned(known), unit)
 
 
-def survey_gear(
-    file: str | Path,
+def survey(
+    table: Source,
     gear: str | Path | Gear = DEFAULT_GEAR,
     *,
     write: Path | None = None,
-    inspections: Path | None = None,
+    inspections: Source | None = None,
     seed: int = 0,
     on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> SurveyResult:
     """Find the linkage that a survey speaks of, and write it as a gear file with ensemble and index
     table.
 
-    Nothing is written if readings contradict each other. With inspections, the next reading narrows
-    what is unknown of their displacement, in place of the indices.
+    Nothing is written if readings contradict each other.
+
+    Parameters
+    ----------
+    table : str, Path or DataFrame
+        The survey, with the columns of its template. [in, rad or as their names say]
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
+    write : Path, optional
+        The gear file to write.
+    inspections : Path or DataFrame, optional
+        Inspections whose displacement the next reading narrows, in place of the indices.
+    seed : int
+        Seed of the draws.
+    on_progress : callable, optional
+        Called with steps done and their number.
+
+    Returns
+    -------
+    SurveyResult
+        The fit, its amplification indices with intervals, and the next reading.
+
+    Raises
+    ------
+    UsageError
+        If the gear file cannot be written, or no inspection can be judged.
     """
+    from mlg_troubleshoot.records.frames import source_label
     from mlg_troubleshoot.records.survey_table import read_survey
     from mlg_troubleshoot.surveying.as_gear_file import assemblies
     from mlg_troubleshoot.surveying.plan import suggested, suggested_early
@@ -80,7 +106,7 @@ def survey_gear(
     linkage = SurveyedLinkage(known)
     rng = np.random.default_rng(seed)
     cases = _clearances(inspections, known)
-    readings, problems, digest = read_survey(Path(file), linkage)
+    readings, problems, digest = read_survey(table, linkage)
     members = linkage.amplification(np.array([linkage.vector(each) for each in known.ensemble]))
     before = np.quantile(members, [0.05, 0.95], axis=0).T
     found = fit(known, readings, rng, on_progress) if readings else None
@@ -98,7 +124,9 @@ def survey_gear(
         if write is not None and found.contradicts:
             warnings += ("readings contradict each other, so that no gear file was written",)
         elif write is not None:
-            path = _write_gear(known, found, write, f"{Path(file).name}, SHA-256 {digest[:12]}")
+            path = _write_gear(
+                known, found, write, f"{Path(source_label(table)).name}, SHA-256 {digest[:12]}"
+            )
             warnings += _left_targets(known, path)
     clearance = np.array([c for _, c in cases]).reshape(len(cases), len(known.joints))
     moved = linkage.displacement(draws, clearance)
@@ -143,7 +171,7 @@ def _beside(path: Path) -> tuple[Path, Path]:
     return path.with_name(f"{path.stem}-ensemble.toml"), path.with_name(f"{path.stem}-indices.json")
 
 
-def _clearances(file: Path | None, gear: Gear) -> list[tuple[str, Array]]:
+def _clearances(file: Source | None, gear: Gear) -> list[tuple[str, Array]]:
     """Clearances of given inspections; as in the prediction of a check, a joint that was not read
     counts 0.
     """

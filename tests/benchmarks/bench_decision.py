@@ -90,7 +90,7 @@ def _explain_some(
     for row in rows:
         read = {j + 1: float(fleet.read_in[row, j]) for j in range(10) if measured[row, j]}
         one = Cases.of(gear, [inspection(read, float(fleet.plunger_in[row]))])
-        answer = explain(one, np.random.default_rng(row), draws=DRAWS)
+        answer = explain(one)
         assert answer is not None
         true = fleet.true_in[row]
         inside = [i.low_in <= true[i.joint - 1] <= i.high_in for i in answer.intervals]
@@ -109,9 +109,6 @@ def _explain_some(
             )
         )
     return found
-
-
-DRAWS = 4096
 
 
 def explained(fleet: worn_gears.Fleet, measured: NDArray[np.bool_]) -> list[Explained]:

@@ -34,7 +34,7 @@ from mlg_troubleshoot.surveying.plan import planned, suggested_early
 from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
 from mlg_troubleshoot.surveying.result import SurveyResult
 from mlg_troubleshoot.surveying.survey import Fitting, Prior
-from mlg_troubleshoot.workflows.survey import survey_gear, write_survey_template
+from mlg_troubleshoot.workflows.survey import survey, write_survey_template
 from tests.gear.independent_solver import LoopClosure
 
 GEAR = load_gear()
@@ -220,7 +220,7 @@ def run(rows: list[dict[str, object]], folder: Path) -> SurveyResult:
         writer = csv.DictWriter(file, rows[0].keys())
         writer.writeheader()
         writer.writerows(rows)
-    return survey_gear(path)
+    return survey(path)
 
 
 def left_open(

@@ -17,7 +17,7 @@ from mlg_troubleshoot.records.survey_table import read_survey, write_survey_temp
 from mlg_troubleshoot.reporting.model_json import survey_as_json
 from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
 from mlg_troubleshoot.units import LengthUnit
-from mlg_troubleshoot.workflows.survey import survey_gear
+from mlg_troubleshoot.workflows.survey import survey as survey_task
 
 from .conftest import FAILURE, mlg
 
@@ -147,7 +147,7 @@ def test_every_surveyed_number_says_its_uncertainty(
 def test_the_same_seed_gives_the_same_gear(
     tmp_path: Path, surveyed: tuple[Path, dict[str, object]]
 ) -> None:
-    again = survey_gear(surveyed[0].with_name("s.csv"), FOUR_BAR, write=tmp_path / "mine.toml")
+    again = survey_task(surveyed[0].with_name("s.csv"), FOUR_BAR, write=tmp_path / "mine.toml")
     assert (tmp_path / "mine.toml").read_bytes() == surveyed[0].read_bytes()
     assert survey_as_json(again)["joints"] == surveyed[1]["joints"]
 

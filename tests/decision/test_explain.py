@@ -10,18 +10,17 @@ import pytest
 from mlg_troubleshoot.decision.assessment import Posterior
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import believed
+from mlg_troubleshoot.decision.inspection import RiggingCheck
 from mlg_troubleshoot.decision.likely_worn import explain
+from mlg_troubleshoot.decision.priors import PRIORS
+from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, level_chances
 from mlg_troubleshoot.gear.gear import Gear
 from tests.benchmarks import worn_gears
 from tests.decision.conftest import Judge, every_joint, inspected
 
 
 def explained(gear: Gear, clearance_in: dict[int, float], reading_in: float) -> Posterior:
-    found = explain(
-        Cases.of(gear, [inspected(clearance_in, readings_in=(reading_in,))]),
-        np.random.default_rng(2),
-        draws=4096,
-    )
+    found = explain(Cases.of(gear, [inspected(clearance_in, readings_in=(reading_in,))]))
     assert found is not None
     return found
 
@@ -31,7 +30,7 @@ def chance(found: Posterior, joint: int) -> float:
 
 
 def test_without_a_plunger_reading_nothing_is_explained(gear: Gear) -> None:
-    assert explain(Cases.of(gear, [inspected({3: 0.013})]), np.random.default_rng(2)) is None
+    assert explain(Cases.of(gear, [inspected({3: 0.013})])) is None
 
 
 def test_the_only_unmeasured_link_explains_a_large_displacement(gear: Gear) -> None:
@@ -99,9 +98,7 @@ def test_ninety_percent_intervals_cover_the_clearances_of_a_simulated_fleet(gear
     for row in range(120):
         read = {j: float(fleet.read_in[row, j - 1]) for j in range(1, 11) if rng.random() < 0.5}
         found = explain(
-            Cases.of(gear, [inspected(read, readings_in=(float(fleet.plunger_in[row]),))]),
-            np.random.default_rng(row),
-            draws=2048,
+            Cases.of(gear, [inspected(read, readings_in=(float(fleet.plunger_in[row]),))])
         )
         assert found is not None
         inside += [
@@ -129,7 +126,7 @@ def test_what_clearance_does_not_explain_names_no_joint(gear: Gear) -> None:
 
 def test_the_chance_of_the_rigging_is_the_one_that_the_plan_follows(gear: Gear) -> None:
     one = Cases.of(gear, [inspected(every_joint(0.003), readings_in=(0.036,))])
-    found = explain(one, np.random.default_rng(2))
+    found = explain(one)
     assert found is not None
     assert found.not_clearance == float(believed(one).rigging[0])
 
@@ -144,7 +141,29 @@ def test_an_unread_joint_is_likelier_worn_on_a_gear_whose_other_joints_are_worn(
 
 def test_a_coarse_reading_of_one_joint_leaves_its_clearance_open(gear: Gear) -> None:
     read = inspected(every_joint(0.004), readings_in=(0.02,), gauge_u_by_joint_in={5: 0.002})
-    found = explain(Cases.of(gear, [read]), np.random.default_rng(1))
+    found = explain(Cases.of(gear, [read]))
     assert found is not None
     width = {each.joint: each.high_in - each.low_in for each in found.intervals}
     assert width[5] > 2.0 * width[3]
+
+
+def test_every_interval_is_a_number_where_nothing_explains_the_reading(gear: Gear) -> None:
+    found = explained(gear, every_joint(0.0005), 0.12)
+    assert all(0.0 <= each.low_in <= each.median_in <= each.high_in for each in found.intervals)
+
+
+def test_the_chance_of_wear_is_that_of_sampling_the_same_model(gear: Gear) -> None:
+    sound = {j: 0.0005 for j in range(1, 11) if j != 2}
+    read = inspected(sound, readings_in=(0.02,), rigging_checked=RiggingCheck.YES)
+    one, rng = Cases.of(gear, [read]), np.random.default_rng(3)
+    found, n = explain(one), 200_000
+    assert found is not None
+    level = rng.choice(len(DENSITIES), n, p=level_chances(one)[0])
+    drawn = np.array([rng.choice(SHARES, n, p=each) for each in DENSITIES])[level, np.arange(n)]
+    clearance = np.full((n, 10), 0.0005)
+    clearance[:, 1] = drawn * gear.limits_in[1]
+    reach = clearance * gear.model.plunger_amplification()
+    moved = np.sum(reach * np.cos(rng.uniform(0.0, 2.0 * np.pi, (n, 10))), axis=1)
+    weight = np.exp(-0.5 * ((0.02 - moved) / np.hypot(0.0015, PRIORS.linkage_u_in)) ** 2)
+    sampled = float(weight @ (drawn > 1.0) / weight.sum())
+    assert chance(found, 2) == pytest.approx(sampled, abs=0.03)

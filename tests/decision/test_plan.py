@@ -250,3 +250,11 @@ def test_the_expected_repair_says_which_joint_nobody_has_read(judge: Judge) -> N
     (repair,) = [step for step in found.plan.steps if step.action is Action.RESTORE]
     assert repair.joints == (3, 2)
     assert repair.text == "Restore #3 and what the readings find worn, perhaps #2."
+
+
+def test_joints_are_expected_to_be_the_cause_where_the_rigging_is_found_right(
+    judge: Judge,
+) -> None:
+    found = judge(every_joint(0.003), readings_in=(0.036,), outcome=Outcome.FAILED)
+    assert [step.action for step in found.plan.steps][:2] == [Action.CHECK_RIGGING, Action.RESTORE]
+    assert found.end is End.DONE

@@ -67,3 +67,9 @@ def test_what_does_not_fit_the_minutes_is_said(judge: Judge) -> None:
     found = judge(every_joint(0.0003, j3=0.0148), **FAILED, minutes_available=60.0)
     assert found.next_action.action is Action.CONTINUE
     assert "restore #3 takes 135 min; 60 min are left today" in (found.plan.open_question or "")
+
+
+def test_a_plan_that_the_minutes_cut_off_does_not_say_that_no_repair_holds(judge: Judge) -> None:
+    found = judge(every_joint(0.003), **FAILED, minutes_available=20.0)
+    assert any(each.kind == "sure" for each in found.repair_sets or ())
+    assert found.next_action.text.startswith("Stop for today")

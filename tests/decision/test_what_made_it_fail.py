@@ -12,6 +12,7 @@ from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import Causes, believed
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
+from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.gear.gear import Gear
 from tests.decision.conftest import every_joint, inspected
 
@@ -76,3 +77,8 @@ def test_a_gear_that_failed_before_its_repair_has_the_chance_of_a_second_one(gea
         ((said,),) = found.with_chances([(asked,)])
         chances.append(said.second_repair_probability is not None)
     assert chances == [True, False]
+
+
+def test_loaded_pins_scatter_by_their_angle() -> None:
+    angles = np.random.default_rng(1).normal(0.0, np.radians(PRIORS.scatter_deg), 200_000)
+    assert PRIORS.cosine == pytest.approx((np.cos(angles).mean(), np.cos(angles).std()), abs=2e-3)

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from mlg_troubleshoot import load_gear
 from mlg_troubleshoot.cli.app import app
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.workflows.beliefs_file import BeliefsFile, load_beliefs
+from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 
 ROOT = Path(__file__).parents[2]
 NAMES = {"geometry", "rigging_offset"}
@@ -70,3 +73,34 @@ def test_a_cause_that_is_all_but_unknown_in_this_fleet_is_not_named(tmp_path: Pa
     (cause,) = named()
     rarer = written(tmp_path, f"schema = 1\n[rarer]\n{cause} = 1e-12\n")
     assert cause not in named("--beliefs", str(rarer))
+
+
+def probability_of_another_linkage(gear: Path | str, beliefs: Path | None = None) -> float:
+    table = ROOT / "inspection_data/measured_pin_direction.csv"
+    options = DiagnoseOptions(gear=str(gear), beliefs_file=beliefs)
+    return diagnose_files([table], options).diagnosis.probabilities["geometry", None]
+
+
+@pytest.fixture(scope="module")
+def measured_gear(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder, data = tmp_path_factory.mktemp("gear"), load_gear().path.parent
+    for file in data.glob("*.toml"):
+        shutil.copy(file, folder)
+    gear = folder / "hawker-800xp.toml"
+    text = gear.read_text(encoding="utf-8")
+    gear.write_text(text.replace('kind = "reconstructed"', 'kind = "measured"'), encoding="utf-8")
+    return gear
+
+
+def test_another_linkage_is_less_likely_where_the_gear_was_measured(measured_gear: Path) -> None:
+    drawn = probability_of_another_linkage("hawker-800xp")
+    assert probability_of_another_linkage(measured_gear) < 0.15 * drawn
+
+
+def test_how_rare_another_linkage_is_of_a_measured_gear_can_be_stated(
+    measured_gear: Path, tmp_path: Path
+) -> None:
+    alike = written(tmp_path, "schema = 1\nsurveyed = 1.0")
+    assert probability_of_another_linkage(measured_gear, alike) == pytest.approx(
+        probability_of_another_linkage("hawker-800xp")
+    )

@@ -363,3 +363,7 @@ def test_the_report_says_how_much_a_rival_that_is_likelier_beforehand_would_chan
     (rival,) = named.diagnosis.ten_times
     assert f"If {rival[0].replace('_', ' ')}" in named.text
     assert "ten times as likely beforehand" in named.text
+
+
+def test_the_screen_says_it_as_well(named: Made) -> None:
+    assert "were ten times as likely beforehand" in seven_lines(named.diagnosis)[2].text

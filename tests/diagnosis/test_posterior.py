@@ -12,7 +12,10 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
+from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
+from mlg_troubleshoot.diagnosis.explain import MisfitProblem
+from mlg_troubleshoot.diagnosis.noise import Rows
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Key
@@ -232,6 +235,20 @@ def test_twice_as_much_searching_says_the_same(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("mlg_troubleshoot.misfit.posterior.BEAM", 40)
     monkeypatch.setattr("mlg_troubleshoot.misfit.posterior.REACH", 14.0)
     assert search().names == pytest.approx(before, abs=2e-3)
+
+
+def test_what_moves_with_a_column_is_as_likely_beforehand_whatever_the_number_of_its_shapes() -> (
+    None
+):
+    shapes, none = RNG.standard_normal((N, 4)), np.empty((N, 0))
+    by_hand = Rows(*(np.zeros(N),) * 5, none, none, 0.0, 0.0, np.zeros(N), none, none, ())
+    bank = Bank(shapes, (("day",), ("day",), ("day",), ("side",)), {})
+    problem = MisfitProblem(DATA, by_hand, (), none, bank, (), CATALOGUE, lambda _m: none, BELIEFS)
+    given = problem.effects(NOISE)
+    share: dict[Key | None, float] = {}
+    for name, prior in zip(given.names, np.exp(given.log_prior), strict=True):
+        share[name] = share.get(name, 0.0) + float(prior)
+    assert share["unlisted", "day"] == pytest.approx(share["unlisted", "side"])
 
 
 def test_what_a_probability_is_said_from_is_odds_of_nine_to_one() -> None:

@@ -131,8 +131,8 @@ def test_a_gear_file_that_was_edited_is_read_anew(edited: Edit) -> None:
     assert load_gear(path).geometry_sha256 != before
 
 
-def test_the_hawker_is_the_one_shipped_gear() -> None:
-    assert shipped_gears() == (DEFAULT_GEAR,)
+def test_the_hawker_is_the_first_shipped_gear() -> None:
+    assert shipped_gears() == (DEFAULT_GEAR, "four-bar-three-pins")
 
 
 def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:

@@ -1,5 +1,5 @@
 """What a real fleet departs in first, diagnosed blind: the departures' rows of the study; one
-command writes them.
+command prints them.
 
     python -m tests.hidden_effect.departures --workers 2
 
@@ -39,7 +39,6 @@ Record = dict[str, Any]
 FIRST_SEED = 5_200_000
 # Chance below which a regression on the clearances beats one scale by more than chance.
 BEATS = 0.01
-RESULT = Path(__file__).with_name("departures_result.json")
 # The other nine, and three between two that close with worn joints and move the plunger by no more
 # than twice as much.
 LINKAGES = (*"BCDEFGHIJ", "A-B:0.3", "A-D:0.2", "A-H:0.3")
@@ -330,39 +329,12 @@ def summarise(records: list[Record]) -> dict[str, Any]:
     }
 
 
-def result_of(records: list[Record], first_seed: int) -> dict[str, Any]:
-    """What is committed: how many fleets of each kind, and the rates."""
-    count = dict(sorted(Counter(r["group"] for r in records).items()))
-    return {
-        "fleets": len(records),
-        "first_seed": first_seed,
-        "of_each": count,
-        **summarise(records),
-    }
-
-
-def renewed(committed: dict[str, Any], run_now: dict[str, Any]) -> dict[str, Any]:
-    """A committed result with the lines of some fleets run again, the others left as they are."""
-    lines = {
-        name: rate if rate["n"] else committed["lines"][name]
-        for name, rate in run_now["lines"].items()
-    }
-    of_each = dict(sorted({**committed["of_each"], **run_now["of_each"]}.items()))
-    said = dict(sorted({**committed["said"], **run_now["said"]}.items()))
-    return {
-        **committed,
-        "fleets": sum(of_each.values()),
-        "of_each": of_each,
-        "lines": lines,
-        "said": said,
-    }
-
-
 def markdown(result: dict[str, Any]) -> str:
     """The table of a result."""
     rows = (
         study.rate_line(name, aim, result["lines"][name])
         for name, (_group, _hit, aim) in LINES.items()
+        if result["lines"][name]["n"]
     )
     return "\n".join((*study.HEAD, *rows))
 
@@ -375,20 +347,13 @@ def main() -> None:
     parser.add_argument("--only", default="", help="fleets whose name begins so")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--keep", type=Path, help="file to keep records in, to go on after a stop")
-    parser.add_argument("--write", action="store_true", help=f"write {RESULT.name}")
     arguments = parser.parse_args()
     plan = {g: max(1, round(n * arguments.share)) for g, n in PLAN.items()}
     listed = [
         (t[2], t) for t in tasks(plan, arguments.first_seed) if t[0].startswith(arguments.only)
     ]
-    result = result_of(
-        study.mapped(run, listed, arguments.workers, arguments.keep), arguments.first_seed
-    )
+    result = summarise(study.mapped(run, listed, arguments.workers, arguments.keep))
     print(markdown(result), json.dumps(result["said"], indent=1), sep="\n")
-    if arguments.write and arguments.only:
-        result = renewed(json.loads(RESULT.read_text(encoding="utf-8")), result)
-    if arguments.write:
-        RESULT.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

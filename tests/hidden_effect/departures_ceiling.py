@@ -344,8 +344,8 @@ def _told_apart(fleets: Sequence[Record], others: Sequence[str]) -> dict[str, An
     }
 
 
-def markdown(result: dict[str, Any], departed: dict[str, Any]) -> tuple[str, str]:
-    """Return the two tables of a result, the first beside what the program does."""
+def markdown(result: dict[str, Any]) -> tuple[str, str]:
+    """Return the two tables of a result."""
 
     def share(rate: dict[str, float]) -> str:
         return f"{100 * rate['rate']:.0f} %"
@@ -356,16 +356,15 @@ def markdown(result: dict[str, Any], departed: dict[str, Any]) -> tuple[str, str
     linkages = [
         (
             "| one cause, S = 15, on another linkage | fleets | S left besides | told the linkage:"
-            " clearly first | told the spread: first | clearly first | named by the program |"
+            " clearly first | told the spread: first | clearly first |"
         ),
-        "|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|",
     ]
     for cause, row in result["linkage"].items():
         text = band if cause == "all" else share
         shown = (text(row[name]) for name in ("known", "first", "clear"))
-        named = text(departed["by_cause"][cause])
         linkages.append(
-            f"| {cause} | {row['first']['n']} | {row['left']:.1f} | {' | '.join(shown)} | {named} |"
+            f"| {cause} | {row['first']['n']} | {row['left']:.1f} | {' | '.join(shown)} |"
         )
     directed = [
         (

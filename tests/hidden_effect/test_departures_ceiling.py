@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.hermite_e import hermegauss
 
-from tests.hidden_effect import departures
+from tests.hidden_effect import calibration, departures
 from tests.hidden_effect.departures_ceiling import (
     OTHERS,
     RESULT,
@@ -22,16 +22,16 @@ from tests.hidden_effect.departures_ceiling import (
 )
 
 COMMITTED: dict[str, Any] = json.loads(RESULT.read_text(encoding="utf-8"))
-DEPARTED: dict[str, Any] = json.loads(departures.RESULT.read_text(encoding="utf-8"))
+DEPARTED: dict[str, Any] = json.loads(calibration.RESULT.read_text(encoding="utf-8"))
 
 
-def test_the_figures_show_what_the_oracle_reaches_beside_what_the_program_does() -> None:
+def test_the_figures_show_what_the_oracle_reaches() -> None:
     figures = (Path(__file__).parents[2] / "docs/reference/figures.md").read_text(encoding="utf-8")
-    assert all(table in figures for table in markdown(COMMITTED, DEPARTED))
+    assert all(table in figures for table in markdown(COMMITTED))
 
 
 def test_the_program_is_nowhere_better_than_the_oracle() -> None:
-    lines, told = DEPARTED["lines"], COMMITTED["linkage"]["all"]["first"]
+    lines, told = DEPARTED["rates"], COMMITTED["linkage"]["all"]["first"]
     assert (
         lines["another linkage, one cause, S = 15: named, with geometry or without"]["low"]
         <= told["rate"]

@@ -1,16 +1,12 @@
-"""The committed result of the departures' fleets, and what its lines count."""
+"""What the lines of the departures' fleets count."""
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.hidden_effect.departures import LINES, RESULT, markdown, renewed, result_of, run
-
-COMMITTED: dict[str, Any] = json.loads(RESULT.read_text(encoding="utf-8"))
+from tests.hidden_effect.departures import run, summarise
 
 
 def record(
@@ -27,21 +23,7 @@ def record(
 
 
 def rate(line: str, *records: dict[str, Any]) -> float:
-    return float(result_of(list(records), 0)["lines"][line]["rate"])
-
-
-def test_the_figures_show_the_table_of_the_committed_result() -> None:
-    figures = (Path(__file__).parents[2] / "docs/reference/figures.md").read_text(encoding="utf-8")
-    assert markdown(COMMITTED) in figures
-
-
-def test_every_line_of_the_committed_result_says_on_how_many_fleets() -> None:
-    assert set(COMMITTED["lines"]) == set(LINES)
-    assert all(
-        rate["n"] > 0 and rate["low"] <= rate["rate"] <= rate["high"]
-        for rate in COMMITTED["lines"].values()
-    )
-    assert COMMITTED["fleets"] == sum(COMMITTED["of_each"].values())
+    return float(summarise(list(records))["lines"][line]["rate"])
 
 
 @pytest.mark.parametrize(
@@ -73,13 +55,12 @@ def test_a_hidden_cause_counts_as_named_beside_the_linkage_but_not_with_another_
 
 def test_what_is_named_on_another_linkage_is_told_by_cause() -> None:
     gauge, rate_error = ([["gauge_bias", "gauge G-1"]], [["calibration_rate", None]])
-    found = result_of(
+    found = summarise(
         [
             record("linkage, one cause", [*gauge], [*gauge]),
             record("linkage, one cause", [], [*rate_error]),
             record("loads:40", [], [["load_directions", None]]),
-        ],
-        0,
+        ]
     )["by_cause"]
     assert {cause: (one["n"], one["rate"]) for cause, one in found.items()} == {
         "calibration_rate": (1, 0.0),
@@ -99,18 +80,6 @@ def test_a_convention_that_is_named_where_nothing_is_hidden_is_counted() -> None
     slip = record("nothing hidden", [["convention_slip", "gauge G-1"]], [])
     other = record("nothing hidden", [["gauge_bias", "gauge G-1"]], [])
     assert rate("nothing hidden: the other convention named", slip, other) == 0.5
-
-
-def test_fleets_that_are_run_again_renew_their_own_lines_only() -> None:
-    line = "nothing hidden: the other convention named"
-    now = result_of([record("nothing hidden", [["convention_slip", "gauge G-1"]], [])], 0)
-    after = renewed(COMMITTED, now)
-    assert {name for name in LINES if after["lines"][name] != COMMITTED["lines"].get(name)} == {
-        line
-    }
-    assert (
-        after["fleets"] == COMMITTED["fleets"] - COMMITTED["of_each"].get("nothing hidden", 0) + 1
-    )
 
 
 def test_a_table_that_is_refused_counts_as_not_named() -> None:

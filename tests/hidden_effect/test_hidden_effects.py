@@ -223,3 +223,36 @@ def test_two_causes_of_single_joints_are_not_taken_for_another_linkage_or_direct
     assert {(c.candidate.cause.name, c.candidate.target) for c in found.causes} == set(
         fleet.label.causes
     )
+
+
+@pytest.mark.parametrize(
+    ("unlisted", "part"),
+    [
+        ("lost_motion_under_load", "elastic_compliance"),
+        ("approach_of_one_technician", "technician_bias"),
+        ("pressure_of_one_gauge", "gauge_bias"),
+    ],
+)
+def test_what_an_unlisted_effect_has_of_a_listed_cause_is_not_put_down_to_that(
+    unlisted: str, part: str
+) -> None:
+    seed = 40_100
+    spec = replace(draw_spec(seed, "null", null="iid"), effects=(EffectSpec(unlisted, None, 15.0),))
+    gear = load_gear()
+    found = diagnose(gear.model, as_table(simulate_fleet(spec, seed).table), gear.discrepancies)
+    assert found.p_unlisted > 0.9
+    assert sum(p for (cause, _target), p in found.probabilities.items() if cause == part) < 0.5
+
+
+def test_one_of_two_causes_that_undo_each_other_does_not_extend_the_model() -> None:
+    seed = 69_700_368
+    gear = load_gear()
+    found = diagnose(
+        gear.model,
+        as_table(draw_fleet(seed, "double").table),
+        gear.discrepancies,
+        ensemble=gear.ensemble_models[1:],
+    )
+    assert found.gain is not None
+    assert found.gain.rms_after_in > found.gain.rms_before_in
+    assert not found.terms

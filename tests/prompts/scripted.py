@@ -53,8 +53,8 @@ class ScriptedTerminal:
         return text
 
 
-# Enter at the optional answers and at the four lines of the sign-off page.
-ENTERS = [""] * 5
+# Enter at the optional answers and at the five lines of the sign-off page.
+ENTERS = [""] * 6
 
 
 def inspect(

@@ -432,27 +432,27 @@ def test_a_tail_number_from_a_flag_must_be_readable(
 # The sign-off page.
 
 
-def test_technician_order_gauge_and_date_are_asked_once_and_reach_the_inspection(
+def test_order_date_landings_technician_and_gauge_are_asked_once_and_reach_the_inspection(
     gear: Gear, store: SessionStore
 ) -> None:
-    typed = ["N1", "l", "i", "r", *TEN, "", "A. Smith", "WO-7", "G-03", "2026-03-01", ""]
+    typed = ["N1", "l", "i", "r", *TEN, "", "WO-7", "2026-03-01", "2100", "A. Smith", "G-03", ""]
     found = inspect(gear, store, typed)
     assert (found.technician_id, found.carried["work_order"], found.gauge_id) == (
         "A. Smith",
         "WO-7",
         "G-03",
     )
-    assert str(found.inspection_date) == "2026-03-01"
+    assert (str(found.inspection_date), found.gear_landings) == ("2026-03-01", 2100.0)
 
 
 def test_a_date_that_is_none_is_asked_again(flow: Flow) -> None:
-    turn = play(flow, [*TEN, "", "", "", "", "some day"])
+    turn = play(flow, [*TEN, "", "", "some day"])
     assert (turn.state.ask, turn.state.at) == (Ask.DETAIL, "inspection_date")
     assert "is not taken" in said(turn)
 
 
 def test_a_line_of_the_sign_off_page_is_changed_from_the_review(flow: Flow) -> None:
-    turn = play(flow, [*TEN, "", "A. Smith", "", "", "", "name", "B. Jones"])
+    turn = play(flow, [*TEN, "", "", "", "", "A. Smith", "", "name", "B. Jones"])
     assert (turn.state.ask, turn.state.answers.more["technician_id"]) == (Ask.REVIEW, "B. Jones")
 
 
@@ -748,20 +748,20 @@ def test_a_confirmed_value_travels_as_a_warning(gear: Gear, store: SessionStore)
     assert asked == "asked again and confirmed: #1"
 
 
-def test_ten_joints_in_inches_take_69_keystrokes_with_the_enters(
+def test_ten_joints_in_inches_take_70_keystrokes_with_the_enters(
     gear: Gear, store: SessionStore
 ) -> None:
     terminal = ScriptedTerminal(["N123AB", "l", "i", "t", *TEN, *ENTERS, ""])
     ask_inspection(gear, terminal, store, Answers())
-    assert terminal.keystrokes == 69
+    assert terminal.keystrokes == 70
 
 
-def test_ten_joints_in_thou_take_39_keystrokes_with_the_enters(
+def test_ten_joints_in_thou_take_40_keystrokes_with_the_enters(
     gear: Gear, store: SessionStore
 ) -> None:
     terminal = ScriptedTerminal(["N123AB", "l", "t", "t", *["4"] * 10, *ENTERS, ""])
     ask_inspection(gear, terminal, store, Answers())
-    assert terminal.keystrokes == 39
+    assert terminal.keystrokes == 40
 
 
 # The sketch.
@@ -845,7 +845,7 @@ def in_millimetres(flow: Flow, *more: str) -> Turn:
     """
     return play(
         flow,
-        [*INCHES_AS_MILLIMETRES, "", "", "", "", "", "", *more],
+        [*INCHES_AS_MILLIMETRES, *ENTERS, "", *more],
         replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE),
     )
 

@@ -109,8 +109,8 @@ def test_keeping_does_not_change_what_a_check_says(tmp_path: Path, place: Path) 
 
 
 def test_keeping_a_file_twice_keeps_it_once(tmp_path: Path, place: Path) -> None:
-    assert "4 new records, 0 known" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
-    assert "0 new records, 4 known" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
+    assert "2 inspections kept" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
+    assert ", 2 known already" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
 
 
 def test_the_same_identity_with_other_content_is_refused_with_what_to_do(

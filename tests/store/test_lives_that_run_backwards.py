@@ -134,7 +134,7 @@ def test_inspections_of_two_gears_are_not_compared(tmp_path: Path) -> None:
 def test_keeping_what_contradicts_the_store_keeps_it_and_warns(tmp_path: Path) -> None:
     mlg("check", years(tmp_path, {}, only=[0, 1, 2], name="first"), "--keep")
     run = mlg("check", years(tmp_path, SLIP, only=[3], name="last"), "--keep")
-    assert "2 new records" in run.err
+    assert "1 inspection kept" in run.err
     assert "240 landings on 2026-03-01 (S4" in run.err
     assert "mlg history correct" in run.err
 

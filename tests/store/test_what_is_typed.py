@@ -161,8 +161,8 @@ NAMELESS = [
 def test_the_same_inspections_from_a_renamed_file_add_nothing(
     tmp_path: Path, place: Path, rows: list[dict[str, str]]
 ) -> None:
-    assert "6 new records, 0 known" in kept(tmp_path, "one.csv", *rows)
-    assert "0 new records, 6 known" in kept(tmp_path, "other.csv", *rows)
+    assert "3 inspections kept" in kept(tmp_path, "one.csv", *rows)
+    assert ", 3 known already" in kept(tmp_path, "other.csv", *rows)
 
 
 @pytest.mark.parametrize("rows", [ROWS, NAMELESS], ids=["with ids", "with made ids"])
@@ -170,7 +170,7 @@ def test_the_same_inspections_from_two_files_of_one_call_are_kept_once(
     tmp_path: Path, place: Path, rows: list[dict[str, str]]
 ) -> None:
     files = [places.table(tmp_path, *rows, name=name) for name in ("one.csv", "other.csv")]
-    assert "6 new records, 6 known" in mlg("check", *files, "--keep").err
+    assert ", 3 known already" in mlg("check", *files, "--keep").err
 
 
 def test_the_same_reading_written_in_another_unit_is_the_same_inspection(
@@ -179,14 +179,14 @@ def test_the_same_reading_written_in_another_unit_is_the_same_inspection(
     kept(tmp_path, "one.csv", ROWS[0])
     in_thou = {**ROWS[0], "clearance_3_thou": "1"}
     assert in_thou.pop("clearance_3_in") == "0.001"
-    assert "0 new records, 2 known" in kept(tmp_path, "other.csv", in_thou)
+    assert ", 1 known already" in kept(tmp_path, "other.csv", in_thou)
 
 
 def test_another_inspection_of_the_day_in_a_file_without_ids_is_kept(
     tmp_path: Path, place: Path
 ) -> None:
     kept(tmp_path, "one.csv", NAMELESS[0])
-    assert "2 new records, 0 known" in kept(
+    assert "1 inspection kept" in kept(
         tmp_path, "other.csv", {**NAMELESS[0], "clearance_3_in": "0.002"}
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from types import MappingProxyType
@@ -51,6 +51,9 @@ DAY = {
 _DATES = {OUTCOME.name: "outcome_date", PLUNGER_DISPLACEMENT.name: "plunger_date"}
 _REPLACEABLE = (OUTCOME.name, *LENGTHS, *DAY.values(), "repair_date", *_DATES.values())
 MORE = (*_REPLACEABLE, *SIGN_OFF, SMALL_READINGS_TRUE.name)
+# What is asked of a new inspection once its joints are: the optional answers, then the sign-off.
+OPTIONAL = "optional"
+REST = (OPTIONAL, *SIGN_OFF)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +67,17 @@ class JointAnswer:
 
 
 NOT_MEASURED = JointAnswer(None)
+# The note of an inspection that names the joints whose readings were confirmed.
+CONFIRMED = "asked again and confirmed: "
 
 
 @dataclass(frozen=True, slots=True)
 class Answers:
     """All answers of one inspection; None or a missing joint is still to be asked, `more` is
     optional, by column.
+
+    `todo` is asked next, joints before the others; `continues` is the hash of the kept inspection
+    that these answers go on with.
     """
 
     tail_no: str | None = None
@@ -79,9 +87,21 @@ class Answers:
     record_id: str | None = None
     joints: Mapping[int, JointAnswer] = field(default_factory=lambda: MappingProxyType({}))
     more: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    todo: tuple[int | str, ...] = REST
+    continues: str = ""
+
+    def reopened(self, joints: Collection[int]) -> Answers:
+        """Return the answers without those of some joints."""
+        left = {n: answer for n, answer in self.joints.items() if n not in joints}
+        return replace(self, joints=MappingProxyType(left))
+
+    def without(self, asked: int | str) -> Answers:
+        """Return the answers with one question less to come."""
+        return replace(self, todo=tuple(each for each in self.todo if each != asked))
 
     def with_joint(self, number: int, answer: JointAnswer) -> Answers:
-        return replace(self, joints=MappingProxyType({**self.joints, number: answer}))
+        joints = MappingProxyType({**self.joints, number: answer})
+        return replace(self, joints=joints).without(number)
 
     def with_each(self, change: Callable[[JointAnswer], JointAnswer]) -> Answers:
         return replace(
@@ -112,6 +132,7 @@ class Answers:
             unit=self.unit or given.unit,
             convention=self.convention or given.convention,
             record_id=given.record_id or self.record_id,
+            todo=tuple(asked for asked in self.todo if asked not in given.more),
         ).with_more(**{**given.more, **self.more})
 
     def read(self, written: WrittenLength | None) -> Reading | None:
@@ -140,7 +161,7 @@ class Answers:
 
         read = admit(self._row(gear, record_id), ReadOptions.of(gear, asks=True))
         confirmed = [f"#{n}" for n, answer in sorted(self.joints.items()) if answer.confirmed]
-        said = f"asked again and confirmed: {', '.join(confirmed)}"
+        said = CONFIRMED + ", ".join(confirmed)
         return replace(read, warnings=(*read.warnings, said)) if confirmed else read
 
     def unit_question(self, gear: Gear) -> str:
@@ -209,11 +230,20 @@ def judge(
     read, problems = judge_length(CLEARANCE.header(number), typed, options)
     if problems or not isinstance(read, Inspection):
         return JudgedReading(
-            " ".join(f"expected {p.expected}. {p.remedy}" for p in problems), refused=True
+            " ".join(f"expected {p.expected}. {_at_prompt(p.remedy)}" for p in problems),
+            refused=True,
         )
     if number not in read.entered:
         return JudgedReading()
     return JudgedReading(Sentence.joined(read.warnings), parse_length(read.entered[number].text))
+
+
+# What a remedy says for the cells of a file only.
+_OF_FILES = re.compile(r",? or (?:pass --decimal-comma|leave it blank[^.]*)")
+
+
+def _at_prompt(remedy: str) -> str:
+    return _OF_FILES.sub("", remedy)
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:
@@ -226,7 +256,8 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
     read, problems = judge_length(column, typed, options)
     if problems or not isinstance(read, Inspection):
         raise UsageError(
-            f"{typed!r} is not taken: expected {problems[0].expected}", problems[0].remedy
+            f"{typed!r} is not taken: expected {problems[0].expected}",
+            _at_prompt(problems[0].remedy),
         )
     return read
 

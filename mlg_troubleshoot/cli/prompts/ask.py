@@ -9,10 +9,11 @@ from datetime import datetime
 from mlg_troubleshoot.cli.prompts import pages
 from mlg_troubleshoot.cli.prompts.answers import Answers
 from mlg_troubleshoot.cli.prompts.conversation import Conversation, Effect, Turn
-from mlg_troubleshoot.cli.prompts.flow import Advice, Ask, Flow, State
+from mlg_troubleshoot.cli.prompts.flow import Advice, Ask, FindVisit, Flow, State
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Tone, line, warning
 from mlg_troubleshoot.cli.prompts.store import Session, SessionStore, SessionTakenError, new_session
 from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
+from mlg_troubleshoot.cli.prompts.visit import Visit
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -36,6 +37,8 @@ class Entry:
 
     inspection: Inspection
     session: Session
+    effect: Effect = Effect.COMPUTE
+    visit: Visit | None = None
 
 
 class _Saver:
@@ -78,6 +81,13 @@ class _Saver:
         self.session = session
         self.saved = True
 
+    def forget(self) -> None:
+        """Delete what was begun: what is offered stands in the store already."""
+        if self.saved:
+            self._store.discard(self.session.id)
+        self.saved = False
+        self._begun_with = self.session.answers
+
     def put_away(self, session: Session) -> None:
         try:
             self._store.finish(session)
@@ -113,12 +123,13 @@ def ask_inspection(
     given: Answers,
     *,
     saved: Session | None = None,
-    correct: bool = False,
+    visit: Visit | None = None,
+    find_visit: FindVisit | None = None,
     advice: Advice | None = None,
     now: Callable[[], datetime] = datetime.now,
 ) -> Entry:
-    """Ask for one inspection, joint by joint; a saved one is continued, or corrected from its
-    review.
+    """Ask for one inspection, joint by joint; a saved one is continued, and after a result, its
+    `visit`, what follows is asked.
     """
     if given.tail_no is not None and not (given.tail_no.strip() and given.tail_no.isprintable()):
         raise UsageError(
@@ -128,25 +139,38 @@ def ask_inspection(
         new_session(gear.id, now(), Answers()) if saved is None else replace(saved, complete=False)
     )
     saver = _Saver(gear, terminal, store, session)
-    flow = Flow(gear, saver.find_saved, advice, now().date())
+    flow = Flow(gear, saver.find_saved, advice, now().date(), find_visit)
     try:
-        if saved is None:
-            terminal.say(pages.welcome(gear, terminal.width, saver.unfinished()))
+        if visit is not None:
+            fresh = Answers(tail_no=visit.row.tail_no, side=visit.row.side)
+            turn = Turn(State(Ask.NEXT, fresh, visit=visit))
+        elif saved is None:
+            flow = replace(flow, unfinished=saver.unfinished())
+            terminal.say(pages.welcome(gear, terminal.width, flow.unfinished))
             turn = flow.begin(given)
         else:
             saver.saved = True
-            turn = Turn(State(Ask.REVIEW, saved.answers)) if correct else flow.resume(saved, given)
+            turn = flow.resume(saved, given)
         return _converse(flow, turn, terminal, saver)
-    except (EOFError, KeyboardInterrupt):
-        raise _stopped(terminal, saver) from None
+    except (EOFError, KeyboardInterrupt) as stopped:
+        if visit is not None and not saver.saved and isinstance(stopped, EOFError):
+            return Entry(visit.row, session, Effect.DONE, visit)
+        raise _stopped(terminal, saver, is_kept=visit is not None) from None
 
 
 def _converse(flow: Flow, turn: Turn[State], terminal: RichTerminal, saver: _Saver) -> Entry:
     conversation = Conversation(flow, terminal)
     while True:
-        saver.save(turn.state.answers)
-        turn = conversation.next(turn)
+        if turn.state.ask in (Ask.OFFER, Ask.NEXT):
+            saver.forget()
+        else:
+            saver.save(turn.state.answers)
+        if turn.effect is not Effect.COMPUTE:
+            turn = conversation.next(turn)
+        visit = turn.state.visit
         match turn.effect:
+            case Effect.SHOW | Effect.REPORT | Effect.DONE | Effect.STOP if visit is not None:
+                return Entry(visit.row, saver.session, turn.effect, visit)
             case Effect.STOP:
                 raise EOFError
             case Effect.RESUME if turn.state.saved is not None:
@@ -154,6 +178,7 @@ def _converse(flow: Flow, turn: Turn[State], terminal: RichTerminal, saver: _Sav
             case Effect.PUT_AWAY if turn.state.saved is not None:
                 saver.put_away(turn.state.saved)
             case Effect.COMPUTE:
+                terminal.say(turn.lines)
                 saver.save(turn.state.answers)
                 try:
                     return Entry(
@@ -165,11 +190,13 @@ def _converse(flow: Flow, turn: Turn[State], terminal: RichTerminal, saver: _Sav
                     turn = Turn(turn.state, (said,))
 
 
-def _stopped(terminal: RichTerminal, saver: _Saver) -> EntryInterruptedError:
+def _stopped(terminal: RichTerminal, saver: _Saver, *, is_kept: bool) -> EntryInterruptedError:
     if saver.saved:
         said = line(("Saved. ", Tone.GOOD), "Go on later with:  ", ("mlg check --resume", Tone.KEY))
         terminal.say((BLANK, said))
         return EntryInterruptedError(saver.session.id)
+    if is_kept:
+        return EntryInterruptedError(None)
     lost = (
         "The answers could not be saved."
         if saver.session.answers.radial_in

@@ -30,6 +30,9 @@ class Effect(StrEnum):
     COMPUTE = "compute"
     RESUME = "resume"
     PUT_AWAY = "put away"
+    SHOW = "show"
+    REPORT = "report"
+    DONE = "done"
 
 
 @dataclass(frozen=True, slots=True)

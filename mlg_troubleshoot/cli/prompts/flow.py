@@ -14,7 +14,10 @@ from typing import TypeVar
 
 from mlg_troubleshoot.cli.prompts import pages
 from mlg_troubleshoot.cli.prompts.answers import (
+    DAY,
     NOT_MEASURED,
+    OPTIONAL,
+    REST,
     SIGN_OFF,
     Answers,
     JointAnswer,
@@ -27,6 +30,7 @@ from mlg_troubleshoot.cli.prompts.answers import (
 from mlg_troubleshoot.cli.prompts.conversation import Effect, Page, Turn, again
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line, warning
 from mlg_troubleshoot.cli.prompts.store import Session
+from mlg_troubleshoot.cli.prompts.visit import Visit
 from mlg_troubleshoot.decision.columns import DATE
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
@@ -39,6 +43,7 @@ _T = TypeVar("_T")
 # it names.
 Advice = Callable[[Mapping[int, float], tuple[int, ...]], tuple[str, int | None] | None]
 FindSaved = Callable[[str, Side], Session | None]
+FindVisit = Callable[[str, Side], Visit | None]
 
 
 class Ask(StrEnum):
@@ -47,6 +52,8 @@ class Ask(StrEnum):
     UNIT = "unit"
     CONVENTION = "reading"
     OFFER = "offer"
+    NEXT = "next"
+    STEP = "step"
     REREAD = "reread"
     JOINT = "joint"
     CONFIRM = "confirm"
@@ -68,8 +75,8 @@ class State:
     """Where the conversation stands.
 
     `at` is the joint or the column that is asked for, `pending` what waits for a confirmation,
-    `saved` an unfinished inspection that is offered, `suggested` the joint that Enter takes, and
-    `trail` where one came from.
+    `saved` an unfinished inspection that is offered, `visit` the last one that is kept, `suggested`
+    the joint that Enter takes, and `trail` where one came from.
     """
 
     ask: Ask
@@ -77,6 +84,7 @@ class State:
     at: int | str | None = None
     pending: WrittenLength | Answers | None = None
     saved: Session | None = None
+    visit: Visit | None = None
     old_unit: LengthUnit | None = None
     from_review: bool = False
     suggested: int | None = None
@@ -89,6 +97,8 @@ class State:
         return self.at
 
 
+# What only shows or ends after a result.
+_AFTER = {"": Effect.DONE, "d": Effect.SHOW, "r": Effect.REPORT}
 _YES_NO = {"y": True, "yes": True, "n": False, "no": False}
 _UNITS = {"i": LengthUnit.INCH, "t": LengthUnit.THOU, "m": LengthUnit.MILLIMETRE}
 _CONVENTIONS = {c.value[0].lower(): c for c in ClearanceConvention}
@@ -104,6 +114,8 @@ class Flow:
     find_saved: FindSaved | None = None
     advice: Advice | None = None
     today: date | None = None
+    find_visit: FindVisit | None = None
+    unfinished: tuple[Session, ...] = ()
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -112,7 +124,10 @@ class Flow:
         return tuple(joint.number for joint in joints)
 
     def open_joints(self, answers: Answers) -> tuple[int, ...]:
-        return tuple(number for number in self.order if number not in answers.joints)
+        """Joints still to be asked: what NEXT names first, in its order."""
+        named = [each for each in answers.todo if isinstance(each, int)]
+        unasked = [each for each in self.order if each not in answers.joints]
+        return tuple(dict.fromkeys((*named, *unasked)))
 
     def resume(self, saved: Session, given: Answers) -> Turn[State]:
         answers = saved.answers
@@ -141,13 +156,15 @@ class Flow:
     def take(self, state: State, typed: str) -> Turn[State]:
         turn = _QUESTIONS[state.ask].take(self, state, typed)
         here, there = (_question(each) for each in (state, turn.state))
-        moved = there != here and state.ask not in (Ask.OFFER, Ask.REREAD)
+        moved = there != here and state.ask not in (Ask.OFFER, Ask.NEXT, Ask.REREAD)
         return replace(
             turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail)
         )
 
     def _tail(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
+        if not typed and answers.tail_no is None and self.unfinished and not state.from_review:
+            return self._on_with(self.unfinished[0], answers)
         if not typed and answers.tail_no is None:
             return again(state, _not_taken(typed, "Type the tail number, for example N123AB."))
         return self.begin(replace(answers, tail_no=typed or answers.tail_no), state.from_review)
@@ -211,12 +228,82 @@ class Flow:
                 state, _not_taken(typed, "Type y to go on with it or n to begin a new one.")
             )
         if yes:
-            answers = saved.answers.beside(state.answers)
-            turn = self._read_anew(answers, told=self._resumed(saved.answers))
-        else:
-            turn = self._go_on(state.answers)
-        effect = Effect.RESUME if yes else Effect.PUT_AWAY
-        return replace(turn, state=replace(turn.state, saved=saved), effect=effect)
+            return self._on_with(saved, state.answers)
+        turn = self._offer_visit(state.answers)
+        return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.PUT_AWAY)
+
+    def _on_with(self, saved: Session, given: Answers) -> Turn[State]:
+        answers = saved.answers.beside(given)
+        turn = self._read_anew(answers, told=self._resumed(saved.answers))
+        return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.RESUME)
+
+    def _next(self, state: State, typed: str) -> Turn[State]:
+        """What follows a result, now or at the next visit."""
+        visit = _known(state.visit)
+        word = typed.lower()
+        if word in _AFTER:
+            return Turn(state, effect=_AFTER[word])
+        if word == "n":
+            return self._go_on(state.answers)
+        if word == "y" and visit.todo:
+            return self._go_on(visit.begun(self.today))
+        if word == "c":
+            return Turn(State(Ask.REVIEW, visit.answers))
+        if word == "u" and visit.before is not None:
+            told = (line(("The last change is taken back.", Tone.GOOD)),)
+            return Turn(State(Ask.REVIEW, visit.before), told, Effect.COMPUTE)
+        return self._added(state, visit.answers, typed)
+
+    def _added(self, state: State, kept: Answers, typed: str) -> Turn[State]:
+        """Take an optional answer that is added to a kept inspection."""
+        try:
+            answers, told = read_more(kept, typed, self.gear)
+        except UsageError as error:
+            return again(state, f"{error.message}. Type one of the letters above, or Enter.")
+        if answers.more == kept.more:
+            return again(state, "That is known already.")
+        turn = self._go_on(self._reread_restored(kept, answers))
+        return replace(turn, lines=(*told, *turn.lines))
+
+    def _reread_restored(self, before: Answers, answers: Answers) -> Answers:
+        """Ask for the clearances of the joints that were restored with the last answer."""
+        repaired = DAY["n"]
+        text = answers.more.get(repaired)
+        if text is None or answers.more.get("repair_date") == before.more.get("repair_date"):
+            return answers
+        read = judge_more(repaired, text, answers.unit, self.gear)
+        return answers.reopened(read.restored_joints)
+
+    def _step(self, state: State, typed: str) -> Turn[State]:
+        column = str(state.at)
+        given = typed or (pages.STEP_ENTERS.get(column, "") and self._advised(state.answers))
+        if typed.lower() in ("s", "skip"):
+            return self._go_on(state.answers.without(column))
+        if not given:
+            return again(state, _not_taken(typed, "Type what you found, or s to leave it out."))
+        letter = pages.STEP_LETTERS[column]
+        try:
+            answers, told = read_more(state.answers, f"{letter} {given}".strip(), self.gear)
+        except UsageError:
+            try:
+                answers, told = read_more(state.answers, given, self.gear)
+            except UsageError as error:
+                return again(state, f"{error.message}. {error.remedy}")
+        if self._is_far(answers, state.answers):
+            return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), told)
+        answers = self._reread_restored(state.answers, answers).without(column)
+        turn = self._go_on(answers)
+        return replace(turn, lines=(*told, *turn.lines))
+
+    def _advised(self, answers: Answers) -> str:
+        """The joints that NEXT says are to be restored."""
+        found = self._visit(answers)
+        return " ".join(map(str, found.joints)) if found is not None else ""
+
+    def _visit(self, answers: Answers) -> Visit | None:
+        if self.find_visit is None or not answers.tail_no or not answers.side:
+            return None
+        return self.find_visit(answers.tail_no, answers.side)
 
     def _joint(self, state: State, typed: str) -> Turn[State]:
         number = state.joint
@@ -282,9 +369,9 @@ class Flow:
         answers = state.answers
         rest = self.open_joints(answers)
         for number in rest:
-            answers = answers.with_joint(number, NOT_MEASURED)
-        names = ", ".join(f"#{number}" for number in rest)
-        told = (warning(f"– {names}  not measured"),) if rest else ()
+            answers = answers.with_joint(number, answers.joints.get(number, NOT_MEASURED))
+        names = ", ".join(f"#{n}" for n in rest if answers.reading(n) is None)
+        told = (warning(f"– {names}  not measured"),) if names else ()
         return self._go_on(answers, state.from_review, told)
 
     def _jump(self, state: State, number: int) -> Turn[State]:
@@ -296,18 +383,19 @@ class Flow:
 
     def _more(self, state: State, typed: str) -> Turn[State]:
         if typed.lower() in ("", "s"):
-            return Turn(State(Ask.DETAIL, state.answers, SIGN_OFF[0]))
+            return self._go_on(state.answers.without(OPTIONAL))
         try:
             answers, told = read_more(state.answers, typed, self.gear)
         except UsageError as error:
             return again(state, f"{error.message}. {error.remedy}")
-        stands, before = (plunger_in(each, self.gear) for each in (answers, state.answers))
-        if stands != before and stands is not None and abs(stands) > self._most_in:
+        if self._is_far(answers, state.answers):
             return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), told)
         return Turn(replace(state, ask=Ask.MORE, answers=answers, pending=None), told)
 
     def _confirm_more(self, state: State, typed: str) -> Turn[State]:
         yes = _YES_NO.get(typed.lower())
+        if yes and isinstance(state.pending, Answers) and state.at is not None:
+            return self._go_on(state.pending.without(state.at))
         if yes and isinstance(state.pending, Answers):
             return Turn(State(Ask.MORE, state.pending))
         if yes is False:
@@ -317,7 +405,11 @@ class Flow:
                 state,
                 "Enter alone does not confirm it. Type y, n, or p with the displacement again.",
             )
-        return self._more(state, typed)
+        return (self._more if state.at is None else self._step)(state, typed)
+
+    def _is_far(self, answers: Answers, before: Answers) -> bool:
+        stands, stood = (plunger_in(each, self.gear) for each in (answers, before))
+        return stands != stood and stands is not None and abs(stands) > self._most_in
 
     @property
     def _most_in(self) -> float:
@@ -329,8 +421,11 @@ class Flow:
     def _detail(self, state: State, typed: str) -> Turn[State]:
         column = str(state.at)
         answers = state.answers
-        if column == DATE.name and column not in answers.more and self.today is not None:
-            typed = typed or self.today.isoformat()
+        if column == DATE.name and self.today is not None:
+            untold = column not in answers.more and not typed
+            typed = self.today.isoformat() if untold or typed.lower() == "today" else typed
+        if typed.lower() == "done" and not state.from_review:
+            return self._go_on(replace(answers, todo=()))
         if typed.lower() == "x":
             answers = answers.with_more(**{column: None})
         elif typed:
@@ -339,10 +434,9 @@ class Flow:
             except UsageError as error:
                 return again(state, f"{error.message}. {error.remedy}")
             answers = answers.with_more(**{column: typed})
-        after = SIGN_OFF.index(column) + 1
-        if after == len(SIGN_OFF) or state.from_review:
+        if state.from_review:
             return Turn(State(Ask.REVIEW, answers))
-        return Turn(State(Ask.DETAIL, answers, SIGN_OFF[after]))
+        return self._go_on(answers.without(column))
 
     def _review(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
@@ -388,12 +482,23 @@ class Flow:
         saved = None
         if self.find_saved and answers.tail_no and answers.side and not begun:
             saved = self.find_saved(answers.tail_no, answers.side)
-        if saved is None:
+        if saved is None and begun:
             return self._go_on(answers, from_review)
+        if saved is None:
+            return self._offer_visit(answers)
         if not _contradictions(saved.answers, answers):
             return Turn(State(Ask.OFFER, answers, saved=saved))
         told = ("An unfinished inspection is not offered: ", Tone.WARN)
         return self._go_on(answers, told=(line(told, self._heading(saved.answers)),))
+
+    def _offer_visit(self, answers: Answers) -> Turn[State]:
+        """Show the last inspection of the gear, if there is one."""
+        visit = self._visit(answers)
+        if visit is None:
+            return self._go_on(answers)
+        if answers.more:
+            return self._go_on(visit.answers.with_more(**answers.more))
+        return Turn(State(Ask.NEXT, answers, visit=visit), pages.visit_lines(visit, self.gear))
 
     def _resumed(self, answers: Answers) -> tuple[Line, ...]:
         return (line((f"Resumed: {pages.identity(answers)}, ", Tone.GOOD), self._heading(answers)),)
@@ -404,13 +509,25 @@ class Flow:
         """Go to the first open question."""
         # What was confirmed of the readings holds for these readings only.
         answers = answers.with_more(small_readings_true=None)
+        state = self._open_question(answers, from_review)
+        if state.ask is Ask.REVIEW and answers.continues and not from_review:
+            return replace(self._compute(state), lines=told)
+        return Turn(state, told)
+
+    def _open_question(self, answers: Answers, from_review: bool) -> State:
+        """The heading, then what NEXT asks for, the joints, and what may be left out."""
         for ask, value in zip(_HEADING, answers.heading, strict=True):
             if value is None:
-                return Turn(State(ask, answers), told)
-        still_open = self.open_joints(answers)
-        if still_open:
-            return Turn(State(Ask.JOINT, answers, still_open[0], from_review=from_review), told)
-        return Turn(State(Ask.REVIEW if from_review else Ask.MORE, answers), told)
+                return State(ask, answers)
+        step = next((each for each in answers.todo if each in pages.STEP_LETTERS), None)
+        if step is not None and not from_review:
+            return State(Ask.STEP, answers, step)
+        for number in self.open_joints(answers):
+            return State(Ask.JOINT, answers, number, from_review=from_review)
+        rest = None if from_review else next((each for each in answers.todo if each in REST), None)
+        if rest is None:
+            return State(Ask.REVIEW, answers)
+        return State(Ask.MORE, answers) if rest == OPTIONAL else State(Ask.DETAIL, answers, rest)
 
     def _read_anew(
         self, answers: Answers, from_review: bool = False, told: tuple[Line, ...] = ()
@@ -448,16 +565,25 @@ class Flow:
 
     def back(self, state: State) -> Turn[State]:
         if state.ask in _CONFIRMS:
-            return Turn(replace(state, ask=_CONFIRMS[state.ask], pending=None))
+            is_step = state.ask is Ask.CONFIRM_MORE and state.at is not None
+            ask = Ask.STEP if is_step else _CONFIRMS[state.ask]
+            return Turn(replace(state, ask=ask, pending=None))
         if state.ask is Ask.REREAD:
             answers = replace(state.answers, unit=state.old_unit)
             return Turn(State(Ask.UNIT, answers, from_review=state.from_review, trail=state.trail))
-        if state.ask is Ask.OFFER:
+        if state.ask in (Ask.OFFER, Ask.NEXT):
             return Turn(State(Ask.SIDE, state.answers))
         if state.trail:
             ask, at = state.trail[-1]
             inside = state.from_review and ask is not Ask.REVIEW
             return Turn(State(ask, state.answers, at, from_review=inside, trail=state.trail[:-1]))
+        visit = self._visit(state.answers) if state.answers.continues else None
+        if visit is not None:
+            return Turn(State(Ask.NEXT, visit.answers, visit=visit))
+        return self._before(state)
+
+    def _before(self, state: State) -> Turn[State]:
+        """The question that usually comes before this one."""
         course: list[Place] = [(ask, None) for ask in _HEADING]
         course += [(Ask.JOINT, number) for number in self.order]
         course += [(Ask.MORE, None), *((Ask.DETAIL, column) for column in SIGN_OFF)]
@@ -544,7 +670,9 @@ class _Question:
 
 
 _QUESTIONS: dict[Ask, _Question] = {
-    Ask.TAIL: _Question(Flow._tail, lambda _, s, __: pages.tail_page(s.answers), pages.TAIL_HELP),
+    Ask.TAIL: _Question(
+        Flow._tail, lambda f, s, _: pages.tail_page(s.answers, f.unfinished), pages.TAIL_HELP
+    ),
     Ask.SIDE: _Question(Flow._side, lambda _, s, __: pages.side_page(s.answers), pages.SIDE_HELP),
     Ask.UNIT: _Question(Flow._unit, lambda _, s, __: pages.unit_page(s.answers), pages.UNIT_HELP),
     Ask.CONVENTION: _Question(
@@ -552,6 +680,14 @@ _QUESTIONS: dict[Ask, _Question] = {
     ),
     Ask.OFFER: _Question(
         Flow._offer, lambda f, s, _: pages.offer_page(_known(s.saved), f.gear), pages.OFFER_HELP
+    ),
+    Ask.NEXT: _Question(
+        Flow._next, lambda _, s, __: pages.next_page(_known(s.visit)), pages.NEXT_HELP
+    ),
+    Ask.STEP: _Question(
+        Flow._step,
+        lambda f, s, _: pages.step_page(s.answers, str(s.at), f._advised(s.answers)),
+        pages.MORE_HELP,
     ),
     Ask.REREAD: _Question(
         Flow._reread,

@@ -9,7 +9,9 @@ from mlg_troubleshoot.cli.prompts.conversation import Page
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line, note, warning
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
+from mlg_troubleshoot.cli.prompts.visit import Visit
 from mlg_troubleshoot.decision.columns import BY_NAME, DATE, MARGIN, PLUNGER_DISPLACEMENT
+from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, said_in
 
@@ -71,28 +73,34 @@ def identity(answers: Answers) -> str:
 
 
 def welcome(gear: Gear, width: int, unfinished: tuple[Session, ...]) -> tuple[Line, ...]:
-    """Return the first lines of all; an inspection that was broken off is mentioned."""
+    """Return the first lines of all; inspections that were broken off are listed."""
     shown = [
         BLANK,
         rule(f"{gear.name}: joint clearances", width),
         line("Type an answer and press Enter. Every answer is saved at once."),
         keys(("b", "back"), ("?", "help"), ("q", "save and stop")),
     ]
-    if unfinished:
-        last = unfinished[0]
-        told = (
-            f"Unfinished: {identity(last.answers)}, begun {last.started:%Y-%m-%d %H:%M}. Go on with"
-            " it:  "
+    return (*shown, *unfinished_lines(unfinished))
+
+
+def unfinished_lines(unfinished: tuple[Session, ...]) -> tuple[Line, ...]:
+    return tuple(
+        warning(
+            f"Unfinished: {identity(each.answers)}, begun {each.started:%Y-%m-%d %H:%M},"
+            f" {len(each.answers.radial_in)} measured."
         )
-        shown.append(warning(told, ("mlg check --resume", Tone.KEY)))
-    return tuple(shown)
+        for each in unfinished
+    )
 
 
 def _heading_page(asked: str, kept: str | None, *shown: Line) -> Page:
     return Page((BLANK, *shown), f" {asked}{_keeps(kept)} > ")
 
 
-def tail_page(answers: Answers) -> Page:
+def tail_page(answers: Answers, unfinished: tuple[Session, ...] = ()) -> Page:
+    if unfinished and answers.tail_no is None:
+        goes_on = f"Tail number (Enter goes on with {identity(unfinished[0].answers)})"
+        return _heading_page(goes_on, None)
     return _heading_page("Tail number", answers.tail_no)
 
 
@@ -142,6 +150,79 @@ def offer_page(saved: Session, gear: Gear) -> Page:
         choice("n", "begin a new one and put the old one away"),
     )
     return Page(shown, " Go on with it? y or n > ")
+
+
+STEP_LETTERS = {
+    PLUNGER_DISPLACEMENT.name: "p",
+    "rigging_checked": "g",
+    "restored_joints": "n",
+    "outcome": "",
+}
+_STEP_ASKS = {
+    PLUNGER_DISPLACEMENT.name: "Plunger off mid-position, + over-travel, {unit}",
+    "rigging_checked": "Rigging and roller: yes = looked at, or corrected",
+    "restored_joints": "Restored joints",
+    "outcome": "The gear: r = retracted, f = failed",
+}
+# Where Enter takes what NEXT says.
+STEP_ENTERS = {"restored_joints": "these joints"}
+NEXT_HELP = (
+    note("y: you have done NEXT; only what it asks for is asked, all other readings stand."),
+    note(
+        "c: the whole table, to correct any answer. u: back to what stood before the last answer."
+    ),
+    note("f, p .041, n 3 5 … are taken as at the optional answers. Nothing is erased."),
+)
+
+
+def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
+    """What is kept of a gear: its readings with their days, its verdict and NEXT."""
+    answers = visit.answers
+    rows = []
+    for number in gear.joint_numbers:
+        reading = answers.reading(number)
+        day = visit.read_on.get(number) or "no date"
+        what = "not measured" if reading is None else f"{_as_typed(reading)}, {day}"
+        rows.append(f"#{number} {what}")
+    kind = "" if answers.convention is None else f" ({CONVENTION_NAMES[answers.convention]})"
+    more = [f"{BY_NAME[name].plain} {text}" for name, text in answers.more.items()]
+    return (
+        BLANK,
+        line(
+            (
+                f"{identity(answers)}, last inspected {visit.record.day or 'without a date'}",
+                Tone.STRONG,
+            )
+        ),
+        note(f"Readings{kind}: ", "; ".join(rows)),
+        *((note("; ".join(more)),) if more else ()),
+        line((f"Last verdict: {visit.verdict}", Tone.STRONG)),
+        line((f"NEXT: {said_in(visit.next, answers.unit or LengthUnit.INCH)}", Tone.STRONG)),
+    )
+
+
+def next_page(visit: Visit) -> Page:
+    """What can follow a result: each is one key."""
+    pairs = [
+        ("y", "I did NEXT") if visit.todo else ("", ""),
+        ("r", "report"),
+        ("c", "correct"),
+        ("u", "take back") if visit.before else ("", ""),
+        ("d", "details"),
+        ("n", "new"),
+    ]
+    shown = [keys(*(pair for pair in pairs if pair[0]))]
+    if visit.action is Action.DONE:
+        end = "The repair is in the records. r writes the report to sign."
+        shown.insert(0, line(("DONE. ", Tone.GOOD), end))
+    return Page(tuple(shown), " " + "y, " * bool(visit.todo) + "another letter, or Enter = done > ")
+
+
+def step_page(answers: Answers, column: str, advised: str) -> Page:
+    unit = "in" if answers.unit is None else answers.unit.value
+    asked = _STEP_ASKS[column].format(unit=unit)
+    enter = f" (Enter: {advised})" if column in STEP_ENTERS and advised else ""
+    return Page((BLANK,), f" {asked}{enter} > ")
 
 
 def joint_page(
@@ -348,7 +429,7 @@ DETAIL_HELP = (
     note(
         "Printed on the sign-off page of the report. Enter leaves it empty; x removes it.",
     ),
-    note("A date as 2026-03-04 or 4-Mar-2026."),
+    note("A date as today, 2026-03-04 or 4-Mar-2026. done leaves the other lines empty."),
 )
 
 
@@ -381,14 +462,19 @@ def review_page(gear: Gear, answers: Answers, width: int) -> Page:
     units = _units_shown(answers.unit)
     numbers = "".join(f"{unit:>9}" for unit in units) * (2 if twice else 1)
     longest = max(len(joint.name) for joint in gear.joints)
-    name_width = max(min(longest, width - len(numbers) - 22), 0)
-    head = f"{'#':>3}  {'joint':<{name_width}}{'typed':>11}{numbers}"
+    # A name is never cut: where the screen is narrow, what was typed stands as read only.
+    as_typed = 11 if longest <= width - len(numbers) - 22 else 0
+    name_width = max(min(longest, width - len(numbers) - 11 - as_typed), 0)
+    head = f"{'#':>3}  {'joint':<{name_width}}{'typed':>{as_typed}.{as_typed}}{numbers}"
     across = 9 * len(units)
     above = (
-        " " * (name_width + 16) + f"{kind:>{across}}" + (f"{'radial':>{across}}" if twice else "")
+        " " * (name_width + 5 + as_typed)
+        + f"{kind:>{across}}"
+        + (f"{'radial':>{across}}" if twice else "")
     )
     rows = [
-        _review_row(gear, answers, number, name_width, twice=twice) for number in gear.joint_numbers
+        _review_row(gear, answers, number, (name_width, as_typed), twice=twice)
+        for number in gear.joint_numbers
     ]
     extras = [
         f"{column.replace('_id', '').replace('_', ' ')} {text}"
@@ -416,18 +502,21 @@ def review_page(gear: Gear, answers: Answers, width: int) -> Page:
     return Page(tuple(shown), " Enter computes > ")
 
 
-def _review_row(gear: Gear, answers: Answers, number: int, name_width: int, *, twice: bool) -> Line:
+def _review_row(
+    gear: Gear, answers: Answers, number: int, widths: tuple[int, int], *, twice: bool
+) -> Line:
+    name_width, as_typed = widths
     joint = gear.joint(number)
     start = f"{number:>3}  {joint.name[:name_width]:<{name_width}}"
     reading = answers.reading(number)
     if reading is None:
         return line(
             start,
-            (f"{'–':>11}  not measured", Tone.WARN if joint.critical else Tone.QUIET),
+            (f"{'–':>{as_typed or 9}}  not measured", Tone.WARN if joint.critical else Tone.QUIET),
             indent=0,
             rigid=True,
         )
-    values = f"{_as_typed(reading)[:10]:>11}"
+    values = f"{_as_typed(reading)[:10]:>11}"[:as_typed]
     for each in (reading.as_read_in, reading.radial_in)[: 1 + twice]:
         values += "".join(f"{unit.shown(each):>9}" for unit in _units_shown(answers.unit))
     flag = (

@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, Answers, JointAnswer
+from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, REST, Answers, JointAnswer
 from mlg_troubleshoot.datafile import walk
 from mlg_troubleshoot.decision.columns import MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
@@ -134,8 +134,14 @@ class SessionStore:
         return own + [draft for draft in found if draft.id not in {each.id for each in own}]
 
     def latest(self) -> Session | None:
-        open_ones = (draft for draft in self._newest_first() if not draft.complete)
-        return next(map(self._readable, open_ones), None)
+        """The last unfinished session; one without any reading only if there is no other."""
+        open_ones = [draft for draft in self._newest_first() if not draft.complete]
+        first = None
+        for session in map(self._readable, open_ones):
+            if session.answers.joints:
+                return session
+            first = first or session
+        return first
 
     def unfinished(self, gear_id: str) -> tuple[tuple[Session, ...], tuple[str, ...]]:
         """Return the unfinished sessions of a gear, the last one first, and what could not be read
@@ -236,6 +242,8 @@ class EntryDraft(msgspec.Struct, frozen=True):
     convention: ClearanceConvention | None
     joints: dict[int, JointDraft | None]
     more: dict[str, str | None]
+    todo: tuple[int | str, ...] = REST
+    continues: str = ""
 
 
 def _as_json(session: Session) -> dict[str, Any]:
@@ -257,6 +265,8 @@ def _as_json(session: Session) -> dict[str, Any]:
         answers.convention,
         joints,
         dict(answers.more),
+        answers.todo,
+        answers.continues,
     )
     plain: dict[str, Any] = msgspec.to_builtins(draft, str_keys=True)
     return plain
@@ -284,6 +294,8 @@ def _from_json(raw: Any) -> Session:
         unit=draft.unit,
         convention=draft.convention,
         joints=joints,
+        todo=draft.todo,
+        continues=draft.continues,
     ).with_more(**draft.more)
     return Session(draft.id, draft.gear, draft.started, answers)
 

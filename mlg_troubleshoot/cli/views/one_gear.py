@@ -17,6 +17,7 @@ from mlg_troubleshoot.cli.views.tables import (
     what_follows,
 )
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
+from mlg_troubleshoot.decision.inspection import EnteredClearance
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
@@ -26,7 +27,7 @@ from mlg_troubleshoot.decision.sentences import (
     rigging_sentence,
 )
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import Length, Sentence, said_in
+from mlg_troubleshoot.units import ClearanceConvention, Length, Sentence, said_in
 
 _JOINTS = 5
 _NOTES = 4
@@ -34,19 +35,20 @@ _DISCLAIMER = "Troubleshooting aid, not maintenance data; not an approval for re
 
 
 def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool) -> None:
-    """Show one gear, in short on 24 lines of 80 columns."""
+    """Show one gear: the verdict and NEXT come last, so that they stay on a screen of 24 lines."""
     row = judgement.row
     words = judgement.verdict.words + ", MEASURED" * measured_outside(judgement)
     title = Text(f"[{MARKS[judgement.verdict]}] {words} ", style=STYLES[judgement.verdict])
-    identity = f" {row.tail_no or 'tail ?'}  {row.side or 'side ?'}  {row.record_id or 'record ?'}"
+    identity = f" {row.tail_no or 'tail ?'}  {row.side or 'side ?'}"
+    record = f"  {row.record_id or 'record ?'}"
+    has_room = len(title) + len(identity) + len(record) + 6 <= screen.width
     panel = Panel(
         _body(judgement, screen, detail=detail),
-        title=title.append_text(word(identity, "not bold default")),
+        title=title.append_text(word(identity + record * has_room, "not bold default")),
         title_align="left",
         subtitle=word(gear.provenance, "dim"),
         subtitle_align="right",
     )
-    screen.print(panel)
     if isinstance(judgement, Assessment) and detail:
         _show_detail(judgement, gear, screen)
     elif isinstance(judgement, Assessment):
@@ -60,7 +62,10 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
             f"{more} more notes; " * (more > 0) + "--detail: all joints, repairs, uncertainty",
             style="dim",
         )
+    if not has_room:
+        screen.print(word(f"Record{record}"))
     screen.print(_DISCLAIMER, style="dim")
+    screen.print(panel)
 
 
 def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
@@ -110,22 +115,41 @@ def _numbers(a: Assessment) -> Iterator[str]:
 
 def _short_table(a: Assessment, screen: DataConsole) -> Table:
     table = plain_table(screen)
+    row = a.inspection
+    typed = row.convention is not ClearanceConvention.RADIAL
+    kind = row.convention.lower().replace("_", " ")
     first = a.next_action
     to_read = first.joints if first.action in (Action.MEASURE, Action.MEASURE_AGAIN) else ()
     joint = "inspect in this order" if to_read else "joints, by contribution"
-    for heading in (
+    headings = (
         "",
         joint,
-        f"clearance {screen.unit}",
-        f"limit {screen.unit}",
-        "contributes",
-    ):
-        table.add_column(heading, justify="left" if heading == joint else "right", no_wrap=True)
+        *([f"typed,\n{kind}"] if typed else []),
+        f"radial\n{screen.unit}",
+        f"limit\n{screen.unit}",
+        "contri-\nbutes",
+    )
+    for heading in headings:
+        is_joint = heading == joint
+        table.add_column(
+            heading,
+            justify="left" if is_joint else "right",
+            no_wrap=not is_joint,
+            min_width=20 if is_joint else None,
+        )
     order = {number: place for place, number in enumerate(to_read)}
     listed = sorted(a.ranked, key=lambda f: order.get(f.joint, len(order)))
     for f in listed[:_JOINTS]:
-        table.add_row(*_joint_cells(f, screen)[:5], style="bold" if f.over_limit else "")
+        cells = list(_joint_cells(f, screen)[:5])
+        if typed:
+            entered = row.entered.get(f.joint)
+            cells.insert(2, "-" if entered is None else _as_typed(entered))
+        table.add_row(*cells, style="bold" if f.over_limit else "")
     return table
+
+
+def _as_typed(entered: EnteredClearance) -> str:
+    return entered.text if entered.text[-1:].isalpha() else f"{entered.text} {entered.unit.value}"
 
 
 def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from traceback import walk_tb
 
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip
@@ -45,6 +48,39 @@ CATALOGUE: tuple[Cause, ...] = (
     LoadDirections(),
     OtherGeometry(),
 )
+
+
+def with_own(own: Iterable[Cause]) -> tuple[Cause, ...]:
+    """The catalogue with a user's own causes, none of which may bear a shipped name."""
+    own = tuple(own)
+    shipped = {cause.name for cause in CATALOGUE}
+    for cause in own:
+        if cause.name in shipped:
+            raise UsageError(
+                f"{type(cause).__name__}: {cause.name!r} is the name of a shipped cause",
+                "Give your cause another name.",
+            )
+    return (*CATALOGUE, *own)
+
+
+@contextmanager
+def in_own_cause(own: Iterable[Cause], columns: Iterable[str]) -> Iterator[None]:
+    """Say of an error in a user's cause where it stands, and which columns there are."""
+    modules = {type(cause).__module__ for cause in own if cause not in CATALOGUE}
+    try:
+        yield
+    except _BROKEN as error:
+        places = [
+            f"{Path(frame.f_code.co_filename)}, line {line}"
+            for frame, line in walk_tb(error.__traceback__)
+            if frame.f_globals.get("__name__") in modules
+        ]
+        if not places:
+            raise
+        raise UsageError(
+            f"{places[-1]}: {type(error).__name__}: {error}",
+            f"Correct the cause. The columns there are: {', '.join(sorted(columns))}.",
+        ) from error
 
 
 # What running a user's file may raise.
@@ -107,4 +143,4 @@ def load_causes(file: Path) -> tuple[Cause, ...]:
     return tuple(found)
 
 
-__all__ = ["CATALOGUE", "Candidate", "Cause", "Scene", "load_causes"]
+__all__ = ["CATALOGUE", "Candidate", "Cause", "Scene", "in_own_cause", "load_causes", "with_own"]

@@ -179,12 +179,17 @@ class CalibrationRate(Cause):
     parameter: ClassVar[str] = "rate_change"
     trial: ClassVar[float] = 0.01
     plausible: ClassVar[float | None] = 0.02
-    sentence: ClassVar[str] = "The calibration rate of the model is off: every prediction is scaled"
+    sentence: ClassVar[str] = (
+        "The calibration rate of the model is off, or the gauge of all rows reads too much or too"
+        " little by the same share: every prediction is scaled"
+    )
     inspect: ClassVar[str] = (
-        "Plunger travel from Down Lock to mid-position (technical order: 0.45 in)"
+        "Calibration of the gauge; plunger travel from Down Lock to mid-position (technical order:"
+        " 0.45 in)"
     )
     separates: ClassVar[str] = (
-        "the plunger's travel over the release, measured on two gears without wear"
+        "the plunger's travel over the release, measured on two gears without wear by a gauge that"
+        " was checked against a gauge block"
     )
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:

@@ -1,0 +1,212 @@
+"""What is kept of a gear when its technician comes back: the last inspection, and what it asked
+for.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from datetime import date
+from types import MappingProxyType
+from typing import Any
+
+from mlg_troubleshoot.cli.prompts.answers import CONFIRMED, MORE, NOT_MEASURED, Answers, JointAnswer
+from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.columns import BY_NAME, DATE, PLUNGER_DISPLACEMENT
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.decision.plan import Action
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.folding import GearLife, KeptInspection, lives, without_dashes
+from mlg_troubleshoot.life.since_repairs import since_repairs
+from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_from
+from mlg_troubleshoot.units import LengthUnit, parse_length
+
+# The one question that a step asks, by its column; joints to read are asked one by one.
+_ASKS = {
+    Action.READ_PLUNGER: "plunger_displacement",
+    Action.CHECK_RIGGING: "rigging_checked",
+    Action.RESTORE: "restored_joints",
+    Action.RETRACT: "outcome",
+}
+_WITH_JOINTS = (Action.MEASURE, Action.MEASURE_AGAIN)
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """The last inspection of a gear as it counts today.
+
+    `read_on` is the day on which each reading was entered, `before` the answers before the last
+    change, `todo` what NEXT asks for.
+    """
+
+    record: Record
+    row: Inspection
+    answers: Answers
+    read_on: Mapping[int, str]
+    verdict: str
+    next: str
+    action: Action | None
+    todo: tuple[int | str, ...]
+    joints: tuple[int, ...]
+    before: Answers | None = None
+
+    def begun(self, today: date | None) -> Answers:
+        """The answers with what NEXT asks for still to come, on the day of this visit."""
+        answers = replace(self.answers, todo=self.todo)
+        if self.action is Action.MEASURE_AGAIN:
+            names = " ".join(map(str, {*self.row.measured_again, *self.joints}))
+            answers = answers.with_more(measured_again=names)
+        if today is None or self.row.inspection_date is None:
+            return answers
+        return answers.with_more(inspection_date=max(today, self.row.inspection_date).isoformat())
+
+    def completed(self, read: Inspection) -> Inspection:
+        """What was typed, with what only the kept inspection says: prompts do not ask for all."""
+        asked = {BY_NAME[name].filled for name in MORE} | {"warnings", "unit_question"}
+        kept = {
+            field.name: getattr(self.row, field.name)
+            for field in fields(Inspection)
+            if field.name not in asked
+            and getattr(read, field.name) in (field.default, None, {}, ())
+            and field.name not in ("clearance_in", "entered")
+        }
+        typed = PLUNGER_DISPLACEMENT.name
+        unit = self.answers.unit or LengthUnit.INCH
+        if self.answers.more.get(typed) == _more(read, unit).get(typed):
+            kept["readings_in"] = self.row.readings_in
+        if not self.row.gauge_u_is_default:
+            kept |= {"gauge_u_in": self.row.gauge_u_in, "gauge_u_is_default": False}
+        kept["carried"] = {**self.row.carried, **read.carried}
+        return replace(read, **kept)
+
+
+def last_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
+    """The last inspection of a gear, under whichever spelling of its tail number it is kept."""
+    if store.is_new:
+        return None
+    kept = [t for t, s in store.gears() if s == side and without_dashes(t) == without_dashes(tail)]
+    if not kept or (tail not in kept and len(kept) > 1):
+        return None
+    key = (tail if tail in kept else kept[0], side.value)
+    life = lives(store, *key)[key]
+    return None if life.latest is None else _visit(life, life.latest, gear, store)
+
+
+def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> Visit | None:
+    stood = latest.inspection
+    if not set(stood.clearance_in) <= set(gear.joint_numbers):
+        return None
+    (row,) = since_repairs([stood], gear, store)
+    if not isinstance(row, Inspection):
+        raise TypeError("an inspection is not an invalid row")
+    restored = tuple(sorted(set(row.restored_joints) - set(stood.restored_joints)))
+    step: Mapping[str, Any] = latest.result.get("next_action") or {}
+    action = Action(step["action"]) if step else None
+    asked = _ASKS.get(action) if action else None
+    joints = tuple(step.get("joints", ()))
+    todo = joints if action in _WITH_JOINTS else () if asked is None else (asked,)
+    said = str(step.get("text", ""))
+    if restored:
+        names = ", ".join(f"#{joint}" for joint in restored)
+        action, todo = Action.MEASURE, restored
+        said = f"Restored since, as the records say: {names}. Enter the new clearances."
+    versions = _versions(life, latest.record)
+    verdict = latest.result.get("verdict")
+    return Visit(
+        latest.record,
+        row,
+        answers_of(row, gear, latest.record.digest),
+        _read_on(versions),
+        Verdict(verdict).words if verdict else "not judged",
+        said,
+        action,
+        todo,
+        joints,
+        answers_of(inspection_from(versions[-2]), gear, latest.record.digest)
+        if len(versions) > 1
+        else None,
+    )
+
+
+def _versions(life: GearLife, last: Record) -> list[Record]:
+    """An inspection from its first entry to what stands now."""
+    chain = [last]
+    for record in reversed(life.records):
+        if chain[-1].kind is not RecordKind.CORRECTION:
+            break
+        if record.digest == chain[-1].body["supersedes"]:
+            chain.append(record)
+    return chain[::-1]
+
+
+def _read_on(versions: list[Record]) -> Mapping[int, str]:
+    """The day of the entry that each reading came with."""
+    days: dict[int, str] = {}
+    readings: Mapping[int, Any] = {}
+    for version in versions:
+        entered = inspection_from(version).entered
+        days = {
+            joint: days[joint] if readings.get(joint) == text else version.day
+            for joint, text in entered.items()
+        }
+        readings = entered
+    return days
+
+
+def answers_of(row: Inspection, gear: Gear, continues: str) -> Answers:
+    """An inspection as answers, each as it was typed."""
+    units = Counter(entered.unit for entered in row.entered.values())
+    unit = units.most_common(1)[0][0] if units else LengthUnit.INCH
+    joints = {
+        joint: _answer(row, joint) if joint in row.clearance_in else NOT_MEASURED
+        for joint in gear.joint_numbers
+    }
+    return Answers(
+        tail_no=row.tail_no,
+        side=row.side,
+        unit=unit,
+        convention=row.convention,
+        record_id=row.record_id,
+        joints=MappingProxyType(joints),
+        todo=(),
+        continues=continues,
+    ).with_more(**_more(row, unit))
+
+
+def _answer(row: Inspection, joint: int) -> JointAnswer:
+    entered = row.entered.get(joint)
+    if entered is not None:
+        try:
+            written = parse_length(entered.text)
+            said = next((each for each in row.warnings if each.startswith(CONFIRMED)), "")
+            named = said.removeprefix(CONFIRMED).split(", ")
+            return JointAnswer(replace(written, unit=entered.unit), f"#{joint}" in named)
+        except UsageError:
+            pass
+    read_in = row.clearance_in[joint] * row.convention.per_radial
+    return JointAnswer(parse_length(f"{read_in:.6g} in"))
+
+
+def _more(row: Inspection, unit: LengthUnit) -> dict[str, str]:
+    """The optional answers of an inspection, by column."""
+    found = {}
+    for name in MORE:
+        column = BY_NAME[name]
+        value = getattr(row, column.filled, None) if not column.carried else row.carried.get(name)
+        if column.copies > 1 and value:
+            value = value[0]
+        if value in (None, (), "", False):
+            continue
+        if column.is_length:
+            found[name] = f"{unit.from_inches(float(value)):.6g} {unit}"
+        elif isinstance(value, tuple):
+            found[name] = ("; " if isinstance(value[0], str) else " ").join(map(str, value))
+        elif value is True:
+            found[name] = "yes"
+        elif name != DATE.name and hasattr(value, "isoformat"):
+            found[name] = value.isoformat(" ") if hasattr(value, "hour") else value.isoformat()
+        else:
+            found[name] = f"{value:g}" if isinstance(value, float) else str(value)
+    return found

@@ -1,0 +1,60 @@
+"""What is assumed of gears before anything is read: one table of numbers, each with its meaning. No
+fleet of this gear is public, so that all of it is assumed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Priors:
+    """What is assumed of wear, gauges and failures.
+
+    joints_for_one_misrigged, joints_for_one_elsewhere: of the gears that failed, how many did so
+    through the joints for each that was mis-rigged, and for each that failed through something that
+    leaves the plunger within its margin.
+    offset: how far a wrong rigging moves the plunger: evenly, up to about so many margins. [1]
+    overlooked: chance that a rigging that was looked at is wrong nevertheless. [1]
+    loaded, scatter_deg: chance that loads hold all pins near their worst directions, and the
+    standard deviation of their angles then. [1, deg]
+    linkage_u_in: standard deviation of what the linkage of this gear adds to a sum of random
+    directions. [in]
+    levels: least and largest level of wear of one gear, in units of the limit. [1]
+    worn_out: chance that a joint is worn out for a reason of its own, at any level: between its
+    limit and twice its limit. [1]
+    gauge_scale: standard deviation of the scale of a gauge, beside its stated uncertainty. [1]
+    wrong_readings: readings of one gear that are the total play where the radial clearance is
+    stated, on average: as many as things that are wrong in any set of data.
+    """
+
+    joints_for_one_misrigged: float = 3.0
+    joints_for_one_elsewhere: float = 3.0
+    offset: float = 2.0
+    overlooked: float = 0.03
+    loaded: float = 0.02
+    scatter_deg: float = 20.0
+    linkage_u_in: float = 0.0015
+    levels: tuple[float, float] = (0.06, 1.2)
+    worn_out: float = 0.02
+    gauge_scale: float = 0.1
+    wrong_readings: float = Beliefs().expected
+
+    @property
+    def cosine(self) -> tuple[float, float]:
+        """Mean and standard deviation of the cosine of the angle of a loaded pin. [1]"""
+        variance = np.radians(self.scatter_deg) ** 2
+        squared = float(np.exp(-variance))
+        return float(np.sqrt(squared)), (1.0 - squared) / float(np.sqrt(2.0))
+
+    @property
+    def usual(self) -> float:
+        """Chance that the joints are the cause of a failure that rigging did not cause. [1]"""
+        return self.joints_for_one_elsewhere / (1.0 + self.joints_for_one_elsewhere)
+
+
+PRIORS = Priors()

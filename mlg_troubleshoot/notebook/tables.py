@@ -1,0 +1,173 @@
+"""Results as the documented JSON, and each list of it as a table."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import Any
+
+import msgspec
+import pandas as pd
+
+from mlg_troubleshoot.decision.assessment import Assessment
+from mlg_troubleshoot.diagnosis import Diagnosis
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.directions import WorstCase
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.output_types import GearIdentity
+from mlg_troubleshoot.paper.study import StudyFindings
+from mlg_troubleshoot.records.frames import frame_of, label_of
+from mlg_troubleshoot.records.headers import Joints
+from mlg_troubleshoot.reporting.json_form import (
+    assessment_as_json,
+    check_as_json,
+    diagnosis_as_json,
+    plain,
+    written,
+)
+from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
+from mlg_troubleshoot.reporting.model_json import study_as_json, survey_as_json
+from mlg_troubleshoot.store import Store
+from mlg_troubleshoot.surveying.result import SurveyResult
+from mlg_troubleshoot.workflows.check import CheckResult
+from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
+from mlg_troubleshoot.workflows.history import Lives
+
+# The list that a result's table is of, the first one that it has.
+_MAIN = ("inspections", "gears", "causes", "joints", "also_possible")
+# What says whose a row of a list within a row is.
+_WHOSE = ("record_id", "tail_no", "side")
+
+
+@singledispatch
+def to_dict(result: Any) -> dict[str, Any]:
+    values: dict[str, Any] = plain(result)
+    return values
+
+
+@to_dict.register
+def _(result: CheckResult) -> dict[str, Any]:
+    return check_as_json(result.gear, result.judgements, result.problems, result.notes, result.seed)
+
+
+@to_dict.register
+def _(result: Assessment) -> dict[str, Any]:
+    return assessment_as_json(result)
+
+
+@to_dict.register
+def _(result: DiagnoseResult) -> dict[str, Any]:
+    return diagnosis_as_json(result.diagnosis, result.extension, result.notes)
+
+
+@to_dict.register
+def _(result: Diagnosis) -> dict[str, Any]:
+    return diagnosis_as_json(result, None)
+
+
+@to_dict.register
+def _(result: SurveyResult) -> dict[str, Any]:
+    return survey_as_json(result)
+
+
+@to_dict.register
+def _(result: StudyFindings) -> dict[str, Any]:
+    return study_as_json(result)
+
+
+@to_dict.register
+def _(result: IndexTable) -> dict[str, Any]:
+    values: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(result))
+    return values
+
+
+@to_dict.register
+def _(result: WorstCase) -> dict[str, Any]:
+    names = ("over_in", "under_in", "magnitude_in", "over_directions", "under_directions")
+    return {name: plain(getattr(result, name)) for name in names}
+
+
+@to_dict.register
+def _(result: Gear) -> dict[str, Any]:
+    return {**written(GearIdentity, result), "joints": plain(result.joints)}
+
+
+@to_dict.register
+def _(result: Lives) -> dict[str, Any]:
+    one_by_one = [
+        life_as_json(life, result.forecasts[life.key], result.gear) for life in result.lives
+    ]
+    joints = [
+        {"tail_no": each["tail_no"], "side": each["side"], **joint}
+        for each in one_by_one
+        for joint in each["joints"]
+    ]
+    return {**fleet_as_json(result.lives, result.forecasts), "joints": joints}
+
+
+def to_frame(result: Any, of: str = "") -> pd.DataFrame:
+    values = to_dict(result)
+    lists = {name: rows for name, rows in values.items() if isinstance(rows, list)}
+    name = of or next((name for name in _MAIN if lists.get(name)), "")
+    if name in lists:
+        frame = _frame(lists[name])
+    else:
+        rows = next((lists[each] for each in _MAIN if lists.get(each)), [])
+        within = [
+            {**{key: row[key] for key in _WHOSE if key in row}, **each}
+            for row in rows
+            for each in row.get(name) or ()
+        ]
+        if name and not any(name in row for row in rows):
+            known = ", ".join(_tables(lists, rows))
+            raise UsageError(f"there is no table {name!r}", f"Give one of {known}.")
+        frame = _frame(within) if name else pd.DataFrame(_columns(lists))
+    if isinstance(result, CheckResult) and name == "inspections":
+        frame.index = _index(result)
+    return frame
+
+
+def _tables(lists: dict[str, Any], rows: list[Any]) -> list[str]:
+    within = [key for row in rows[:1] for key, each in row.items() if _is_table(each)]
+    return [*(name for name, each in lists.items() if _is_table(each)), *within]
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, list) and isinstance(next(iter(value), {}), dict)
+
+
+def _frame(rows: list[Any]) -> pd.DataFrame:
+    """One line per row; what is a table itself has its own."""
+    if not all(isinstance(row, dict) for row in rows):
+        return pd.DataFrame({"value": rows})
+    bare = [{k: each for k, each in row.items() if not (each and _is_table(each))} for row in rows]
+    return pd.json_normalize(bare)
+
+
+def _columns(lists: dict[str, Any]) -> dict[str, Any]:
+    """Lists of numbers, one per row of an array."""
+    return {
+        name: values
+        for name, values in lists.items()
+        if not any(isinstance(value, list | dict) for value in values)
+    }
+
+
+def _index(result: CheckResult) -> pd.Index[Any]:
+    """The labels of the frame that the rows came from, else their place."""
+    read = result.read
+    if read is None or len(read.files) != 1 or not read.files[0].labels:
+        return pd.RangeIndex(len(result.judgements))
+    labels = read.files[0].labels
+    return pd.Index([label_of(labels, judged.row.source.row) for judged in result.judgements])
+
+
+def store_frame(store: Store, of: str) -> pd.DataFrame:
+    """The inspections of a store that stand, or one line per gear in it."""
+    found = lives(store).values()
+    if of == "lives":
+        return _frame(fleet_as_json([*found], {})["gears"])
+    rows = [kept.inspection for life in found for kept in life.inspections]
+    numbers = {joint for row in rows for joint in row.clearance_in}
+    return frame_of(rows, Joints(tuple(sorted(numbers))))

@@ -1,0 +1,158 @@
+"""Entries that are interrupted at random moments: no answer is lost or asked again.
+
+``python -m tests.prompts.test_interruptions 200`` says how many were.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.store import Store
+
+pexpect = pytest.importorskip("pexpect")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal"),
+    pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning"),
+]
+_ROOT = Path(__file__).parents[2]
+_ENDS = (signal.SIGKILL, signal.SIGHUP, signal.SIGINT)
+# Every question by the beginning of its prompt, and what is typed there.
+_ANSWERS = {
+    "Tail number": "N{gear}",
+    "Side": "l",
+    "Unit": "t",
+    "Reading is": "t",
+    **{f"#{n} ": f"{n + 2}" for n in range(1, 11)},
+    "f, r, p": "",
+    "Work order": "WO-{gear}",
+    "Date": "2026-10-05",
+    "Landings": "21{gear:02d}",
+    "Measured by": "A. Smith",
+    "Gauge": "G-7",
+    "Enter computes": "",
+}
+_RESULT = "Enter = done"
+
+
+@dataclass
+class Trial:
+    """Gears that are entered one after the other while the program is interrupted."""
+
+    home: Path
+    chance: random.Random
+    gear: int = 1
+    interruptions: int = 0
+    acknowledged: set[str] = field(default_factory=set)
+    asked_again: list[str] = field(default_factory=list)
+
+    @property
+    def store(self) -> Path:
+        return self.home / "store.sqlite"
+
+    def start(self, *arguments: str) -> pexpect.spawn:
+        child = pexpect.spawn(
+            sys.executable,
+            ["-m", "mlg_troubleshoot", "check", "--store", str(self.store), *arguments],
+            dimensions=(24, 80),
+            env={
+                "PATH": os.environ["PATH"],
+                "HOME": str(self.home),
+                "PYTHONPATH": str(_ROOT),
+                "LANG": "C.UTF-8",
+                "TERM": "xterm",
+                "NO_COLOR": "1",
+            },
+            encoding="utf-8",
+            timeout=60,
+        )
+        child.delaybeforesend = None
+        return child
+
+    def asked(self, child: pexpect.spawn) -> str | None:
+        """The question that stands at the prompt; None after the end."""
+        if child.expect_exact(["> ", pexpect.EOF]) == 1:
+            return None
+        prompt = child.before.rpartition("\n")[2].strip()
+        if _RESULT in prompt:
+            return _RESULT
+        return next(each for each in _ANSWERS if f"{prompt} ".startswith(each))
+
+    def run(self) -> None:
+        """One start of the program, and its end at a random moment."""
+        child = self.start(*["--resume"] * bool(self.acknowledged))
+        pending = ""
+        for _ in range(self.chance.randint(1, 6)):
+            question = self.asked(child)
+            if question is not None and pending:
+                self.acknowledged.add(pending)
+            if question is None or question == _RESULT:
+                self.next_gear(child)
+                return
+            if question in self.acknowledged and question != "Enter computes":
+                self.asked_again.append(f"N{self.gear}: {question}")
+            pending = question
+            child.sendline(_ANSWERS[question].format(gear=self.gear))
+        time.sleep(self.chance.choice((0.0, 0.002, 0.01, 0.05, 0.2)))
+        child.kill(self.chance.choice(_ENDS))
+        child.expect(pexpect.EOF)
+        child.close(force=True)
+        self.interruptions += 1
+
+    def next_gear(self, child: pexpect.spawn) -> None:
+        if child.isalive():
+            child.kill(self.chance.choice(_ENDS))
+            self.interruptions += 1
+        child.close(force=True)
+        self.acknowledged.clear()
+        self.gear += 1
+
+    def missing(self) -> list[str]:
+        """What the store lacks of the gears whose result was shown."""
+        kept = lives(Store(self.store))
+        lost = []
+        for gear in range(1, self.gear):
+            life = kept.get((f"N{gear}", "LH"))
+            found = None if life is None else life.inspections[-1].inspection
+            if (
+                found is None
+                or len(found.clearance_in) != 10
+                or any(found.entered[n].text != str(n + 2) for n in range(1, 11))
+                or found.carried.get("work_order") != f"WO-{gear}"
+                or found.gear_landings != 2100 + gear
+                or str(found.inspection_date) != "2026-10-05"
+            ):
+                lost.append(f"N{gear}: {found}")
+        return lost
+
+
+def interrupted(home: Path, count: int, seed: int = 1) -> Trial:
+    trial = Trial(home, random.Random(seed))
+    while trial.interruptions < count:
+        trial.run()
+    return trial
+
+
+def test_two_hundred_interruptions_lose_no_answer(tmp_path: Path) -> None:
+    trial = interrupted(tmp_path, 200)
+    assert trial.asked_again == []
+    assert trial.missing() == []
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        done = interrupted(Path(folder), int(sys.argv[1]))
+        print(
+            f"{done.interruptions} interruptions, {done.gear - 1} gears; asked again:"
+            f" {done.asked_again or 'none'}; missing: {done.missing() or 'none'}"
+        )

@@ -1,0 +1,302 @@
+"""The second visit to a gear: it goes on with what is kept, to the end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+
+import pytest
+
+from mlg_troubleshoot.cli.check import Flags, Wanted
+from mlg_troubleshoot.cli.check_run import Run
+from mlg_troubleshoot.cli.options import Tables
+from mlg_troubleshoot.cli.prompts import EntryInterruptedError, SessionStore
+from mlg_troubleshoot.life.folding import GearLife, life_of
+from mlg_troubleshoot.store import RecordKind, Store
+from tests.cli.conftest import mlg
+from tests.prompts.scripted import ENTERS, ScriptedTerminal
+
+GEAR = ("N1", "l")
+PLAY = ("8", "9", "18", "10", "11", "3", "3", "3", "3", "3")
+FIRST = (*GEAR, "t", "t", *PLAY, "f", *ENTERS, "")
+
+Visit = Callable[..., ScriptedTerminal]
+
+
+@pytest.fixture
+def visit(store: SessionStore, monkeypatch: pytest.MonkeyPatch) -> Visit:
+    """One run of ``mlg check`` on a terminal, ended with Enter; the screen is returned."""
+
+    def one(*typed: str, resume: bool = False, flags: Flags | None = None) -> ScriptedTerminal:
+        terminal = ScriptedTerminal([*typed, ""])
+        monkeypatch.setattr("mlg_troubleshoot.cli.prompts.RichTerminal", lambda: terminal)
+        monkeypatch.setattr("mlg_troubleshoot.cli.output.can_ask", lambda: True)
+        wanted = Wanted(store=str(store.place), resume=resume)
+        Run([], flags or Flags(), Tables(), wanted).run()
+        return terminal
+
+    return one
+
+
+def broken_off(visit: Visit, *typed: str) -> None:
+    """A visit that Ctrl-C ends after the given lines."""
+
+    class Stopped(ScriptedTerminal):
+        def ask(self, prompt: str) -> str:
+            if len(self._typed) == 1:
+                raise KeyboardInterrupt
+            return super().ask(prompt)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tests.prompts.test_visits.ScriptedTerminal", Stopped)
+        with pytest.raises(EntryInterruptedError):
+            visit(*typed)
+
+
+def life(store: SessionStore) -> GearLife:
+    return life_of(Store(store.place), "N1", "LH")
+
+
+def test_a_gear_that_was_seen_before_shows_its_verdict_next_and_readings_with_their_day(
+    visit: Visit,
+) -> None:
+    visit(*FIRST)
+    screen = visit(*GEAR).screen
+    today = date.today().isoformat()
+    assert f"N1 LH, last inspected {today}" in screen
+    assert "Last verdict: OUTSIDE MARGIN" in screen
+    assert "NEXT: Read the plunger" in screen
+    assert f"#3 18 thou, {today}" in screen
+
+
+def test_a_second_visit_asks_only_for_what_next_asked(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    screen = visit(*GEAR, "y", "36").screen
+    assert screen.count(" > ") == len((*GEAR, "y", "36", ""))
+    assert life(store).inspections[-1].inspection.readings_in == (0.036,)
+
+
+def test_readings_of_an_earlier_visit_stand_without_being_typed_again(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    before = life(store).inspections[-1].inspection
+    visit(*GEAR, "y", "36")
+    after = life(store).inspections[-1].inspection
+    assert (after.clearance_in, after.entered) == (before.clearance_in, before.entered)
+
+
+def test_a_continued_inspection_is_one_inspection_and_the_former_stays_in_the_chain(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36")
+    kinds = [r.kind for r in life(store).records if r.kind is not RecordKind.ASSESSMENT]
+    assert kinds == [RecordKind.INSPECTION, RecordKind.CORRECTION]
+    assert len(life(store).inspections) == 1
+
+
+def test_what_only_a_table_said_of_a_continued_inspection_stands(
+    visit: Visit, store: SessionStore, tmp_path: Path
+) -> None:
+    table = tmp_path / "one.csv"
+    table.write_text(
+        "record_id,tail_no,side,clearance_convention,clearance_1_in,clearance_3_in,temperature_c,"
+        "remarks,gauge_u_in,inspection_date\n"
+        "R1,N1,LH,RADIAL,.004,.009,21,oil seen,.0004,2026-03-01\n"
+    )
+    mlg("check", table, "--keep", "--store", store.place)
+    visit(*GEAR, "p 36 thou")
+    found = life(store).inspections[-1].inspection
+    assert (found.record_id, found.temperature_c, found.carried["remarks"]) == (
+        "R1",
+        21.0,
+        "oil seen",
+    )
+    assert (found.gauge_u_in, found.readings_in) == (0.0004, (0.036,))
+
+
+def test_a_new_inspection_is_one_key_away(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "n", "t", "t", *["4"] * 10, *ENTERS, "")
+    assert len(life(store).inspections) == 2
+
+
+def test_the_last_answer_is_taken_back_by_a_record_that_is_appended(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36")
+    records = len(life(store).records)
+    visit(*GEAR, "u")
+    assert life(store).inspections[-1].inspection.readings_in == ()
+    assert len(life(store).records) > records
+
+
+def test_an_outcome_is_taken_back(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "retracted")
+    assert life(store).inspections[-1].inspection.outcome == "RETRACTED"
+    visit(*GEAR, "u")
+    assert life(store).inspections[-1].inspection.outcome == "FAILED"
+
+
+def test_a_repair_is_recorded_and_taken_back_with_its_record(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "n 3 5", "3", "3")
+    (repair,) = life(store).repairs
+    assert repair.body["joints"] == [3, 5]
+    visit(*GEAR, "u")
+    assert life(store).repairs == ()
+    assert life(store).inspections[-1].inspection.clearance_in[3] == 0.009
+
+
+def test_a_repair_that_was_recorded_elsewhere_opens_its_joints(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    day = date.today().isoformat()
+    mlg("history", "repair", "N1", "LH", "--joint", "3", "--date", day, "--store", store.place)
+    screen = visit(*GEAR, "y", "3").screen
+    assert "Restored since, as the records say: #3" in screen
+    assert life(store).inspections[-1].inspection.clearance_in[3] == 0.0015
+
+
+def test_an_entry_broken_off_at_an_offer_leaves_no_empty_draft(
+    visit: Visit, store: SessionStore
+) -> None:
+    broken_off(visit, *GEAR, "t", "t", "8", "9")
+    broken_off(visit, *GEAR)
+    session = store.latest()
+    assert session is not None
+    assert len(session.answers.joints) == 2
+    assert len(store._newest_first()) == 1
+
+
+def test_an_entry_without_a_reading_does_not_stand_before_one_with_readings(
+    visit: Visit, store: SessionStore
+) -> None:
+    broken_off(visit, *GEAR, "t", "t", "8", "9")
+    broken_off(visit, "N2", "l")
+    session = store.latest()
+    assert session is not None
+    assert session.answers.tail_no == "N1"
+
+
+def test_enter_at_the_tail_number_goes_on_with_the_unfinished_entry(
+    visit: Visit, store: SessionStore
+) -> None:
+    broken_off(visit, *GEAR, "t", "t", *PLAY[:9])
+    visit("", PLAY[9], "f", *ENTERS, "")
+    assert len(life(store).inspections[-1].inspection.clearance_in) == 10
+
+
+def test_resume_lists_the_unfinished_entries_of_other_gears(
+    visit: Visit, store: SessionStore
+) -> None:
+    broken_off(visit, *GEAR, "t", "t", "8")
+    broken_off(visit, "N2", "r", "t", "t", "8")
+    flags = Flags(typed={"tail_no": "N1", "side": "LH"})
+    screen = visit(*PLAY[1:], *ENTERS, "", resume=True, flags=flags).screen
+    assert "Unfinished: N2 RH" in screen
+    assert len(life(store).inspections) == 1
+
+
+def test_a_resumed_visit_asks_for_nothing_that_it_knows(visit: Visit, store: SessionStore) -> None:
+    broken_off(visit, *GEAR, "t", "t", *PLAY, "f", "", "WO-7", "")
+    screen = visit("2100", "", "", "", resume=True).screen
+    assert "Work order" not in screen
+    found = life(store).inspections[-1].inspection
+    assert (found.carried["work_order"], found.gear_landings) == ("WO-7", 2100.0)
+
+
+def test_a_continued_entry_that_was_broken_off_goes_on_where_it_stood(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    broken_off(visit, *GEAR, "n 3 5", "4")
+    visit("3", resume=True)
+    found = life(store).inspections[-1].inspection
+    assert (found.clearance_in[3], found.clearance_in[5]) == (0.002, 0.0015)
+
+
+def test_two_entries_that_go_on_with_one_inspection_are_both_kept(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    broken_off(visit, *GEAR, "n 3", "4")
+    visit(*GEAR, "n", *("t", "t"), *["4"] * 10, *ENTERS, "")
+    assert len(life(store).inspections) == 2
+
+
+def test_the_word_today_is_a_date(visit: Visit, store: SessionStore) -> None:
+    visit(*GEAR, "t", "t", *PLAY, "", "", "today", "", "", "", "")
+    assert life(store).inspections[-1].inspection.inspection_date == date.today()
+
+
+def test_a_date_with_one_reading_is_taken(visit: Visit, store: SessionStore) -> None:
+    visit(*GEAR, "t", "t", *PLAY, "", "", "31/10/26", "", "", "", "")
+    assert life(store).inspections[-1].inspection.inspection_date == date(2026, 10, 31)
+
+
+def test_q_after_a_result_ends_as_enter_does(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST, "q")
+    assert len(life(store).inspections) == 1
+
+
+def test_one_inspection_is_said_to_be_one(visit: Visit, capsys: pytest.CaptureFixture) -> None:
+    visit(*FIRST)
+    assert "1 inspection kept" in capsys.readouterr().err
+
+
+def test_a_gear_is_followed_over_five_visits_to_done_with_half_the_keys(
+    visit: Visit, store: SessionStore
+) -> None:
+    visits = (
+        FIRST,
+        (*GEAR, "y", "36"),
+        (*GEAR, "y", "yes"),
+        (*GEAR, "y", "18", "y", "", "3", "3"),
+        (*GEAR, "y", "4", "y", "r"),
+    )
+    keys = sum(visit(*typed).keystrokes for typed in visits)
+    latest = life(store).inspections[-1].result
+    assert latest["next_action"]["action"] == "DONE", json.dumps(latest["plan"])[:600]
+    # 261 keys where each visit types all that is known again, with the prompts that asked for no
+    # landings.
+    assert keys <= 261 / 2
+
+
+def test_a_visit_that_changes_nothing_appends_nothing(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    records = len(life(store).records)
+    visit(*GEAR, "c", "")
+    assert len(life(store).records) == records
+
+
+@pytest.mark.parametrize("typed", ["8,5", "abc"])
+def test_what_is_said_of_a_reading_at_a_prompt_is_not_about_files(visit: Visit, typed: str) -> None:
+    screen = visit(*GEAR, "t", "t", typed, *PLAY, *ENTERS, "").screen
+    assert "is not taken" in screen
+    assert "--decimal-comma" not in screen
+    assert "leave it blank" not in screen
+
+
+def test_landings_and_date_that_flags_give_are_not_asked(visit: Visit, store: SessionStore) -> None:
+    given = {"gear_landings": "2100", "inspection_date": "2026-03-01"}
+    flags = Flags(typed={"tail_no": "N1", "side": "LH", **given})
+    visit("t", "t", *PLAY, *ENTERS[:-2], "", flags=flags)
+    found = life(store).inspections[-1].inspection
+    assert (found.gear_landings, str(found.inspection_date)) == (2100.0, "2026-03-01")
+
+
+def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36", "y", "yes", "y", "18")
+    screen = visit(*GEAR, "y", "", "3", "3", "y", "4", "y", "r").screen
+    assert "DONE. The repair is in the records. r writes the report to sign." in screen
+    assert life(store).repairs

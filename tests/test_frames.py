@@ -1,0 +1,388 @@
+"""DataFrames in, tables and pictures out: what an analyst does in a notebook."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import random
+from collections.abc import Callable
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import joblib
+import jsonschema
+import numpy as np
+import pandas as pd
+import pytest
+
+import mlg_troubleshoot as mlg
+from mlg_troubleshoot.schemas import schema
+
+ROOT = Path(__file__).parents[1]
+DATA = ROOT / "inspection_data"
+EXAMPLES = sorted(DATA.glob("*.csv"))
+BAD = ("x", "-0.002", "0,007", "0.9", "<0.002x", "1/8", "#REF!")
+
+
+def sheet(seed: int, *, bad: bool = True) -> pd.DataFrame:
+    """A table of a fleet as people write it: some cells blank, some of them wrong."""
+    draw = random.Random(seed)
+    unit = draw.choice(("in", "thou", "mm"))
+    per_inch = {"in": 1.0, "thou": 1000.0, "mm": 25.4}[unit]
+    rows = []
+    for number in range(draw.randint(1, 6)):
+        row: dict[str, Any] = {
+            "record_id": f"R{number}",
+            "tail_no": f"N{draw.randint(100, 999)}",
+            "side": draw.choice(("LH", "right", "L")),
+            "clearance_convention": draw.choice(("RADIAL", "diametral", "total play")),
+            "inspection_date": f"2024-{draw.randint(1, 12):02d}-{draw.randint(1, 28):02d}",
+            "gear_landings": str(draw.randint(0, 4000)),
+            "gauge_id": draw.choice(("G-1", "007", "")),
+            "Bay": draw.choice(("north", "south", "")),
+        }
+        factor = 1.0 if row["clearance_convention"] == "RADIAL" else 2.0
+        for joint in range(1, 11):
+            value = draw.uniform(0.001, 0.009) * per_inch * factor
+            row[f"clearance_{joint}_{unit}"] = "" if draw.random() < 0.2 else f"{value:.4f}"
+        rows.append(row)
+    frame = pd.DataFrame(rows)
+    if bad:
+        for _ in range(draw.randint(1, 4)):
+            place = draw.randrange(len(frame)), draw.randrange(8, frame.shape[1])
+            frame.iloc[place] = draw.choice(BAD)
+        if draw.random() < 0.3:
+            frame.loc[0, "side"] = "both"
+    return frame
+
+
+def as_csv(frame: pd.DataFrame) -> BytesIO:
+    return BytesIO(frame.to_csv(index=False).encode())
+
+
+def judged(source: Any) -> tuple[list[Any], list[Any]]:
+    """Verdicts with their numbers, and problems without the name of the table."""
+    found = mlg.check(source, advice=False)
+    verdicts = [
+        (row["verdict"], row["predicted_displacement_in"], row["next_action"]["text"])
+        for row in found.to_dict()["inspections"]
+    ]
+    return verdicts, [(p.code, p.column, p.value, p.expected, p.remedy) for p in found.problems]
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_a_frame_has_the_verdicts_and_the_problems_of_its_file(seed: int) -> None:
+    frame = sheet(seed)
+    assert judged(frame) == judged(as_csv(frame))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_dict_has_the_verdict_and_the_problems_of_its_row(seed: int) -> None:
+    frame = sheet(seed).head(1)
+    (row,) = frame.to_dict("records")
+    assert judged(row) == judged(as_csv(frame))
+
+
+def test_a_series_is_one_gear() -> None:
+    frame = sheet(3, bad=False)
+    assert judged(frame.iloc[0]) == judged(as_csv(frame.head(1)))
+
+
+def test_a_problem_names_the_row_label_and_the_column() -> None:
+    frame = sheet(5, bad=False)
+    frame.index = pd.Index([f"gear {n}" for n in range(len(frame))])
+    column = frame.columns[10]
+    frame.loc["gear 1", column] = "x"
+    (problem,) = mlg.check(frame).problems
+    assert problem.place().startswith(f"DataFrame, cell loc['gear 1', {column!r}]")
+
+
+def test_missing_values_of_a_frame_are_not_measured() -> None:
+    frame = pd.DataFrame(
+        {"tail_no": ["N1"], "side": ["LH"], "clearance_3_in": [0.004], "clearance_5_in": [np.nan]}
+    )
+    joints = mlg.check(frame, convention="RADIAL").to_frame("joints")
+    assert joints["clearance_in"].notna().tolist() == [n == 3 for n in range(1, 11)]
+
+
+def test_days_of_a_frame_are_days() -> None:
+    frame = sheet(4, bad=False).assign(inspection_date=pd.Timestamp("2024-03-04"))
+    found = mlg.read_inspections(frame)
+    assert set(found["inspection_date"]) == {pd.Timestamp("2024-03-04")}
+
+
+def test_an_empty_frame_is_a_problem() -> None:
+    assert [p.code for p in mlg.check(pd.DataFrame()).problems] != []
+
+
+def test_predict_takes_the_columns_of_a_frame_by_name() -> None:
+    frame = pd.DataFrame({"clearance_5_thou": [7.0, 0.0], "clearance_3_in": [0.013, None]})
+    assert mlg.predict(frame).over_in.tolist() == [
+        mlg.predict({3: 0.013, 5: 0.007}).over_in[0],
+        0.0,
+    ]
+
+
+def test_predict_halves_what_a_frame_calls_total_play() -> None:
+    frame = pd.DataFrame({"clearance_3_in": [0.026], "clearance_convention": ["TOTAL_PLAY"]})
+    assert mlg.predict(frame) == mlg.predict({3: 0.013})
+
+
+def test_predict_names_the_wrong_cell_of_a_frame() -> None:
+    frame = pd.DataFrame({"clearance_3_in": [0.013, -1.0]}, index=["a", "b"])
+    with pytest.raises(mlg.TroubleshootError, match=r"loc\['b', 'clearance_3_in'\]"):
+        mlg.predict(frame)
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_read_inspections_loses_nothing_of_an_example(file: Path) -> None:
+    read = mlg.read_inspections(file)
+    wrong = {problem.row for problem in read.attrs["problems"]}
+    first, again = judged(file)[0], judged(as_csv(read))[0]
+    # A wrong cell is missing in the frame.
+    assert [v for n, v in enumerate(first, 2) if n not in wrong] == [
+        v for n, v in enumerate(again, 2) if n not in wrong
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(500))
+def test_read_inspections_loses_nothing_of_a_sheet(seed: int) -> None:
+    frame = sheet(1000 + seed, bad=False)
+    read = mlg.read_inspections(as_csv(frame))
+    assert read.attrs["problems"] == ()
+    verdicts, again = judged(as_csv(frame))[0], judged(as_csv(read))[0]
+    assert [v[0] for v in again] == [v[0] for v in verdicts]
+    assert [v[1] for v in again] == pytest.approx([v[1] for v in verdicts], abs=1e-15)
+    assert read["Bay"].fillna("").tolist() == frame["Bay"].tolist()
+
+
+def test_a_wrong_cell_is_missing_and_its_row_keeps_the_others() -> None:
+    frame = sheet(7, bad=False)
+    column = next(c for c in frame.columns[8:] if frame.loc[0, c])
+    frame.loc[0, column] = "x"
+    read = mlg.read_inspections(as_csv(frame))
+    joint = column.split("_")[1]
+    assert pd.isna(read.loc[0, f"clearance_{joint}_in"])
+    assert read.loc[0, "gear_landings"] == float(frame.loc[0, "gear_landings"])
+    assert [problem.column for problem in read.attrs["problems"]] == [column]
+
+
+def test_read_inspections_has_nullable_numbers_dates_and_categories() -> None:
+    read = mlg.read_inspections(DATA / "measured_pressure.csv")
+    kinds = {"clearance_3_in": "Float64", "inspection_date": "datetime64[s]", "side": "category"}
+    assert {name: str(read[name].dtype) for name in kinds} == kinds
+
+
+def simulated() -> Any:
+    force = np.linspace(1.0, 20.0, 40)
+    measured = force / 8.0 + np.random.default_rng(1).normal(0.0, 0.02, 40)
+    suspects = [mlg.Suspect("stiffness", 10.0, 0.5)]
+    return mlg.diagnose_simulation(lambda p: force / p["stiffness"], measured, suspects)
+
+
+# One of every result that a public function gives.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "gear": mlg.load_gear,
+    "worst": lambda: mlg.predict({3: 0.013}),
+    "check": lambda: mlg.check_files([DATA / "fleet_batch.csv"]),
+    "assessment": lambda: result("check").judgements[0],
+    "inspection": lambda: result("assessment").inspection,
+    "indices": lambda: mlg.load_index_table(mlg.load_gear()),
+    "study": lambda: mlg.run_study(mlg.load_gear(), mlg.StudyOptions()),
+    "diagnose": lambda: mlg.diagnose(DATA / "measured_pressure.csv"),
+    "diagnosis": lambda: result("diagnose").diagnosis,
+    "extension": lambda: result("diagnose").extension,
+    "simulation": simulated,
+    "survey": lambda: mlg.survey(pd.DataFrame(SURVEY)),
+    "lives": lambda: mlg.forecast(DATA / "fleet_batch.csv"),
+}
+
+
+@cache
+def result(name: str) -> Any:
+    return RESULTS[name]()
+
+
+SURVEY = {"kind": ["PLUNGER"], "from": [None], "to": [None], "value_in": ["x"]}
+COPIES: dict[str, Callable[[Any], Any]] = {
+    "pickle": lambda given: pickle.loads(pickle.dumps(given)),
+    "deepcopy": copy.deepcopy,
+    "copy": copy.copy,
+}
+
+
+@pytest.mark.parametrize("how", COPIES)
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_copy_of_a_result_is_equal_to_it(name: str, how: str) -> None:
+    given = result(name)
+    assert COPIES[how](given) == given
+
+
+def same_again(given: Any) -> Any:
+    return given
+
+
+@pytest.mark.slow
+def test_results_travel_to_two_processes_and_back() -> None:
+    given = [result(name) for name in RESULTS]
+    assert joblib.Parallel(2)(joblib.delayed(same_again)(each) for each in given) == given
+
+
+def test_results_of_other_inspections_differ() -> None:
+    assert mlg.predict({3: 0.013}) != mlg.predict({3: 0.012})
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_result_says_itself_in_twenty_lines(name: str) -> None:
+    text = repr(result(name))
+    assert len(text.splitlines()) <= 20
+    assert len(text) <= 4000
+
+
+@pytest.mark.parametrize("name", [n for n in RESULTS if n not in ("inspection", "extension")])
+def test_a_result_is_a_table(name: str) -> None:
+    assert not result(name).to_frame().empty
+
+
+@pytest.mark.parametrize("name", ["check", "diagnose", "study", "survey"])
+def test_the_dict_of_a_result_is_the_documented_json(name: str) -> None:
+    jsonschema.validate(result(name).to_dict(), schema(name))
+
+
+def test_a_table_has_a_row_per_gear_with_the_labels_of_the_frame() -> None:
+    frame = sheet(11)
+    frame.index = pd.Index([f"g{n}" for n in range(len(frame))])
+    frame.loc["g0", "side"] = "both"
+    found = mlg.check(frame).to_frame()
+    assert found.index.tolist() == frame.index.tolist()
+    assert found.loc["g0", "verdict"] == "INVALID"
+
+
+def test_a_table_that_is_not_there_names_those_that_are() -> None:
+    with pytest.raises(mlg.TroubleshootError) as caught:
+        result("check").to_frame("joint")
+    assert "joints" in caught.value.remedy
+
+
+def test_a_small_check_shows_its_report() -> None:
+    page = result("check")._repr_html_()
+    assert page.startswith("<iframe")
+    assert "Batch summary" in page
+
+
+PICTURES = [
+    ("check", "linkage", {"row": 3}),
+    ("check", "stroke", {}),
+    ("assessment", "margin", {"unit": "mm"}),
+    ("gear", "linkage", {}),
+    ("indices", "indices", {}),
+    ("study", "indices", {}),
+    ("diagnose", "residuals", {"against": "hydraulic_pressure_psi"}),
+    ("diagnose", "residuals", {"against": "technician_id"}),
+    ("diagnose", "measured", {}),
+    ("lives", "life", {}),
+]
+
+
+@pytest.mark.parametrize(("name", "picture", "how"), PICTURES)
+def test_a_result_draws_itself(name: str, picture: str, how: dict[str, Any]) -> None:
+    drawn = result(name).plot(picture, **how)
+    assert drawn._repr_svg_().startswith('<svg xmlns="http://www.w3.org/2000/svg"')
+
+
+@pytest.mark.parametrize(
+    ("ending", "start"), [(".svg", b"<svg"), (".png", b"\x89PNG"), (".pdf", b"%PDF")]
+)
+def test_a_picture_is_saved_as_its_name_ends(tmp_path: Path, ending: str, start: bytes) -> None:
+    file = result("gear").plot().save(tmp_path / f"gear{ending}")
+    assert file.read_bytes().startswith(start)
+
+
+def test_residuals_against_an_unknown_column_name_the_columns() -> None:
+    with pytest.raises(mlg.TroubleshootError) as caught:
+        result("diagnose").plot("residuals", against="colour")
+    assert "hydraulic_pressure_psi" in caught.value.remedy
+
+
+def test_a_store_gives_what_it_keeps_as_tables(tmp_path: Path) -> None:
+    from mlg_troubleshoot.workflows.keep import keep
+
+    store = mlg.Store(tmp_path / "store.sqlite")
+    options = mlg.CheckOptions(advice=False)
+    checked = mlg.check_files([DATA / "fleet_batch.csv"], options)
+    keep(checked, options, store)
+    kept = store.inspections()
+    assert set(kept["record_id"]) == set(checked.to_frame()["record_id"])
+    gears = checked.to_frame()[["tail_no", "side"]].drop_duplicates()
+    assert len(store.lives()) == len(gears)
+
+
+def test_a_survey_of_a_frame_names_its_wrong_cell() -> None:
+    (problem,) = result("survey").problems
+    assert problem.place() == "DataFrame, cell loc[0, 'value_in'], column 'value_in'"
+
+
+CAUSE = """
+import numpy as np
+from mlg_troubleshoot import Cause
+from mlg_troubleshoot.diagnosis.causes.base import offset
+
+
+class Hot(Cause):
+    name, parameter, trial = "{name}", "offset_in", 0.001
+    sentence, inspect, separates = "Hot oil", "the oil", "cold oil"
+
+    def adjust(self, scene, candidate, value):
+        return offset(scene, scene.table.quantities["{column}"], value)
+"""
+
+
+def cause_file(folder: Path, name: str, column: str) -> Path:
+    file = folder / "hot.py"
+    file.write_text(CAUSE.format(name=name, column=column), encoding="utf-8")
+    return file
+
+
+def test_an_error_in_a_cause_of_ones_own_names_file_line_and_columns(tmp_path: Path) -> None:
+    file = cause_file(tmp_path, "hot_oil", "temperature")
+    with pytest.raises(mlg.TroubleshootError) as caught:
+        mlg.diagnose(DATA / "measured_pressure.csv", cause_files=(file,))
+    assert caught.value.message == f"{file}, line 12: KeyError: 'temperature'"
+    assert "temperature_c" in caught.value.remedy
+
+
+def test_a_cause_with_a_shipped_name_is_refused(tmp_path: Path) -> None:
+    file = cause_file(tmp_path, "gauge_bias", "temperature_c")
+    with pytest.raises(mlg.TroubleshootError, match="'gauge_bias' is the name of a shipped cause"):
+        mlg.diagnose(DATA / "measured_pressure.csv", cause_files=(file,))
+
+
+def test_the_sentence_of_a_cause_stands_in_the_json() -> None:
+    (cause,) = result("diagnose").to_dict()["causes"]
+    (named,) = result("diagnose").diagnosis.causes
+    assert cause["sentence"] == named.candidate.cause.sentence
+
+
+def test_a_gauge_that_reads_too_much_in_all_rows_is_an_alias_of_the_calibration_rate() -> None:
+    frame = mlg.read_inspections(DATA / "measured_nothing_wrong.csv")
+    readings = [name for name in frame.columns if name.startswith("plunger_displacement")]
+    frame[readings] *= 1.15
+    found = mlg.diagnose(frame).to_dict()
+    said = {each["cause"]: each["sentence"] for each in found["causes"] + found["also_possible"]}
+    assert "the gauge of all rows reads too much" in said["calibration_rate"]
+
+
+def test_a_name_that_a_simulation_does_not_get_is_noted_with_those_that_it_gets() -> None:
+    suspects = [mlg.Suspect("mass", 1.0, 0.05)]
+    with pytest.raises(KeyError) as caught:
+        mlg.diagnose_simulation(lambda p: np.ones(9) * p["nope"], np.ones(9), suspects)
+    assert caught.value.__notes__ == ["The simulation is given: mass."]
+
+
+def test_a_suspect_of_text_is_refused_with_its_name() -> None:
+    suspects = [mlg.Suspect("mass", "1", 0.05)]  # type: ignore[arg-type]
+    with pytest.raises(mlg.TroubleshootError, match="mass"):
+        mlg.diagnose_simulation(lambda p: np.ones(9) * p["mass"], np.ones(9), suspects)
