@@ -15,7 +15,8 @@ from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
 # What the rows of one aircraft may move with alone.
 WITHIN = ("hydraulic_pressure_psi", "temperature_c", "gear_landings", "predicted")
 _LEAST_OF_TAIL = 6
-_PERIODS_DAYS = (120.0, 150.0, 185.0, 225.0, 275.0, 365.25)
+# Periods of seasons: one to three a year, evenly spaced in frequency.
+_PERIODS_DAYS = 365.25 / np.linspace(1, 3, 6)
 
 
 @dataclass(frozen=True)

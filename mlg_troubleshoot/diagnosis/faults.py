@@ -1,17 +1,19 @@
 """Data faults: a cell in the wrong unit, a slipped decimal point, two joints or two sides swapped.
 
-A fault is proposed only where three things agree: the row stands far out, one simple slip explains
-it, and the corrected cell looks more like the gear's other rows than the written one does. Rows
-that stand out together with others of their tail, gauge or technician are an effect and are left
-alone.
+Each row has one posterior over what was meant: as written, or one entry error. It weighs how often
+entry errors are with how well the clearances lie on the wear of their gear, how well the readings
+repeat each other, and how near the misfit comes to other rows of its tail, gauge, technician and
+fleet: rows that stand out together are an effect and stay.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import logsumexp
 
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.along import predicted
@@ -22,44 +24,31 @@ from mlg_troubleshoot.diagnosis.wear import fleet_history
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.units import SLIPS
 
-# Evidence of a slip: set in 2026 on slips in fleets of the study's tuning seeds, at most 0.3 false
-# ones per 1,000 rows; less evidence finds more swaps of joints that are worn alike, and repairs
-# sound rows. Not re-tuned.
-
-# Degree of the curve along the stroke, rounds to fit it without slips, and rows from which there is
-# one.
-_BEND, _BEND_ROUNDS = 6, 4
+# Degree of the curve along the stroke, rounds to fit it, median distances from it within which rows
+# count, and rows from which there is one.
+_BEND, _BEND_ROUNDS, _BEND_FAR = 6, 4, 6
 LEAST_ALONG = 8
-# Misfit by which a row must stand out, and within which its correction must bring it, in scatters
-# of a row.
-_FAR = 5.5
-_NEAR = 3.0
-# Standard deviations by which a clearance must lie off its gear's history to make its row worth a
-# look.
-_ODD = 4.0
-# Wear about its history has heavier tails than a normal distribution: degrees of freedom of
-# Student's t.
-_FREEDOM = 4.0
-# A clearance is never expected more sharply than this. [in]
+# Share of rows with an entry error, each kind as often; probability from which one is said. [1]
+_WRONG, _SURE = 0.005, 0.9
+# Wear and misfit have heavier tails than a normal distribution: degrees of freedom of Student's t.
+_FREEDOM = 8.0
+# No clearance, reading or misfit is expected more sharply than this. [in]
 _LEAST_SPREAD_IN = 0.0005
-# Log-likelihoods by which cell and row must speak for a slip: each of them, and both together …
-_LEAST_CLEARANCE_EVIDENCE = 3.5
-_LEAST_ROW_EVIDENCE = 4.0
-_LEAST_EVIDENCE = 10.0
-# … or the cell nearly alone, or the row nearly alone with as little as this from the cell.
-_CLEARANCE_ALONE = 6.5
-_ROW_ALONE = 30.0
-# What one gets for supposing a slip in a plunger reading. [1]
-_READING_EVIDENCE = 3.0
-# Readings that repeat each other lie no further apart [in]; no plunger goes further [in]; largest
-# clearance meant [in].
-_AGREE_IN, _FARTHEST_IN, _LARGEST_IN = 0.012, 0.4, 0.03
-# Neither plunger nor actuator goes further than this beyond mid-position. [1]
-_REACH = 1.3
 # Supposed: no joint of a gear that still moves has a radial clearance as large as this, four times
 # its limit. [in]
-_NEVER_WORN_IN = 0.0325
-_LEAST_ROW_ALONE = 3.0
+_WORN_OUT_IN = 0.0325
+# Log-density of the logarithm of a value that means nothing: anywhere in four decades. [1]
+_ANYTHING = -float(np.log(4 * np.log(10)))
+# Neither plunger nor actuator goes further than this beyond mid-position. [1]
+_REACH = 1.3
+# The kinds of entry errors in a row, and what their cells are to be multiplied by.
+_FACTORS = tuple(
+    (kind, factor)
+    for kind, slip in (("mm_as_in", SLIPS["unit"]), ("factor_10", SLIPS["point"]))
+    for factor in (1 / slip.factor, slip.factor)
+)
+_TOO_LARGE = tuple((kind, factor) for kind, factor in _FACTORS if factor < 1)
+_KINDS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,97 +97,247 @@ class _Usual:
     expected: Array
     spread: Array
 
-    def off(
-        self, clearance: Array, place: slice | int = slice(None), joints: Sequence[int] = ()
-    ) -> Array:
-        """How far clearances lie off what is usual, in standard deviations; of their logarithm if
-        they are less. [1]
-        """
-        at = (place, list(joints)) if joints else place
-        usual, apart = self.expected[at], clearance - self.expected[at]
-        size = usual + _LEAST_SPREAD_IN
+    def off(self, clearance: Array, place: slice | int = slice(None)) -> Array:
+        """How far clearances lie off what is usual; by their logarithm if they are less. [in]"""
+        apart = clearance - self.expected[place]
+        size = self.expected[place] + _LEAST_SPREAD_IN
         less = size * np.log((clearance + _LEAST_SPREAD_IN) / size)
-        return np.asarray(np.where(apart < 0.0, less, apart) / self.spread[at])
-
-    def surprise(self, place: int, joints: Sequence[int], values: Array) -> float:
-        """How unlikely clearances are in a row, as minus a log-likelihood. [1]"""
-        off = self.off(values, place, joints)
-        return float(0.5 * (_FREEDOM + 1.0) * np.sum(np.log1p(off**2 / _FREEDOM)))
+        return np.where(apart < 0.0, less, apart)
 
 
 @dataclass(frozen=True)
-class _Slip:
-    """A slip that would explain a row: what the row would be without it."""
+class _Meant:
+    """What a row was meant to be, NaN where that is not known.
 
-    kind: str
+    kind: entry error that made what is written of it; none if it is as written.
+    cells: what is wrong: column, what is written, what was meant.
+    evidence: log-density of what is written given what was meant. [1]
+    """
+
     clearance: Array
-    measured: float
-    cells: tuple[tuple[str, float, float | None], ...]
-    clearance_evidence: float
-    extension: float = np.nan
+    readings: Array
+    extension: float
+    kind: str = ""
+    cells: tuple[tuple[str, float, float | None], ...] = ()
+    evidence: float = 0.0
+
+
+def _surprise(off: Array) -> Array:
+    """Minus the log-density of Student's t over its middle, 0 where there is nothing. [1]"""
+    return np.nan_to_num(0.5 * (_FREEDOM + 1.0) * np.log1p(off**2 / _FREEDOM))
+
+
+def _density(off: Array, spread: Array | float) -> Array:
+    """Log-density of Student's t without its constant, 0 where there is nothing. [1]"""
+    return np.where(np.isnan(off), 0.0, -_surprise(off / spread) - np.log(spread))
+
+
+def _cells(
+    column: list[str], written: Array, meant: Array
+) -> tuple[tuple[str, float, float | None], ...]:
+    """Cells that are not what was meant."""
+    return tuple(
+        (column[k], float(written[k]), float(meant[k]) if np.isfinite(meant[k]) else None)
+        for k in np.flatnonzero(np.isfinite(written) & (written != meant))
+    )
+
+
+@dataclass(frozen=True)
+class _Screen:
+    """The rows of a table, and how likely each is as written or otherwise.
+
+    usual: clearances to expect.
+    rest, shape (n,): misfit beyond what is explained. [in]
+    explained, shape (n,): what is. [in]
+    scale_in, repeat_in: scatter of the misfits, and between the readings of a row. [in]
+    """
+
+    model: LinkageModel
+    table: DiagnosisTable
+    usual: _Usual
+    rest: Array
+    explained: Array
+    scale_in: float
+    repeat_in: float
+
+    def as_written(self, place: int) -> _Meant:
+        """A row as it is written."""
+        table = self.table
+        return _Meant(
+            table.clearance_in[place], table.readings_in[place], float(table.extension_in[place])
+        )
+
+    def misfit_of(self, place: int, meant: list[_Meant]) -> Array:
+        """Misfit beyond what is explained, if the row was meant so. [in]"""
+        rows = self.table.take(np.full(len(meant), place))
+        extension = np.array([row.extension for row in meant])
+        readings = np.array([row.readings for row in meant])
+        quantities = {**rows.quantities, ALONG: extension}
+        rows = replace(rows, readings_in=readings, quantities=quantities)
+        clearance = np.array([row.clearance for row in meant])
+        clearance = np.where(np.isfinite(clearance), clearance, self.usual.expected[place])
+        over = predicted(self.model, rows, clearance)[0]
+        return np.asarray(rows.measured_in - over - self.explained[place])
+
+    def near(self, place: int, misfit: Array) -> Array:
+        """Log-density of misfits by the other rows of the tail, gauge, technician and fleet. [1]"""
+        weight = np.zeros(len(self.table))
+        others = np.isfinite(self.rest)
+        others[place] = False
+        groups = [others]
+        for name in ("tail_no", "gauge_id", "technician_id"):
+            texts = self.table.factors.get(name)
+            if texts is not None and texts[place]:
+                groups.append(others & (texts == texts[place]))
+        for rows in groups:
+            weight += rows / max(int(rows.sum()), 1)
+        kept = weight > 0.0
+        if not kept.any():
+            return np.zeros(len(misfit))
+        density = _density(misfit[:, None] - self.rest[kept], self.scale_in)
+        density = logsumexp(density, b=weight[kept] / weight.sum(), axis=1)
+        return np.asarray(np.where(np.isfinite(misfit), density, -np.inf))
+
+    def evidence(self, place: int, meant: list[_Meant]) -> Array:
+        """Log-likelihood of a row but its misfit under each of what it may have been meant to be.
+        [1]
+        """
+        clearance = np.array([row.clearance for row in meant])
+        readings = np.array([row.readings for row in meant])
+        wear = _density(self.usual.off(clearance, place), self.usual.spread[place])
+        # One of the joints may be worn out, as rarely as there is an entry error of one kind.
+        rare = np.log(_WRONG / _KINDS / clearance.shape[1] / _WORN_OUT_IN)
+        worn_out = np.where(clearance < _WORN_OUT_IN, rare, -np.inf)
+        wear = np.where(np.isfinite(clearance), np.logaddexp(wear, worn_out), 0.0)
+        again = _density(np.diff(np.sort(readings)), self.repeat_in)
+        own = np.array([row.evidence for row in meant])
+        return np.asarray(own + wear.sum(axis=1) + again.sum(axis=1))
+
+    def best(self, place: int) -> _Meant | None:
+        """The likeliest entry error of a row, if one is likely."""
+        meant = [self.as_written(place), *self.errors(place)]
+        often = Counter(row.kind for row in meant)
+        prior = [1.0 - _WRONG, *(_WRONG / _KINDS / often[row.kind] for row in meant[1:])]
+        found = np.log(prior) + self.evidence(place, meant)
+        read = np.array([np.isfinite(row.readings).any() for row in meant])
+        written = found[0] + self.near(place, self.rest[[place]])[0]
+        # The misfit need only be known of what may be likelier with the best one that there is.
+        possible = found - np.where(read, np.log(self.scale_in), 0.0) > written + np.log(_WRONG)
+        possible[0] = False
+        kept = np.flatnonzero(possible)
+        if not len(kept):
+            return None
+        meant, found, read = [meant[k] for k in kept], found[kept], read[kept]
+        found += np.where(read, self.near(place, self.misfit_of(place, meant)), 0.0)
+        if logsumexp(found) - written < np.log(_SURE / (1.0 - _SURE)):
+            return None
+        return meant[int(np.argmax(found))]
+
+    def errors(self, place: int) -> Iterator[_Meant]:
+        """Every entry error that a row may hold."""
+        row, numbers = self.as_written(place), self.model.joint_numbers
+        written = row.clearance
+        known = [int(j) for j in np.flatnonzero(written > 0.0)]
+        column = [f"clearance_{number}_in" for number in numbers]
+
+        def clearances(kind: str, joints: list[int], right: Array, evidence: float) -> _Meant:
+            meant = written.copy()
+            meant[joints] = right
+            cells = _cells(column, written, meant)
+            return replace(row, clearance=meant, kind=kind, cells=cells, evidence=evidence)
+
+        for joints in [*([j] for j in known), *([known] if len(known) > 1 else [])]:
+            # A gear may be worn less than any other: then all its clearances are small.
+            for kind, factor in _FACTORS if len(joints) == 1 else _TOO_LARGE:
+                size = len(joints) * min(float(np.log(factor)), 0.0)
+                yield clearances(kind, joints, written[joints] * factor, size)
+        # A value that means nothing is large: a small one is what a restored joint has.
+        for j in [j for j in known if written[j] > self.usual.expected[place, j]]:
+            nothing = _ANYTHING - float(np.log(written[j]))
+            yield clearances("implausible", [j], np.full(1, np.nan), nothing)
+        known = [int(j) for j in np.flatnonzero(np.isfinite(written))]
+        for i, a in enumerate(known):
+            for b in known[i + 1 :]:
+                yield clearances("swapped_joints", [a, b], written[[b, a]], 0.0)
+        yield from self.reading_errors(place, row)
+
+    def reading_errors(self, place: int, row: _Meant) -> Iterator[_Meant]:
+        """Every entry error in the readings of a row, or in its extension."""
+        along = bool(self.table.along[place])
+        at_rest = float(np.nan_to_num(self.model.plunger(row.extension))) if along else 0.0
+        written = row.readings + at_rest
+        present = [int(k) for k in np.flatnonzero(np.isfinite(written))]
+        column = [
+            f"plunger_displacement{'' if k == 0 else f'_{k + 1}'}_in" for k in range(len(written))
+        ]
+        if along:
+            column = ["plunger_position_in"]
+
+        def readings(kind: str, places: list[int], right: Array, evidence: float) -> _Meant:
+            meant = written.copy()
+            meant[places] = right
+            cells = _cells(column, written, meant)
+            return replace(row, readings=meant - at_rest, kind=kind, cells=cells, evidence=evidence)
+
+        end = _REACH * float(self.model.plunger(self.model.stroke[1]))
+        for places in [*([k] for k in present), *([present] if len(present) > 1 else [])]:
+            if along and abs(float(written[places[0]])) <= end:
+                continue
+            for kind, factor in _FACTORS:
+                size = len(places) * min(float(np.log(factor)), 0.0)
+                yield readings(kind, places, written[places] * factor, size)
+        for k in present if len(present) > 1 else []:
+            nothing = _ANYTHING - float(np.log(abs(written[k]) + _LEAST_SPREAD_IN))
+            yield readings("implausible", [k], np.full(1, np.nan), nothing)
+        nothing = _ANYTHING - float(np.log(abs(float(np.nanmean(written))) + _LEAST_SPREAD_IN))
+        nothing += float(_density(np.diff(np.sort(row.readings)), self.repeat_in).sum())
+        wrong = readings("implausible", present, np.full(len(present), np.nan), nothing)
+        if along:
+            at = row.extension
+            wrong = replace(wrong, cells=(*wrong.cells, (ALONG, at, None)))
+            for kind, factor in _FACTORS if at > _REACH * self.model.stroke[1] else ():
+                there = at * factor
+                yield replace(
+                    row,
+                    readings=written - float(self.model.plunger(there)),
+                    extension=there,
+                    kind=kind,
+                    cells=((ALONG, at, there),),
+                    evidence=float(np.log(factor)),
+                )
+        yield wrong
 
 
 def screen_faults(
     model: LinkageModel, table: DiagnosisTable, explained: Array | None = None
 ) -> tuple[DiagnosisTable, tuple[DataFault, ...], Mask]:
-    """Find data faults, and repair them for the analysis where one slip explains them."""
-    everything = _usual(table, np.ones(len(table), bool))
-    clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, everything.expected)
-    measured = np.nanmedian(table.readings_in, axis=1)
-    named = np.zeros(len(table)) if explained is None else explained
-    misfit = measured - predicted(model, table, clearance)[0]
-    named = named + _bend(table, misfit - named)
-    known = np.isfinite(misfit)
-    left = misfit - named
-    centre = float(np.median(left[known])) if known.any() else 0.0
-    scale = max(robust_scale(left[known]) if known.any() else 0.0, 0.0008)
-    local = _local_level(table, left, centre, scale) + named
-    spread = _reading_spread(table)
-    far = ~known | (np.abs(misfit - local) > _FAR * scale) | (spread > _FAR * scale)
-    far |= (np.abs(np.nan_to_num(everything.off(table.clearance_in))) > _ODD).any(axis=1) & (
-        np.abs(misfit - local) > 0.5 * scale
-    )
-    usual = _usual(table, ~far)
-    faults: list[DataFault] = []
-    usable = np.ones(len(table), bool)
-    new_clearance, new_readings = table.clearance_in.copy(), table.readings_in.copy()
+    """Find data faults, and repair them for the analysis where one entry error explains them."""
+    screen, suspects = _suspects(model, table, explained)
+    clearance, readings = table.clearance_in.copy(), table.readings_in.copy()
     extension = table.extension_in.copy()
-    for place in np.flatnonzero(far):
-        found, slip, isolated = _explain(
-            model, table, usual, int(place), misfit, float(local[place]), scale, clearance[place]
-        )
-        plain = slip is not None and slip.clearance_evidence > _CLEARANCE_ALONE
-        alone = spread[place] > _FAR * scale
-        if (
-            known[place]
-            and not (plain or alone)
-            and _gathers(table, left, centre, scale, int(place))
-        ):
+    faults: list[DataFault] = []
+    for place in np.flatnonzero(suspects):
+        meant = screen.best(int(place))
+        if meant is None:
             continue
-        faults += found
-        if slip is not None:
-            new_clearance[place] = np.where(
-                np.isfinite(table.clearance_in[place]), slip.clearance, np.nan
+        clearance[place], readings[place] = meant.clearance, meant.readings
+        extension[place] = meant.extension
+        faults += [
+            DataFault.at(
+                table,
+                int(place),
+                column,
+                meant.kind,
+                f"{written:g}",
+                None if right is None else f"{right:.4g}",
             )
-            extension[place] = slip.extension
-            for column, _written, right in slip.cells:
-                if table.along[place] and not column.startswith("clearance"):
-                    new_readings[place, 0] = slip.measured
-                elif column.startswith("plunger"):
-                    new_readings[place, _reading_index(column)] = np.nan if right is None else right
-                elif right is None:
-                    new_clearance[place, model.joint_numbers.index(int(column.split("_")[1]))] = (
-                        np.nan
-                    )
-            usable[place] = bool(np.isfinite(new_readings[place]).any())
-        elif isolated:
-            usable[place] = False
+            for column, written, right in meant.cells
+        ]
+    usable = np.asarray(np.isfinite(readings).any(axis=1))
     quantities = (
         {**table.quantities, ALONG: extension} if ALONG in table.quantities else table.quantities
     )
-    repaired = replace(
-        table, clearance_in=new_clearance, readings_in=new_readings, quantities=quantities
-    )
+    repaired = replace(table, clearance_in=clearance, readings_in=readings, quantities=quantities)
     swapped = swapped_sides(repaired)
     faults += [
         DataFault.at(table, row, "side", "swapped_side", own, other) for row, own, other in swapped
@@ -208,6 +347,36 @@ def screen_faults(
         side[[row for row, _own, _other in swapped]] = [other for _row, _own, other in swapped]
         repaired = replace(repaired, factors={**repaired.factors, "side": side})
     return repaired, tuple(faults), usable
+
+
+def _suspects(
+    model: LinkageModel, table: DiagnosisTable, explained: Array | None
+) -> tuple[_Screen, Mask]:
+    """The screen of a table without what its suspect rows say of wear; rows that an entry error may
+    make likelier by more than it is rare.
+    """
+    usual = _usual(table, np.ones(len(table), bool))
+    clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, usual.expected)
+    misfit = table.measured_in - predicted(model, table, clearance)[0]
+    named = np.zeros(len(table)) if explained is None else explained
+    named = named + _bend(table, misfit - named)
+    rest = misfit - named
+    scale = _scale(rest)
+    apart = np.diff(np.sort(table.readings_in)).ravel()
+    screen = _Screen(model, table, usual, rest, named, scale, _scale(np.append(apart, -apart)))
+    # An entry error is in one cell or in two, or in so many that any two of them show it.
+    lost = np.sort(_surprise(usual.off(table.clearance_in) / usual.spread))[:, -2:].sum(axis=1)
+    lost += _surprise((rest - np.nanmedian(rest)) / scale)
+    lost += _surprise(np.diff(np.sort(table.readings_in)) / screen.repeat_in).sum(axis=1)
+    suspects = (lost > np.log(_KINDS / _WRONG)) | ~np.isfinite(rest)
+    suspects &= np.isfinite(table.readings_in).any(axis=1)
+    return replace(screen, usual=_usual(table, ~suspects)), np.asarray(suspects)
+
+
+def _scale(values: Array) -> float:
+    """Robust standard deviation of what there is. [in]"""
+    known = values[np.isfinite(values)]
+    return max(robust_scale(known) if len(known) else 0.0, _LEAST_SPREAD_IN)
 
 
 def _usual(table: DiagnosisTable, trusted: Mask) -> _Usual:
@@ -236,267 +405,5 @@ def _bend(table: DiagnosisTable, left: Array) -> Array:
         )
         off = np.abs(left - curve(at))
         bend = np.where(table.along, curve(at), 0.0)
-        near = table.along & (off <= _FAR * max(float(np.median(off[near])), 1e-9))
+        near = table.along & (off <= _BEND_FAR * max(float(np.median(off[near])), 1e-9))
     return bend
-
-
-def _local_level(table: DiagnosisTable, misfit: Array, centre: float, scale: float) -> Array:
-    """Median misfit of the row's own gear where that is clearly off the fleet's, else the fleet's.
-    [in]
-    """
-    level = np.full(len(misfit), centre)
-    gears = table.gears
-    for gear in np.unique(gears):
-        rows = np.flatnonzero((gears == gear) & np.isfinite(misfit))
-        if len(rows) >= 4:
-            own = float(np.median(misfit[rows]))
-            if abs(own - centre) > 1.5 * scale:
-                level[rows] = own
-    return level
-
-
-def _reading_spread(table: DiagnosisTable) -> Array:
-    """Range of the repeat readings of each row. [in]"""
-    readings = table.readings_in
-    spread = np.zeros(len(readings))
-    several = np.isfinite(readings).sum(axis=1) > 1
-    spread[several] = np.nanmax(readings[several], axis=1) - np.nanmin(readings[several], axis=1)
-    return spread
-
-
-def _gathers(table: DiagnosisTable, misfit: Array, centre: float, scale: float, place: int) -> bool:
-    """Tell whether other rows of the same tail, gauge or technician stand out alike: then it is an
-    effect.
-    """
-    off = misfit[place] - centre
-    alike = (
-        np.isfinite(misfit)
-        & (np.sign(misfit - centre) == np.sign(off))
-        & (np.abs(misfit - centre) > 0.4 * abs(off))
-    )
-    alike &= np.abs(misfit - centre) < 2.5 * abs(off)
-    for name in ("tail_no", "gauge_id", "technician_id"):
-        texts = table.factors.get(name)
-        if texts is None or not texts[place]:
-            continue
-        same = texts == texts[place]
-        others = int(np.sum(alike & same)) - 1
-        # By chance few rows stand out; two more in one small group, or many in a large one, are not
-        # chance.
-        rate = float(np.mean(alike & ~same)) if np.any(~same) else 0.0
-        if others >= max(2.0, 3.0 * rate * same.sum() + 2.0):
-            return True
-    return abs(off) < 12.0 * scale and float(np.mean(alike)) > 0.04
-
-
-def _explain(
-    model: LinkageModel,
-    table: DiagnosisTable,
-    usual: _Usual,
-    place: int,
-    misfit: Array,
-    level: float,
-    scale: float,
-    clearance: Array,
-) -> tuple[list[DataFault], _Slip | None, bool]:
-    """Try every slip on one row; name the best one, or the row as implausible."""
-    slips = _slips(model, table, usual, place, clearance)
-    rows = table.take(np.full(len(slips), place))
-    rows = replace(
-        rows, quantities={**rows.quantities, ALONG: np.array([s.extension for s in slips])}
-    )
-    over = (
-        predicted(model, rows, np.array([s.clearance for s in slips]))[0] if slips else np.empty(0)
-    )
-    before = misfit[place]
-    best: tuple[float, _Slip] | None = None
-    for slip, at in zip(slips, over, strict=True):
-        after = slip.measured - at - level
-        if not np.isfinite(after) or abs(after) > _NEAR * scale:
-            continue
-        was = min(abs(before - level) / scale, 30.0) if np.isfinite(before) else 30.0
-        spread = float(_reading_spread(table)[place]) / scale
-        row_evidence = 0.5 * (max(was, min(spread, 30.0)) ** 2 - (after / scale) ** 2)
-        if not _convincing(row_evidence, slip):
-            continue
-        total = (
-            -0.5 * (after / scale) ** 2
-            + slip.clearance_evidence
-            - (1.5 if slip.kind == "implausible" else 0.0)
-        )
-        if best is None or total > best[0]:
-            best = (total, slip)
-    if best is not None:
-        slip = best[1]
-        found = [
-            DataFault.at(
-                table,
-                place,
-                column,
-                slip.kind,
-                f"{written:g}",
-                None if right is None else f"{right:.4g}",
-            )
-            for column, written, right in slip.cells
-        ]
-        return found, slip, True
-    if np.isfinite(before) and abs(before - level) < 3.0 * _FAR * scale:
-        return [], None, False
-    worst = table.readings_in[place]
-    cells = [
-        (f"plunger_displacement{_suffix(k)}_in", worst[k])
-        for k in range(len(worst))
-        if np.isfinite(worst[k])
-    ]
-    if table.along[place]:
-        at = float(table.extension_in[place])
-        position = float(worst[0] + np.nan_to_num(model.plunger(at)))
-        cells = [("plunger_position_in", position), (ALONG, at)]
-    return (
-        [
-            DataFault.at(table, place, column, "implausible", f"{value:g}")
-            for column, value in cells
-        ],
-        None,
-        True,
-    )
-
-
-def _convincing(row_evidence: float, slip: _Slip) -> bool:
-    """Tell whether row and cell together speak for a slip, or one of them alone does clearly
-    enough.
-    """
-    cell = slip.clearance_evidence
-    together = row_evidence >= _LEAST_ROW_EVIDENCE and cell >= _LEAST_CLEARANCE_EVIDENCE
-    if together and row_evidence + cell >= _LEAST_EVIDENCE:
-        return True
-    if row_evidence >= _ROW_ALONE and cell >= _LEAST_ROW_ALONE:
-        return True
-    largest = max(written for _c, written, _r in slip.cells)
-    # A joint may be worn as badly as that: then the plunger must also speak for a slip.
-    return (
-        cell > _CLEARANCE_ALONE
-        and row_evidence > (-1.0 if largest > _NEVER_WORN_IN else 1.0)
-        and largest > 0.02
-    )
-
-
-def _suffix(k: int) -> str:
-    return "" if k == 0 else f"_{k + 1}"
-
-
-def _reading_index(column: str) -> int:
-    middle = column.removeprefix("plunger_displacement").removesuffix("_in").strip("_")
-    return 0 if not middle else int(middle) - 1
-
-
-_UNIT, _POINT = SLIPS["unit"].factor, SLIPS["point"].factor
-_TOO_LARGE = (("mm_as_in", 1.0 / _UNIT), ("factor_10", 1.0 / _POINT))
-
-
-def _slips(
-    model: LinkageModel, table: DiagnosisTable, usual: _Usual, place: int, clearance: Array
-) -> list[_Slip]:
-    """Every entry error that a row may hold."""
-    written = table.clearance_in[place]
-    seen = table.readings_in[place][np.isfinite(table.readings_in[place])]
-    measured = float(np.median(seen))
-    known = [int(j) for j in np.flatnonzero(np.isfinite(written))]
-
-    def slip(kind: str, joints: list[int], right: Sequence[float], *, meant: bool = True) -> _Slip:
-        new = clearance.copy()
-        new[joints] = right
-        evidence = usual.surprise(place, joints, written[joints])
-        evidence -= usual.surprise(place, joints, np.asarray(right)) if meant else 1.0
-        cells = tuple(
-            (
-                f"clearance_{model.joint_numbers[j]}_in",
-                float(written[j]),
-                float(value) if meant else None,
-            )
-            for j, value in zip(joints, right, strict=True)
-        )
-        return _Slip(kind, new, measured, cells, evidence)
-
-    slips = [
-        slip(kind, [j], [written[j] * factor])
-        for j in known
-        for kind, factor in (*_TOO_LARGE, ("factor_10", _POINT))
-        if 0.0 < written[j] * factor <= _LARGEST_IN
-    ]
-    slips += [slip("implausible", [j], [usual.expected[place, j]], meant=False) for j in known]
-    worn = [j for j in known if written[j] > 0.0]
-    slips += [
-        slip(kind, worn, written[worn] * factor)
-        for kind, factor in _TOO_LARGE
-        if len(worn) > 1 and float(np.max(written[worn])) * factor <= _LARGEST_IN
-    ]
-    slips += [
-        slip("swapped_joints", [a, b], written[[b, a]])
-        for i, a in enumerate(known)
-        for b in known[i + 1 :]
-    ]
-    at = float(table.extension_in[place])
-    if not np.isfinite(at):
-        return slips + _reading_slips(table.readings_in[place], clearance)
-    return [replace(s, extension=at) for s in slips] + _along_slips(model, measured, at, clearance)
-
-
-def _along_slips(model: LinkageModel, measured: float, at: float, clearance: Array) -> list[_Slip]:
-    """Slips in a position, or in an extension, beyond what the linkage reaches; within it either
-    may be wrong.
-    """
-    nominal = float(np.nan_to_num(model.plunger(at)))
-    position, slips = measured + nominal, []
-    for kind, factor in _TOO_LARGE:
-        if abs(position) > _REACH * float(model.plunger(model.stroke[1])):
-            cell = ("plunger_position_in", position, position * factor)
-            slips.append(
-                _Slip(kind, clearance, position * factor - nominal, (cell,), _READING_EVIDENCE, at)
-            )
-        if at > model.stroke[1] * _REACH:
-            there, cell = at * factor, (ALONG, at, at * factor)
-            moved = position - float(model.plunger(there))
-            slips.append(_Slip(kind, clearance, moved, (cell,), _READING_EVIDENCE, there))
-    return slips
-
-
-def _reading_slips(readings: Array, clearance: Array) -> list[_Slip]:
-    """Slips in one plunger reading of a row, or in all of them alike."""
-    slips: list[_Slip] = []
-    present = [int(k) for k in np.flatnonzero(np.isfinite(readings))]
-    seen = readings[present]
-    for k in present:
-        others = readings[[other for other in present if other != k]]
-        column = f"plunger_displacement{_suffix(k)}_in"
-        for kind, factor in (*_TOO_LARGE, ("mm_as_in", _UNIT), ("factor_10", _POINT)):
-            right = float(readings[k] * factor)
-            spread = float(np.max(np.abs(others - right))) if len(others) else 0.0
-            if spread < _AGREE_IN and abs(right) < _FARTHEST_IN:
-                agreed = float(np.mean([*others, right]))
-                cells = ((column, float(readings[k]), right),)
-                slips.append(_Slip(kind, clearance.copy(), agreed, cells, _READING_EVIDENCE))
-        if len(others):
-            wrong = ((column, float(readings[k]), None),)
-            slips.append(
-                _Slip(
-                    "implausible",
-                    clearance.copy(),
-                    float(np.mean(others)),
-                    wrong,
-                    _READING_EVIDENCE,
-                )
-            )
-    for kind, factor in _TOO_LARGE:
-        if len(seen) > 1 and float(np.ptp(seen)) * factor < _AGREE_IN:
-            all_cells = tuple(
-                (
-                    f"plunger_displacement{_suffix(k)}_in",
-                    float(readings[k]),
-                    float(readings[k] * factor),
-                )
-                for k in present
-            )
-            middle = float(np.median(seen)) * factor
-            slips.append(_Slip(kind, clearance.copy(), middle, all_cells, _READING_EVIDENCE))
-    return slips

@@ -10,7 +10,8 @@ import numpy as np
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
-_ROOM_QUANTILES = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97)
+# How many rooms of two joints are tried, at evenly spaced quantiles of their clearances together.
+_ROOMS = 8
 
 
 class _JointShare(Cause):
@@ -96,7 +97,7 @@ class JointContact(Cause):
             yield Candidate(
                 self, label, {"pair": (first, second), "room_in": None, "smaller": "clearance"}
             )
-            for share in _ROOM_QUANTILES:
+            for share in (np.arange(_ROOMS) + 0.5) / _ROOMS:
                 yield Candidate(
                     self,
                     label,
