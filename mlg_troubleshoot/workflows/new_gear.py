@@ -22,7 +22,17 @@ NEW_GEAR = OutputKind.marked("is not a gear file that mlg gear new wrote", _HEAD
 
 @dataclass(frozen=True, slots=True)
 class WrittenGear:
-    """A gear that was written, what was understood, and what was assumed."""
+    """A gear that was written, what was understood, and what was assumed.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear, as it is read from its file.
+    steps : tuple of str
+        How each point is located.
+    assumed : tuple of str
+        What the short form does not state.
+    """
 
     gear: Gear
     steps: tuple[str, ...]
