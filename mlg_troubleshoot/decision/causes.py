@@ -241,7 +241,7 @@ def _believed(cases: Cases, unread: _Unread, levels: Array, u: Array) -> _Believ
     rows = np.flatnonzero(np.isfinite(cases.mean_in))
     if len(rows):
         x = np.abs(cases.mean_in[rows])
-        at = blur(u[rows]) * _LINKAGE * pins.kernel(FREQUENCIES * x[:, None])
+        at = pins.kernel(FREQUENCIES * x[:, None]) * blur(u[rows]) * _LINKAGE
         fits[rows], likely[rows], worn[rows] = _given_plunger(
             unread, read[rows], known[rows], levels[rows], at
         )
@@ -291,7 +291,7 @@ def _weighed(
         stands = np.abs(AT_IN + shift[:, None])
         if each.unread.pins is HELD:
             # One way on, whichever way that is; the expansion is good to a tenth there.
-            waves = waves * blur(0.1 * mean_in @ each.unread.amplification)
+            waves = waves * blur(0.1 * np.asarray(mean_in @ each.unread.amplification))
             reading, stands = np.abs(x), np.abs(AT_IN)[None]
         density = each.unread.pins.sense * each.unread.pins.density(waves, AT_IN)
         density = density * np.exp(-0.5 * ((reading[:, None] - AT_IN) / u[:, None]) ** 2)

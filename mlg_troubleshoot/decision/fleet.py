@@ -19,10 +19,10 @@ class Fleet:
         Chance that loads hold its pins near their worst directions. [1]
     levels : tuple of float
         Chances of the levels of wear of `wear_levels`; empty if each is as likely. [1]
-    gears : int
-        Inspections that it was learned from.
+    text : str
+        What was learned and from how many gears, in words; empty if nothing was.
     """
 
     loaded: float = PRIORS.loaded
     levels: tuple[float, ...] = ()
-    gears: int = 0
+    text: str = ""
