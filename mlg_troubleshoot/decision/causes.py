@@ -53,35 +53,42 @@ class _Unread:
     """A gear of which nothing was read, with its pins at rest in one way.
 
     unread, worn: characteristic functions of its joints, and of those beyond their limit, (levels,
-    joints, terms). fresh: of new parts, (joints, terms). exceeds: chance of leaving the margin. [1]
+    joints, terms). fresh: of new parts, (joints, terms). bend: by how much each joint moves the
+    plunger on average. [1/in] exceeds: chance of leaving the margin. [1]
     """
 
     pins: Pins
     amplification: Array
+    bend: Array
     unread: Array
     worn: Array
     fresh: Array
     exceeds: float
 
 
-@lru_cache(maxsize=8)
-def _unread(gear: Gear, pins: Pins) -> _Unread:
-    amplification = responses(gear)[0].amplification
-    reach = amplification * gear.limits_in
-    waves = pins.waves(FREQUENCIES * reach[:, None, None] * SHARES[:, None])
-    unread = np.einsum("ls,jst->ljt", DENSITIES, waves)
-    worn = np.einsum("ls,jst->ljt", BEYOND, waves)
-    fresh = pins.waves(FREQUENCIES * (amplification * gear.new_parts_in)[:, None])
-    everything = np.prod(unread, axis=1).mean(axis=0) * _LINKAGE
-    exceeds = float(1.0 - inside(everything[None], np.array([gear.margin.value]))[0])
-    return _Unread(pins, amplification, unread, worn, fresh, exceeds)
-
-
 @lru_cache(maxsize=4)
-def _bend(gear: Gear) -> Array:
-    """By how much random directions of each joint move the plunger on average. [1/in]"""
-    diagonal = np.diag(responses(gear)[0].curvature)
-    return np.asarray(0.25 * (diagonal[0::2] + diagonal[1::2]))
+def _unread(gear: Gear) -> tuple[_Unread, _Unread]:
+    response, found = responses(gear)[0], []
+    amplification, diagonal = response.amplification, np.diag(response.curvature)
+    bend = 0.25 * (diagonal[0::2] + diagonal[1::2])
+    reach = amplification * gear.limits_in
+    for pins in (RANDOM, HELD):
+        waves = pins.waves(FREQUENCIES * reach[:, None, None] * SHARES[:, None])
+        unread = np.einsum("ls,jst->ljt", DENSITIES, waves)
+        everything = np.prod(unread, axis=1).mean(axis=0) * _LINKAGE
+        found.append(
+            _Unread(
+                pins,
+                amplification,
+                bend if pins is RANDOM else 0.0 * bend,
+                unread,
+                np.einsum("ls,jst->ljt", BEYOND, waves),
+                pins.waves(FREQUENCIES * (amplification * gear.new_parts_in)[:, None]),
+                float(1.0 - inside(everything[None], np.array([gear.margin.value]))[0]),
+            )
+        )
+    random, held = found
+    return random, held
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,8 +120,10 @@ class Causes:
     exceeds: chance with random directions that the joints hold the plunger beyond its margin,
     unread ones by their wear, whatever the plunger reads; leaves: the same, with the chance that
     loads hold the pins. [1]
-    loaded: chance that loads hold the pins near their worst directions, the joints being the cause;
-    held: how much likelier all that is known is if they do. [1]
+    loaded: chance that loads hold the pins near their worst directions, the joints being the cause.
+    usually: the chance `leaves` of a gear of which nothing was read. [1]
+    outside, within: densities of the plunger's reading where the joints hold it beyond its margin
+    and where they do not, with random pins and with held ones; by_rigging: where rigging does. [1]
     """
 
     cases: Cases
@@ -126,15 +135,28 @@ class Causes:
     exceeds: Array
     leaves: Array
     loaded: Array
-    held: Array
+    usually: float
+    outside: tuple[Array, ...]
+    within: tuple[Array, ...]
+    by_rigging: Array
     mean_in: Array
     u_in: Array
     by_pins: tuple[_Believed, ...]
 
     @property
+    def held(self) -> Array:
+        """How much likelier the plunger's reading is if loads hold the pins. [1]"""
+        likely = []
+        for each, outside, within in zip(self.by_pins, self.outside, self.within, strict=True):
+            failed = outside / each.unread.exceeds + within / PRIORS.joints_for_one_elsewhere
+            failed = failed + self.by_rigging
+            likely.append(np.where(self.cases.failed, failed, outside + within))
+        return np.asarray(likely[1] / np.maximum(likely[0], 1e-300))
+
+    @property
     def expected_elsewhere(self) -> float:
         """Chance of leaving the margin from which the joints are the likelier cause. [1]"""
-        return _usually_leaves(self.cases) / PRIORS.joints_for_one_elsewhere
+        return self.usually / PRIORS.joints_for_one_elsewhere
 
     @property
     def leverage(self) -> Array:
@@ -203,19 +225,10 @@ class Causes:
         return np.asarray(np.sum(given * beyond, axis=1))
 
 
-def _usually_leaves(cases: Cases) -> float:
-    """Chance that the joints of a gear of which nothing is known hold the plunger beyond its
-    margin. [1]
-    """
-    loaded = cases.fleet.loaded
-    random, held = (_unread(cases.gear, pins).exceeds for pins in (RANDOM, HELD))
-    return (1.0 - loaded) * random + loaded * held
-
-
 def believed(cases: Cases) -> Causes:
     """Weigh what may be the matter with n gears, by everything that is known of each."""
     levels, u = level_chances(cases), np.hypot(cases.mean_u_in, 1e-4)
-    both = tuple(_believed(cases, _unread(cases.gear, pins), levels, u) for pins in (RANDOM, HELD))
+    both = tuple(_believed(cases, unread, levels, u) for unread in _unread(cases.gear))
     chances = np.array([1.0 - cases.fleet.loaded, cases.fleet.loaded])[:, None]
     chances = chances * [each.fits for each in both]
     chances /= chances.sum(axis=0)
@@ -240,8 +253,8 @@ def _believed(cases: Cases, unread: _Unread, levels: Array, u: Array) -> _Believ
     fits, likely = np.ones(len(cases)), levels.copy()
     rows = np.flatnonzero(np.isfinite(cases.mean_in))
     if len(rows):
-        x = np.abs(cases.mean_in[rows])
-        at = pins.kernel(FREQUENCIES * x[:, None]) * blur(u[rows]) * _LINKAGE
+        turns = np.asarray(FREQUENCIES * np.abs(cases.mean_in[rows])[:, None], float)
+        at = pins.kernel(turns) * blur(u[rows]) * _LINKAGE
         fits[rows], likely[rows], worn[rows] = _given_plunger(
             unread, read[rows], known[rows], levels[rows], at
         )
@@ -284,17 +297,18 @@ def _weighed(
     """Divide each gear between its joints, its rigging and everything else."""
     margin, seen = cases.margin_in[:, None], np.isfinite(cases.mean_in)
     x = np.nan_to_num(cases.mean_in)
-    shift = np.sum(_bend(cases.gear) * mean_in**2, axis=1)
     outside, within = [], []
     for each in both:
-        waves, reading = np.prod(each.waves, axis=1) * _LINKAGE, x - shift
-        stands = np.abs(AT_IN + shift[:, None])
-        if each.unread.pins is HELD:
+        pins, waves = each.unread.pins, np.prod(each.waves, axis=1) * _LINKAGE
+        shift = np.sum(each.unread.bend * mean_in**2, axis=1)
+        reading = x - shift
+        if pins is HELD:
             # One way on, whichever way that is; the expansion is good to a tenth there.
             waves = waves * blur(0.1 * np.asarray(mean_in @ each.unread.amplification))
-            reading, stands = np.abs(x), np.abs(AT_IN)[None]
-        density = each.unread.pins.sense * each.unread.pins.density(waves, AT_IN)
+            reading = np.abs(x)
+        density = pins.sense * pins.density(waves, AT_IN)
         density = density * np.exp(-0.5 * ((reading[:, None] - AT_IN) / u[:, None]) ** 2)
+        stands = np.abs(AT_IN + shift[:, None])
         beyond = tabled_normal_cdf((stands - margin) / (0.5 * STEP_IN))
         outside.append(np.sum(density * beyond, axis=1))
         within.append(np.sum(density * (1.0 - beyond), axis=1))
@@ -304,7 +318,8 @@ def _weighed(
     by_rigging = HALF_IN / STEP_IN * np.sum(offset * fits, axis=1) / np.sum(offset, axis=1)
     looked = np.array([i.rigging_checked not in (None, RiggingCheck.NO) for i in cases.inspections])
     by_rigging *= np.where(looked, PRIORS.overlooked, 1.0) / PRIORS.joints_for_one_misrigged
-    usually, loaded = _usually_leaves(cases), cases.fleet.loaded
+    loaded = cases.fleet.loaded
+    usually = (1.0 - loaded) * both[0].unread.exceeds + loaded * both[1].unread.exceeds
     all_joints = (1.0 - loaded) * outside[0] + loaded * outside[1]
     by_elsewhere = (1.0 - loaded) * within[0] + loaded * within[1]
     parts = np.array(
@@ -333,27 +348,14 @@ def _weighed(
         exceeds=both[0].exceeds,
         leaves=(1.0 - loaded) * both[0].exceeds + loaded * both[1].exceeds,
         loaded=np.where(seen, loaded * outside[1] / np.maximum(all_joints, 1e-300), loaded),
-        held=_held(cases, both, outside, within, by_rigging),
+        usually=usually,
+        outside=tuple(outside),
+        within=tuple(within),
+        by_rigging=by_rigging,
         mean_in=mean_in,
         u_in=u,
         by_pins=both,
     )
-
-
-def _held(
-    cases: Cases,
-    both: tuple[_Believed, ...],
-    outside: Sequence[Array],
-    within: Sequence[Array],
-    by_rigging: Array,
-) -> Array:
-    """How much likelier the plunger's reading is if loads hold the pins. [1]"""
-    likely = []
-    for each, out, stays in zip(both, outside, within, strict=True):
-        leaves = each.unread.exceeds
-        failed = out / leaves + by_rigging + stays / PRIORS.joints_for_one_elsewhere
-        likely.append(np.where(cases.failed, failed, out + stays))
-    return np.asarray(likely[1] / np.maximum(likely[0], 1e-300))
 
 
 def _products(waves: Array) -> tuple[list[Array], list[Array]]:

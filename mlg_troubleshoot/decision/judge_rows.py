@@ -245,7 +245,8 @@ def _detail(
         detail["confidence"] = check_probability(one, worst_in, budget, rng)
         if found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
             detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    detail["posterior"] = explain(one, causes)
+    if np.isfinite(one.mean_in[0]):
+        detail["posterior"] = explain(one, causes)
     return detail
 
 
@@ -363,9 +364,9 @@ def _warnings(
             "Standard uncertainty of the plunger reading not stated:"
             f" {DEFAULT_PLUNGER_U_IN:.4f} in taken as the default."
         )
-    warnings += sentences.older_than_the_repair(
-        inspection, [f.joint for f in findings if f.over_limit]
-    )
+    if inspection.is_repaired:
+        over = [f.joint for f in findings if f.over_limit]
+        warnings += sentences.older_than_the_repair(inspection, over)
     return tuple(warnings)
 
 

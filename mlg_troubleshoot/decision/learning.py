@@ -55,8 +55,8 @@ def learned(cases: Cases) -> Fleet:
     weight = np.exp(likely - likely.max())
     loaded = float(np.sum(share * weight) / np.sum(weight))
     text = (
-        f"Expected from the last inspections of {len(fits)} gears that are kept: an unread joint is"
-        f" worn to {percent(float(levels @ MEAN))} of its limit on average; loads hold the pins"
-        f" near their worst directions with a chance of {percent(loaded)}"
+        f"Expected from {len(fits)} gear{'s' * (len(fits) > 1)} kept: an unread joint is worn to"
+        f" {percent(float(levels @ MEAN))} of its limit on average; loads hold the pins near their"
+        f" worst directions with a chance of {percent(loaded)}"
     )
     return Fleet(loaded, tuple(levels.tolist()), text)

@@ -25,10 +25,9 @@ from mlg_troubleshoot.decision.waves import FREQUENCIES, HELD, RANDOM, blur
 from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, level_chances
 
 
-def explain(one: Cases, causes: Causes | None = None) -> Posterior | None:
+def explain(one: Cases, causes: Causes | None = None) -> Posterior:
+    """Find which joints explain the plunger's reading of one gear."""
     gear, reading = one.gear, abs(float(one.mean_in[0]))
-    if not np.isfinite(reading):
-        return None
     found = causes or believed(one)
     rigging = float(found.rigging[0])
     loaded = float(found.joints[0] * found.loaded[0])

@@ -40,10 +40,6 @@ def _held(turns: Array) -> Array:
     return np.asarray(np.exp(1j * mean * turns - 0.5 * (spread * turns) ** 2))
 
 
-def _turned_back(turns: Array) -> Array:
-    return np.asarray(np.exp(-1j * turns))
-
-
 @dataclass(frozen=True, slots=True)
 class Pins:
     """How pins rest.
@@ -65,7 +61,7 @@ class Pins:
 
 
 RANDOM = Pins(_random, np.cos, 1.0, float(np.sqrt(0.5)))
-HELD = Pins(_held, _turned_back, 0.5, float(np.hypot(*PRIORS.cosine)))
+HELD = Pins(_held, lambda turns: np.exp(-1j * turns), 0.5, float(np.hypot(*PRIORS.cosine)))
 
 
 def blur(u_in: Array | float) -> Array:
