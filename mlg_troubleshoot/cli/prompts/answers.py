@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from types import MappingProxyType
 
+from mlg_troubleshoot.cli.output import at_prompt
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
@@ -230,20 +231,12 @@ def judge(
     read, problems = judge_length(CLEARANCE.header(number), typed, options)
     if problems or not isinstance(read, Inspection):
         return JudgedReading(
-            " ".join(f"expected {p.expected}. {_at_prompt(p.remedy)}" for p in problems),
+            " ".join(f"expected {p.expected}. {at_prompt(p.remedy)}" for p in problems),
             refused=True,
         )
     if number not in read.entered:
         return JudgedReading()
     return JudgedReading(Sentence.joined(read.warnings), parse_length(read.entered[number].text))
-
-
-# What a remedy says for the cells of a file only.
-_OF_FILES = re.compile(r",? or (?:pass --decimal-comma|leave it blank[^.]*)")
-
-
-def _at_prompt(remedy: str) -> str:
-    return _OF_FILES.sub("", remedy)
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:
@@ -257,7 +250,7 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
     if problems or not isinstance(read, Inspection):
         raise UsageError(
             f"{typed!r} is not taken: expected {problems[0].expected}",
-            _at_prompt(problems[0].remedy),
+            at_prompt(problems[0].remedy),
         )
     return read
 
