@@ -10,9 +10,9 @@ from types import MappingProxyType
 
 from mlg_troubleshoot.cli.output import at_prompt
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
+from mlg_troubleshoot.decision import columns
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
-    COLUMNS,
     CONVENTION,
     MARGIN,
     OUTCOME,
@@ -37,8 +37,7 @@ from mlg_troubleshoot.units import (
 # Columns that an entry may have in addition to its heading and its clearances, in the order in
 # which they are shown.
 LENGTHS = (PLUNGER_DISPLACEMENT.name, MARGIN.name)
-_SIGNED = sorted((column for column in COLUMNS if column.sign_off), key=lambda c: c.sign_off)
-SIGN_OFF = tuple(column.name for column in _SIGNED)
+SIGN_OFF = tuple(column.name for column in columns.SIGN_OFF)
 # What was repaired and what the day allows, by the letters that are typed for it.
 DAY = {
     "n": "restored_joints",
