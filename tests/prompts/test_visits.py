@@ -304,6 +304,11 @@ def test_landings_and_date_that_flags_give_are_not_asked(visit: Visit, store: Se
     assert (found.gear_landings, str(found.inspection_date)) == (2100.0, "2026-03-01")
 
 
+def test_done_of_a_gear_that_needed_no_repair_speaks_of_none(visit: Visit) -> None:
+    screen = visit(*GEAR, "t", "t", *["3"] * 10, "r", *ENTERS, "").screen
+    assert "DONE. r writes the report to sign." in screen
+
+
 def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
     visit(*GEAR, "y", "36", "y", "yes", "y", "18")

@@ -215,7 +215,8 @@ def next_page(visit: Visit) -> Page:
     ]
     shown = [keys(*(pair for pair in pairs if pair[0]))]
     if visit.action is Action.DONE:
-        end = "The repair is in the records. r writes the report to sign."
+        kept = "The repair is in the records. " * visit.row.is_repaired
+        end = f"{kept}r writes the report to sign."
         shown.insert(0, line(("DONE. ", Tone.GOOD), end))
     return Page(tuple(shown), " " + "y, " * bool(visit.todo) + "another letter, or Enter = done > ")
 
