@@ -257,15 +257,13 @@ def _show_joints(
 
 
 def _what(event: dict[str, Any], unit: LengthUnit) -> str:
-    from mlg_troubleshoot.decision.assessment import Verdict
     from mlg_troubleshoot.decision.sentences import joint_list
 
     match event["kind"]:
         case "assessment":
             found = event["predicted_displacement_in"]
             worst = "" if found is None else f", worst case {Length(found).said_in(unit)}"
-            verdict = event["verdict"]
-            return (Verdict(verdict).words if verdict else "not judged") + worst
+            return str(event["verdict"]).replace("_", " ") + worst
         case "repair":
             return f"restored {joint_list(event['joints'])}"
         case "void":

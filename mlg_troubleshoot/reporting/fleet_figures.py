@@ -113,15 +113,17 @@ class WearInTime:
         if not between:
             return None
         last = max(at for of in between.values() for each in of for at, *_ in each.placed)
-        end = max(last * 1.4, last + 2.0 * (ahead.next_inspection_landings or 0.0), 1.0)
+        restored = max(each.begun for of in between.values() for each in of)
+        due = ahead.next_inspection_landings or 0.0
+        end = max(last * 1.4, last + 2.0 * due, restored, 1.0)
         return cls(between, last, end, ahead)
 
-    def expected(self, number: int, gear: Gear) -> tuple[Array, Array] | None:
+    def expected(self, number: int, gear: Gear, places: int) -> tuple[Array, Array] | None:
         """Landings from the last inspection on, and the 5, 50 and 95 % quantiles at each. [in]"""
         band = self.ahead.bands.get(number)
         if band is None:
             return None
-        passed = np.linspace(0.0, min(self.end - self.last, gear.horizon.value), 25)
+        passed = np.linspace(0.0, min(self.end - self.last, gear.horizon.value), places)
         edges = [np.interp(passed, landings_of_bands(gear), edge) for edge in band]
         return self.last + passed, np.transpose(edges)
 
@@ -173,7 +175,7 @@ def _panel(
     plot = Plot(canvas, Axis("landings", 0.0, end), Axis("", 0.0, 1.15 * max(limit, most)))
     plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
     canvas.text(x + 52, y + 13, f"#{number} {joint.name}, {lengths.unit}", bold=True)
-    expected = wear.expected(number, gear)
+    expected = wear.expected(number, gear, 25)
     if expected is not None:
         ahead_at, edges_in = expected
         low, middle, high = np.minimum(edges_in.T * shown(1.0), plot.y.high)

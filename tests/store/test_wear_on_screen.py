@@ -55,6 +55,15 @@ def test_a_joint_that_was_not_restored_has_no_sign_of_it(drawn: list[str]) -> No
     assert "^" not in line_of(drawn, "#4 ")
 
 
+def test_a_restoration_long_after_the_last_reading_stands_in_the_plot(tmp_path: Path) -> None:
+    store = tmp_path / "store.sqlite"
+    gear = ("N123", "LH", "--store", store)
+    first = row(inspection_date="2021-01-10", gear_landings="500")
+    mlg("check", table(tmp_path, first), "--keep", "--store", store)
+    mlg("history", "repair", *gear, "--joint", "3", "--date", "2024-01-10", "--landings", "2000")
+    assert line_of(mlg("history", *gear).out.splitlines(), "#3 ").endswith("^")
+
+
 def test_a_gear_without_landings_has_no_plot(tmp_path: Path) -> None:
     store = tmp_path / "store.sqlite"
     mlg("check", table(tmp_path, row()), "--keep", "--store", store)

@@ -31,7 +31,7 @@ def wear_lines(life: GearLife, ahead: Forecast, gear: Gear, width: int) -> Itera
     for number, between in wear.between.items():
         limit = gear.joint(number).limit.value
         drawn = [" "] * room
-        expected = wear.expected(number, gear)
+        expected = wear.expected(number, gear, room)
         for at, (_low, middle, high) in () if expected is None else zip(*expected, strict=True):
             drawn[column(at)] = "×" if middle > limit else "?" if high > limit else "·"
         for stretch in between:
