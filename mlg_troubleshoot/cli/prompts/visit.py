@@ -134,11 +134,12 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
 
 def _with_lengths(kept: str) -> Sentence:
     """A sentence as it is kept, in inches, that can be said in the unit of its reader again."""
-    parts: list[object] = list(_LENGTH.split(kept))
-    for place, number in enumerate(parts[1::2]):
-        text = str(number)
-        decimals = len(text.partition(".")[2])
-        parts[2 * place + 1] = Length(float(text), decimals, sign=text[0] in "+-")
+    parts = [
+        Length(float(each), len(each.partition(".")[2]), sign=each[0] in "+-")
+        if place % 2
+        else each
+        for place, each in enumerate(_LENGTH.split(kept))
+    ]
     return Sentence.of("{}" * len(parts), *parts)
 
 
