@@ -69,7 +69,7 @@ def fleet_picture(places: Sequence[GearInPicture]) -> Markup:
     )
     top = Plot(canvas, order, Axis("worst case, % of margin", 0.0, high), top=22, right=18)
     top.area = (*top.area[:3], 160.0)
-    top.draw_axes()
+    top.draw_axes(min(6, len(places)))
     top.draw(Series("", (order.low, order.high), (100.0, 100.0), "5 3", _RED))
     for number, (place, case) in enumerate(zip(places, cases, strict=True), 1):
         shape, colour = _MARKS.get(place.verdict or "", ("cross", INK))
@@ -82,7 +82,7 @@ def fleet_picture(places: Sequence[GearInPicture]) -> Markup:
     if due:
         axis = Axis("due in, landings", 0.0, max(*due, 1.0) * 1.08)
         left = Plot(canvas, order, axis, top=214, right=18)
-        left.draw_axes()
+        left.draw_axes(min(6, len(places)))
         for number, place in enumerate(places, 1):
             if place.due is not None:
                 x, y = left.at(number, place.due)
