@@ -3,8 +3,10 @@
 __all__ = [
     "assessment",
     "columns",
+    "fleet",
     "inspection",
     "judge_rows",
+    "learning",
     "plan",
     "prediction",
     "ranking",

@@ -9,7 +9,7 @@ as much as one gear, its mean what `priors` assumes.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import betaincinv
@@ -17,28 +17,32 @@ from scipy.special import betaincinv
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.fleet import Fleet
+from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.decision.wear_levels import LEVELS, MEAN, level_chances
+from mlg_troubleshoot.gear.gear import Gear
 
 # Quantiles of the share of gears whose pins are held, and rounds in which shares of levels settle.
 _QUANTILES, _ROUNDS = (np.arange(2000) + 0.5) / 2000, 50
 
 
-def learned(cases: Cases) -> Fleet:
+def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:
     """Learn from the last inspections of some gears.
 
     Parameters
     ----------
-    cases : Cases
-        One inspection of each gear, as it stood when it was read.
+    gear : Gear
+        The linkage of all of them.
+    inspections : sequence of Inspection
+        One of each gear, as it stood when it was read.
 
     Returns
     -------
     Fleet
         What to expect of another gear.
     """
-    known = replace(cases, fleet=Fleet())
+    known = Cases.of(gear, inspections)
     read = known.measured.any(axis=1)
     fits = level_chances(known)[read]
     levels = np.full(len(LEVELS), 1.0 / len(LEVELS))
@@ -55,8 +59,8 @@ def learned(cases: Cases) -> Fleet:
     weight = np.exp(likely - likely.max())
     loaded = float(np.sum(share * weight) / np.sum(weight))
     text = (
-        f"Expected from {len(fits)} gear{'s' * (len(fits) > 1)} kept: an unread joint is worn to"
-        f" {percent(float(levels @ MEAN))} of its limit on average; loads hold the pins near their"
-        f" worst directions with a chance of {percent(loaded)}"
+        f"Expected from {len(fits)} gears kept: an unread joint is worn to"
+        f" {percent(float(levels @ MEAN))} of its limit on average; the chance that loads hold the"
+        f" pins near their worst directions is {percent(loaded)}"
     )
     return Fleet(loaded, tuple(levels.tolist()), text)

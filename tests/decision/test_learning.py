@@ -10,6 +10,7 @@ import pytest
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.fleet import Fleet
+from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.learning import learned
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.gear.gear import Gear
@@ -21,37 +22,36 @@ from tests.decision.conftest import every_joint, inspected
 from tests.decision.technician import Hangar, World
 
 
-def cases_of(gear: Gear, pins: str, n: int, joints: int = 10) -> Cases:
+def read(pins: str, n: int, joints: int = 10) -> list[Inspection]:
     """Gears of the independent simulator, the plunger read on each."""
     hangar = Hangar(World(pins, pins=pins), n, 51)
     for one in hangar.gears:
         for j in range(1, joints + 1):
             hangar.read(one, j)
         hangar.read_plunger(one)
-    rows = [
+    return [
         inspected(
             {j: one.row[f"clearance_{j}_in"] for j in range(1, joints + 1)},
             readings_in=(one.row["plunger_displacement_in"],),
         )
         for one in hangar.gears
     ]
-    return Cases.of(gear, rows)
 
 
 def test_a_fleet_whose_pins_are_held_says_so(gear: Gear) -> None:
-    assert learned(cases_of(gear, "axial", 40)).loaded > 0.95
+    assert learned(gear, read("axial", 40)).loaded > 0.95
 
 
 def test_a_fleet_whose_pins_rest_anywhere_says_so(gear: Gear) -> None:
-    assert learned(cases_of(gear, "uniform", 40)).loaded < 0.01
+    assert learned(gear, read("uniform", 40)).loaded < 0.01
 
 
 def test_one_gear_is_not_a_fleet(gear: Gear) -> None:
-    assert learned(cases_of(gear, "axial", 8).take(np.array([0]))).loaded < 0.5
+    assert learned(gear, read("axial", 8)[:1]).loaded < 0.5
 
 
 def test_gears_that_were_not_read_whole_say_nothing_of_their_pins(gear: Gear) -> None:
-    found = learned(cases_of(gear, "axial", 40, joints=9))
+    found = learned(gear, read("axial", 40, joints=9))
     assert found.loaded == pytest.approx(PRIORS.loaded, rel=0.05)
 
 
@@ -59,7 +59,7 @@ def test_gears_that_were_not_read_whole_say_nothing_of_their_pins(gear: Gear) ->
 def test_unread_joints_are_worn_as_the_fleet_is(
     gear: Gear, clearance_in: float, more: bool
 ) -> None:
-    fleet = learned(Cases.of(gear, [inspected(every_joint(clearance_in))] * 20))
+    fleet = learned(gear, [inspected(every_joint(clearance_in))] * 20)
     expected = [
         believed(Cases.of(gear, [inspected({})], fleet=known)).mean_in[0, 0]
         for known in (Fleet(), fleet)
@@ -82,10 +82,10 @@ def test_a_failure_near_the_bound_is_repaired_again_less_often_in_a_fleet_that_i
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
-    """Three gears of one fleet, kept; one of them inspected twice."""
+    """Ten gears of one fleet, kept; one of them inspected twice."""
     folder = tmp_path_factory.mktemp("kept")
     rows = ["record_id,tail_no,side,clearance_convention,inspection_date,clearance_3_in"]
-    rows += [f"R{k},N{k % 3},LH,RADIAL,2026-03-0{k + 1},0.004" for k in range(4)]
+    rows += [f"R{k},N{k % 10},LH,RADIAL,2026-03-{k + 1:02},0.004" for k in range(11)]
     (folder / "fleet.csv").write_text("\n".join(rows), encoding="utf-8")
     found, options = Store(folder / "kept.sqlite"), CheckOptions()
     keep(check_files([folder / "fleet.csv"], options), options, found)
@@ -95,11 +95,20 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 def test_the_last_inspection_of_each_gear_is_learned_from(gear: Gear, store: Store) -> None:
     fleet = expected_of(store, gear)
     assert fleet is not None
-    assert fleet.text.startswith("Expected from 3 gears kept:")
+    assert fleet.text.startswith("Expected from 10 gears kept:")
 
 
 def test_an_empty_store_teaches_nothing(gear: Gear, tmp_path: Path) -> None:
     assert expected_of(Store(tmp_path / "none.sqlite"), gear) is None
+
+
+def test_a_few_gears_are_no_fleet(gear: Gear, tmp_path: Path) -> None:
+    rows = ["record_id,tail_no,side,clearance_convention,clearance_3_in"]
+    rows += [f"R{k},N{k},LH,RADIAL,0.004" for k in range(9)]
+    (tmp_path / "few.csv").write_text("\n".join(rows), encoding="utf-8")
+    few, options = Store(tmp_path / "kept.sqlite"), CheckOptions()
+    keep(check_files([tmp_path / "few.csv"], options), options, few)
+    assert expected_of(few, gear) is None
 
 
 def test_a_check_beside_a_store_says_what_it_expects(store: Store, tmp_path: Path) -> None:
@@ -108,7 +117,7 @@ def test_a_check_beside_a_store_says_what_it_expects(store: Store, tmp_path: Pat
         "record_id,tail_no,side,clearance_convention,clearance_3_in\nR9,N9,LH,RADIAL,0.004\n"
     )
     assert any(
-        "Expected from 3 gears kept" in note for note in check_files([file], store=store).notes
+        "Expected from 10 gears kept" in note for note in check_files([file], store=store).notes
     )
 
 
