@@ -5,6 +5,7 @@ Its modules are its doors: who keeps an inspection needs no forecast, which is s
 
 __all__ = [
     "chronology",
+    "fleet",
     "folding",
     "forecast",
     "looking_back",
