@@ -17,11 +17,11 @@ def renew_index_table(gear: Gear) -> str | None:
     """Compute and write the table of indices of a gear if it is missing or of another geometry, and
     return what to say about it; None if it fits.
     """
-    from mlg_troubleshoot.paper.study import StudyOptions, run_study
-
     try:
         load_index_table(gear)
     except StaleTableError as stale:
+        from mlg_troubleshoot.paper.study import StudyOptions, run_study
+
         write_index_table(run_study(gear, StudyOptions()).table, gear.indices_file)
         return f"{stale.message}. It was computed again: {gear.indices_file}"
     return None
