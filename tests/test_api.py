@@ -92,7 +92,8 @@ def packages_of(modules: set[str]) -> set[str]:
 # What a command line needs: typer before 0.26 brings click from outside.
 COMMAND_LINE = {"annotated_doc", "click", "mlg_troubleshoot", "rich", "shellingham", "typer"}
 # And a check: numpy brings Cython's, msgspec typing_extensions.
-CHECK = COMMAND_LINE | {"msgspec", "numpy", "platformdirs", "typing_extensions", "cython_runtime"}
+CHECK = COMMAND_LINE | {"msgspec", "numpy", "platformdirs", "threadpoolctl"}
+CHECK |= {"cython_runtime", "typing_extensions"}
 ONE_GEAR = ("check", "inspection_data/failure_case.csv")
 
 
