@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearLife
-from mlg_troubleshoot.life.forecast import Forecast, landings_of_bands
-from mlg_troubleshoot.life.wear_paths import Stretch, stretches
 from mlg_troubleshoot.reporting.figures import (
     ACCENT,
     INK,
@@ -24,6 +22,11 @@ from mlg_troubleshoot.reporting.figures import (
     Series,
 )
 from mlg_troubleshoot.reporting.formats import Lengths
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.life.folding import GearLife
+    from mlg_troubleshoot.life.forecast import Forecast
+    from mlg_troubleshoot.life.wear_paths import Stretch
 
 # The colours and shapes of the signs that stand beside the verdicts in templates/signs.html.j2.
 _RED = "#a3131a"
@@ -97,6 +100,8 @@ def wear_figure(life: GearLife, ahead: Forecast, gear: Gear, lengths: Lengths) -
     """Draw the clearance of each joint over the landings: readings, limit, restorations and, from
     the last inspection on, the forecast with its 90 % band.
     """
+    from mlg_troubleshoot.life.wear_paths import stretches
+
     drawn = {
         n: s for n, s in stretches(life, gear.joint_numbers).items() if any(e.placed for e in s)
     }
@@ -136,6 +141,8 @@ def _panel(
     time: tuple[Forecast, float, float],
     lengths: Lengths,
 ) -> None:
+    from mlg_troubleshoot.life.forecast import landings_of_bands
+
     ahead, last, end = time
     joint = gear.joint(number)
     shown = lengths.unit.from_inches
