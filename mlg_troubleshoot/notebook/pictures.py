@@ -15,10 +15,9 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.paper.study import StudyFindings
-from mlg_troubleshoot.reporting import diagnosis_figures, inspection_figures
+from mlg_troubleshoot.reporting import diagnosis_figures, fleet_figures, inspection_figures
 from mlg_troubleshoot.reporting.diagnosis_figures import Residuals
 from mlg_troubleshoot.reporting.figures import Style
-from mlg_troubleshoot.reporting.fleet_figures import wear_figure
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.picture import Picture
 from mlg_troubleshoot.reporting.schematic import blank_schematic, schematic
@@ -128,7 +127,7 @@ def _life(result: Lives, *, tail: str = "", side: str = "", unit: str = "in") ->
         raise UsageError(f"there is no gear {tail} {side}".rstrip(), f"There is {known}.")
     life = wanted[0]
     lengths = Lengths(LengthUnit.parse(unit))
-    return [wear_figure(life, result.forecasts[life.key], result.gear, lengths)]
+    return [fleet_figures.wear_figure(life, result.forecasts[life.key], result.gear, lengths)]
 
 
 _Draw = Callable[..., list[Markup]]

@@ -5,6 +5,7 @@ __all__ = [
     "diagnosis_lines",
     "diagnosis_report",
     "figures",
+    "fleet_figures",
     "fleet_report",
     "formats",
     "html",

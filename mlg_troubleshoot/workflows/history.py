@@ -61,6 +61,8 @@ class Lives(Result):
         How joints wear; None if nothing can be learnt.
     problems : tuple of Problem
         Wrong cells of the table that they were read from, if it was one.
+    order : Order
+        Order of the gears in tables and reports.
     """
 
     gear: Gear

@@ -14,7 +14,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.short_form import NewGear, read_short_form, short_form
 from mlg_troubleshoot.outputs import OutputKind, write_text
 from mlg_troubleshoot.units import LengthUnit
-from mlg_troubleshoot.workflows.index_tables import renew_index_table
+from mlg_troubleshoot.workflows.index_tables import index_table
 
 _HEADING = "# Written by mlg gear new.\n"
 NEW_GEAR = OutputKind.marked("is not a gear file that mlg gear new wrote", _HEADING)
@@ -22,7 +22,17 @@ NEW_GEAR = OutputKind.marked("is not a gear file that mlg gear new wrote", _HEAD
 
 @dataclass(frozen=True, slots=True)
 class WrittenGear:
-    """A gear that was written, what was understood, and what was assumed."""
+    """A gear that was written, what was understood, and what was assumed.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear, as it is read from its file.
+    steps : tuple of str
+        How each point is located.
+    assumed : tuple of str
+        What the short form does not state.
+    """
 
     gear: Gear
     steps: tuple[str, ...]
@@ -106,5 +116,5 @@ def _write(found: NewGear, file: Path) -> WrittenGear:
     found.closes()
     write_text(file, text)
     gear = load_gear(file)
-    renew_index_table(gear)
+    index_table(gear, say=str)
     return WrittenGear(gear, found.steps, found.assumed)
