@@ -21,7 +21,6 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.wear_paths import placed_in_time, stretches, unit_of, wear_paths
 from mlg_troubleshoot.wear import (
-    LEARN_FROM,
     Samples,
     WearModel,
     WearPath,
@@ -102,7 +101,10 @@ def fit_fleet(lives: Iterable[GearLife], gear: Gear) -> WearModel | None:
             for path in own
             if len(own) > 1 or len(np.asarray(path.usage))
         ]
-        if len({path.unit for path in paths if len(np.asarray(path.usage)) > 1}) >= LEARN_FROM:
+        if (
+            len({path.unit for path in paths if len(np.asarray(path.usage)) > 1})
+            >= WearModel.learns_from
+        ):
             break
     return fit_wear(paths) if any(len(np.asarray(path.usage)) for path in paths) else None
 

@@ -1,6 +1,6 @@
 """Forecasts of wear from irregular inspections of many units; knows no gear."""
 
-from mlg_troubleshoot.wear.model import LEARN_FROM, Samples, WearModel, first_passage, fit_wear
+from mlg_troubleshoot.wear.model import Samples, WearModel, first_passage, fit_wear
 from mlg_troubleshoot.wear.paths import WearPath
 
-__all__ = ["LEARN_FROM", "Samples", "WearModel", "WearPath", "first_passage", "fit_wear"]
+__all__ = ["Samples", "WearModel", "WearPath", "first_passage", "fit_wear"]

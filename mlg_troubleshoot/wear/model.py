@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,9 +24,7 @@ _DRAWS = 128
 _PATHS = 4096
 _PATHS_OF_MANY = 256
 _MANY = 64
-# Units read twice or more, and other units, that the population is learnt from at most: more would
-# not narrow it. [1]
-LEARN_FROM = 160
+# Units read once that the population is learnt from at most, in addition to `learns_from`. [1]
 _LEARN_FROM_OTHERS = 40
 # Standard deviation of the pace of wear beyond the usage that any unit has reached: no reading so
 # far can show a curve that bends later. [1]
@@ -84,6 +83,9 @@ class WearModel(Result):
     simulated : int
         Simulated paths of each unit. [1]
     """
+
+    # Units read twice or more that are learnt from at most: more would not narrow it. [1]
+    learns_from: ClassVar[int] = 160
 
     paths: Mapping[str, tuple[WearPath, ...]]
     kinds: Mapping[str, float]
@@ -359,7 +361,7 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
     }
     learn: list[str] = []
     for most, pool in (
-        (LEARN_FROM, [u for u, n in readings.items() if n > 1]),
+        (WearModel.learns_from, [u for u, n in readings.items() if n > 1]),
         (_LEARN_FROM_OTHERS, [u for u, n in readings.items() if n == 1]),
     ):
         learn += [pool[i] for i in sorted(rng.permutation(len(pool))[:most])]
