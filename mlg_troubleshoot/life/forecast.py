@@ -101,10 +101,8 @@ def fit_fleet(lives: Iterable[GearLife], gear: Gear) -> WearModel | None:
             for path in own
             if len(own) > 1 or len(np.asarray(path.usage))
         ]
-        if (
-            len({path.unit for path in paths if len(np.asarray(path.usage)) > 1})
-            >= WearModel.learns_from
-        ):
+        followed = {path.unit for path in paths if len(np.asarray(path.usage)) > 1}
+        if len(followed) >= WearModel.learns_from:
             break
     return fit_wear(paths) if any(len(np.asarray(path.usage)) for path in paths) else None
 
