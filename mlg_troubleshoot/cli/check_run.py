@@ -247,7 +247,9 @@ class Run:
                 supersede(self._place, before, result, self._asked)
             added = Kept(1, 0, tuple(warnings_of(self._place, [(before.tail_no, before.side)])))
         else:
-            added = keep(result, self._asked, self._place, self._same_tail())
+            with stages(quiet=self._wanted.quiet) as bar:
+                told = partial(bar, "Keeping")
+                added = keep(result, self._asked, self._place, self._same_tail(), told)
         if not self._wanted.quiet:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""

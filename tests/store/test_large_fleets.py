@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -15,7 +16,9 @@ from mlg_troubleshoot.life.folding import lives
 from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
 from mlg_troubleshoot.store import Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
+from mlg_troubleshoot.workflows.check import CheckOptions, check_inspection
 from mlg_troubleshoot.workflows.history import show_fleet, show_lives
+from mlg_troubleshoot.workflows.keep import keep
 
 TAILS = [f"N{n:03d}" for n in range(TEACHERS + 30)]
 
@@ -75,6 +78,28 @@ def test_where_few_gears_state_their_landings_all_of_them_are_learnt_from(tmp_pa
     model = fit_fleet((by_key[key] for key in teachers_first(by_key)), load_gear())
     assert model is not None
     assert {unit.split()[0] for unit in model.paths} == set(last)
+
+
+def test_keeping_says_how_far_it_is_also_where_rows_state_repairs(tmp_path: Path) -> None:
+    rows = [
+        Inspection(
+            f"R{n}",
+            f"N{n}",
+            Side.LH,
+            ClearanceConvention.RADIAL,
+            {3: 0.001},
+            inspection_date=date(2024, 5, 1),
+            restored_joints=(3,),
+            repair_date=date(2024, 5, 2),
+        )
+        for n in range(3)
+    ]
+    checked = [check_inspection(row, CheckOptions()) for row in rows]
+    result = replace(checked[0], judgements=tuple(each.judgements[0] for each in checked))
+    said: list[tuple[int, int]] = []
+    store = Store(tmp_path / "store.sqlite")
+    keep(result, CheckOptions(), store, progress=lambda done, total: said.append((done, total)))
+    assert said == [(1, 3), (2, 3), (3, 3)]
 
 
 def test_the_gears_learnt_from_stay_the_same_when_one_comes_in_behind_them() -> None:
