@@ -10,6 +10,7 @@ changes both alike. The import of numpy is the measure of the machine.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import statistics
 import subprocess
@@ -19,25 +20,32 @@ from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+# A process of its own starts what is measured: the memory of who starts it counts as its own.
+MEASURE = """
+import json, resource, subprocess, sys
+of = subprocess.DEVNULL
+code = subprocess.run([sys.executable, *sys.argv[1:]], stdout=of, stderr=of).returncode
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(json.dumps([code, used.ru_utime + used.ru_stime, used.ru_maxrss]))
+"""
 ONE_GEAR = ["check", str(ROOT / "inspection_data" / "failure_case.csv")]
 
 
 def run(tree: Path, command: Sequence[str], environment: dict[str, str]) -> tuple[float, float]:
     """Processor time and largest memory of one run. [s, MiB]"""
-    process = subprocess.Popen(
-        [sys.executable, *command],
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", MEASURE, *command],
         cwd=tree,
         env=environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
     )
-    _pid, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode not in (0, 1):
-        raise SystemExit(f"{command} ended with exit code {process.returncode} in {tree}")
+    code, seconds, memory = json.loads(done.stdout)
+    if code not in (0, 1):
+        raise SystemExit(f"{command} ended with exit code {code} in {tree}")
     # Linux counts in KiB, macOS in bytes.
-    memory = usage.ru_maxrss / (1024.0 if sys.platform != "darwin" else 1024.0**2)
-    return usage.ru_utime + usage.ru_stime, memory
+    return seconds, memory / (1024.0 if sys.platform != "darwin" else 1024.0**2)
 
 
 def main() -> None:
