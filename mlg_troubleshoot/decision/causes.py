@@ -32,6 +32,7 @@ from mlg_troubleshoot.decision.waves import (
     STEP_IN,
     Pins,
     blur,
+    density,
     inside,
 )
 from mlg_troubleshoot.decision.wear_levels import (
@@ -215,7 +216,8 @@ class Causes:
             return np.asarray(1.0 - inside(left * new, np.full(len(left), margin)))
         gone = np.prod(np.where(members[:, :, None], waves, 1.0), axis=1) * blur(self.u_in[row])
         # The density of what is left, given that all together read x.
-        given = pins.density(left, AT_IN) * pins.density(gone, abs(x) - AT_IN)
+        away = np.exp(-1j * FREQUENCIES * abs(x))
+        given = density(left) * density(gone * away)[:, ::-1]
         given /= np.maximum(given.sum(axis=1, keepdims=True), 1e-300)
         # Restored parts move it a little, always on where loads hold them.
         moved = unread.amplification * gear.new_parts_in
@@ -253,8 +255,8 @@ def _believed(cases: Cases, unread: _Unread, levels: Array, u: Array) -> _Believ
     fits, likely = np.ones(len(cases)), levels.copy()
     rows = np.flatnonzero(np.isfinite(cases.mean_in))
     if len(rows):
-        turns = np.asarray(FREQUENCIES * np.abs(cases.mean_in[rows])[:, None], float)
-        at = pins.kernel(turns) * blur(u[rows]) * _LINKAGE
+        at = np.exp(-1j * FREQUENCIES * np.abs(cases.mean_in[rows])[:, None])
+        at = (at if pins is HELD else at.real) * blur(u[rows]) * _LINKAGE
         fits[rows], likely[rows], worn[rows] = _given_plunger(
             unread, read[rows], known[rows], levels[rows], at
         )
@@ -270,20 +272,20 @@ def _given_plunger(
     joint being worn.
     """
     count, beyond = read.shape[1], BEYOND.sum(axis=1)
-    density, worn = np.empty_like(levels), np.zeros((len(at), len(LEVELS), count))
+    fits, worn = np.empty_like(levels), np.zeros((len(at), len(LEVELS), count))
     for k in range(len(LEVELS)):
         waves = np.where(read[:, :, None], known, unread.unread[k])
         ahead, behind = _products(waves)
-        density[:, k] = 0.5 + np.sum((ahead[-1] * at).real, axis=1)
+        fits[:, k] = 0.5 + np.sum((ahead[-1] * at).real, axis=1)
         for j in range(count):
             rest = ahead[j] * behind[j + 1] * at
             worn[:, k, j] = 0.5 * beyond[k] + (rest @ unread.worn[k, j]).real
-    density, worn = np.maximum(density, 1e-12), np.maximum(worn, 0.0)
-    likely = levels * density
-    fits = likely.sum(axis=1, keepdims=True)
-    likely /= fits
-    worn = np.sum(likely[:, :, None] * worn / density[:, :, None], axis=1)
-    return unread.pins.sense * fits[:, 0], likely, worn
+    fits, worn = np.maximum(fits, 1e-12), np.maximum(worn, 0.0)
+    likely = levels * fits
+    total = likely.sum(axis=1, keepdims=True)
+    likely /= total
+    worn = np.sum(likely[:, :, None] * worn / fits[:, :, None], axis=1)
+    return unread.pins.sense * total[:, 0], likely, worn
 
 
 def _weighed(
@@ -306,12 +308,12 @@ def _weighed(
             # One way on, whichever way that is; the expansion is good to a tenth there.
             waves = waves * blur(0.1 * np.asarray(mean_in @ each.unread.amplification))
             reading = np.abs(x)
-        density = pins.sense * pins.density(waves, AT_IN)
-        density = density * np.exp(-0.5 * ((reading[:, None] - AT_IN) / u[:, None]) ** 2)
+        fits = pins.sense * density(waves)
+        fits = fits * np.exp(-0.5 * ((reading[:, None] - AT_IN) / u[:, None]) ** 2)
         stands = np.abs(AT_IN + shift[:, None])
         beyond = tabled_normal_cdf((stands - margin) / (0.5 * STEP_IN))
-        outside.append(np.sum(density * beyond, axis=1))
-        within.append(np.sum(density * (1.0 - beyond), axis=1))
+        outside.append(np.sum(fits * beyond, axis=1))
+        within.append(np.sum(fits * (1.0 - beyond), axis=1))
     fits = np.exp(-0.5 * ((x[:, None] - AT_IN) / u[:, None]) ** 2)
     offset = 1.0 / (1.0 + (AT_IN / (PRIORS.offset * margin)) ** 8)
     offset = offset * tabled_normal_cdf((np.abs(AT_IN) - margin) / (0.5 * STEP_IN))

@@ -21,6 +21,7 @@ HALF_IN, _TERMS, _PLACES = 0.18, 104, 145
 FREQUENCIES = np.pi * np.arange(1, _TERMS + 1) / HALF_IN
 AT_IN = np.linspace(-HALF_IN, HALF_IN, _PLACES)
 STEP_IN = AT_IN[1] - AT_IN[0]
+_COSINES, _SINES = np.cos(FREQUENCIES[:, None] * AT_IN), np.sin(FREQUENCIES[:, None] * AT_IN)
 
 
 @lru_cache(maxsize=1)
@@ -44,24 +45,24 @@ def _held(turns: Array) -> Array:
 class Pins:
     """How pins rest.
 
-    waves: characteristic function of a clearance, by frequency times what it can move. [1]
-    kernel: what a characteristic function is multiplied by for the density, by frequency times
-    displacement. [1] sense: chance of the sense of a displacement. [1] cosine: of the angle from
-    the worst direction, root mean square. [1]
+    waves: characteristic function of a clearance, by frequency times what it can move. [1] sense:
+    chance of the sense of a displacement. [1] cosine: of the angle from the worst direction, root
+    mean square. [1]
     """
 
     waves: Callable[[Array], Array]
-    kernel: Callable[[Array], Array]
     sense: float
     cosine: float
 
-    def density(self, waves: Array, at_in: Array) -> Array:
-        """Density of a sum times half its range, one row per characteristic function. [1]"""
-        return np.maximum(0.5 + (waves @ self.kernel(FREQUENCIES[:, None] * at_in)).real, 0.0)
+
+RANDOM = Pins(_random, 1.0, float(np.sqrt(0.5)))
+HELD = Pins(_held, 0.5, float(np.hypot(*PRIORS.cosine)))
 
 
-RANDOM = Pins(_random, np.cos, 1.0, float(np.sqrt(0.5)))
-HELD = Pins(_held, lambda turns: np.exp(-1j * turns), 0.5, float(np.hypot(*PRIORS.cosine)))
+def density(waves: Array) -> Array:
+    """Density of sums at `AT_IN`, times half its range, one row per characteristic function. [1]"""
+    found = 0.5 + waves.real @ _COSINES
+    return np.maximum(found + waves.imag @ _SINES if np.iscomplexobj(waves) else found, 0.0)
 
 
 def blur(u_in: Array | float) -> Array:
