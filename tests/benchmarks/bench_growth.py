@@ -12,6 +12,7 @@ import math
 import os
 import sys
 from collections.abc import Mapping
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,7 @@ def main() -> None:
     given.folder.mkdir(parents=True, exist_ok=True)
     costs = measured(given.folder)
     about = {
+        "day": date.today().isoformat(),
         "cores": str(os.cpu_count()),
         "load average": f"{os.getloadavg()[0]:.1f}",
         "Python": ".".join(map(str, sys.version_info[:2])),
