@@ -106,22 +106,20 @@ def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
 
 def unfinished(store: SessionStore, terminal: RichTerminal, gear: Gear, flags: Flags) -> Session:
     """The unfinished entry to go on with: the last one, or the one of the gear that flags name."""
+    from mlg_troubleshoot.cli.prompts.answers import Answers
+    from mlg_troubleshoot.cli.prompts.flow import contradictions
     from mlg_troubleshoot.cli.prompts.pages import unfinished_lines
 
     found, damaged = store.unfinished(gear.id)
     for message in damaged:
         output.say(message)
     tail, side = (flags.typed.get(column.name) for column in (TAIL_NO, SIDE))
-    named = [
-        each
-        for each in found
-        if tail in (None, each.answers.tail_no)
-        and Side.spelt(side or "") in (None, each.answers.side)
-    ]
-    saved = next(iter(named), None) or (None if tail else store.latest())
+    asked = Answers(tail_no=tail, side=Side.spelt(side or ""))
+    named = (each for each in found if not contradictions(each.answers, asked))
+    saved = next(named, None) or (None if tail else store.latest())
     if saved is None:
         raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
-    others = tuple(each for each in found if each.id != saved.id)
+    others = tuple(each for each in found if each.answers.joints and each.id != saved.id)
     if others:
         terminal.say(unfinished_lines(others))
         output.say("Go on with another one: mlg check --resume --tail TAIL --side LH|RH")

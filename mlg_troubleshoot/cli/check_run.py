@@ -152,9 +152,9 @@ class Run:
                     if wanted.report is not None or wanted.as_json:
                         return result
                 case Effect.SHOW:
-                    self._show(result, self._seen(unit).show, detail=True)
+                    self._show(result, wanted.seen(self._shown, unit).show, detail=True)
                 case Effect.REPORT:
-                    self._write_reports(result, _ASKED_FOR, self._seen(unit))
+                    self._write_reports(result, _ASKED_FOR, wanted.seen(self._shown, unit))
                 case _:
                     return result
             visit = find(inspection.tail_no, inspection.side)
@@ -162,16 +162,9 @@ class Run:
                 return result
             entry = ask(given, visit=visit)
 
-    def _seen(self, entered_in: LengthUnit) -> Settings:
-        """Lengths are shown in the unit that a flag or the memory says, or else in that of the
-        entry.
-        """
-        said = self._wanted.show or self._shown.show is not LengthUnit.INCH
-        return self._shown if said else replace(self._shown, show=entered_in)
-
     def _publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
         wanted = self._wanted
-        seen = self._seen(entered_in)
+        seen = wanted.seen(self._shown, entered_in)
         if wanted.as_json:
             from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
 
@@ -194,6 +187,7 @@ class Run:
             notes.show_notes(result.notes)
         notes.show_problems(result.problems)
         screen = output.console(unit=unit)
+        screen.asks = self._asks
         if len(result.judgements) == 1:
             one_gear.show(result.judgements[0], result.gear, screen, detail=detail)
         elif result.judgements:

@@ -67,6 +67,7 @@ def show(
     """Show the records: the gears and their latest state, or one gear's life with the forecast of
     each joint.
     """
+    from mlg_troubleshoot.cli.prompts.visit import unit_entered
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.life.folding import lives
     from mlg_troubleshoot.reporting import life_json
@@ -93,6 +94,9 @@ def show(
         raise UsageError(
             f"{tail} has two gears here, and JSON shows one", f"Run: mlg history {tail} LH --json"
         )
+    latest = found.lives[0].latest
+    if latest is not None:
+        settings = shown.seen(settings, unit_entered(latest.inspection))
     for life in found.lives:
         if shown.as_json:
             output.write_json(life_json.life_as_json(life, found.forecasts[life.key], known))
@@ -170,6 +174,7 @@ def _show_advice(console: output.DataConsole, advice: Advice) -> None:
 
 
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
+    from mlg_troubleshoot.cli.views.tables import lines_of
     from mlg_troubleshoot.life.looking_back import Advice
     from mlg_troubleshoot.life.outlook import outlook_sentence
     from mlg_troubleshoot.reporting.life_json import life_as_json
@@ -177,18 +182,19 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     console = output.console(unit=unit)
     told = life_as_json(life, ahead, gear)
     console.print(output.text(life.name, "bold"))
-    table = output.plain_table(
-        console, "date", "landings", "what", "record", "hash", right=("landings",)
-    )
-    for event in told["events"]:
-        table.add_row(
+    events = [
+        (
             event["date"] or "no date",
             _count(event["gear_landings"]),
-            _what(event, unit),
-            output.word(event["record_id"] or "-"),
+            event["record_id"] or event["hash"][:10],
             event["hash"][:10],
+            _what(event, unit),
         )
-    console.print(table)
+        for event in told["events"]
+    ]
+    headings = ("date", "landings", "record", "hash", "what")
+    for each in lines_of(console, headings, events, "landings", ("hash", "record")):
+        console.print(each)
     show_warnings(console, [life])
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
@@ -203,29 +209,37 @@ def _show_joints(
     ahead: Forecast,
     gear: Gear,
 ) -> None:
+    from mlg_troubleshoot.cli.views.tables import lines_of
+    from mlg_troubleshoot.cli.views.wear import wear_lines
     from mlg_troubleshoot.decision.sentences import joint_list
     from mlg_troubleshoot.life.outlook import span
     from mlg_troubleshoot.life.wear_paths import stretches
 
-    table = output.plain_table(
-        console,
+    headings = (
         "joint",
         f"limit {console.unit}",
-        f"readings since restored (landings: {console.unit})",
         "landings to its limit",
+        f"readings (landings: {console.unit})",
     )
+    rows = []
     for joint in joints:
         if not joint["readings"] and joint["joint"] not in ahead.joints:
             continue
-        newest = joint["readings"][-4:]
+        newest = joint["readings"][-3:]
         read = ", ".join(f"{at:g}: {console.length(clearance)}" for at, clearance in newest)
-        table.add_row(
-            f"#{joint['joint']}",
-            console.length(joint["limit_in"]),
-            ("… " if len(joint["readings"]) > len(newest) else "") + (read or "none"),
-            span(joint["landings_to_limit"], gear),
+        rows.append(
+            (
+                f"#{joint['joint']}",
+                console.length(joint["limit_in"]),
+                span(joint["landings_to_limit"], gear),
+                ("… " if len(joint["readings"]) > len(newest) else "") + (read or "none"),
+            )
         )
-    console.print(table)
+    for each in (
+        *(lines_of(console, headings, rows, "", ()) if rows else ()),
+        *wear_lines(life, ahead, gear, console.width),
+    ):
+        console.print(each)
     ever = {n for kept in life.inspections for n in kept.inspection.clearance_in}
     since = stretches(life, gear.joint_numbers)
     unread = [n for n, of in since.items() if not of[-1].readings]
@@ -249,7 +263,7 @@ def _what(event: dict[str, Any], unit: LengthUnit) -> str:
         case "assessment":
             found = event["predicted_displacement_in"]
             worst = "" if found is None else f", worst case {Length(found).said_in(unit)}"
-            return f"assessed {event['verdict']}{worst}"
+            return str(event["verdict"]).replace("_", " ") + worst
         case "repair":
             return f"restored {joint_list(event['joints'])}"
         case "void":

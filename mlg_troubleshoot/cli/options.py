@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import wraps
 from inspect import Parameter, Signature, signature
@@ -204,6 +204,13 @@ class OutputOptions:
         claim(gear, inputs, outputs, self.report, store=store, force=self.force)
         columns = {} if tables is None else tables.columns
         return settings(gear, self.show, self.page, columns, keep=keep)
+
+    def seen(self, settings: Settings, entered_in: LengthUnit) -> Settings:
+        """Lengths are shown in the unit that a flag or the memory says, or else in that of the
+        entry.
+        """
+        said = self.show or settings.show is not LengthUnit.INCH
+        return settings if said else replace(settings, show=entered_in)
 
 
 @dataclass(frozen=True, slots=True)

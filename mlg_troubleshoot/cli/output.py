@@ -32,9 +32,20 @@ _PLAIN = "mlg.plain"
 # A sign and what stands for it, one for one, so that drawings and tables keep their columns.
 _SIGNS = (
     "═=─-━-│|┃|╭+╮+╰+╯+┌+┐+└+┘+├+┤+▲^△A▶>"
-    "◀<○o■#□.█#▏|✓*✗!·-•*—-–-−-→>←<….’'‘'“\"”\"‹<›>×x±~≤<≥>≈~²2³3μuµu\u00a0 "
+    "◀<○o■#□.█#▁1▂2▃3▄4▅5▆6▇7▏|✓*✗!·-•*—-–-−-→>←<….’'‘'“\"”\"‹<›>×x±~≤<≥>≈~²2³3μuµu\u00a0 "
 )
 _IN_ASCII = str.maketrans(_SIGNS[::2], _SIGNS[1::2])
+# What a sentence says for the cells of a file only.
+_OF_FILES = re.compile(
+    r",? or (?:pass --decimal-comma|leave it blank[^.]*)|leave it blank, and "
+    r"| Is it newer\? Then enter \w+_date[^.]*\.|: enter repair_date[^.]*| in restored_joints"
+    r"| Enter (?:rigging_checked: yes or corrected|the outcome with its date and time)\."
+)
+
+
+def at_prompt(said: str) -> str:
+    """Return a sentence as it is said to someone who types at a prompt."""
+    return _OF_FILES.sub("", said)
 
 
 def to_ascii(text: str) -> str:
@@ -90,13 +101,18 @@ class DataConsole(Console):
     """
 
     unit = LengthUnit.INCH
+    asks = False
 
     def length(self, value_in: float, *, sign: bool = False) -> str:
         return self.unit.shown(value_in, sign=sign)
 
     def sentence(self, said: str, style: str = "") -> None:
-        """Print a sentence of this program, its lengths in the unit that the user reads."""
-        self.print(said_in(said, self.unit), style=style)
+        self.print(self.said(said), style=style)
+
+    def said(self, sentence: str) -> str:
+        """Say a sentence of this program, its lengths in the unit that the user reads."""
+        said = said_in(sentence, self.unit)
+        return at_prompt(said) if self.asks else said
 
     def print(self, *objects: Any, **how: Any) -> None:
         """Print; a text is data, made visible before it is measured."""

@@ -611,6 +611,9 @@ BY_NAME: Mapping[str, Column] = {column.name: column for column in COLUMNS}
 COVARIATES: tuple[Column, ...] = tuple(
     sorted((column for column in COLUMNS if column.covariate), key=lambda c: c.covariate)
 )
+SIGN_OFF: tuple[Column, ...] = tuple(
+    sorted((column for column in COLUMNS if column.sign_off), key=lambda c: c.sign_off)
+)
 IDENTITY = (RECORD_ID, TAIL_NO, SIDE)
 # A reading along the stroke: neither is of use without the other.
 STROKE = (ACTUATOR_EXTENSION, PLUNGER_POSITION)

@@ -13,14 +13,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import gammaln, logsumexp
 
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import fleet_history
+from mlg_troubleshoot.diagnosis.wear import fleet_history, one_inspection
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.units import SLIPS
 
@@ -132,6 +132,11 @@ def _density(off: Array, spread: Array | float) -> Array:
     return np.where(np.isnan(off), 0.0, -_surprise(off / spread) - np.log(spread))
 
 
+def _normal(off: Array, spread: Array | float) -> Array:
+    """Log-density of a normal distribution. [1]"""
+    return np.asarray(-0.5 * (off / spread) ** 2 - np.log(spread * np.sqrt(2.0 * np.pi)))
+
+
 def _cells(
     column: list[str], written: Array, meant: Array
 ) -> tuple[tuple[str, float, float | None], ...]:
@@ -150,6 +155,7 @@ class _Screen:
     rest, shape (n,): misfit beyond what is explained. [in]
     explained, shape (n,): what is. [in]
     scale_in, repeat_in: scatter of the misfits, and between the readings of a row. [in]
+    again, shape (n, n): other rows of one inspection.
     """
 
     model: LinkageModel
@@ -159,6 +165,7 @@ class _Screen:
     explained: Array
     scale_in: float
     repeat_in: float
+    again: Mask
 
     def as_written(self, place: int) -> _Meant:
         """A row as it is written."""
@@ -204,14 +211,27 @@ class _Screen:
         """
         clearance = np.array([row.clearance for row in meant])
         readings = np.array([row.readings for row in meant])
-        wear = _density(self.usual.off(clearance, place), self.usual.spread[place])
+        spread, known = self.usual.spread[place], np.isfinite(clearance)
+        clearance = np.where(known, clearance, self.usual.expected[place])
+        wear = _normal(self.usual.off(clearance, place), spread)
+        again = self.table.clearance_in[self.again[place]]
+        if len(again):
+            # Two rows do not hold the same slip: what both read of a joint that still moves is so.
+            off = clearance[:, None] - np.where(again < _WORN_OUT_IN, again, np.inf)
+            same = np.where(np.isfinite(off), _normal(off, _LEAST_SPREAD_IN), -np.inf)
+            wear = np.logaddexp(wear, logsumexp(same, axis=1)) - np.log1p(len(again))
         # One of the joints may be worn out, as rarely as there is an entry error of one kind.
         rare = np.log(_WRONG / _KINDS / clearance.shape[1] / _WORN_OUT_IN)
-        worn_out = np.where(clearance < _WORN_OUT_IN, rare, -np.inf)
-        wear = np.where(np.isfinite(clearance), np.logaddexp(wear, worn_out), 0.0)
-        again = _density(np.diff(np.sort(readings)), self.repeat_in)
+        wear = np.logaddexp(wear, np.where(clearance < _WORN_OUT_IN, rare, -np.inf))
+        # A row that lies off the wear of its gear altogether says little of two of its joints.
+        apart = np.where(known, -2.0 * (wear + np.log(spread * np.sqrt(2.0 * np.pi))), 0.0)
+        count, apart = known.sum(axis=1), np.maximum(apart.sum(axis=1), 0.0)
+        together = 0.5 * (_FREEDOM + count)
+        wear = gammaln(together) - together * np.log1p(apart / _FREEDOM)
+        wear -= 0.5 * count * np.log(_FREEDOM * np.pi) + np.where(known, np.log(spread), 0.0).sum(1)
+        repeats = _density(np.diff(np.sort(readings)), self.repeat_in)
         own = np.array([row.evidence for row in meant])
-        return np.asarray(own + wear.sum(axis=1) + again.sum(axis=1))
+        return np.asarray(own + wear + repeats.sum(axis=1))
 
     def best(self, place: int) -> _Meant | None:
         """The likeliest entry error of a row, if one is likely."""
@@ -363,7 +383,9 @@ def _suspects(
     rest = misfit - named
     scale = _scale(rest)
     apart = np.diff(np.sort(table.readings_in)).ravel()
-    screen = _Screen(model, table, usual, rest, named, scale, _scale(np.append(apart, -apart)))
+    again = one_inspection(table) & (table.row[:, None] != table.row)
+    repeat = _scale(np.append(apart, -apart))
+    screen = _Screen(model, table, usual, rest, named, scale, repeat, again)
     # An entry error is in one cell or in two, or in so many that any two of them show it.
     lost = np.sort(_surprise(usual.off(table.clearance_in) / usual.spread))[:, -2:].sum(axis=1)
     lost += _surprise((rest - np.nanmedian(rest)) / scale)

@@ -181,6 +181,16 @@ def landed_share(table: DiagnosisTable) -> Array:
     return landings / np.mean(landings) if landings.any() else np.ones(len(table))
 
 
+def one_inspection(table: DiagnosisTable) -> Mask:
+    """Rows of one gear at one number of landings and on one day, so far as told, shape (n, n)."""
+    gears = gears_of(table)
+    same = gears[:, None] == gears
+    for name in {"gear_landings", "day"} & set(table.quantities):
+        values = np.nan_to_num(table.quantities[name], nan=-1.0)
+        same &= values[:, None] == values
+    return np.asarray(same)
+
+
 def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
     """What wear may add or lack where none was read, each column at one standard deviation: (n, k).
     [in]
@@ -190,11 +200,7 @@ def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
     share their wear.
     """
     gears, worn = gears_of(table), landed_share(table)
-    own = gears[:, None] == gears
-    visit = own.copy()
-    for name in {"gear_landings", "day"} & set(table.quantities):
-        values = np.nan_to_num(table.quantities[name], nan=-1.0)
-        visit &= values[:, None] == values
+    own, visit = gears[:, None] == gears, one_inspection(table)
     each, all_in = unread_in @ unread_in.T, unread_in.sum(axis=1)
     together, grown = np.outer(all_in, all_in), np.outer(worn, worn)
     covariance = (1.0 + grown) * (FLEET_TOGETHER**2 * together + JOINTS_APART**2 * each)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.figures import (
     ACCENT,
@@ -71,7 +72,7 @@ def fleet_picture(places: Sequence[GearInPicture]) -> Markup:
     )
     top = Plot(canvas, order, Axis("worst case, % of margin", 0.0, high), top=22, right=18)
     top.area = (*top.area[:3], 160.0)
-    top.draw_axes()
+    top.draw_axes(min(6, len(places)))
     top.draw(Series("", (order.low, order.high), (100.0, 100.0), "5 3", _RED))
     for number, (place, case) in enumerate(zip(places, cases, strict=True), 1):
         shape, colour = _MARKS.get(place.verdict or "", ("cross", INK))
@@ -84,7 +85,7 @@ def fleet_picture(places: Sequence[GearInPicture]) -> Markup:
     if due:
         axis = Axis("due in, landings", 0.0, max(*due, 1.0) * 1.08)
         left = Plot(canvas, order, axis, top=214, right=18)
-        left.draw_axes()
+        left.draw_axes(min(6, len(places)))
         for number, place in enumerate(places, 1):
             if place.due is not None:
                 x, y = left.at(number, place.due)
@@ -96,27 +97,59 @@ def fleet_picture(places: Sequence[GearInPicture]) -> Markup:
     return canvas.svg()
 
 
+@dataclass(frozen=True, slots=True)
+class WearInTime:
+    """Clearances over landings to the end of a plot: readings between restorations up to the last
+    inspection, then the forecast.
+    """
+
+    between: dict[int, list[Stretch]]
+    last: float
+    end: float
+    ahead: Forecast
+
+    @classmethod
+    def of(cls, life: GearLife, ahead: Forecast, gear: Gear) -> WearInTime | None:
+        """The joints that were read at known landings; None if there is none."""
+        from mlg_troubleshoot.life.wear_paths import stretches
+
+        known = stretches(life, gear.joint_numbers)
+        between = {n: s for n, s in known.items() if any(each.placed for each in s)}
+        if not between:
+            return None
+        last = max(at for of in between.values() for each in of for at, *_ in each.placed)
+        restored = max(each.begun for of in between.values() for each in of)
+        due = ahead.next_inspection_landings or 0.0
+        end = max(last * 1.4, last + 2.0 * due, restored, 1.0)
+        return cls(between, last, end, ahead)
+
+    def expected(self, number: int, gear: Gear, places: int) -> tuple[Array, Array] | None:
+        """Landings from the last inspection on, and the 5, 50 and 95 % quantiles at each. [in]"""
+        from mlg_troubleshoot.life.forecast import landings_of_bands
+
+        band = self.ahead.bands.get(number)
+        if band is None:
+            return None
+        passed = np.linspace(0.0, min(self.end - self.last, gear.horizon.value), places)
+        edges = [np.interp(passed, landings_of_bands(gear), edge) for edge in band]
+        return self.last + passed, np.transpose(edges)
+
+
 def wear_figure(life: GearLife, ahead: Forecast, gear: Gear, lengths: Lengths) -> Markup:
     """Draw the clearance of each joint over the landings: readings, limit, restorations and, from
     the last inspection on, the forecast with its 90 % band.
     """
-    from mlg_troubleshoot.life.wear_paths import stretches
-
-    drawn = {
-        n: s for n, s in stretches(life, gear.joint_numbers).items() if any(e.placed for e in s)
-    }
-    if not drawn:
+    wear = WearInTime.of(life, ahead, gear)
+    if wear is None:
         return Markup("")
-    last = max(at for of in drawn.values() for each in of for at, *_ in each.placed)
-    end = max(last * 1.4, last + 2.0 * (ahead.next_inspection_landings or 0.0), 1.0)
-    rows = -(-len(drawn) // 2)
+    rows = -(-len(wear.between) // 2)
     canvas = Canvas(
         2 * _PANEL_WIDE,
         rows * _PANEL_HIGH + 18,
         f"Clearance of each joint of {life.name} over landings",
     )
-    for place, (number, between) in enumerate(drawn.items()):
-        _panel(canvas, place, gear, number, between, (ahead, last, end), lengths)
+    for place, number in enumerate(wear.between):
+        _panel(canvas, place, gear, number, wear, lengths)
     base = rows * _PANEL_HIGH + 10
     shown = [
         Series("limit", (), (), "5 3", _RED),
@@ -137,13 +170,10 @@ def _panel(
     place: int,
     gear: Gear,
     number: int,
-    between: Sequence[Stretch],
-    time: tuple[Forecast, float, float],
+    wear: WearInTime,
     lengths: Lengths,
 ) -> None:
-    from mlg_troubleshoot.life.forecast import landings_of_bands
-
-    ahead, last, end = time
+    between, end = wear.between[number], wear.end
     joint = gear.joint(number)
     shown = lengths.unit.from_inches
     limit = shown(joint.limit.value)
@@ -152,14 +182,10 @@ def _panel(
     plot = Plot(canvas, Axis("landings", 0.0, end), Axis("", 0.0, 1.15 * max(limit, most)))
     plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
     canvas.text(x + 52, y + 13, f"#{number} {joint.name}, {lengths.unit}", bold=True)
-    band = ahead.bands.get(number)
-    if band is not None:
-        passed = np.linspace(0.0, min(end - last, gear.horizon.value), 25)
-        low, middle, high = (
-            np.minimum(shown(np.interp(passed, landings_of_bands(gear), edge)), plot.y.high)
-            for edge in band
-        )
-        ahead_at = last + passed
+    expected = wear.expected(number, gear, 25)
+    if expected is not None:
+        ahead_at, edges_in = expected
+        low, middle, high = np.minimum(edges_in.T * shown(1.0), plot.y.high)
         around = [
             *zip(ahead_at, low, strict=True),
             *zip(ahead_at[::-1], high[::-1], strict=True),

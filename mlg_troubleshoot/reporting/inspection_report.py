@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
+from mlg_troubleshoot.decision.columns import SIGN_OFF
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
 from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear
@@ -284,6 +285,7 @@ def write_form(
         ),
         "conventions": tuple(ClearanceConvention),
         "drawing": blank_schematic(gear),
+        "sign_off": SIGN_OFF,
     }
     document = Document("form.html.j2", context, file.stem)
     if file.suffix.lower() == ".html":

@@ -116,10 +116,11 @@ class Gear:
 class Hangar:
     """The gears of one world, and the technician who works on them."""
 
-    def __init__(self, world: World, n: int, seed: int) -> None:
+    def __init__(self, world: World, n: int, seed: int, loads: int | None = None) -> None:
         self.world, self.rng = world, np.random.default_rng(seed)
+        self.loads = seed if loads is None else loads
         self.store: Store | None = None
-        self.load = np.random.default_rng(seed + 77).uniform(0.0, 2.0 * np.pi, 10)
+        self.load = np.random.default_rng(self.loads + 77).uniform(0.0, 2.0 * np.pi, 10)
         self.gears: list[Gear] = []
         share = np.array(world.mix) / sum(world.mix)
         for kind in range(4):
@@ -283,7 +284,7 @@ class Hangar:
 
     def kept(self, n: int, seed: int, folder: Path) -> Hangar:
         """Keep other gears of the same world, every joint and the plunger read on each."""
-        others = Hangar(self.world, n, seed)
+        others = Hangar(self.world, n, seed, self.loads)
         for gear in others.gears:
             for j in set(range(1, 11)) - gear.shut:
                 others.read(gear, j)

@@ -130,3 +130,8 @@ def test_what_one_rig_cannot_say_stands_beside_its_verdict(tmp_path: Path) -> No
     said = json.loads(out.stdout)["cannot_say"]
     assert [out.exit_code, len(said)] == [0, 1]
     assert "whether other gears do the same" in said[0]
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_joints_worn_unlike_the_rest_of_their_gear_are_not_called_swapped(seed: int) -> None:
+    assert found("RATE", seed).faults == ()

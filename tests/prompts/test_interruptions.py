@@ -1,6 +1,6 @@
 """Entries that are interrupted at random moments: no answer is lost or asked again.
 
-``python -m tests.prompts.test_interruptions 200`` says how many were.
+``python -m tests.prompts.test_interruptions 200`` says how many were; a second number is the seed.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import pytest
 
 from mlg_troubleshoot.life.folding import lives
 from mlg_troubleshoot.store import Store
+from tests.cli.conftest import mlg
 
 pexpect = pytest.importorskip("pexpect")
 pytestmark = [
@@ -55,6 +56,7 @@ class Trial:
     interruptions: int = 0
     acknowledged: set[str] = field(default_factory=set)
     asked_again: list[str] = field(default_factory=list)
+    ended: dict[int, str] = field(default_factory=dict)
 
     @property
     def store(self) -> Path:
@@ -90,13 +92,15 @@ class Trial:
 
     def run(self) -> None:
         """One start of the program, and its end at a random moment."""
-        child = self.start(*["--resume"] * bool(self.acknowledged))
+        gear = ("--resume", "--tail", f"N{self.gear}", "--side", "LH")
+        child = self.start(*gear if self.acknowledged else ())
         pending = ""
         for _ in range(self.chance.randint(1, 6)):
             question = self.asked(child)
             if question is not None and pending:
                 self.acknowledged.add(pending)
             if question is None or question == _RESULT:
+                self.ended[self.gear] = child.before
                 self.next_gear(child)
                 return
             if question in self.acknowledged and question != "Enter computes":
@@ -133,7 +137,7 @@ class Trial:
                 or found.gear_landings != 2100 + gear
                 or str(found.inspection_date) != "2026-10-05"
             ):
-                lost.append(f"N{gear}: {found}")
+                lost.append(f"N{gear}: {found}, after {self.ended[gear][-600:]!r}")
         return lost
 
 
@@ -150,9 +154,41 @@ def test_two_hundred_interruptions_lose_no_answer(tmp_path: Path) -> None:
     assert trial.missing() == []
 
 
+# What is typed at a second visit, and what the inspection is then.
+_SECOND = ("n 3 5", "4", "5")
+
+
+@pytest.mark.parametrize("end", _ENDS)
+@pytest.mark.parametrize("place", range(len(_SECOND) + 1))
+def test_a_second_visit_loses_no_answer_at_any_question(
+    end: int, place: int, tmp_path: Path
+) -> None:
+    trial = Trial(tmp_path, random.Random(1))
+    entered = [f"--set={n}={n + 2}thou" for n in range(1, 11)]
+    gear = ("--tail", "N1", "--side", "LH")
+    mlg("check", *gear, "--convention", "TOTAL_PLAY", *entered, "--keep", "--store", trial.store)
+    child = trial.start(*gear)
+    for text in _SECOND[:place]:
+        child.expect_exact("> ")
+        child.sendline(text)
+    child.expect_exact("> ")
+    child.kill(end)
+    child.expect([pexpect.EOF, pexpect.TIMEOUT], timeout=5)
+    child.close(force=True)
+    is_open = 0 < place < len(_SECOND)
+    child = trial.start(*["--resume"] * is_open, *gear)
+    for text in _SECOND[place:]:
+        child.expect_exact("> ")
+        child.sendline(text)
+    child.expect_exact("Enter = done > ")
+    child.close(force=True)
+    found = lives(Store(trial.store))["N1", "LH"].inspections[-1].inspection
+    assert [found.entered[n].text for n in (3, 4, 5)] == ["4", "6thou", "5"]
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        done = interrupted(Path(folder), int(sys.argv[1]))
+        done = interrupted(Path(folder), *map(int, sys.argv[1:]))
         print(
             f"{done.interruptions} interruptions, {done.gear - 1} gears; asked again:"
             f" {done.asked_again or 'none'}; missing: {done.missing() or 'none'}"

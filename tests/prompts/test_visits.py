@@ -206,6 +206,16 @@ def test_resume_lists_the_unfinished_entries_of_other_gears(
     assert len(life(store).inspections) == 1
 
 
+def test_resume_of_a_named_gear_finds_its_entry_that_has_no_reading_yet(
+    visit: Visit, store: SessionStore
+) -> None:
+    broken_off(visit, "N2", "r", "t", "t", "8")
+    broken_off(visit, "N1")
+    flags = Flags(typed={"tail_no": "N1", "side": "LH"})
+    visit("t", "t", *PLAY, *ENTERS, "", resume=True, flags=flags)
+    assert len(life(store).inspections) == 1
+
+
 def test_a_resumed_visit_asks_for_nothing_that_it_knows(visit: Visit, store: SessionStore) -> None:
     broken_off(visit, *GEAR, "t", "t", *PLAY, "f", "", "WO-7", "")
     screen = visit("2100", "", "", "", resume=True).screen
@@ -294,9 +304,32 @@ def test_landings_and_date_that_flags_give_are_not_asked(visit: Visit, store: Se
     assert (found.gear_landings, str(found.inspection_date)) == (2100.0, "2026-03-01")
 
 
+def test_done_of_a_gear_that_needed_no_repair_speaks_of_none(visit: Visit) -> None:
+    screen = visit(*GEAR, "t", "t", *["3"] * 10, "r", *ENTERS, "").screen
+    assert "DONE. r writes the report to sign." in screen
+
+
 def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
     visit(*GEAR, "y", "36", "y", "yes", "y", "18")
     screen = visit(*GEAR, "y", "", "3", "3", "y", "4", "y", "r").screen
     assert "DONE. The repair is in the records. r writes the report to sign." in screen
     assert life(store).repairs
+
+
+def test_next_of_an_earlier_visit_is_said_in_the_unit_of_its_readings(visit: Visit) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36")
+    assert "The plunger stands +36.0 thou off." in visit(*GEAR).screen
+
+
+def test_a_result_of_the_prompts_names_no_column_of_a_file(
+    visit: Visit, capsys: pytest.CaptureFixture
+) -> None:
+    visit(*FIRST)
+    screen = visit(*GEAR, "y", "36", "y", "yes", "y", "18", "y", "", "3", "3").screen
+    shown = screen + capsys.readouterr().out
+    assert "Check rigging and lock roller" in shown
+    assert "counts as older than the repair" in shown
+    for column in ("rigging_checked", "outcome_date", "plunger_date"):
+        assert column not in shown

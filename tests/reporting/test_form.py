@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+from mlg_troubleshoot.cli.prompts.answers import DAY, LENGTHS
+from mlg_troubleshoot.cli.prompts.conversation import answer
+from mlg_troubleshoot.cli.prompts.flow import Ask, Flow
 from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import pdf
 from mlg_troubleshoot.reporting.inspection_report import write_form
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from tests.prompts.scripted import ENTERS, NOTHING
 
 from .conftest import readable
 from .test_pdf import opened
+
+# The optional answers by the letters that are typed for them.
+OPTIONAL = {**dict(zip("pm", LENGTHS, strict=True)), **DAY}
 
 
 @pytest.mark.parametrize("page", ["A4", "Letter"])
@@ -47,6 +55,28 @@ def test_the_form_asks_for_side_unit_and_convention_and_fills_in_none(form: str)
     ):
         assert words in form
     assert "(default)" not in form
+
+
+def test_the_form_has_the_boxes_of_the_prompts_in_their_order(gear: Gear, tmp_path: Path) -> None:
+    typed = ("N1", "l", "t", "t", *["3"] * len(gear.joints), *ENTERS)
+    flow = Flow(gear)
+    turn = flow.begin(NOTHING)
+    asked: list[str] = []
+    for text in typed:
+        ask, at = turn.state.ask, turn.state.at
+        if ask is Ask.MORE:
+            letters = flow.page(turn.state, 80).prompt.partition(" or ")[0].split(",")
+            found = [
+                OPTIONAL.get(letter.strip(), "outcome") for letter in letters if letter.strip()
+            ]
+            asked += dict.fromkeys(found)
+        else:
+            asked.append(str(ask.value if at is None else at))
+        turn = answer(flow, turn.state, text)
+    assert turn.state.ask is Ask.REVIEW
+    write_form(tmp_path / "form.html", gear)
+    boxes = re.findall(r'data-asks="(\w+)"', (tmp_path / "form.html").read_text(encoding="utf-8"))
+    assert boxes == asked
 
 
 def test_without_an_engine_the_form_says_what_to_do(

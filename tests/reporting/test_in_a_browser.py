@@ -18,7 +18,8 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Rejected
 from mlg_troubleshoot.gear.gear import Gear
-from tests.cli.conftest import mlg
+from tests.cli.conftest import FLEET, mlg
+from tests.store.places import table
 from tests.store.test_history_commands import keep, visit
 
 from .conftest import FAILURE, SOUND, WORN, Judge, Made, write_reports
@@ -48,6 +49,53 @@ axe.run(document, {{resultTypes: ["violations"]}}).then(result => {{
 }});
 </script>
 </body>"""
+
+# Shows a document in a frame of a given width and compares the boxes of its texts, and of the
+# shapes that are drawn over a text.
+BOXES = """<!doctype html><meta charset="utf-8">
+<iframe id="frame" style="border: 0; width: {width}px; height: 30000px"></iframe>
+<script>
+const frame = document.getElementById("frame");
+frame.onload = () => {{
+  const page = frame.contentDocument;
+  const boxes = [];
+  const add = (node, element, rectangles) => {{
+    const clip = element.closest(".scroll")?.getBoundingClientRect();
+    for (const each of rectangles) {{
+      const left = Math.max(each.left, clip?.left ?? 0);
+      const right = Math.min(each.right, clip?.right ?? Infinity);
+      if (right > left) boxes.push([node, left, each.top, right, each.bottom]);
+    }}
+  }};
+  const texts = page.createTreeWalker(page.body, NodeFilter.SHOW_TEXT);
+  while (texts.nextNode()) {{
+    const node = texts.currentNode;
+    if (!node.data.trim() || !node.parentElement.checkVisibility()) continue;
+    const range = page.createRange();
+    range.selectNodeContents(node);
+    add(node, node.parentElement, range.getClientRects());
+  }}
+  const count = boxes.length;
+  for (const shape of page.querySelectorAll("svg circle, svg rect"))
+    if (frame.contentWindow.getComputedStyle(shape).fill !== "none")
+      add(shape, shape, [shape.getBoundingClientRect()]);
+  const found = [];
+  boxes.slice(0, count).forEach(([a, left, top, right, bottom], place) => {{
+    for (const [b, left2, top2, right2, bottom2] of boxes.slice(place + 1)) {{
+      const wide = Math.min(right, right2) - Math.max(left, left2);
+      const high = Math.min(bottom, bottom2) - Math.max(top, top2);
+      const drawnOver = b.nodeType === 3 || a.compareDocumentPosition(b) & 4;
+      if (a !== b && drawnOver && wide > 1 && high > 0.3 * Math.min(bottom - top, bottom2 - top2))
+        found.push([a.data, b.data ?? b.outerHTML]);
+    }}
+  }});
+  const out = document.createElement("pre");
+  out.id = "result";
+  out.textContent = JSON.stringify({{found, count, wide: page.documentElement.scrollWidth}});
+  document.body.append(out);
+}};
+frame.srcdoc = {document};
+</script>"""
 
 
 def chromium(profile: Path, *arguments: str) -> str:
@@ -136,3 +184,57 @@ def test_axe_finds_nothing_in_the_pages_of_a_fleet_and_of_a_life(tmp_path: Path)
     mlg("fleet", *store, "--report", tmp_path / "out")
     for file in (tmp_path / "out").glob("*.html"):
         assert violations(file.read_text(encoding="utf-8"), tmp_path) == []
+
+
+def overlaps(html: str, folder: Path, width: int) -> list[list[str]]:
+    """Texts that lie over one another, or under a shape, at a width of the window."""
+    page = folder / "boxes.html"
+    document = json.dumps(html).replace("</", "<\\/")
+    page.write_text(BOXES.format(width=width, document=document), encoding="utf-8")
+    dumped = chromium(folder, "--virtual-time-budget=20000", "--dump-dom", page.as_uri())
+    result = json.loads(unescape(re.findall(r'<pre id="result">(.*?)</pre>', dumped, re.DOTALL)[0]))
+    assert result["count"] > 20
+    assert result["wide"] <= width
+    return list(result["found"])
+
+
+@pytest.fixture(scope="module")
+def documents(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """A report with earlier inspections, a batch summary, a fleet page and the page of a life."""
+    folder = tmp_path_factory.mktemp("documents")
+    store = ("--store", str(folder / "store.sqlite"))
+    earlier = [visit(n, 0.0010 + 0.0012 * n, tail="N123AB") for n in range(12)]
+    keep(folder, *earlier, more=store)
+    worn = {f"clearance_{n}_in": "0.009" for n in (2, 4, 5)}
+    last = table(folder, visit(12, 0.013, tail="N123AB") | worn)
+    out = ("--report", folder / "out", "--format", "html")
+    mlg("check", last, *store, "--keep", *out)
+    mlg("check", FLEET, *out)
+    mlg("fleet", *store, "--report", folder / "out")
+    named = [*(folder / "out").glob("mlg-N123AB*"), *(folder / "out").glob("*batch*")]
+    named += [folder / "out" / "fleet.html", *(folder / "out").glob("mlg-life*")]
+    return [file.read_text(encoding="utf-8") for file in named if file.suffix == ".html"]
+
+
+@pytest.mark.parametrize("width", [390, 1000, 1600])
+@pytest.mark.parametrize("place", range(4), ids=["report", "batch", "fleet", "life"])
+def test_no_text_lies_over_another(
+    place: int, width: int, documents: list[str], tmp_path: Path
+) -> None:
+    assert len(documents) == 4
+    assert overlaps(documents[place], tmp_path, width) == []
+
+
+@pytest.mark.parametrize(
+    ("end", "cover"),
+    [
+        ("</h1>", '</h1><p style="margin-top: -1rem">covers</p>'),
+        ("</text></svg>", '</text><rect width="900" height="900" fill="#123"></rect></svg>'),
+    ],
+    ids=["text", "shape"],
+)
+def test_what_covers_a_text_would_be_found(
+    end: str, cover: str, worn: Made, tmp_path: Path
+) -> None:
+    assert end in worn.html
+    assert overlaps(worn.html.replace(end, cover, 1), tmp_path, 1000)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from types import MappingProxyType
 
+from mlg_troubleshoot.cli.output import at_prompt
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
+from mlg_troubleshoot.decision import columns
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
-    COLUMNS,
     CONVENTION,
     MARGIN,
     OUTCOME,
@@ -36,8 +37,7 @@ from mlg_troubleshoot.units import (
 # Columns that an entry may have in addition to its heading and its clearances, in the order in
 # which they are shown.
 LENGTHS = (PLUNGER_DISPLACEMENT.name, MARGIN.name)
-_SIGNED = sorted((column for column in COLUMNS if column.sign_off), key=lambda c: c.sign_off)
-SIGN_OFF = tuple(column.name for column in _SIGNED)
+SIGN_OFF = tuple(column.name for column in columns.SIGN_OFF)
 # What was repaired and what the day allows, by the letters that are typed for it.
 DAY = {
     "n": "restored_joints",
@@ -230,20 +230,12 @@ def judge(
     read, problems = judge_length(CLEARANCE.header(number), typed, options)
     if problems or not isinstance(read, Inspection):
         return JudgedReading(
-            " ".join(f"expected {p.expected}. {_at_prompt(p.remedy)}" for p in problems),
+            " ".join(f"expected {p.expected}. {at_prompt(p.remedy)}" for p in problems),
             refused=True,
         )
     if number not in read.entered:
         return JudgedReading()
     return JudgedReading(Sentence.joined(read.warnings), parse_length(read.entered[number].text))
-
-
-# What a remedy says for the cells of a file only.
-_OF_FILES = re.compile(r",? or (?:pass --decimal-comma|leave it blank[^.]*)")
-
-
-def _at_prompt(remedy: str) -> str:
-    return _OF_FILES.sub("", remedy)
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:
@@ -257,7 +249,7 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
     if problems or not isinstance(read, Inspection):
         raise UsageError(
             f"{typed!r} is not taken: expected {problems[0].expected}",
-            _at_prompt(problems[0].remedy),
+            at_prompt(problems[0].remedy),
         )
     return read
 

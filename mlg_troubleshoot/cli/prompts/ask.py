@@ -95,11 +95,11 @@ class _Saver:
             self._say_once(f"{error.message}. {error.remedy}")
 
     def unfinished(self) -> tuple[Session, ...]:
-        """The other unfinished sessions of this gear type, the last one first."""
+        """The other unfinished sessions with readings of this gear type, the last one first."""
         found, damaged = self._store.unfinished(self._gear.id)
         for message in damaged:
             self._say_once(message)
-        return tuple(each for each in found if each.id != self.session.id)
+        return tuple(each for each in found if each.answers.joints and each.id != self.session.id)
 
     def find_saved(self, tail_no: str, side: Side) -> Session | None:
         gear = (tail_no.casefold(), side)

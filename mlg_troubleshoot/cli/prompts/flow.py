@@ -136,7 +136,7 @@ class Flow:
                 f"the saved inspection is one of gear {saved.gear_id!r}, not of {self.gear.id!r}",
                 "Give that gear with --gear, or begin a new inspection.",
             )
-        against = _contradictions(answers, given)
+        against = contradictions(answers, given)
         if against:
             raise UsageError(
                 f"the saved inspection has {against}",
@@ -486,7 +486,7 @@ class Flow:
             return self._go_on(answers, from_review)
         if saved is None:
             return self._offer_visit(answers)
-        if not _contradictions(saved.answers, answers):
+        if not contradictions(saved.answers, answers):
             return Turn(State(Ask.OFFER, answers, saved=saved))
         told = ("An unfinished inspection is not offered: ", Tone.WARN)
         return self._go_on(answers, told=(line(told, self._heading(saved.answers)),))
@@ -625,7 +625,7 @@ def _known(value: _T | None) -> _T:
     return value
 
 
-def _contradictions(saved: Answers, given: Answers) -> str:
+def contradictions(saved: Answers, given: Answers) -> str:
     """Say where what is given contradicts what is saved; empty if nowhere."""
     return ", ".join(
         f"{ask.value} {kept}, not {new}"

@@ -7,6 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+# Stands for a space at which no line is wrapped.
+GLUE = "\u2800"
+
 
 class Tone(StrEnum):
     """What a part of a line is; the terminal decides how it looks."""
@@ -31,7 +34,7 @@ class Line:
 
     @property
     def text(self) -> str:
-        return " " * self.indent + "".join(text for text, _ in self.parts)
+        return " " * self.indent + "".join(text for text, _ in self.parts).replace(GLUE, " ")
 
 
 BLANK = Line((), 0)
@@ -54,5 +57,6 @@ def warning(text: str, *more: str | tuple[str, Tone]) -> Line:
 def keys(*pairs: tuple[str, str]) -> Line:
     parts: list[tuple[str, Tone]] = []
     for name, meaning in pairs:
-        parts += [(name, Tone.KEY), (f" = {meaning}", Tone.PLAIN), ("   ", Tone.PLAIN)]
+        said = f" = {meaning}".replace(" ", GLUE)
+        parts += [(name, Tone.KEY), (said, Tone.PLAIN), ("   ", Tone.PLAIN)]
     return Line(tuple(parts[:-1]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import date
 
+from mlg_troubleshoot.cli.output import at_prompt
 from mlg_troubleshoot.cli.prompts.answers import DAY, SIGN_OFF, Answers, Reading, judge
 from mlg_troubleshoot.cli.prompts.conversation import Page
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line, note, warning
@@ -178,6 +179,7 @@ NEXT_HELP = (
 def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
     """What is kept of a gear: its readings with their days, its verdict and NEXT."""
     answers = visit.answers
+    unit = answers.unit or LengthUnit.INCH
     rows = []
     for number in gear.joint_numbers:
         reading = answers.reading(number)
@@ -197,7 +199,7 @@ def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
         note(f"Readings{kind}: ", "; ".join(rows)),
         *((note("; ".join(more)),) if more else ()),
         line((f"Last verdict: {visit.verdict}", Tone.STRONG)),
-        line((f"NEXT: {said_in(visit.next, answers.unit or LengthUnit.INCH)}", Tone.STRONG)),
+        line((f"NEXT: {at_prompt(said_in(visit.next, unit))}", Tone.STRONG)),
     )
 
 
@@ -213,7 +215,8 @@ def next_page(visit: Visit) -> Page:
     ]
     shown = [keys(*(pair for pair in pairs if pair[0]))]
     if visit.action is Action.DONE:
-        end = "The repair is in the records. r writes the report to sign."
+        kept = "The repair is in the records. " * visit.row.is_repaired
+        end = f"{kept}r writes the report to sign."
         shown.insert(0, line(("DONE. ", Tone.GOOD), end))
     return Page(tuple(shown), " " + "y, " * bool(visit.todo) + "another letter, or Enter = done > ")
 

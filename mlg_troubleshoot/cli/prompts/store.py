@@ -144,8 +144,8 @@ class SessionStore:
         return first
 
     def unfinished(self, gear_id: str) -> tuple[tuple[Session, ...], tuple[str, ...]]:
-        """Return the unfinished sessions of a gear, the last one first, and what could not be read
-        on the way.
+        """Return the unfinished sessions of a gear, the last one first but those without any
+        reading after all others, and what could not be read on the way.
         """
         found = []
         damaged = []
@@ -158,11 +158,11 @@ class SessionStore:
                 except SessionFileError as error:
                     damaged.append(f"{error.message} {error.remedy}")
                     continue
-                if session.gear_id == gear_id and session.answers.joints:
+                if session.gear_id == gear_id:
                     found.append(session)
         except OutputError as error:
             damaged.append(f"{error.message}. {error.remedy}")
-        return tuple(found), tuple(damaged)
+        return tuple(sorted(found, key=lambda each: not each.answers.joints)), tuple(damaged)
 
     def _readable(self, draft: Draft) -> Session:
         """Read a draft; one that is damaged is said once and put away."""

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from rich.text import Text
 
 from mlg_troubleshoot.cli.output import DataConsole, console, word
-from mlg_troubleshoot.cli.prompts.lines import Line, Tone
+from mlg_troubleshoot.cli.prompts.lines import GLUE, Line, Tone
 
 _STYLES = {
     Tone.PLAIN: "",
@@ -51,6 +51,7 @@ class RichTerminal:
                 rows = list(text.wrap(self._console, space)) or [text]
             for row in rows:
                 row.rstrip()
+                row.plain = row.plain.replace(GLUE, " ")
                 self._console.print(Text(" " * each.indent if row else "") + row, soft_wrap=True)
 
     def ask(self, prompt: str) -> str:

@@ -4,6 +4,7 @@ for.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -28,7 +29,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife, KeptInspection, lives, without_dashes
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_from
-from mlg_troubleshoot.units import LengthUnit, parse_length
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence, parse_length
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
 _ASKS = {
@@ -37,6 +38,7 @@ _ASKS = {
     Action.RESTORE: RESTORED_JOINTS.name,
     Action.RETRACT: OUTCOME.name,
 }
+_LENGTH = re.compile(r"([+-]?\d\.\d+) in\b")
 _WITH_JOINTS = (Action.MEASURE, Action.MEASURE_AGAIN)
 
 
@@ -53,7 +55,7 @@ class Visit:
     answers: Answers
     read_on: Mapping[int, str]
     verdict: str
-    next: str
+    next: Sentence
     action: Action | None
     todo: tuple[int | str, ...]
     joints: tuple[int, ...]
@@ -114,11 +116,11 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
     asked = _ASKS.get(action) if action else None
     joints = tuple(step.get("joints", ()))
     todo = joints if action in _WITH_JOINTS else () if asked is None else (asked,)
-    said = str(step.get("text", ""))
+    said = _with_lengths(str(step.get("text", "")))
     if restored:
         names = ", ".join(f"#{joint}" for joint in restored)
         action, todo = Action.MEASURE, restored
-        said = f"Restored since, as the records say: {names}. Enter the new clearances."
+        said = Sentence(f"Restored since, as the records say: {names}. Enter the new clearances.")
     versions = _versions(life, latest.record)
     verdict = latest.result.get("verdict")
     return Visit(
@@ -135,6 +137,17 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
         if len(versions) > 1
         else None,
     )
+
+
+def _with_lengths(kept: str) -> Sentence:
+    """A sentence as it is kept, in inches, that can be said in the unit of its reader again."""
+    parts = [
+        Length(float(each), len(each.partition(".")[2]), sign=each[0] in "+-")
+        if place % 2
+        else each
+        for place, each in enumerate(_LENGTH.split(kept))
+    ]
+    return Sentence.of("{}" * len(parts), *parts)
 
 
 def _versions(life: GearLife, last: Record) -> list[Record]:
@@ -162,10 +175,15 @@ def _read_on(versions: list[Record]) -> Mapping[int, str]:
     return days
 
 
+def unit_entered(row: Inspection) -> LengthUnit:
+    """The unit of most readings of an inspection."""
+    units = Counter(entered.unit for entered in row.entered.values())
+    return units.most_common(1)[0][0] if units else LengthUnit.INCH
+
+
 def answers_of(row: Inspection, gear: Gear, continues: str) -> Answers:
     """An inspection as answers, each as it was typed."""
-    units = Counter(entered.unit for entered in row.entered.values())
-    unit = units.most_common(1)[0][0] if units else LengthUnit.INCH
+    unit = unit_entered(row)
     joints = {
         joint: _answer(row, joint) if joint in row.clearance_in else NOT_MEASURED
         for joint in gear.joint_numbers

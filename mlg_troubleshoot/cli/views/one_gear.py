@@ -27,7 +27,7 @@ from mlg_troubleshoot.decision.sentences import (
     rigging_sentence,
 )
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, Length, Sentence, said_in
+from mlg_troubleshoot.units import ClearanceConvention, Length, Sentence
 
 _JOINTS = 5
 _NOTES = 4
@@ -86,7 +86,7 @@ def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
         advice = (judgement.measuring, judgement.posterior) if detail else (judgement.posterior,)
         lines += [(said.text, "") for said in advice if said is not None]
     for said, style in lines:
-        body.append_text(text(("\n" if body else "") + said_in(said, screen.unit), style))
+        body.append_text(text(("\n" if body else "") + screen.said(said), style))
     return body
 
 
