@@ -245,7 +245,7 @@ class Sentence(str):
 
     def said_in(self, unit: LengthUnit) -> str:
         """Say it again, its lengths in another unit."""
-        if not self._facts:
+        if unit is LengthUnit.INCH or not self._facts:
             return str(self)
         return self._template.format(*(said_in(fact, unit) for fact in self._facts))
 

@@ -135,13 +135,13 @@ def pictures() -> dict[str, str]:
     )
     drawn = schematic(gear, found, width=900.0)
     return {
-        "linkage.svg": _standing_alone(
+        "linkage.svg": standing_alone(
             [str(panel) for _plane, panel, _width in drawn.panels],
             f"{gear.name}, linkage {gear.reference.name} at mid-position: {gear.provenance}."
             f" Arrows: worst-case clearances of the published failure, {drawn.exaggeration} times"
             " larger than life.",
         ),
-        "plunger.svg": _standing_alone(
+        "plunger.svg": standing_alone(
             [str(plunger_curve(gear, found, width=620.0))],
             "Plunger over the release stroke, nominal and with the clearances of the published"
             " failure.",
@@ -149,7 +149,7 @@ def pictures() -> dict[str, str]:
     }
 
 
-def _standing_alone(panels: list[str], caption: str) -> str:
+def standing_alone(panels: list[str], caption: str) -> str:
     """Set drawings side by side in a file of their own, with a caption below."""
     sizes = [
         tuple(map(float, re.search(r'width="([\d.]+)" height="([\d.]+)"', p).groups()))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Any
+from importlib import import_module
+from types import ModuleType, SimpleNamespace
+from typing import Any, cast
 
 import typer
 from typer.core import TyperGroup
@@ -27,12 +29,28 @@ from mlg_troubleshoot.cli import (
 from mlg_troubleshoot.cli.boundary import Boundary
 from mlg_troubleshoot.errors import ExitCode
 
+_ASK_FOR_HELP = frozenset(("--help", "-h"))
+
+
+def _load_help_pages() -> None:
+    """Load what typer lays out help with, but not the Markdown and the tracebacks that it can also
+    show and this program does not: they take as long as the rest.
+    """
+    unused = SimpleNamespace(Markdown=None, Traceback=None)
+    names = {"rich.markdown", "rich.traceback"} - sys.modules.keys()
+    sys.modules.update(dict.fromkeys(names, cast(ModuleType, unused)))
+    import_module("typer.rich_utils")
+    for name in names:
+        del sys.modules[name]
+
 
 class CommandGroup(TyperGroup):
     """All commands behind one boundary; without a command the help is shown."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
         given = list(sys.argv[1:] if args is None else args)
+        if not given or _ASK_FOR_HELP.intersection(given):
+            _load_help_pages()
         with Boundary():
             code = super().main(given or ["--help"], *more, **{**named, "standalone_mode": False})
             raise SystemExit(code if given else ExitCode.USAGE)

@@ -65,8 +65,9 @@ class Run:
             seed=wanted.seed,
             extension=load_model_extension(extensions, tables.gear, causes),
         )
-        self._records = options.Records(wanted.store, tables.gear).kept
-        self._place = self._records if wanted.keep or self._asks else None
+        self._records = options.Records(wanted.store, tables.gear)
+        # A store that nothing is kept in is not opened: SQLAlchemy is a third of a check.
+        self._place = self._records.kept if wanted.keep or self._asks else None
 
     def run(self) -> int:
         """Judge, show and keep; the exit code is returned."""
@@ -125,7 +126,7 @@ class Run:
         terminal = RichTerminal()
         saved = by_hand.unfinished(store, terminal, gear, self._flags) if wanted.resume else None
         given = by_hand.answers_of(self._flags, self._asked)
-        find = partial(by_hand.kept_visit, self._records, gear)
+        find = partial(by_hand.kept_visit, self._records.kept, gear)
         ask = partial(
             ask_inspection, gear, terminal, store, advice=by_hand.advice_for(gear), find_visit=find
         )
@@ -240,7 +241,9 @@ class Run:
                 supersede(self._place, before, result, self._asked)
             added = Kept(1, 0, tuple(warnings_of(self._place, [(before.tail_no, before.side)])))
         else:
-            added = keep(result, self._asked, self._place, self._same_tail())
+            with stages(quiet=self._wanted.quiet) as bar:
+                told = partial(bar, "Keeping")
+                added = keep(result, self._asked, self._place, self._same_tail(), told)
         if not self._wanted.quiet:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""

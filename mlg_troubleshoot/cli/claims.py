@@ -29,15 +29,15 @@ def claim(
     Inputs of every command are the store, `mlg.toml`, the gear file and what it names. A report is
     a file of its own name: of the files in its folder only those that a report could replace count.
     """
-    from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.outputs import claim_outputs
-    from mlg_troubleshoot.store import files_of
-
     wanted = [each for each in outputs if each.path is not None]
     if report is not None:
         wanted += _reports(report, wanted)
     if not wanted:
         return
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.outputs import claim_outputs
+    from mlg_troubleshoot.store import files_of
+
     files: list[str | Path | int] = [*remembered.files(), *files_of(store)]
     for name in inputs:
         files += _read(name)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision import plunger_reading, sentences
@@ -67,9 +68,10 @@ def assess(
         part = rows[start : start + _CHUNK]
         valid = [row for row in part if isinstance(row, Inspection)]
         drawn = seed if advice else None
-        assessed = iter(
-            _assess_valid(Cases.of(gear, valid, extension, fleet), table, drawn) if valid else ()
-        )
+        # Products of this size take twice as long where they wait for other threads.
+        with threadpool_limits(1, "blas"):
+            cases = Cases.of(gear, valid, extension, fleet)
+            assessed = iter(_assess_valid(cases, table, drawn) if valid else ())
         judged += [
             (
                 next(assessed)

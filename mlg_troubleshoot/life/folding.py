@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -16,8 +16,6 @@ from mlg_troubleshoot.store import Record, RecordKind, Store, StoreError, inspec
 GearKey = tuple[str, str]
 # Letters of a hash by which a record may be named. [1]
 LEAST_OF_A_HASH = 6
-# Of more gears than this, the whole store is read at once. [1]
-_GEARS_ONE_BY_ONE = 100
 
 
 @dataclass(frozen=True)
@@ -86,10 +84,21 @@ def lives(
     store: Store, tail: str | None = None, side: str | None = None
 ) -> dict[GearKey, GearLife]:
     """Every gear's life, or those of one aircraft."""
+    return _lives(store.all() if tail is None else store.of_gear(tail, side))
+
+
+def lives_of(store: Store, keys: Collection[GearKey]) -> dict[GearKey, GearLife]:
+    """The lives of some gears."""
+    wanted = set(keys)
+    records = store.of_aircraft({tail for tail, _side in wanted})
+    return _lives(each for each in records if (each.tail_no, each.side) in wanted)
+
+
+def _lives(records: Iterable[Record]) -> dict[GearKey, GearLife]:
     by_gear: dict[GearKey, list[Record]] = {}
-    for record in store.all() if tail is None else store.of_gear(tail, side):
+    for record in records:
         by_gear.setdefault((record.tail_no, record.side), []).append(record)
-    return {key: _life(key, records) for key, records in sorted(by_gear.items())}
+    return {key: _life(key, own) for key, own in sorted(by_gear.items())}
 
 
 def life_of(store: Store, tail: str, side: str) -> GearLife:
@@ -115,11 +124,8 @@ def without_dashes(tail: str) -> str:
 
 def warnings_of(store: Store, keys: Collection[GearKey]) -> list[str]:
     """The records of some gears whose dates and landings disagree."""
-    if len(keys) > _GEARS_ONE_BY_ONE:
-        found = lives(store)
-    else:
-        found = {key: life for wanted in keys for key, life in lives(store, *wanted).items()}
-    return [warning for key, life in found.items() if key in keys for warning in life.warnings]
+    found = lives_of(store, keys).values()
+    return [warning for life in found for warning in life.warnings]
 
 
 def find(store: Store, record_id: str) -> Record:

@@ -7,6 +7,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import date
+from hashlib import sha256
+from itertools import islice
+from operator import attrgetter
 
 import numpy as np
 
@@ -17,7 +20,13 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.wear_paths import placed_in_time, stretches, unit_of, wear_paths
-from mlg_troubleshoot.wear import Samples, WearModel, first_passage, fit_wear
+from mlg_troubleshoot.wear import (
+    Samples,
+    WearModel,
+    WearPath,
+    first_passage,
+    fit_wear,
+)
 
 # Where a forecast looks between the last inspection and the horizon: now, and from 1/800 of the
 # horizon (25 of 20,000 landings, about a week) on in equal ratios. [1]
@@ -25,7 +34,10 @@ _AHEAD = np.concatenate([[0], np.geomspace(1 / 800, 1, 28)])
 # At which of these the model itself is asked for the worst case, which departs slowly from the sum
 # of amplified clearances.
 _ASKED = np.array([0, 8, 14, 18, 22, 25, 28])
-_GEARS_AT_ONCE = 100
+# Gears that are forecast at once: their simulated clearances are 15 MB.
+_GEARS_AT_ONCE = 25
+# Gears that the wear is learnt from at first; more follow only where these say too little. [1]
+TEACHERS = 100
 # Stands for the worst case of a linkage that does not close: beyond any margin. [in]
 _NOT_CLOSING_IN = 1000
 
@@ -44,29 +56,19 @@ class Forecast:
     due_date: the day of the next inspection, None where it is not known.
     """
 
-    joints: Mapping[int, Samples] = field(default_factory=dict)
+    joints: Mapping[int, Quantiles] = field(default_factory=dict)
     bands: Mapping[int, Array] = field(default_factory=dict)
-    limit: Samples | None = None
+    landings_to_limit: Quantiles | None = None
     limit_joint: int | None = None
-    margin: Samples | None = None
+    landings_to_margin: Quantiles | None = None
     next_inspection_landings: float | None = None
     due_now: str = ""
     due_date: str | None = None
 
-    @property
-    def landings_to_limit(self) -> Quantiles | None:
-        return quantiles(self.limit)
 
-    @property
-    def landings_to_margin(self) -> Quantiles | None:
-        return quantiles(self.margin)
-
-
-def quantiles(samples: Samples | None) -> Quantiles | None:
+def _quantiles(samples: Array) -> Quantiles:
     """The 5, 50 and 95 % quantiles; null beyond the horizon."""
-    if samples is None:
-        return None
-    ends = samples.quantile([0.05, 0.5, 0.95])
+    ends = Samples(samples).quantile([0.05, 0.5, 0.95])
     return {
         name: float(end) if np.isfinite(end) else None
         for name, end in zip(("p05", "p50", "p95"), ends, strict=True)
@@ -79,18 +81,29 @@ def landings_of_bands(gear: Gear) -> Array:
     return landings
 
 
+def teachers_first(keys: Iterable[GearKey]) -> list[GearKey]:
+    """The gears of a fleet in an order by chance, which stays as the fleet grows."""
+    return sorted(keys, key=lambda key: sha256("\0".join(key).encode()).digest())
+
+
 def fit_fleet(lives: Iterable[GearLife], gear: Gear) -> WearModel | None:
-    """Learn the wear of all joints of all gears whose dates and landings agree; None if none states
-    its landings.
+    """Learn the wear of joints from as many gears as are needed, of which the dates and landings
+    agree; None if none states its landings.
     """
-    paths = [
-        path
-        for life in lives
-        if not life.warnings
-        for own, _begun in wear_paths(life, gear.joint_numbers).values()
-        for path in own
-        if len(own) > 1 or len(np.asarray(path.usage))
-    ]
+    paths: list[WearPath] = []
+    asked = iter(lives)
+    while part := sorted(islice(asked, TEACHERS), key=attrgetter("key")):
+        paths += [
+            path
+            for life in part
+            if not life.warnings
+            for own, _begun in wear_paths(life, gear.joint_numbers).values()
+            for path in own
+            if len(own) > 1 or len(np.asarray(path.usage))
+        ]
+        followed = {path.unit for path in paths if len(np.asarray(path.usage)) > 1}
+        if len(followed) >= WearModel.learns_from:
+            break
     return fit_wear(paths) if any(len(np.asarray(path.usage)) for path in paths) else None
 
 
@@ -152,7 +165,7 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
         reasons.append(f"{joint_list(list(over))} over the limit when last read")
     if not reasons:
         return None
-    nothing = Samples(np.zeros(1))
+    nothing = _quantiles(np.zeros(1))
     worst = max(over, key=lambda n: over[n] / gear.joint(n).limit.value, default=None)
     why = ", and ".join(reasons)
     return Forecast(dict.fromkeys(over, nothing), {}, nothing, worst, nothing, 0.0, why)
@@ -211,11 +224,11 @@ def _forecast_part(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
         bands = np.quantile(wear[g][:, _ASKED], [0.05, 0.5, 0.95], axis=2)
         first = to_limit.argmin(axis=0)[np.isfinite(to_any)]
         yield Forecast(
-            {number: Samples(to_limit[j]) for j, number in enumerate(numbers) if read[g, j]},
+            {number: _quantiles(to_limit[j]) for j, number in enumerate(numbers) if read[g, j]},
             {number: bands[:, j] for j, number in enumerate(numbers) if read[g, j]},
-            Samples(to_any),
+            _quantiles(to_any),
             numbers[int(np.bincount(first).argmax())] if len(first) else None,
-            Samples(to_margin),
+            _quantiles(to_margin),
             due if np.isfinite(due) else None,
         )
 
@@ -223,17 +236,19 @@ def _forecast_part(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
 def _wear_ahead(part: Sequence[GearLife], model: WearModel, gear: Gear, ahead: Array) -> Array:
     """Simulated clearances (gears, joints, ahead, samples). [in]
 
-    Gear by gear, each from the model's seed: the forecast of a gear is the same whoever else is
-    asked for.
+    Each gear from the model's seed: its forecast is the same whoever else is asked for.
     """
-    found = []
+    numbers = gear.joint_numbers
+    paths: list[WearPath] = []
+    usage = []
     for life in part:
         now = life.inspections[-1].inspection.gear_landings or 0.0
-        begun = [start for _own, start in wear_paths(life, gear.joint_numbers).values()]
-        usage = np.maximum(now + ahead - np.array(begun)[:, None], 0.0)
-        units = [unit_of(life.key, number) for number in gear.joint_numbers]
-        found.append(model.forecast(units, usage, reading=False).samples)
-    return np.maximum(np.stack(found), 0.0)
+        for own, begun in wear_paths(life, numbers).values():
+            paths += own
+            usage.append(np.maximum(now + ahead - begun, 0.0))
+    units = [unit_of(life.key, number) for life in part for number in numbers]
+    found = model.of(paths).forecast(units, usage, reading=False, together=len(numbers)).samples
+    return np.maximum(found, 0.0).reshape(len(part), len(numbers), *found.shape[1:])
 
 
 def _worst_case_of(wear: Array, gear: Gear) -> Array:

@@ -153,7 +153,7 @@ def outlook_sentence(life: GearLife, ahead: Forecast, gear: Gear) -> str:
         return f"No landings left: {ahead.due_now}. Next inspection due now."
     if life.latest is not None and life.latest.inspection.gear_landings is None:
         return "No forecast: the last inspection does not state its landings (gear_landings)."
-    if ahead.limit is None:
+    if ahead.landings_to_limit is None:
         return ""
     joint = ""
     if ahead.limit_joint is not None:

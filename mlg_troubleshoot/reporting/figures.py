@@ -76,9 +76,14 @@ class Canvas:
         written = []
         for name, value in attributes.items():
             if value is not None:
-                shown = value if isinstance(value, str) else f"{value:.2f}".rstrip("0").rstrip(".")
-                written.append(f' {name.rstrip("_").replace("_", "-")}="{escape(shown)}"')
-        body = f">{escape(visible(content))}</{element}>" if content else "/>"
+                # Digits need no escape: that would be most of the time of a drawing.
+                shown = (
+                    str(escape(value))
+                    if isinstance(value, str)
+                    else f"{value:.2f}".rstrip("0").rstrip(".")
+                )
+                written.append(f' {name.rstrip("_").replace("_", "-")}="{shown}"')
+        body = f">{escape(visible(content))!s}</{element}>" if content else "/>"
         self._parts.append(f"<{element}{''.join(written)}{body}")
 
     def line(self, x1: float, y1: float, x2: float, y2: float, **stroke: Unpack[Stroke]) -> None:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearLife
-from mlg_troubleshoot.life.forecast import Forecast, landings_of_bands
-from mlg_troubleshoot.life.wear_paths import Stretch, stretches
 from mlg_troubleshoot.reporting.figures import (
     ACCENT,
     INK,
@@ -25,6 +23,11 @@ from mlg_troubleshoot.reporting.figures import (
     Series,
 )
 from mlg_troubleshoot.reporting.formats import Lengths
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.life.folding import GearLife
+    from mlg_troubleshoot.life.forecast import Forecast
+    from mlg_troubleshoot.life.wear_paths import Stretch
 
 # The colours and shapes of the signs that stand beside the verdicts in templates/signs.html.j2.
 _RED = "#a3131a"
@@ -108,6 +111,8 @@ class WearInTime:
     @classmethod
     def of(cls, life: GearLife, ahead: Forecast, gear: Gear) -> WearInTime | None:
         """The joints that were read at known landings; None if there is none."""
+        from mlg_troubleshoot.life.wear_paths import stretches
+
         known = stretches(life, gear.joint_numbers)
         between = {n: s for n, s in known.items() if any(each.placed for each in s)}
         if not between:
@@ -120,6 +125,8 @@ class WearInTime:
 
     def expected(self, number: int, gear: Gear, places: int) -> tuple[Array, Array] | None:
         """Landings from the last inspection on, and the 5, 50 and 95 % quantiles at each. [in]"""
+        from mlg_troubleshoot.life.forecast import landings_of_bands
+
         band = self.ahead.bands.get(number)
         if band is None:
             return None

@@ -76,7 +76,7 @@ def missing_characters(text: str) -> str:
         return ""
     covered = font_coverage()
     return "".join(
-        dict.fromkeys(c for c in text if ord(c) not in covered and c not in _PLAIN_SPACE)
+        c for c in dict.fromkeys(text) if ord(c) not in covered and c not in _PLAIN_SPACE
     )
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
 from mlg_troubleshoot.decision.columns import SIGN_OFF
@@ -23,7 +23,6 @@ from mlg_troubleshoot.decision.sentences import (
 )
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.looking_back import PastInspection
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.reporting import inspection_figures as drawn
 from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture
@@ -40,6 +39,9 @@ from mlg_troubleshoot.reporting.schematic import (
     schematic,
 )
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.life.looking_back import PastInspection
 
 SIGNATORIES = ("Measured by", "Independently measured by", "Rectified by", "Inspected by")
 _SIDES = {Side.LH: "left-hand main landing gear", Side.RH: "right-hand main landing gear"}

@@ -11,12 +11,11 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
-from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.output_types import (
@@ -32,6 +31,9 @@ from mlg_troubleshoot.output_types import (
 )
 from mlg_troubleshoot.outputs import SCHEMA_VERSION
 from mlg_troubleshoot.units import Sentence
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 
 _AS_THEY_ARE = frozenset((str, Sentence, int, bool, type(None)))
 _SINGLE = (Enum, np.generic)

@@ -8,7 +8,7 @@ from typing import Any
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
-from mlg_troubleshoot.life.forecast import Forecast, quantiles
+from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice
 from mlg_troubleshoot.life.outlook import Order, fleet_lines, work_sentence
 from mlg_troubleshoot.life.wear_paths import stretches
@@ -101,7 +101,7 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
                 "joint": number,
                 "limit_in": gear.joint(number).limit.value,
                 "readings": [reading[:2] for reading in between[-1].placed],
-                "landings_to_limit": quantiles(ahead.joints.get(number)),
+                "landings_to_limit": ahead.joints.get(number),
             }
             for number, between in stretches(life, gear.joint_numbers).items()
         ],

@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -560,6 +560,18 @@ class Store:
         where = [_records.c.tail_no == tail_no] + ([_records.c.side == side] if side else [])
         with self.transaction(writing=False) as connection:
             return [self._record(row) for row in self._rows(connection, *where)]
+
+    def of_aircraft(self, tails: Collection[str]) -> list[Record]:
+        """All records of some aircraft, each in the order of the chain."""
+        wanted = sorted(tails)
+        with self.transaction(writing=False) as connection:
+            return [
+                self._record(row)
+                for first in range(0, len(wanted), _AT_ONCE)
+                for row in self._rows(
+                    connection, _records.c.tail_no.in_(wanted[first : first + _AT_ONCE])
+                )
+            ]
 
     def newest(self, kind: RecordKind, most: int) -> list[Record]:
         """The newest records of a kind, the last one first."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.errors import UsageError
@@ -21,9 +24,7 @@ _DRAWS = 128
 _PATHS = 4096
 _PATHS_OF_MANY = 256
 _MANY = 64
-# Units read twice or more, and other units, that the population is learnt from at most: more would
-# not narrow it. [1]
-_LEARN_FROM = 160
+# Units read once that the population is learnt from at most, in addition to `learns_from`. [1]
 _LEARN_FROM_OTHERS = 40
 # Standard deviation of the pace of wear beyond the usage that any unit has reached: no reading so
 # far can show a curve that bends later. [1]
@@ -79,39 +80,58 @@ class WearModel(Result):
         Posterior draws of the population's parameters.
     seed : int
         Seed of fit and forecasts.
+    simulated : int
+        Simulated paths of each unit. [1]
     """
+
+    # Units read twice or more that are learnt from at most: more would not narrow it. [1]
+    learns_from: ClassVar[int] = 160
 
     paths: Mapping[str, tuple[WearPath, ...]]
     kinds: Mapping[str, float]
     scale: Scale
     draws: Draws
     seed: int
+    simulated: int
+
+    def of(self, paths: Iterable[WearPath]) -> WearModel:
+        """The same population, asked about other units of it."""
+        return replace(self, paths=_by_unit(paths))
 
     def forecast(
-        self, unit: str | Sequence[str], usage: ArrayLike, *, reading: bool = True
+        self,
+        unit: str | Sequence[str],
+        usage: ArrayLike,
+        *,
+        reading: bool = True,
+        together: int | None = None,
     ) -> Samples:
         """Forecast readings of the current path of a unit, or of n units at once.
 
         unit: one that is not known is a new one of the same population. usage, shape (m,) or (n,
         m): usage since the last restoration, the same for all or one row per unit; before
           the last reading the path is followed back along its drift. [usage]
-        reading: of a new reading, with its error; otherwise of the wear itself. Along the usages a
-        sample is one path. Returns samples of shape (m, n_samples) or (n, m, n_samples). [value]
+        reading: of a new reading, with its error; otherwise of the wear itself.
+        together: units that stand behind each other and are forecast as if nobody else was asked
+          for. Along the usages a sample is one path. Returns samples of shape (m, n_samples) or (n,
+        m, n_samples). [value]
         """
         units = [unit] if isinstance(unit, str) else list(unit)
         asked = np.asarray(usage, float)
         if not np.isfinite(asked).all() or (asked < 0.0).any():
             raise UsageError("a usage to forecast is negative or not finite", "Give usages from 0.")
         wanted = np.broadcast_to(np.atleast_1d(asked), (len(units), np.atleast_1d(asked).shape[-1]))
-        rng = np.random.default_rng(self.seed)
+        rng = _Streams(self.seed)
         parts = []
-        for chosen, count in self._chunks(len(units)):
+        for chosen in self._chunks(len(units), together or 1):
+            if together is not None:
+                rng = _Streams(self.seed, len(chosen) // together)
             names = [units[i] for i in chosen]
             order = np.argsort(wanted[chosen], axis=1)
             ascending = np.take_along_axis(wanted[chosen], order, axis=1) / self.scale.usage
             last = self._last(names)
             known = self._known_reading(names)
-            ends = self._ends(names, count, rng)
+            ends = self._ends(names, rng)
             found = np.concatenate(
                 [end.follow(ascending, last, known, rng, reading=reading) for end in ends]
             )
@@ -140,13 +160,12 @@ class WearModel(Result):
         samples = last + np.stack(passed)
         return Samples(samples[0] if isinstance(unit, str) else samples)
 
-    def _chunks(self, units: int) -> Iterator[tuple[Places, int]]:
-        """Units that are worked out at once, and simulated paths of each: as many whoever else is
-        asked for.
-        """
-        size, count = (_MANY, _PATHS) if len(self.paths) <= _MANY else (250, _PATHS_OF_MANY)
+    def _chunks(self, units: int, together: int) -> Iterator[Places]:
+        """Units that are worked out at once: whole groups of those asked about together."""
+        most = _MANY if self.simulated > _PATHS_OF_MANY else 250
+        size = max(most // together, 1) * together
         for first in range(0, units, size):
-            yield np.arange(first, min(first + size, units)), count
+            yield np.arange(first, min(first + size, units))
 
     def _paths(self, unit: str) -> tuple[WearPath, ...]:
         return self.paths[unit] if unit in self.paths else (WearPath(unit, (), ()),)
@@ -165,17 +184,42 @@ class WearModel(Result):
         last = [self.paths[u][-1].reading_u if u in self.paths else default for u in units]
         return np.array([np.nan if u is None else (u / self.scale.value) ** 2 for u in last])
 
-    def _ends(self, units: Sequence[str], count: int, rng: np.random.Generator) -> list[_Ends]:
+    def _ends(self, units: Sequence[str], rng: _Streams) -> list[_Ends]:
         steps = lay_out([self._paths(unit) for unit in units], self.scale)
-        # Draws stand kind by kind: every second one keeps their shares.
-        every = self.draws if count > _PATHS_OF_MANY else self.draws.take(np.arange(0, _DRAWS, 2))
-        repeats = count // len(every.start)
+        every = self.draws
+        if self.simulated <= _PATHS_OF_MANY:
+            # Draws stand kind by kind: every second one keeps their shares.
+            every = every.take(np.arange(0, _DRAWS, 2))
+        repeats = self.simulated // len(every.start)
         ends = []
         for is_gamma in (False, True):
             draws = every.take(every.gamma[:, 0] == is_gamma)
             if len(draws.start):
                 ends.append(_Ends.drawn(draws, follow(steps, draws)[1], repeats, rng))
         return ends
+
+
+class _Streams:
+    """Random numbers of arrays (draws, units, repeats), the same for each of several groups of
+    units.
+    """
+
+    def __init__(self, seed: int, groups: int = 1) -> None:
+        self._groups = groups
+        # One for all, until what the groups ask for differs.
+        self._streams = [np.random.default_rng(seed)]
+
+    def normal(self, count: int, shape: tuple[int, int, int]) -> Array:
+        draws, units, repeats = shape
+        of_group = (count, draws, units // self._groups, repeats)
+        found = [stream.standard_normal(of_group) for stream in self._streams]
+        return np.concatenate(found * (self._groups // len(found)), axis=2)
+
+    def gamma(self, shape: Array) -> Array:
+        if len(self._streams) < self._groups:
+            self._streams = [deepcopy(self._streams[0]) for _ in range(self._groups)]
+        parts = zip(self._streams, np.split(shape, self._groups, axis=1), strict=True)
+        return np.concatenate([stream.standard_gamma(part) for stream, part in parts], axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,17 +234,15 @@ class _Ends:
     pace: Array
 
     @classmethod
-    def drawn(
-        cls, draws: Draws, state: FilterState, repeats: int, rng: np.random.Generator
-    ) -> _Ends:
+    def drawn(cls, draws: Draws, state: FilterState, repeats: int, rng: _Streams) -> _Ends:
         """Sample levels and drifts jointly."""
-        shape = (*state.level.shape[:2], repeats)
+        shape = (len(state.level), state.level.shape[1], repeats)
         level, drift, level_var, cov, drift_var = (
             getattr(state, name)[:, :, None]
             for name in ("level", "drift", "level_var", "both_cov", "drift_var")
         )
         sd = np.sqrt(np.maximum(level_var, 1e-30))
-        one, two, three = rng.standard_normal((3, *shape))
+        one, two, three = rng.normal(3, shape)
         rest = np.sqrt(np.maximum(drift_var - (cov / sd) ** 2, 0.0))
         pace = np.maximum(1.0 + _DOUBT * three, _SLOWEST)
         drift = drift + cov / sd * one + rest * two
@@ -216,7 +258,7 @@ class _Ends:
         return np.asarray(getattr(self.draws, name))[:, :, None]
 
     def follow(
-        self, usage: Array, last: Array, known: Array, rng: np.random.Generator, *, reading: bool
+        self, usage: Array, last: Array, known: Array, rng: _Streams, *, reading: bool
     ) -> Array:
         """Simulate the paths on to ascending usages (units, m); return (draws, units, repeats,
         m).
@@ -227,27 +269,29 @@ class _Ends:
         known = known[None, :, None]
         sd = np.where(np.isnan(known), self._column("reading_sd"), np.sqrt(known))
         start = clock(last[None, :, None], power)
+        # The unit itself may have reached further than all that the population was learnt from.
+        bend = clock(np.maximum(last, 1.0)[None, :, None], power)
         x = self.level
         b = self.drift
         before = np.zeros_like(x)
         out = np.empty((*x.shape, usage.shape[1]))
         for j in range(usage.shape[1]):
             at = clock(usage[None, :, j, None], power)
-            now = np.minimum(at, 1.0) - start + self.pace * np.maximum(at - 1.0, 0.0)
+            now = np.minimum(at, bend) - start + self.pace * np.maximum(at - bend, 0.0)
             d = now - before
             before = now
             if self.draws.gamma.any():
                 shape = np.maximum(d, 0.0) / s**2
-                x = x + np.where(d > 0.0, b * s**2 * rng.standard_gamma(shape), b * d)
+                x = x + np.where(d > 0.0, b * s**2 * rng.gamma(shape), b * d)
             else:
                 span = np.abs(d)
-                one, two = rng.standard_normal((2, *x.shape))
+                one, two = rng.normal(2, x.shape)
                 sway = np.sqrt(v * v * span**3 / 12.0 + s * s * span)
                 x = x + b * d + v * span**1.5 * one / 2.0 + sway * two
                 b = b + v * np.sqrt(span) * one
             out[..., j] = x
             if reading:
-                out[..., j] += sd * rng.standard_normal(x.shape)
+                out[..., j] += sd * rng.normal(1, x.shape)[0]
         return out
 
 
@@ -309,9 +353,7 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
     """
     if not any(len(np.asarray(path.usage)) for path in paths):
         raise UsageError("no path has a reading", "Give at least one reading of one unit.")
-    by_unit: dict[str, list[WearPath]] = {}
-    for path in paths:
-        by_unit.setdefault(path.unit, []).append(path)
+    by_unit = _by_unit(paths)
     rng = np.random.default_rng(seed)
     scale = scale_of(paths)
     readings = {
@@ -319,7 +361,7 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
     }
     learn: list[str] = []
     for most, pool in (
-        (_LEARN_FROM, [u for u, n in readings.items() if n > 1]),
+        (WearModel.learns_from, [u for u, n in readings.items() if n > 1]),
         (_LEARN_FROM_OTHERS, [u for u, n in readings.items() if n == 1]),
     ):
         learn += [pool[i] for i in sorted(rng.permutation(len(pool))[:most])]
@@ -328,7 +370,16 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
         estimate_reading=any(path.reading_u is None for unit in learn for path in by_unit[unit]),
         restored=any(len(by_unit[unit]) > 1 for unit in learn),
     )
-    draws, shares = posterior(steps, scale, _DRAWS, rng, kinds)
-    return WearModel(
-        {unit: tuple(own) for unit, own in by_unit.items()}, shares, scale, draws, seed
-    )
+    # Matrices this small only wait for other threads.
+    with threadpool_limits(1, "blas"):
+        draws, shares = posterior(steps, scale, _DRAWS, rng, kinds)
+    simulated = _PATHS if len(by_unit) <= _MANY else _PATHS_OF_MANY
+    return WearModel(by_unit, shares, scale, draws, seed, simulated)
+
+
+def _by_unit(paths: Iterable[WearPath]) -> dict[str, tuple[WearPath, ...]]:
+    """The paths of each unit, in their order."""
+    found: dict[str, list[WearPath]] = {}
+    for path in paths:
+        found.setdefault(path.unit, []).append(path)
+    return {unit: tuple(own) for unit, own in found.items()}

@@ -19,7 +19,6 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.life.fleet import expected_of
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
@@ -359,7 +358,11 @@ def _judge(
     **told: Any,
 ) -> CheckResult:
     advice = len(rows) == 1 if options.advice is None else options.advice
-    fleet = None if store is None else expected_of(store, gear)
+    fleet = None
+    if store is not None:
+        from mlg_troubleshoot.life.fleet import expected_of
+
+        fleet = expected_of(store, gear)
     asked: dict[str, Any] = {
         "advice": advice,
         "seed": options.seed,

@@ -23,6 +23,7 @@ from mlg_troubleshoot.life.folding import (
     is_readable,
     life_of,
     lives,
+    lives_of,
 )
 from mlg_troubleshoot.life.outlook import Order
 from mlg_troubleshoot.outputs import write_csv
@@ -113,27 +114,31 @@ def show_fleet(
     problems: tuple[Problem, ...] = (),
 ) -> Lives:
     """Every gear's life, with its forecast unless nobody wants to look ahead."""
-    from mlg_troubleshoot.life.forecast import fit_fleet, forecast
+    from mlg_troubleshoot.life.forecast import fit_fleet, forecast, teachers_first
 
     progress("Reading the store", 0, None)
-    found = tuple(lives(store).values())
+    by_key = lives(store)
+    found = tuple(by_key.values())
     progress("Learning how joints wear", 0, None)
-    model = fit_fleet(found, gear) if ahead else None
+    model = fit_fleet(map(by_key.__getitem__, teachers_first(by_key)), gear) if ahead else None
     return Lives(gear, found, forecast(found, model, gear, progress), model, problems)
 
 
 def show_lives(store: Store, gear: Gear, tail: str, side: str | None, *, ahead: bool) -> Lives:
     """The lives of one aircraft's gears, or of one of them."""
-    from mlg_troubleshoot.life.forecast import fit_fleet, forecast
+    from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, forecast, teachers_first
 
     tail, meant = key_of(tail, "LH" if side is None else side)
-    wanted = [key for key in store.gears() if key == (tail, meant if side else key[1])]
+    keys = store.gears()
+    wanted = [key for key in keys if key == (tail, meant if side else key[1])]
     if not wanted:
         life_of(store, tail, meant)
-    # The whole fleet teaches how joints wear.
-    everything = lives(store, None if ahead else tail)
-    model = fit_fleet(everything.values(), gear) if ahead else None
-    found = tuple(everything[key] for key in wanted)
+    # The whole fleet teaches how joints wear: of a large one as many gears as are needed are read.
+    order = teachers_first(keys)
+    parts = (order[first : first + TEACHERS] for first in range(0, len(order), TEACHERS))
+    taught = (life for part in parts for life in lives_of(store, part).values())
+    model = fit_fleet(taught, gear) if ahead else None
+    found = tuple(lives_of(store, wanted).values())
     return Lives(gear, found, forecast(found, model, gear), model)
 
 

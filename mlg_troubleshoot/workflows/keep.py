@@ -44,6 +44,7 @@ def keep(
     options: CheckOptions,
     store: Store,
     same_tail: Callable[[str, str], bool] | None = None,
+    progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Kept:
     """Add the judged inspections of a check and their assessments, all or none.
 
@@ -60,12 +61,14 @@ def keep(
     known = store.known([record.identity_hash for record in inspections])
     stood = len(known)
     records: list[Record] = []
-    for assessment, row, record in zip(judged, written, inspections, strict=True):
+    each = zip(judged, written, inspections, strict=True)
+    for done, (assessment, row, record) in enumerate(each, 1):
         # Before what was read after it.
         records += _repairs_of(row, store)
         # Wherever an inspection was entered again, it is the first entry that was assessed.
         first = known.setdefault(record.identity_hash, record)
         records += [record, assessment_record(result.gear, options, assessment, record, first)]
+        progress(done, len(judged))
     store.add(
         records,
         lambda kept, new: new.kind is not RecordKind.INSPECTION or _agrees(store, kept, new),

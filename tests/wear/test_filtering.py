@@ -10,7 +10,7 @@ from scipy import stats
 
 from mlg_troubleshoot.wear import Samples, WearPath, first_passage
 from mlg_troubleshoot.wear.filtering import Draws, FilterState, follow
-from mlg_troubleshoot.wear.model import _Ends
+from mlg_troubleshoot.wear.model import _Ends, _Streams
 from mlg_troubleshoot.wear.paths import Scale, grid_step, lay_out
 from mlg_troubleshoot.wear.posterior import members
 
@@ -98,7 +98,7 @@ def test_gamma_increments_scatter_as_simulated_ones_whose_drift_is_not_known() -
 def test_level_and_drift_are_sampled_together() -> None:
     one = np.ones((1, 1))
     state = FilterState(one, one, one, 0.8 * one, one)
-    ends = _Ends.drawn(parameters(), state, 200_000, np.random.default_rng(1))
+    ends = _Ends.drawn(parameters(), state, 200_000, _Streams(1))
     assert np.cov(ends.level.ravel(), ends.drift.ravel()) == pytest.approx(
         np.array([[1.0, 0.8], [0.8, 1.0]]), abs=0.02
     )
@@ -107,12 +107,9 @@ def test_level_and_drift_are_sampled_together() -> None:
 def test_beyond_what_any_unit_has_reached_the_pace_is_a_quarter_uncertain() -> None:
     zero, one = np.zeros((1, 1)), np.ones((1, 1))
     sharp = parameters(increment_sd=0.0, power=1.0)
-    ends = _Ends.drawn(
-        sharp, FilterState(one, one, zero, zero, zero), 50_000, np.random.default_rng(1)
-    )
-    rng = np.random.default_rng(2)
+    ends = _Ends.drawn(sharp, FilterState(one, one, zero, zero, zero), 50_000, _Streams(1))
     found = ends.follow(
-        np.array([[1.0, 3.0]]), np.array([0.5]), np.array([0.0]), rng, reading=False
+        np.array([[1.0, 3.0]]), np.array([0.5]), np.array([0.0]), _Streams(2), reading=False
     )
     assert np.std(found[0, 0], axis=0) == pytest.approx([0.0, 0.25 * 2.0], abs=0.01)
 
@@ -134,7 +131,7 @@ def test_a_path_is_followed_with_the_variance_of_its_increments_and_of_its_wande
 ) -> None:
     draws = parameters(increment_sd=increment_sd, wander_sd=wander_sd, power=1.0)
     found = ends(0.3, 0.8, draws, 100_000).follow(
-        np.array([[2.5]]), np.array([0.5]), np.array([0.0]), np.random.default_rng(1), reading=False
+        np.array([[2.5]]), np.array([0.5]), np.array([0.0]), _Streams(1), reading=False
     )
     assert np.mean(found) == pytest.approx(0.3 + 0.8 * 2.0, abs=0.02)
     assert np.var(found) == pytest.approx(
@@ -149,7 +146,7 @@ def test_a_gamma_path_follows_the_moments_of_its_increments_and_the_error_of_a_r
             np.array([[2.5]]),
             np.array([0.5]),
             np.array([0.5**2]),
-            np.random.default_rng(1),
+            _Streams(1),
             reading=reading,
         )
         for reading in (False, True)

@@ -56,6 +56,26 @@ def test_many_units_at_once_are_forecast_as_each_alone(model: WearModel) -> None
     assert among == pytest.approx(alone, abs=0.25 * float(alone[0, 2] - alone[0, 0]))
 
 
+def test_groups_of_units_have_the_very_numbers_that_each_group_has_alone(model: WearModel) -> None:
+    assert 0.0 < np.mean(model.draws.gamma) < 1.0
+    units = ["part 1", "renewed", "part 3", "new", "read once", "part 2"]
+    usage = np.linspace(1.5, 2.5, 12).reshape(6, 2)
+    among = model.forecast(units, usage, together=2).samples
+    alone = [model.forecast(units[n : n + 2], usage[n : n + 2]).samples for n in (0, 2, 4)]
+    assert np.array_equal(among, np.concatenate(alone))
+
+
+def test_a_unit_that_went_further_than_all_others_goes_on_from_its_own_last_reading(
+    model: WearModel,
+) -> None:
+    last = 3.0 * model.scale.usage
+    far = model.of([WearPath("far", np.linspace(0.2, last, 9), np.linspace(0.2, last, 9))])
+    now, ahead = far.forecast("far", [last, 1.01 * last], reading=False).quantile(0.5)
+    spread = width(far.forecast("far", [last], reading=False))
+    assert (now, ahead) == pytest.approx((last, 1.01 * last), abs=0.05 * last)
+    assert spread < 0.05 * last
+
+
 def test_usages_in_any_order_give_each_its_own_forecast(model: WearModel) -> None:
     ahead = model.forecast("part 1", [1.6, 2.4]).quantile(0.5)
     assert model.forecast("part 1", [2.4, 1.6]).quantile(0.5) == pytest.approx(ahead[::-1])

@@ -1,0 +1,88 @@
+"""Cold starts and large pieces of work of two trees, in turns: ``python
+tests/benchmarks/bench_cold.py --base FOLDER [--runs 7] [--before PATH] -- check FILE``.
+
+Not collected by pytest. FOLDER is a checkout of the version before; ``--before`` is put into its
+``PYTHONPATH``, for libraries of that time. Each run is a process of its own, the trees take turns,
+and what is compared is the processor's time (user and system), so that other work on the machine
+changes both alike. The import of numpy is the measure of the machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+# A process of its own starts what is measured: the memory of who starts it counts as its own.
+MEASURE = """
+import json, resource, subprocess, sys
+of = subprocess.DEVNULL
+code = subprocess.run([sys.executable, *sys.argv[1:]], stdout=of, stderr=of).returncode
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(json.dumps([code, used.ru_utime + used.ru_stime, used.ru_maxrss]))
+"""
+ONE_GEAR = ["check", str(ROOT / "inspection_data" / "failure_case.csv")]
+
+
+def run(tree: Path, command: Sequence[str], environment: dict[str, str]) -> tuple[float, float]:
+    """Processor time and largest memory of one run. [s, MiB]"""
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", MEASURE, *command],
+        cwd=tree,
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    code, seconds, memory = json.loads(done.stdout)
+    if code not in (0, 1):
+        raise SystemExit(f"{command} ended with exit code {code} in {tree}")
+    # Linux counts in KiB, macOS in bytes.
+    return seconds, memory / (1024.0 if sys.platform != "darwin" else 1024.0**2)
+
+
+def main() -> None:
+    """Print the medians of both trees."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--base", type=Path, required=True)
+    parser.add_argument("--before", default="")
+    parser.add_argument("--runs", type=int, default=7)
+    parser.add_argument("command", nargs="*", help="a command of mlg instead of the usual ones")
+    given = parser.parse_args()
+    start = ["-m", "mlg_troubleshoot"]
+    usual = [["-c", "import numpy"], [*start, "--help"], [*start, *ONE_GEAR]]
+    usual.append([*start, *ONE_GEAR, "--json"])
+    commands = [[*start, *given.command]] if given.command else usual
+    with tempfile.TemporaryDirectory() as compiled:
+        # Installed packages are compiled once.
+        own = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+        own["PYTHONPYCACHEPREFIX"] = compiled
+        sides = {
+            given.base.resolve(): {**own, "PYTHONPATH": given.before},
+            ROOT: {**own, "PYTHONPATH": ""},
+        }
+        for command in commands:
+            found: dict[Path, list[tuple[float, float]]] = {tree: [] for tree in sides}
+            for turn in range(given.runs + (not given.command)):
+                for tree, environment in sides.items():
+                    taken = run(tree, command, environment)
+                    # The first run of a short command compiles.
+                    if turn or given.command:
+                        found[tree].append(taken)
+            shown = [
+                f"{statistics.median(s for s, _ in of):.3f} s {max(m for _, m in of):.0f} MiB"
+                for of in found.values()
+            ]
+            print(f"{' '.join(command)[-60:]:<62} {' -> '.join(shown)}", flush=True)
+    print(f"load average {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""How many threads a judgement uses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from threadpoolctl import threadpool_info
+
+from mlg_troubleshoot.decision import judge_rows
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.indices.index_table import load_index_table
+from tests.decision.conftest import inspected
+
+
+def test_matrix_products_of_a_judgement_wait_for_no_other_threads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen: list[int] = []
+    judge = judge_rows._assess_valid
+
+    def watched(*given: Any) -> Any:
+        seen.extend(of["num_threads"] for of in threadpool_info() if of["user_api"] == "blas")
+        return judge(*given)
+
+    monkeypatch.setattr(judge_rows, "_assess_valid", watched)
+    gear = load_gear()
+    judge_rows.assess([inspected({3: 0.013})], gear, load_index_table(gear))
+    assert set(seen) == {1}

@@ -1,0 +1,108 @@
+"""Fleets of more gears than the wear of joints is learnt from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
+from mlg_troubleshoot.store import Store, inspection_record
+from mlg_troubleshoot.units import ClearanceConvention
+from mlg_troubleshoot.workflows.check import CheckOptions, check_inspection
+from mlg_troubleshoot.workflows.history import show_fleet, show_lives
+from mlg_troubleshoot.workflows.keep import keep
+
+TAILS = [f"N{n:03d}" for n in range(TEACHERS + 30)]
+
+
+def fleet_of(folder: Path, landings_of: Sequence[str] = TAILS) -> Store:
+    """Gears of three inspections each; only some state their landings."""
+    rng = np.random.default_rng(5)
+    store = Store(folder / "fleet.sqlite")
+    pace = dict(zip(TAILS, 1e-6 * np.exp(0.3 * rng.standard_normal(len(TAILS))), strict=True))
+    inspections = [
+        Inspection(
+            f"{tail}-{visit}",
+            tail,
+            Side.LH,
+            ClearanceConvention.RADIAL,
+            {
+                joint: round(0.0005 + pace[tail] * 500.0 * visit + 0.0002 * rng.random(), 4)
+                for joint in (3, 4, 5)
+            },
+            inspection_date=date(2020 + visit, 1, 1),
+            gear_landings=500.0 * visit if tail in landings_of else None,
+        )
+        for tail in TAILS
+        for visit in (1, 2, 3)
+    ]
+    store.add([inspection_record(each) for each in inspections])
+    return store
+
+
+def test_a_gear_has_the_same_forecast_alone_as_in_its_fleet(tmp_path: Path) -> None:
+    store, gear = fleet_of(tmp_path), load_gear()
+    fleet = show_fleet(store, gear, ahead=True)
+    taught = teachers_first(fleet.forecasts)[:TEACHERS]
+    for key in (taught[0], teachers_first(fleet.forecasts)[-1]):
+        alone = show_lives(store, gear, *key, ahead=True).forecasts[key]
+        assert alone.landings_to_limit == fleet.forecasts[key].landings_to_limit is not None
+        assert alone.landings_to_margin == fleet.forecasts[key].landings_to_margin
+        assert alone.due_date == fleet.forecasts[key].due_date
+
+
+def test_the_life_of_one_gear_is_shown_without_reading_the_whole_store(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    read: list[str] = []
+    found = Store._record
+    monkeypatch.setattr(
+        Store, "_record", lambda self, row: (read.append(row.tail_no), found(self, row))[1]
+    )
+    show_lives(store, load_gear(), TAILS[0], "LH", ahead=True)
+    assert TEACHERS <= len(set(read)) <= TEACHERS + 1
+
+
+def test_where_few_gears_state_their_landings_all_of_them_are_learnt_from(tmp_path: Path) -> None:
+    last = [tail for tail, _side in teachers_first((tail, "LH") for tail in TAILS)[-5:]]
+    by_key = lives(fleet_of(tmp_path, last))
+    model = fit_fleet((by_key[key] for key in teachers_first(by_key)), load_gear())
+    assert model is not None
+    assert {unit.split()[0] for unit in model.paths} == set(last)
+
+
+def test_keeping_says_how_far_it_is_also_where_rows_state_repairs(tmp_path: Path) -> None:
+    rows = [
+        Inspection(
+            f"R{n}",
+            f"N{n}",
+            Side.LH,
+            ClearanceConvention.RADIAL,
+            {3: 0.001},
+            inspection_date=date(2024, 5, 1),
+            restored_joints=(3,),
+            repair_date=date(2024, 5, 2),
+        )
+        for n in range(3)
+    ]
+    checked = [check_inspection(row, CheckOptions()) for row in rows]
+    result = replace(checked[0], judgements=tuple(each.judgements[0] for each in checked))
+    said: list[tuple[int, int]] = []
+    store = Store(tmp_path / "store.sqlite")
+    keep(result, CheckOptions(), store, progress=lambda done, total: said.append((done, total)))
+    assert said == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_the_gears_learnt_from_stay_the_same_when_one_comes_in_behind_them() -> None:
+    keys = [(tail, "LH") for tail in TAILS]
+    order = teachers_first(keys)
+    assert [key for key in teachers_first([*keys, ("NEW", "RH")]) if key[0] != "NEW"] == order
