@@ -18,6 +18,7 @@ import pandas as pd
 import pytest
 
 import mlg_troubleshoot as mlg
+from mlg_troubleshoot.diagnosis import CATALOGUE
 from mlg_troubleshoot.schemas import schema
 
 ROOT = Path(__file__).parents[1]
@@ -200,6 +201,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "simulation": simulated,
     "survey": lambda: mlg.survey(pd.DataFrame(SURVEY)),
     "lives": lambda: mlg.forecast(DATA / "fleet_batch.csv"),
+    "catalogue": lambda: CATALOGUE,
 }
 
 
@@ -249,9 +251,29 @@ def test_a_result_is_a_table(name: str) -> None:
     assert not result(name).to_frame().empty
 
 
-@pytest.mark.parametrize("name", ["check", "diagnose", "study", "survey"])
-def test_the_dict_of_a_result_is_the_documented_json(name: str) -> None:
-    jsonschema.validate(result(name).to_dict(), schema(name))
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        *((name, name) for name in ("check", "diagnose", "study", "survey", "gear")),
+        ("lives", "fleet"),
+    ],
+)
+def test_the_dict_of_a_result_is_the_documented_json(name: str, command: str) -> None:
+    jsonschema.validate(result(name).to_dict(), schema(command))
+
+
+def test_the_ensemble_is_a_table_of_the_points_of_each_linkage() -> None:
+    gear = mlg.load_gear()
+    table = gear.to_frame("ensemble").set_index(["linkage", "point"])
+    last = gear.ensemble[-1]
+    assert len(table) == sum(len(linkage.mechanism.points) for linkage in gear.ensemble)
+    assert table.loc[(last.name, "E"), "x_in"] == last.mechanism.point("E").x
+
+
+def test_the_catalogue_is_a_table_of_its_causes() -> None:
+    table = CATALOGUE.to_frame().set_index("name")
+    assert table.index.tolist() == [cause.name for cause in CATALOGUE]
+    assert table.loc["elastic_compliance", "needs"] == ["hydraulic_pressure_psi"]
 
 
 def test_a_table_has_a_row_per_gear_with_the_labels_of_the_frame() -> None:
