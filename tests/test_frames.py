@@ -79,13 +79,6 @@ def test_a_frame_has_the_verdicts_and_the_problems_of_its_file(seed: int) -> Non
     assert judged(frame) == judged(as_csv(frame))
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_a_dict_has_the_verdict_and_the_problems_of_its_row(seed: int) -> None:
-    frame = sheet(seed).head(1)
-    (row,) = frame.to_dict("records")
-    assert judged(row) == judged(as_csv(frame))
-
-
 def test_a_series_is_one_gear() -> None:
     frame = sheet(3, bad=False)
     assert judged(frame.iloc[0]) == judged(as_csv(frame.head(1)))
