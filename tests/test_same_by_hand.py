@@ -1,5 +1,5 @@
-"""The rows of 200 tables with planted bad cells, as dicts, as flags and at the prompts: the verdicts
-and the problems of the file.
+"""The rows of 200 tables with planted bad cells, as dicts, as flags and at the prompts: the
+verdicts and the problems of the file.
 """
 
 from __future__ import annotations
