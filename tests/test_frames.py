@@ -383,11 +383,16 @@ def test_the_sentence_of_a_cause_stands_in_the_json() -> None:
     assert cause["sentence"] == named.candidate.cause.sentence
 
 
-def test_a_gauge_that_reads_too_much_in_all_rows_is_an_alias_of_the_calibration_rate() -> None:
+@pytest.mark.parametrize("share", [0.85, 1.15, 1.3])
+def test_a_gauge_that_is_wrong_in_all_rows_is_an_alias_of_the_calibration_rate(
+    share: float,
+) -> None:
     frame = mlg.read_inspections(DATA / "measured_nothing_wrong.csv")
     readings = [name for name in frame.columns if name.startswith("plunger_displacement")]
-    frame[readings] *= 1.15
+    frame[readings] *= share
     found = mlg.diagnose(frame).to_dict()
+    if share != 1.3:
+        assert [cause["cause"] for cause in found["causes"]] == ["calibration_rate"]
     said = {each["cause"]: each["sentence"] for each in found["causes"] + found["also_possible"]}
     assert "the gauge of all rows reads too much" in said["calibration_rate"]
 
