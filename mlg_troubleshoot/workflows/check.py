@@ -23,7 +23,7 @@ from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-from mlg_troubleshoot.workflows.index_tables import index_table
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -221,7 +221,7 @@ def check(
         return check_files([inspection], asked)
     known = load_gear(gear)
     row = judge_again(inspection, ReadOptions.of(known))
-    table = index_table(known)
+    table = load_index_table(known)
     (judged,) = assess([row], known, table, advice=advice is not False, extension=extension)
     if not isinstance(judged, Assessment):
         raise TypeError(f"{type(inspection).__name__} is not an Inspection")
@@ -334,7 +334,7 @@ def read_inspections(
 def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice | None:
     """Say which joint's reading is most useful next, and whether one may stop measuring."""
     row = replace(trial_inspection(gear), clearance_in=dict(measured))
-    (judged,) = assess([row], gear, index_table(gear), advice=True)
+    (judged,) = assess([row], gear, load_index_table(gear), advice=True)
     return judged.measuring if isinstance(judged, Assessment) else None
 
 
@@ -360,7 +360,7 @@ def _judge(
     advice = len(rows) == 1 if options.advice is None else options.advice
     asked: dict[str, Any] = {"advice": advice, "seed": options.seed, "extension": options.extension}
     as_they_count = since_repairs(rows, gear, store)
-    judgements = assess(as_they_count, gear, index_table(gear), **asked, progress=on_judged)
+    judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
     if as_they_count is not rows:
         # What is shown and kept of an inspection is what was found, whatever counts no more.
         judgements = tuple(

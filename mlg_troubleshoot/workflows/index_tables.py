@@ -8,7 +8,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import (
     IndexTable,
     StaleTableError,
-    load_index_table,
+    read_index_table,
     write_index_table,
 )
 
@@ -20,14 +20,14 @@ def renew_index_table(gear: Gear) -> str | None:
     from mlg_troubleshoot.paper.study import StudyOptions, run_study
 
     try:
-        load_index_table(gear)
+        read_index_table(gear)
     except StaleTableError as stale:
         write_index_table(run_study(gear, StudyOptions()).table, gear.indices_file)
         return f"{stale.message}. It was computed again: {gear.indices_file}"
     return None
 
 
-def index_table(gear: Gear) -> IndexTable:
+def load_index_table(gear: Gear) -> IndexTable:
     """Load the table of indices of a gear, renewed with a warning when its geometry changed.
 
     Parameters
@@ -50,4 +50,4 @@ def index_table(gear: Gear) -> IndexTable:
     said = renew_index_table(gear)
     if said is not None:
         warnings.warn(said, stacklevel=2)
-    return load_index_table(gear)
+    return read_index_table(gear)
