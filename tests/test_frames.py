@@ -408,3 +408,19 @@ def test_a_suspect_of_text_is_refused_with_its_name() -> None:
     suspects = [mlg.Suspect("mass", "1", 0.05)]  # type: ignore[arg-type]
     with pytest.raises(mlg.TroubleshootError, match="mass"):
         mlg.diagnose_simulation(lambda p: np.ones(9) * p["mass"], np.ones(9), suspects)
+
+
+PAGES = {"formats": ("html",), "unit": "mm"}
+
+
+def test_every_file_may_be_given_by_its_name(tmp_path: Path) -> None:
+    extension, cause = str(tmp_path / "extension.toml"), str(DATA / "own_cause.py")
+    mlg.write_extension(result("diagnose").extension, extension)
+    assert mlg.load_model_extension([extension], "hawker-800xp", [cause]) is not None
+    (tmp_path / "beliefs.toml").write_text("schema = 1\n")
+    options = {"cause_files": (cause,), "beliefs_file": str(tmp_path / "beliefs.toml")}
+    assert mlg.diagnose(str(DATA / "measured_pressure.csv"), **options).diagnosis.causes
+    assert mlg.survey(pd.DataFrame(SURVEY), write=str(tmp_path / "gear.toml")).gear_file is None
+    found = mlg.check(str(DATA / "failure_case.csv"))
+    (report,) = mlg.write_reports(found, mlg.CheckOptions(), str(tmp_path / "pages"), **PAGES)
+    assert report.html is not None and report.html.parent == tmp_path / "pages"

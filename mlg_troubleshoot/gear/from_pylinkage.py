@@ -101,7 +101,7 @@ def _read(linkage: Any) -> DataFile[TheirMechanism]:
         from pylinkage.mechanism.serialization import mechanism_to_dict
 
         values = mechanism_to_dict(linkage)
-    path = Path(str(values.get("name")) or "linkage")
+    path = Path(str(values.get("name") or "linkage"))
     values = msgspec.to_builtins(values)
     return DataFile(path, values, decode(path, values, TheirMechanism))
 

@@ -375,12 +375,12 @@ def _judge(
 def write_reports(
     result: CheckResult,
     options: CheckOptions,
-    directory: Path,
+    directory: Path | str,
     formats: Sequence[str] = ("html", "pdf"),
     page: str = "A4",
     on_written: Callable[[int, int], None] | None = None,
     *,
-    unit: LengthUnit = LengthUnit.INCH,
+    unit: LengthUnit | str = LengthUnit.INCH,
     before: Sequence[Sequence[PastInspection]] = (),
 ) -> tuple[WrittenReport, ...]:
     """Write a report for each inspection that was judged and, for a batch, its summary, in which
@@ -392,7 +392,7 @@ def write_reports(
         The check.
     options : CheckOptions
         What the user declared.
-    directory : Path
+    directory : Path or str
         Folder to write to; it is made if it does not exist.
     formats : sequence of str
         ``html``, ``pdf`` or both.
@@ -400,7 +400,7 @@ def write_reports(
         ``A4`` or ``Letter``.
     on_written : callable, optional
         Called with reports written and their number.
-    unit : LengthUnit
+    unit : LengthUnit or str
         The unit that its readers use.
     before : sequence, optional
         What each gear was like before, as `looking_back.seen_before` says it.
@@ -415,6 +415,7 @@ def write_reports(
     OutputError
         If the folder cannot be written to.
     """
+    directory, unit = Path(directory), LengthUnit.parse(unit)
     if directory.exists() and not directory.is_dir():
         raise OutputError(
             f"{directory} is a file, not a folder", "Give a folder that you may write to."
