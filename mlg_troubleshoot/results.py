@@ -90,7 +90,8 @@ def same(one: Any, other: Any) -> bool:
 
     if one is other:
         return True
-    if type(one) is not type(other):
+    both_map = isinstance(one, Mapping) and isinstance(other, Mapping)
+    if type(one) is not type(other) and not both_map:
         return False
     if isinstance(one, np.ndarray | float):
         return np.array_equal(one, other, equal_nan=np.asarray(one).dtype.kind == "f")

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.prediction import (
     DEFAULT_PLUNGER_U_IN,
@@ -48,10 +49,15 @@ class Cases:
     retracted: Mask
     reachable: Mask
     restorable: Mask
+    fleet: Fleet
 
     @classmethod
     def of(
-        cls, gear: Gear, inspections: Sequence[Inspection], extension: Extension | None = None
+        cls,
+        gear: Gear,
+        inspections: Sequence[Inspection],
+        extension: Extension | None = None,
+        fleet: Fleet | None = None,
     ) -> Cases:
         numbers, rows = gear.joint_numbers, tuple(inspections)
         means = [i.measured_displacement_in for i in rows]
@@ -81,6 +87,7 @@ class Cases:
             restorable=np.array(
                 [[n not in (*i.cannot_reach, *i.no_spare) for n in numbers] for i in rows]
             ),
+            fleet=fleet or Fleet(),
         )
 
     def __len__(self) -> int:
@@ -149,7 +156,7 @@ class Cases:
         arrays = {
             f.name: getattr(self, f.name)[rows]
             for f in fields(self)
-            if f.name not in ("gear", "inspections", "extension")
+            if f.name not in ("gear", "inspections", "extension", "fleet")
         }
         return replace(self, inspections=tuple(self.inspections[int(i)] for i in rows), **arrays)
 

@@ -3,12 +3,9 @@ the linkage, the gauges, the rigging, and everything else.
 
 The plunger stands where the sum of all joints puts it, each clearance times its amplification times
 the cosine of its direction, plus a rigging offset where there is one. Densities of such sums are
-products of characteristic functions: of a clearance c in uniformly random directions J₀(t·A·c), of
-a joint that nobody read the same averaged over its wear. With a small chance the loads hold all
-pins in their worst directions: a reading near the bound then says so.
-
-Wear before the plunger is read is that of `wear_levels`. No fleet of this gear is public: all of
-this is assumed, and stands in the table of `priors`.
+products of characteristic functions: of a clearance in random directions, or held near its worst
+one by the loads, of a joint that nobody read the same averaged over its wear. How often loads hold
+the pins, and how far gears are worn, is assumed, or learned from a fleet (`fleet`).
 """
 
 from __future__ import annotations
@@ -28,12 +25,14 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import tabled_normal_cdf
 from mlg_troubleshoot.decision.waves import (
     AT_IN,
-    COSINES,
     FREQUENCIES,
     HALF_IN,
+    HELD,
+    RANDOM,
     STEP_IN,
-    bessel,
+    Pins,
     blur,
+    density,
     inside,
 )
 from mlg_troubleshoot.decision.wear_levels import (
@@ -47,32 +46,68 @@ from mlg_troubleshoot.decision.wear_levels import (
 )
 from mlg_troubleshoot.gear.gear import Gear
 
+_LINKAGE = blur(PRIORS.linkage_u_in)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Tables:
-    """What a gear says of joints that nobody read: characteristic functions, and the same of worn
-    ones, (levels, joints, terms); the bend of the mean, by joint.
+class _Unread:
+    """A gear of which nothing was read, with its pins at rest in one way.
+
+    unread, worn: characteristic functions of its joints, and of those beyond their limit, (levels,
+    joints, terms). fresh: of new parts, (joints, terms). bend: by how much each joint moves the
+    plunger on average. [1/in] exceeds: chance of leaving the margin. [1]
     """
 
+    pins: Pins
     amplification: Array
+    bend: Array
     unread: Array
     worn: Array
-    bend: Array
+    fresh: Array
     exceeds: float
 
 
 @lru_cache(maxsize=4)
-def _tables(gear: Gear) -> _Tables:
-    response = responses(gear)[0]
-    reach = response.amplification * gear.limits_in
-    waves = bessel(FREQUENCIES[None, None, :] * reach[:, None, None] * SHARES[None, :, None])
-    unread = np.einsum("ls,jsk->ljk", DENSITIES, waves)
-    worn = np.einsum("ls,jsk->ljk", BEYOND, waves)
-    diagonal = np.diag(response.curvature)
+def _unread(gear: Gear) -> tuple[_Unread, _Unread]:
+    response, found = responses(gear)[0], []
+    amplification, diagonal = response.amplification, np.diag(response.curvature)
     bend = 0.25 * (diagonal[0::2] + diagonal[1::2])
-    everything = np.prod(unread, axis=1).mean(axis=0) * blur(PRIORS.linkage_u_in)
-    exceeds = float(1.0 - inside(everything[None], np.array([gear.margin.value]))[0])
-    return _Tables(response.amplification, unread, worn, bend, exceeds)
+    reach = amplification * gear.limits_in
+    for pins in (RANDOM, HELD):
+        waves = pins.waves(FREQUENCIES * reach[:, None, None] * SHARES[:, None])
+        unread = np.einsum("ls,jst->ljt", DENSITIES, waves)
+        everything = np.prod(unread, axis=1).mean(axis=0) * _LINKAGE
+        found.append(
+            _Unread(
+                pins,
+                amplification,
+                bend if pins is RANDOM else 0.0 * bend,
+                unread,
+                np.einsum("ls,jst->ljt", BEYOND, waves),
+                pins.waves(FREQUENCIES * (amplification * gear.new_parts_in)[:, None]),
+                float(1.0 - inside(everything[None], np.array([gear.margin.value]))[0]),
+            )
+        )
+    random, held = found
+    return random, held
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Believed:
+    """What is believed of n gears if their pins rest in one way.
+
+    fits: density of the plunger's reading. levels: chances of the levels of wear, (n, levels). [1]
+    worn: chance that each unread joint is beyond its limit. [1] waves: characteristic function of
+    each joint, (n, joints, terms). exceeds: chance that the joints hold the plunger beyond its
+    margin, whatever it reads. [1]
+    """
+
+    unread: _Unread
+    fits: Array
+    levels: Array
+    worn: Array
+    waves: Array
+    exceeds: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,9 +119,12 @@ class Causes:
     worn: chance that each joint is beyond its limit. [1]
     levels: chances of the levels of wear, (n, levels). [1]
     exceeds: chance with random directions that the joints hold the plunger beyond its margin,
-    unread ones by their wear, whatever the plunger reads. [1]
-    waves: characteristic function of each joint, (n, joints, terms).
-    loaded: chance that loads hold the pins in their worst directions. [1]
+    unread ones by their wear, whatever the plunger reads; leaves: the same, with the chance that
+    loads hold the pins. [1]
+    loaded: chance that loads hold the pins near their worst directions, the joints being the cause.
+    usually: the chance `leaves` of a gear of which nothing was read. [1]
+    outside, within: densities of the plunger's reading where the joints hold it beyond its margin
+    and where they do not, with random pins and with held ones; by_rigging: where rigging does. [1]
     """
 
     cases: Cases
@@ -96,26 +134,41 @@ class Causes:
     worn: Array
     levels: Array
     exceeds: Array
-    waves: Array
+    leaves: Array
     loaded: Array
+    usually: float
+    outside: tuple[Array, ...]
+    within: tuple[Array, ...]
+    by_rigging: Array
     mean_in: Array
     u_in: Array
+    by_pins: tuple[_Believed, ...]
+
+    @property
+    def held(self) -> Array:
+        """How much likelier the plunger's reading is if loads hold the pins. [1]"""
+        likely = []
+        for each, outside, within in zip(self.by_pins, self.outside, self.within, strict=True):
+            failed = outside / each.unread.exceeds + within / PRIORS.joints_for_one_elsewhere
+            failed = failed + self.by_rigging
+            likely.append(np.where(self.cases.failed, failed, outside + within))
+        return np.asarray(likely[1] / np.maximum(likely[0], 1e-300))
 
     @property
     def expected_elsewhere(self) -> float:
         """Chance of leaving the margin from which the joints are the likelier cause. [1]"""
-        return _tables(self.cases.gear).exceeds / PRIORS.joints_for_one_elsewhere
+        return self.usually / PRIORS.joints_for_one_elsewhere
 
     @property
     def leverage(self) -> Array:
         """Amplification of each joint as a share of the largest. [1]"""
-        amplification = _tables(self.cases.gear).amplification
+        amplification = self.by_pins[0].unread.amplification
         return np.asarray(amplification / amplification.max())
 
     @property
     def reach_in(self) -> Array:
         """How far each joint can move the plunger. [in]"""
-        return _tables(self.cases.gear).amplification * self.mean_in
+        return self.by_pins[0].unread.amplification * self.mean_in
 
     def with_chances(self, sets: Sequence[tuple[RepairSet, ...]]) -> list[tuple[RepairSet, ...]]:
         """Repair sets with the chance of a second repair after each, of gears that failed."""
@@ -142,160 +195,168 @@ class Causes:
         Given the plunger's reading, joints that are left as they are keep their directions, and
         what is restored takes new ones. [1]
         """
-        cases, gear = self.cases, self.cases.gear
-        tables, waves = _tables(gear), self.waves[row]
-        margin, x = float(cases.margin_in[row]), float(cases.mean_in[row])
-        fresh = bessel(FREQUENCIES * (tables.amplification * gear.new_parts_in)[:, None])
-        left = np.prod(np.where(members[:, :, None], 1.0, waves), axis=1) * blur(
-            PRIORS.linkage_u_in
-        )
-        new = np.prod(np.where(members[:, :, None], fresh, 1.0), axis=1)
-        if not np.isfinite(x):
-            return np.asarray(1.0 - inside(left * new, np.full(len(left), margin)))
-        gone = np.prod(np.where(members[:, :, None], waves, 1.0), axis=1)
-        gone = gone * blur(self.u_in[row])
-        # The density of what is left, given that all together read x.
-        of_left = np.maximum(0.5 + left @ COSINES, 0.0)
-        of_gone = np.maximum(0.5 + gone @ np.cos(FREQUENCIES[:, None] * (x - AT_IN)), 0.0)
-        given = of_left * of_gone
-        given /= np.maximum(given.sum(axis=1, keepdims=True), 1e-300)
-        # Restored parts move it a little.
-        spread = np.sqrt(members @ (0.5 * (tables.amplification * gear.new_parts_in) ** 2))
-        spread = np.hypot(spread, 0.3 * STEP_IN)[:, None]
-        beyond = tabled_normal_cdf((np.abs(AT_IN) - margin) / spread)
-        uniform = np.sum(given * beyond, axis=1)
         loaded = float(self.loaded[row])
-        return np.asarray((1.0 - loaded) * uniform + loaded * self._loaded(row, members))
+        chances = ((1.0 - loaded, self.by_pins[0]), (loaded, self.by_pins[1]))
+        # What is less likely than this moves no decision.
+        return np.asarray(
+            sum(
+                chance * self._second_repair(row, members, each)
+                for chance, each in chances
+                if chance > 1e-3
+            )
+        )
 
-    def _loaded(self, row: int, members: Mask) -> Array:
-        """The same with all pins near their worst directions: normal distributions. [1]"""
-        cases, tables = self.cases, _tables(self.cases.gear)
-        a, linkage = tables.amplification, PRIORS.linkage_u_in**2
-        centre, spread = (
-            PRIORS.cosine[0] * a * self.mean_in[row],
-            PRIORS.cosine[1] * a * self.mean_in[row],
-        )
-        margin, x = float(cases.margin_in[row]), abs(float(cases.mean_in[row]))
-        kept = ~members
-        left, of_left = kept @ centre, kept @ spread**2 + linkage
-        total, of_total = (
-            centre.sum(),
-            np.sum(spread**2) + self.u_in[row] ** 2 + PRIORS.linkage_u_in**2,
-        )
-        given = left + of_left / of_total * (x - total) + members @ (a * cases.gear.new_parts_in)
-        u = np.sqrt(np.maximum(of_left * (1.0 - of_left / of_total), linkage))
-        return tabled_normal_cdf((given - margin) / u)
+    def _second_repair(self, row: int, members: Mask, believed_of: _Believed) -> Array:
+        unread, waves = believed_of.unread, believed_of.waves[row]
+        pins, gear = unread.pins, self.cases.gear
+        margin, x = float(self.cases.margin_in[row]), float(self.cases.mean_in[row])
+        left = np.prod(np.where(members[:, :, None], 1.0, waves), axis=1) * _LINKAGE
+        if not np.isfinite(x):
+            new = np.prod(np.where(members[:, :, None], unread.fresh, 1.0), axis=1)
+            return np.asarray(1.0 - inside(left * new, np.full(len(left), margin)))
+        gone = np.prod(np.where(members[:, :, None], waves, 1.0), axis=1) * blur(self.u_in[row])
+        # The density of what is left, given that all together read x.
+        away = np.exp(-1j * FREQUENCIES * abs(x))
+        given = density(left) * density(gone * away)[:, ::-1]
+        given /= np.maximum(given.sum(axis=1, keepdims=True), 1e-300)
+        # Restored parts move it a little, always on where loads hold them.
+        moved = unread.amplification * gear.new_parts_in
+        spread = np.hypot(np.sqrt(members @ (0.5 * moved**2)), 0.3 * STEP_IN)[:, None]
+        on = (members @ moved)[:, None] if pins is HELD else 0.0
+        beyond = tabled_normal_cdf((np.abs(AT_IN + on) - margin) / spread)
+        return np.asarray(np.sum(given * beyond, axis=1))
 
 
 def believed(cases: Cases) -> Causes:
     """Weigh what may be the matter with n gears, by everything that is known of each."""
-    gear = cases.gear
-    tables, read, limits = _tables(gear), cases.measured, gear.limits_in
-    levels = level_chances(cases)
-    known = bessel(FREQUENCIES * (tables.amplification * cases.filled(0.0))[:, :, None])
-    known = known * blur(np.sqrt(0.5) * tables.amplification * cases.gauge_u_in)
-    x = np.abs(np.nan_to_num(cases.mean_in))
-    u = np.hypot(cases.mean_u_in, 1e-4)
-    seen = np.isfinite(cases.mean_in)
-    likely, worn = levels.copy(), levels @ BEYOND.sum(axis=1)
-    worn = np.repeat(worn[:, None], len(limits), axis=1)
-    rows = np.flatnonzero(seen)
+    levels, u = level_chances(cases), np.hypot(cases.mean_u_in, 1e-4)
+    both = tuple(_believed(cases, unread, levels, u) for unread in _unread(cases.gear))
+    chances = np.array([1.0 - cases.fleet.loaded, cases.fleet.loaded])[:, None]
+    chances = chances * [each.fits for each in both]
+    chances /= chances.sum(axis=0)
+    likely, worn = (
+        sum(chance[:, None] * part for chance, part in zip(chances, parts, strict=True))
+        for parts in ([each.levels for each in both], [each.worn for each in both])
+    )
+    read = cases.measured
+    mean_in = np.where(read, cases.filled(0.0), (likely @ MEAN)[:, None] * cases.gear.limits_in)
+    worn = np.where(read, surely_worn(cases, levels), np.clip(worn, 0.0, 1.0))
+    return _weighed(cases, both, mean_in, worn, likely, u)
+
+
+def _believed(cases: Cases, unread: _Unread, levels: Array, u: Array) -> _Believed:
+    pins, read = unread.pins, cases.measured
+    known = pins.waves(FREQUENCIES * (unread.amplification * cases.filled(0.0))[:, :, None])
+    known = known * blur(pins.cosine * unread.amplification * cases.gauge_u_in)
+    flat = unread.unread.reshape(len(LEVELS), -1)
+    waves = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
+    exceeds = 1.0 - inside(np.prod(waves, axis=1) * _LINKAGE, cases.margin_in)
+    worn = np.repeat((levels @ BEYOND.sum(axis=1))[:, None], read.shape[1], axis=1)
+    fits, likely = np.ones(len(cases)), levels.copy()
+    rows = np.flatnonzero(np.isfinite(cases.mean_in))
     if len(rows):
-        likely[rows], worn[rows] = _given_plunger(
-            tables, read[rows], known[rows], levels[rows], x[rows], u[rows]
+        at = np.exp(-1j * FREQUENCIES * np.abs(cases.mean_in[rows])[:, None])
+        at = (at if pins is HELD else at.real) * blur(u[rows]) * _LINKAGE
+        fits[rows], likely[rows], worn[rows] = _given_plunger(
+            unread, read[rows], known[rows], levels[rows], at
         )
-    flat = tables.unread.reshape(len(LEVELS), -1)
-    before = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
-    exceeds = 1.0 - inside(np.prod(before, axis=1) * blur(PRIORS.linkage_u_in), cases.margin_in)
-    waves = before.copy()
-    if len(rows):
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
-    mean_in = np.where(read, cases.filled(0.0), (likely @ MEAN)[:, None] * limits)
-    worn = np.where(read, surely_worn(cases, levels), np.clip(worn, 0.0, 1.0))
-    return _weighed(cases, tables, waves, mean_in, worn, likely, u, exceeds)
+    return _Believed(unread, fits, likely, worn, waves, exceeds)
 
 
 def _given_plunger(
-    tables: _Tables, read: Mask, known: Array, levels: Array, x: Array, u: Array
-) -> tuple[Array, Array]:
-    """Chances of the levels, and of each unread joint being worn, given the plunger's reading."""
-    at = blur(np.hypot(u, PRIORS.linkage_u_in)) * np.cos(FREQUENCIES * x[:, None])
+    unread: _Unread, read: Mask, known: Array, levels: Array, at: Array
+) -> tuple[Array, Array, Array]:
+    """Density of the plunger's reading, and given it chances of the levels, and of each unread
+    joint being worn.
+    """
     count, beyond = read.shape[1], BEYOND.sum(axis=1)
-    density, worn = np.empty_like(levels), np.zeros((len(x), len(LEVELS), count))
+    fits, worn = np.empty_like(levels), np.zeros((len(at), len(LEVELS), count))
     for k in range(len(LEVELS)):
-        waves = np.where(read[:, :, None], known, tables.unread[k])
+        waves = np.where(read[:, :, None], known, unread.unread[k])
         ahead, behind = _products(waves)
-        density[:, k] = 0.5 + np.sum(ahead[-1] * at, axis=1)
+        fits[:, k] = 0.5 + np.sum((ahead[-1] * at).real, axis=1)
         for j in range(count):
             rest = ahead[j] * behind[j + 1] * at
-            worn[:, k, j] = 0.5 * beyond[k] + rest @ tables.worn[k, j]
-    density, worn = np.maximum(density, 1e-12), np.maximum(worn, 0.0)
-    likely = levels * density
-    likely /= likely.sum(axis=1, keepdims=True)
-    return likely, np.sum(likely[:, :, None] * worn / density[:, :, None], axis=1)
+            worn[:, k, j] = 0.5 * beyond[k] + (rest @ unread.worn[k, j]).real
+    fits, worn = np.maximum(fits, 1e-12), np.maximum(worn, 0.0)
+    likely = levels * fits
+    total = likely.sum(axis=1, keepdims=True)
+    likely /= total
+    worn = np.sum(likely[:, :, None] * worn / fits[:, :, None], axis=1)
+    return unread.pins.sense * total[:, 0], likely, worn
 
 
 def _weighed(
     cases: Cases,
-    tables: _Tables,
-    waves: Array,
+    both: tuple[_Believed, ...],
     mean_in: Array,
     worn: Array,
     levels: Array,
     u: Array,
-    exceeds: Array,
 ) -> Causes:
     """Divide each gear between its joints, its rigging and everything else."""
-    margin, seen = cases.margin_in, np.isfinite(cases.mean_in)
+    margin, seen = cases.margin_in[:, None], np.isfinite(cases.mean_in)
     x = np.nan_to_num(cases.mean_in)
-    together = np.prod(waves, axis=1) * blur(PRIORS.linkage_u_in)
-    shift = np.sum(tables.bend * mean_in**2, axis=1)
-    density = np.maximum(0.5 + together @ COSINES, 0.0) * STEP_IN / HALF_IN
-    fits = np.exp(-0.5 * ((x[:, None] - shift[:, None] - AT_IN) / u[:, None]) ** 2) / u[:, None]
-    stands = np.abs(AT_IN + shift[:, None])
-    outside = tabled_normal_cdf((stands - margin[:, None]) / (0.5 * STEP_IN))
-    by_joints = np.sum(density * fits * outside, axis=1)
-    # Pins in their worst directions, either sense.
-    centre = PRIORS.cosine[0] * mean_in @ tables.amplification
-    variance = np.sum((PRIORS.cosine[1] * tables.amplification * mean_in) ** 2, axis=1)
-    variance += (0.1 * centre) ** 2 + PRIORS.linkage_u_in**2
-    scatter, off = np.sqrt(variance + u**2), np.abs(x) - centre
-    loaded = PRIORS.loaded * np.exp(-0.5 * (off / scatter) ** 2) / (2.0 * scatter)
-    # Where the plunger then stands, by its reading and by the clearances.
-    stood = centre + variance / scatter**2 * off
-    loaded_outside = loaded * tabled_normal_cdf(
-        (stood - margin) * scatter / (np.sqrt(variance) * u)
-    )
-    by_elsewhere = np.sum(density * fits * (1.0 - outside), axis=1) + loaded - loaded_outside
-    by_elsewhere *= tables.exceeds / PRIORS.joints_for_one_elsewhere
-    offset = 1.0 / (1.0 + (AT_IN / (PRIORS.offset * margin[:, None])) ** 8)
-    by_rigging = np.sum(offset * fits * outside, axis=1) / np.sum(offset * outside, axis=1)
-    by_rigging *= tables.exceeds / PRIORS.joints_for_one_misrigged
+    outside, within = [], []
+    for each in both:
+        pins, waves = each.unread.pins, np.prod(each.waves, axis=1) * _LINKAGE
+        shift = np.sum(each.unread.bend * mean_in**2, axis=1)
+        reading = x - shift
+        if pins is HELD:
+            # One way on, whichever way that is; the expansion is good to a tenth there.
+            waves = waves * blur(0.1 * np.asarray(mean_in @ each.unread.amplification))
+            reading = np.abs(x)
+        fits = pins.sense * density(waves)
+        fits = fits * np.exp(-0.5 * ((reading[:, None] - AT_IN) / u[:, None]) ** 2)
+        stands = np.abs(AT_IN + shift[:, None])
+        beyond = tabled_normal_cdf((stands - margin) / (0.5 * STEP_IN))
+        outside.append(np.sum(fits * beyond, axis=1))
+        within.append(np.sum(fits * (1.0 - beyond), axis=1))
+    fits = np.exp(-0.5 * ((x[:, None] - AT_IN) / u[:, None]) ** 2)
+    offset = 1.0 / (1.0 + (AT_IN / (PRIORS.offset * margin)) ** 8)
+    offset = offset * tabled_normal_cdf((np.abs(AT_IN) - margin) / (0.5 * STEP_IN))
+    by_rigging = HALF_IN / STEP_IN * np.sum(offset * fits, axis=1) / np.sum(offset, axis=1)
     looked = np.array([i.rigging_checked not in (None, RiggingCheck.NO) for i in cases.inspections])
-    by_rigging *= np.where(looked, PRIORS.overlooked, 1.0)
-    all_joints = by_joints + loaded_outside
-    total = np.maximum(all_joints + by_elsewhere + by_rigging, 1e-300)
+    by_rigging *= np.where(looked, PRIORS.overlooked, 1.0) / PRIORS.joints_for_one_misrigged
+    loaded = cases.fleet.loaded
+    usually = (1.0 - loaded) * both[0].unread.exceeds + loaded * both[1].unread.exceeds
+    all_joints = (1.0 - loaded) * outside[0] + loaded * outside[1]
+    by_elsewhere = (1.0 - loaded) * within[0] + loaded * within[1]
+    parts = np.array(
+        [
+            all_joints,
+            usually * by_rigging,
+            usually * by_elsewhere / PRIORS.joints_for_one_elsewhere,
+        ]
+    )
     before = np.array(
         [1.0, 1.0 / PRIORS.joints_for_one_misrigged, 1.0 / PRIORS.joints_for_one_elsewhere]
     )
-    before /= before.sum()
-    parts = [
-        np.where(seen, part / total, prior)
-        for part, prior in zip((all_joints, by_rigging, by_elsewhere), before, strict=True)
-    ]
+    chances = np.where(
+        seen,
+        parts / np.maximum(parts.sum(axis=0), 1e-300),
+        (before / before.sum())[:, None],
+    )
+    joints, rigging, elsewhere = chances
     return Causes(
         cases,
-        joints=parts[0],
-        rigging=parts[1],
-        elsewhere=parts[2],
+        joints=joints,
+        rigging=rigging,
+        elsewhere=elsewhere,
         worn=worn,
         levels=levels,
-        exceeds=exceeds,
-        waves=waves,
-        loaded=np.where(seen, loaded_outside / np.maximum(all_joints, 1e-300), PRIORS.loaded),
+        exceeds=both[0].exceeds,
+        leaves=(1.0 - loaded) * both[0].exceeds + loaded * both[1].exceeds,
+        loaded=np.where(seen, loaded * outside[1] / np.maximum(all_joints, 1e-300), loaded),
+        usually=usually,
+        outside=tuple(outside),
+        within=tuple(within),
+        by_rigging=by_rigging,
         mean_in=mean_in,
         u_in=u,
+        by_pins=both,
     )
 
 

@@ -20,6 +20,7 @@ from mlg_troubleshoot.decision.assessment import (
 )
 from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.causes import believed
+from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.decision.monte_carlo import check_probability
@@ -55,10 +56,11 @@ def assess(
     advice: bool = False,
     seed: int = 1,
     extension: Extension | None = None,
+    fleet: Fleet | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Judgement, ...]:
     """Judge rows: verdict, plan, repair sets and allowances; with `advice` what is worth it for one
-    gear alone.
+    gear alone. `fleet` is what other gears teach.
     """
     judged: list[Judgement] = []
     for start in range(0, len(rows), _CHUNK):
@@ -66,7 +68,7 @@ def assess(
         valid = [row for row in part if isinstance(row, Inspection)]
         drawn = seed if advice else None
         assessed = iter(
-            _assess_valid(Cases.of(gear, valid, extension), table, drawn) if valid else ()
+            _assess_valid(Cases.of(gear, valid, extension, fleet), table, drawn) if valid else ()
         )
         judged += [
             (
@@ -243,7 +245,8 @@ def _detail(
         detail["confidence"] = check_probability(one, worst_in, budget, rng)
         if found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
             detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    detail["posterior"] = explain(one, causes)
+    if np.isfinite(one.mean_in[0]):
+        detail["posterior"] = explain(one, causes)
     return detail
 
 
@@ -361,9 +364,9 @@ def _warnings(
             "Standard uncertainty of the plunger reading not stated:"
             f" {DEFAULT_PLUNGER_U_IN:.4f} in taken as the default."
         )
-    warnings += sentences.older_than_the_repair(
-        inspection, [f.joint for f in findings if f.over_limit]
-    )
+    if inspection.is_repaired:
+        over = [f.joint for f in findings if f.over_limit]
+        warnings += sentences.older_than_the_repair(inspection, over)
     return tuple(warnings)
 
 

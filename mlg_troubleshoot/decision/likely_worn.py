@@ -21,21 +21,19 @@ from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
-from mlg_troubleshoot.decision.waves import FREQUENCIES, bessel, blur
+from mlg_troubleshoot.decision.waves import FREQUENCIES, HELD, RANDOM, blur
 from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, level_chances
 
 
-def explain(one: Cases, causes: Causes | None = None) -> Posterior | None:
+def explain(one: Cases, causes: Causes | None = None) -> Posterior:
+    """Find which joints explain the plunger's reading of one gear."""
     gear, reading = one.gear, abs(float(one.mean_in[0]))
-    if not np.isfinite(reading):
-        return None
     found = causes or believed(one)
     rigging = float(found.rigging[0])
     loaded = float(found.joints[0] * found.loaded[0])
     clearance = _clearances(one)
     turns = FREQUENCIES * (responses(gear)[0].amplification[:, None] * clearance.at_in)[..., None]
-    random, (mean, spread) = bessel(turns), PRIORS.cosine
-    aligned = np.exp(1j * mean * turns - 0.5 * (spread * turns) ** 2)
+    random, aligned = RANDOM.waves(turns), HELD.waves(turns)
     u = np.hypot(found.u_in[0], PRIORS.linkage_u_in)
     # As wide as what a wrong rigging adds, which is about even.
     wide = np.hypot(u, PRIORS.offset * one.margin_in[0] / np.sqrt(3.0))

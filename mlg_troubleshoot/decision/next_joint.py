@@ -45,10 +45,6 @@ class Outlook:
     within: float
     too_close: float
 
-    @property
-    def enough(self) -> Verdict | None:
-        return enough(self.within, self.too_close)
-
 
 def outlook(one: Cases, unread: Unread | None = None) -> Outlook:
     """Find what each reading is worth, and the chances that the gear is within its margin or too
@@ -105,6 +101,6 @@ def advise(
         expected_within=p_within if complete else ahead.within,
         expected=(found if found is not Verdict.INCONCLUSIVE else None)
         if complete
-        else ahead.enough,
+        else enough(ahead.within, ahead.too_close),
         text=text if reads else f"Nothing is to be measured now. {text}",
     )

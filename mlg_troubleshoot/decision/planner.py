@@ -213,7 +213,7 @@ class _PlanBuilder:
         if not self.read_plunger or self._again():
             self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
         if not self.read_plunger:
-            if causes.exceeds[i] < causes.expected_elsewhere:
+            if causes.leaves[i] < causes.expected_elsewhere:
                 return self._restore_over_limit()._end(End.NOT_EXPLAINED)
             return self._to_repair(joints, rigging)
         if joints + rigging < _EXCLUDED:

@@ -5,13 +5,14 @@ fleet of this gear is public, so that all of it is assumed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Priors:
     """What is assumed of wear, gauges and failures.
 
@@ -44,7 +45,7 @@ class Priors:
     gauge_scale: float = 0.1
     wrong_readings: float = Beliefs().expected
 
-    @property
+    @cached_property
     def cosine(self) -> tuple[float, float]:
         """Mean and standard deviation of the cosine of the angle of a loaded pin. [1]"""
         variance = np.radians(self.scatter_deg) ** 2

@@ -379,9 +379,7 @@ def no_repair_set(a: Assessment) -> str:
 
 
 def older_than_the_repair(inspection: Inspection, over_limit: Collection[int]) -> list[str]:
-    """Ask about what stands in a row and may be older than the repair; joints over their limit."""
-    if not inspection.is_repaired:
-        return []
+    """Ask about what stands in a row and may be older than its repair; joints over their limit."""
     said = [
         f"Joint #{joint} was restored, and its reading, which counts as taken after that, is above"
         " its limit. Was it taken before? Then leave it blank, and read the joint once more."

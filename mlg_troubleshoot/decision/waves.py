@@ -1,14 +1,19 @@
-"""Densities of sums of clearances in random directions, as series of their characteristic
-functions.
+"""Densities of sums of clearances, as series of their characteristic functions.
+
+Pins rest in one of two ways: in uniformly random directions, or near their worst directions where
+loads hold them there.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.decision.priors import PRIORS
 
 # Half the range of displacements that a sum may have, the frequencies and the places of its
 # density. [in, 1/in, in]
@@ -16,7 +21,7 @@ HALF_IN, _TERMS, _PLACES = 0.18, 104, 145
 FREQUENCIES = np.pi * np.arange(1, _TERMS + 1) / HALF_IN
 AT_IN = np.linspace(-HALF_IN, HALF_IN, _PLACES)
 STEP_IN = AT_IN[1] - AT_IN[0]
-COSINES = np.cos(FREQUENCIES[:, None] * AT_IN)
+_COSINES, _SINES = np.cos(FREQUENCIES[:, None] * AT_IN), np.sin(FREQUENCIES[:, None] * AT_IN)
 
 
 @lru_cache(maxsize=1)
@@ -25,10 +30,39 @@ def _bessel_table() -> Array:
     return np.asarray(np.mean(np.cos(np.arange(0.0, 260.0, 0.05)[:, None] * np.sin(turns)), axis=1))
 
 
-def bessel(z: Array) -> Array:
+def _random(turns: Array) -> Array:
     """J₀ from a table. [1]"""
     table = _bessel_table()
-    return np.asarray(np.interp(z, np.arange(len(table)) * 0.05, table))
+    return np.asarray(np.interp(turns, np.arange(len(table)) * 0.05, table))
+
+
+def _held(turns: Array) -> Array:
+    mean, spread = PRIORS.cosine
+    return np.asarray(np.exp(1j * mean * turns - 0.5 * (spread * turns) ** 2))
+
+
+@dataclass(frozen=True, slots=True)
+class Pins:
+    """How pins rest.
+
+    waves: characteristic function of a clearance, by frequency times what it can move. [1] sense:
+    chance of the sense of a displacement. [1] cosine: of the angle from the worst direction, root
+    mean square. [1]
+    """
+
+    waves: Callable[[Array], Array]
+    sense: float
+    cosine: float
+
+
+RANDOM = Pins(_random, 1.0, float(np.sqrt(0.5)))
+HELD = Pins(_held, 0.5, float(np.hypot(*PRIORS.cosine)))
+
+
+def density(waves: Array) -> Array:
+    """Density of sums at `AT_IN`, times half its range, one row per characteristic function. [1]"""
+    found = 0.5 + waves.real @ _COSINES
+    return np.maximum(found + waves.imag @ _SINES if np.iscomplexobj(waves) else found, 0.0)
 
 
 def blur(u_in: Array | float) -> Array:
@@ -37,5 +71,5 @@ def blur(u_in: Array | float) -> Array:
 
 def inside(waves: Array, bound_in: Array) -> Array:
     """Chance that a sum is within ± a bound, from its characteristic function. [1]"""
-    added = np.sum(waves * np.sin(FREQUENCIES * bound_in[:, None]) / FREQUENCIES, axis=-1)
+    added = np.sum(waves.real * np.sin(FREQUENCIES * bound_in[:, None]) / FREQUENCIES, axis=-1)
     return np.asarray(np.clip((bound_in + 2.0 * added) / HALF_IN, 0.0, 1.0))

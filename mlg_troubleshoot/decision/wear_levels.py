@@ -48,7 +48,7 @@ def level_chances(cases: Cases) -> Array:
     share = np.clip(cases.filled(0.0) / cases.gear.limits_in, 0.0, 2.0)
     each = np.array([np.interp(share, SHARES, level) for level in np.log(DENSITIES / SHARE)])
     total = np.sum(np.where(cases.measured, each, 0.0), axis=2).T
-    chances = np.exp(total - total.max(axis=1, keepdims=True))
+    chances = np.exp(total - total.max(axis=1, keepdims=True)) * (cases.fleet.levels or 1.0)
     return np.asarray(chances / chances.sum(axis=1, keepdims=True))
 
 

@@ -136,10 +136,7 @@ def _is_scratch(path: Path) -> bool:
 def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
     if is_frame(source):
         return _read_frame(as_frame(source), options, ticker)
-    return _read_file(cast("File", source), options, ticker)
-
-
-def _read_file(source: File, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
+    source = cast("File", source)
     label = writable(
         str(source if isinstance(source, str | Path) else getattr(source, "name", STDIN_NAME))
     )

@@ -561,6 +561,15 @@ class Store:
         with self.transaction(writing=False) as connection:
             return [self._record(row) for row in self._rows(connection, *where)]
 
+    def newest(self, kind: RecordKind, most: int) -> list[Record]:
+        """The newest records of a kind, the last one first."""
+        with self.transaction(writing=False) as connection:
+            if not self._ready:
+                return []
+            wanted = sql.select(*_COLUMNS).where(_records.c.kind == kind.value)
+            rows = connection.execute(wanted.order_by(_records.c.seq.desc()).limit(most))
+            return [self._record(row) for row in rows]
+
     def all(self) -> list[Record]:
         """All records in the order of the chain."""
         with self.transaction(writing=False) as connection:

@@ -19,6 +19,7 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.life.fleet import expected_of
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
@@ -358,7 +359,15 @@ def _judge(
     **told: Any,
 ) -> CheckResult:
     advice = len(rows) == 1 if options.advice is None else options.advice
-    asked: dict[str, Any] = {"advice": advice, "seed": options.seed, "extension": options.extension}
+    fleet = None if store is None else expected_of(store, gear)
+    asked: dict[str, Any] = {
+        "advice": advice,
+        "seed": options.seed,
+        "extension": options.extension,
+        "fleet": fleet,
+    }
+    if fleet is not None:
+        told["notes"] = (*told.get("notes", ()), fleet.text)
     as_they_count = since_repairs(rows, gear, store)
     judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
     if as_they_count is not rows:

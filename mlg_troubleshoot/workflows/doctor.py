@@ -15,7 +15,7 @@ from mlg_troubleshoot.workflows.check import (
     trial_inspection,
     write_reports,
 )
-from mlg_troubleshoot.workflows.index_tables import renew_index_table
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,10 @@ def examine_installation(gear: str = DEFAULT_GEAR) -> tuple[Ability, ...]:
         found.append(
             Ability("gear", f"{loaded.name}, geometry {loaded.geometry_sha256[:12]}", True)
         )
-        renewed = renew_index_table(loaded)
-        found.append(Ability("precomputed indices", renewed or "match the geometry", True))
+        renewed: list[str] = []
+        load_index_table(loaded, renewed.append)
+        said = "; ".join(renewed) or "match the geometry"
+        found.append(Ability("precomputed indices", said, True))
         result = check_inspection(trial_inspection(loaded), CheckOptions(gear=gear, advice=False))
         found.append(
             Ability("prediction", f"{result.counts[Verdict.OUTSIDE_MARGIN]} trial judged", True)

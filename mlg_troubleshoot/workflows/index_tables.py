@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import (
@@ -13,27 +14,15 @@ from mlg_troubleshoot.indices.index_table import (
 )
 
 
-def renew_index_table(gear: Gear) -> str | None:
-    """Compute and write the table of indices of a gear if it is missing or of another geometry, and
-    return what to say about it; None if it fits.
-    """
-    from mlg_troubleshoot.paper.study import StudyOptions, run_study
-
-    try:
-        read_index_table(gear)
-    except StaleTableError as stale:
-        write_index_table(run_study(gear, StudyOptions()).table, gear.indices_file)
-        return f"{stale.message}. It was computed again: {gear.indices_file}"
-    return None
-
-
-def load_index_table(gear: Gear) -> IndexTable:
-    """Load the table of indices of a gear, renewed with a warning when its geometry changed.
+def load_index_table(gear: Gear, say: Callable[[str], object] | None = None) -> IndexTable:
+    """Load the table of indices of a gear; one of another geometry is computed again and written.
 
     Parameters
     ----------
     gear : Gear
         The gear.
+    say : callable or None
+        Takes what is said of a table that was computed again; None warns.
 
     Returns
     -------
@@ -47,7 +36,15 @@ def load_index_table(gear: Gear) -> IndexTable:
     OutputError
         If a table that no longer fits cannot be written again.
     """
-    said = renew_index_table(gear)
-    if said is not None:
-        warnings.warn(said, stacklevel=2)
+    try:
+        return read_index_table(gear)
+    except StaleTableError as stale:
+        from mlg_troubleshoot.paper.study import StudyOptions, run_study
+
+        write_index_table(run_study(gear, StudyOptions()).table, gear.indices_file)
+        said = f"{stale.message}. It was computed again: {gear.indices_file}"
+        if say is None:
+            warnings.warn(said, stacklevel=2)
+        else:
+            say(said)
     return read_index_table(gear)

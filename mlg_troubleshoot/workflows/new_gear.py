@@ -14,7 +14,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.short_form import NewGear, read_short_form, short_form
 from mlg_troubleshoot.outputs import OutputKind, write_text
 from mlg_troubleshoot.units import LengthUnit
-from mlg_troubleshoot.workflows.index_tables import renew_index_table
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 _HEADING = "# Written by mlg gear new.\n"
 NEW_GEAR = OutputKind.marked("is not a gear file that mlg gear new wrote", _HEADING)
@@ -120,5 +120,5 @@ def _write(found: NewGear, file: Path) -> WrittenGear:
     found.closes()
     write_text(file, text)
     gear = load_gear(file)
-    renew_index_table(gear)
+    load_index_table(gear, say=str)
     return WrittenGear(gear, found.steps, found.assumed)

@@ -18,6 +18,7 @@ import numpy as np
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.likely_worn import explain
+from mlg_troubleshoot.life.fleet import expected_of
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from tests.benchmarks.worn_gears import LIMIT_IN, displacement, worst
 from tests.decision.technician import (
@@ -45,7 +46,9 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
         hangar.read_plunger(gear)
     hangar.judged(gears, folder)
     result = check_files([folder / "row.csv"], CheckOptions(advice=False))
-    cases = Cases.of(result.gear, [judgement.inspection for judgement in result.judgements])
+    fleet = None if hangar.store is None else expected_of(hangar.store, result.gear)
+    rows = [judgement.inspection for judgement in result.judgements]
+    cases = Cases.of(result.gear, rows, fleet=fleet)
     causes = believed(cases)
     for i, (gear, said) in enumerate(zip(gears, unread, strict=True)):
         read = cases.measured[i]
@@ -67,7 +70,6 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
             pairs["something else"].append((causes.elsewhere[i], gear.kind == OTHER))
         if gear.kind in (CLEARANCE, MISRIGGED):
             found = explain(cases.take(np.array([i])))
-            assert found is not None
             for each in found.intervals:
                 j = each.joint - 1
                 inside = each.low_in <= true[i, j] <= each.high_in
@@ -87,12 +89,15 @@ def main() -> None:
     parser.add_argument("--gears", type=int, default=200)
     parser.add_argument("--seed", type=int, default=8100)
     parser.add_argument("--pins", default="uniform")
+    parser.add_argument("--known", type=int, default=0, help="gears of the fleet that are kept")
     chosen = parser.parse_args()
     pairs: dict[str, list] = defaultdict(list)
     with tempfile.TemporaryDirectory() as folder:
         for place, linkage in enumerate("ABCDEFGHIJ"):
             world = World(linkage, linkage, chosen.pins, mix=_MIX)
             hangar = Hangar(world, chosen.gears, chosen.seed + place)
+            if chosen.known:
+                hangar.kept(chosen.known, chosen.seed + 5000 + place, Path(folder))
             rng = np.random.default_rng(chosen.seed + 50 + place)
             for name, some in _said(hangar, Path(folder), rng).items():
                 pairs[name] += some

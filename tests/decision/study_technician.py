@@ -19,6 +19,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, action="append", help="may repeat; default 7100")
     parser.add_argument("--world", help="the beginning of a world's name")
     parser.add_argument("--replay", action="store_true", help="rows left as before their repair")
+    parser.add_argument("--known", type=int, default=0, help="gears of the fleet that are kept")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         if chosen.replay:
@@ -29,7 +30,9 @@ def main() -> None:
         for seed in chosen.seed or [7100]:
             for place, world in enumerate(WORLDS):
                 if chosen.world is None or world.name.startswith(chosen.world):
-                    found, _ = counted(world, chosen.gears, seed + place, Path(folder))
+                    found, _ = counted(
+                        world, chosen.gears, seed + place, Path(folder), chosen.known
+                    )
                     print(f"seed {seed + place}, {say(world.name, found)}", flush=True)
 
 

@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 
 import mlg_troubleshoot
 from mlg_troubleshoot.reporting.json_form import check_as_json
+from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
+from mlg_troubleshoot.workflows.keep import keep
 from tests.benchmarks.worn_gears import GROUPS, LIMIT_IN, displacement, worst
 from tests.hidden_effect.simulator.linkage import load
 
@@ -116,6 +118,7 @@ class Hangar:
 
     def __init__(self, world: World, n: int, seed: int) -> None:
         self.world, self.rng = world, np.random.default_rng(seed)
+        self.store: Store | None = None
         self.load = np.random.default_rng(seed + 77).uniform(0.0, 2.0 * np.pi, 10)
         self.gears: list[Gear] = []
         share = np.array(world.mix) / sum(world.mix)
@@ -278,6 +281,20 @@ class Hangar:
                 gear.end = said["end"]
         gear.minutes += 0.0 if gear.end else 1e-9
 
+    def kept(self, n: int, seed: int, folder: Path) -> Hangar:
+        """Keep other gears of the same world, every joint and the plunger read on each."""
+        others = Hangar(self.world, n, seed)
+        for gear in others.gears:
+            for j in set(range(1, 11)) - gear.shut:
+                others.read(gear, j)
+            others.read_plunger(gear)
+        others.judged(others.gears, folder)
+        (folder / "kept.sqlite").unlink(missing_ok=True)
+        self.store = Store(folder / "kept.sqlite")
+        options = CheckOptions(advice=False)
+        keep(check_files([folder / "row.csv"], options), options, self.store)
+        return self
+
     def judged(self, gears: Sequence[Gear], folder: Path) -> list[dict[str, Any]]:
         """What the program says of some gears."""
         numbers = range(1, 11)
@@ -295,8 +312,17 @@ class Hangar:
             writer.writerow([*header, *columns])
             for place, gear in enumerate(gears):
                 cells = [gear.row.get(name, "") for name in columns]
-                writer.writerow([f"R{place}", f"N{place}", "LH", "RADIAL", GAUGE_U_IN, *cells])
-        result = check_files([file], CheckOptions(advice=False))
+                writer.writerow(
+                    [
+                        f"R{place}",
+                        f"N{place}" if self.store else f"K{place}",
+                        "LH",
+                        "RADIAL",
+                        GAUGE_U_IN,
+                        *cells,
+                    ]
+                )
+        result = check_files([file], CheckOptions(advice=False), store=self.store)
         assert not result.problems, result.problems[0]
         form = check_as_json(result.gear, result.judgements, result.problems, result.notes)
         return list(form["inspections"])
@@ -347,11 +373,18 @@ class Counted:
     figures: dict[str, float]
 
 
-def counted(world: World, n: int, seed: int, folder: Path) -> tuple[Counted, Hangar]:
-    """Work on the gears of a world, and on the same ones by measuring everything."""
+def counted(
+    world: World, n: int, seed: int, folder: Path, known: int = 0
+) -> tuple[Counted, Hangar]:
+    """Work on the gears of a world, and on the same ones by measuring everything; `known` others
+    were kept before.
+    """
     hangar = Hangar(world, n, seed)
     best = oracle(hangar) if world.mix[CLEARANCE] else Oracle(float("nan"), float("nan"))
-    base = deepcopy(hangar).measure_all(folder)
+    base = deepcopy(hangar)
+    if known:
+        base.store = hangar.kept(known, seed + 5000, folder).store
+    base.measure_all(folder)
     hangar.work(folder)
     by = [[g for g in hangar.gears if g.kind == kind] for kind in range(4)]
     base_by = [[g for g in base.gears if g.kind == kind] for kind in range(4)]

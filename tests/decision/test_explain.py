@@ -20,17 +20,15 @@ from tests.decision.conftest import Judge, every_joint, inspected
 
 
 def explained(gear: Gear, clearance_in: dict[int, float], reading_in: float) -> Posterior:
-    found = explain(Cases.of(gear, [inspected(clearance_in, readings_in=(reading_in,))]))
-    assert found is not None
-    return found
+    return explain(Cases.of(gear, [inspected(clearance_in, readings_in=(reading_in,))]))
 
 
 def chance(found: Posterior, joint: int) -> float:
     return next(group.probability for group in found.groups if joint in group.joints)
 
 
-def test_without_a_plunger_reading_nothing_is_explained(gear: Gear) -> None:
-    assert explain(Cases.of(gear, [inspected({3: 0.013})])) is None
+def test_without_a_plunger_reading_nothing_is_explained(judge: Judge) -> None:
+    assert judge({3: 0.013}, advice=True).posterior is None
 
 
 def test_the_only_unmeasured_link_explains_a_large_displacement(gear: Gear) -> None:

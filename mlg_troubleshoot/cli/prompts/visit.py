@@ -13,7 +13,14 @@ from typing import Any
 
 from mlg_troubleshoot.cli.prompts.answers import CONFIRMED, MORE, NOT_MEASURED, Answers, JointAnswer
 from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.columns import BY_NAME, DATE, PLUNGER_DISPLACEMENT
+from mlg_troubleshoot.decision.columns import (
+    BY_NAME,
+    DATE,
+    OUTCOME,
+    PLUNGER_DISPLACEMENT,
+    RESTORED_JOINTS,
+    RIGGING_CHECKED,
+)
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.errors import UsageError
@@ -25,10 +32,10 @@ from mlg_troubleshoot.units import LengthUnit, parse_length
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
 _ASKS = {
-    Action.READ_PLUNGER: "plunger_displacement",
-    Action.CHECK_RIGGING: "rigging_checked",
-    Action.RESTORE: "restored_joints",
-    Action.RETRACT: "outcome",
+    Action.READ_PLUNGER: PLUNGER_DISPLACEMENT.name,
+    Action.CHECK_RIGGING: RIGGING_CHECKED.name,
+    Action.RESTORE: RESTORED_JOINTS.name,
+    Action.RETRACT: OUTCOME.name,
 }
 _WITH_JOINTS = (Action.MEASURE, Action.MEASURE_AGAIN)
 

@@ -1,0 +1,62 @@
+"""What inspections of a fleet teach of its next gear: how far gears are worn, and whether loads
+hold their pins near their worst directions.
+
+Wear is learned from readings of joints, as chances of its levels; the share of gears whose pins are
+held from gears with all joints and the plunger read, by how much likelier the plunger's reading is
+then. Before any gear is known, the share is either small or large: a beta distribution that weighs
+as much as one gear, its mean what `priors` assumes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import betaincinv
+
+from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.causes import believed
+from mlg_troubleshoot.decision.fleet import Fleet
+from mlg_troubleshoot.decision.priors import PRIORS
+from mlg_troubleshoot.decision.sentences import percent
+from mlg_troubleshoot.decision.wear_levels import LEVELS, MEAN, level_chances
+
+# Quantiles of the share of gears whose pins are held, and rounds in which shares of levels settle.
+_QUANTILES, _ROUNDS = (np.arange(2000) + 0.5) / 2000, 50
+
+
+def learned(cases: Cases) -> Fleet:
+    """Learn from the last inspections of some gears.
+
+    Parameters
+    ----------
+    cases : Cases
+        One inspection of each gear, as it stood when it was read.
+
+    Returns
+    -------
+    Fleet
+        What to expect of another gear.
+    """
+    known = replace(cases, fleet=Fleet())
+    read = known.measured.any(axis=1)
+    fits = level_chances(known)[read]
+    levels = np.full(len(LEVELS), 1.0 / len(LEVELS))
+    for _ in range(_ROUNDS):
+        each = fits * levels
+        each /= each.sum(axis=1, keepdims=True)
+        levels = (1.0 + each.sum(axis=0)) / (len(LEVELS) + len(fits))
+    whole = np.flatnonzero(known.measured.all(axis=1) & np.isfinite(known.mean_in))
+    share = betaincinv(PRIORS.loaded, 1.0 - PRIORS.loaded, _QUANTILES)
+    likely = np.zeros(len(share))
+    if len(whole):
+        ratio = believed(known.take(whole)).held
+        likely = np.log1p(share[:, None] * (ratio - 1.0)).sum(axis=1)
+    weight = np.exp(likely - likely.max())
+    loaded = float(np.sum(share * weight) / np.sum(weight))
+    text = (
+        f"Expected from {len(fits)} gear{'s' * (len(fits) > 1)} kept: an unread joint is worn to"
+        f" {percent(float(levels @ MEAN))} of its limit on average; loads hold the pins near their"
+        f" worst directions with a chance of {percent(loaded)}"
+    )
+    return Fleet(loaded, tuple(levels.tolist()), text)
