@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import joblib
@@ -195,7 +196,11 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "survey": lambda: mlg.survey(pd.DataFrame(SURVEY)),
     "lives": lambda: mlg.forecast(DATA / "fleet_batch.csv"),
     "catalogue": lambda: CATALOGUE,
+    "picture": lambda: result("gear").plot(),
+    "written": lambda: mlg.new_gear(FORM, Path(mkdtemp()) / "gear.toml"),
 }
+FORM = ROOT / "docs" / "how-to" / "data" / "four-bar-three-pins.toml"
+NO_TABLE = ("inspection", "extension", "picture", "written")
 
 
 @cache
@@ -239,7 +244,7 @@ def test_a_result_says_itself_in_twenty_lines(name: str) -> None:
     assert len(text) <= 4000
 
 
-@pytest.mark.parametrize("name", [n for n in RESULTS if n not in ("inspection", "extension")])
+@pytest.mark.parametrize("name", [n for n in RESULTS if n not in NO_TABLE])
 def test_a_result_is_a_table(name: str) -> None:
     assert not result(name).to_frame().empty
 
