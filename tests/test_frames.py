@@ -108,6 +108,11 @@ def test_days_of_a_frame_are_days() -> None:
     assert set(found["inspection_date"]) == {pd.Timestamp("2024-03-04")}
 
 
+def test_a_column_of_days_that_is_only_carried_has_no_times() -> None:
+    frame = sheet(4, bad=False).assign(bought=pd.Timestamp("2024-03-04"))
+    assert set(mlg.read_inspections(frame)["bought"]) == {"2024-03-04"}
+
+
 def test_an_empty_frame_is_a_problem() -> None:
     assert [p.code for p in mlg.check(pd.DataFrame()).problems] != []
 
@@ -265,13 +270,15 @@ def test_the_ensemble_is_a_table_of_the_points_of_each_linkage() -> None:
     table = gear.to_frame("ensemble").set_index(["linkage", "point"])
     last = gear.ensemble[-1]
     assert len(table) == sum(len(linkage.mechanism.points) for linkage in gear.ensemble)
-    assert table.loc[(last.name, "E"), "x_in"] == last.mechanism.point("E").x
+    place = last.mechanism.point("E")
+    assert tuple(table.loc[(last.name, "E"), ["x_in", "y_in"]]) == (place.x, place.y)
 
 
 def test_the_catalogue_is_a_table_of_its_causes() -> None:
     table = CATALOGUE.to_frame().set_index("name")
     assert table.index.tolist() == [cause.name for cause in CATALOGUE]
     assert table.loc["elastic_compliance", "needs"] == ["hydraulic_pressure_psi"]
+    assert table.loc["gauge_bias", "sentence"] == "Readings with … are shifted"
 
 
 def test_a_table_has_a_row_per_gear_with_the_labels_of_the_frame() -> None:

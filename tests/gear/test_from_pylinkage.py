@@ -216,6 +216,12 @@ def test_every_point_of_an_example_is_where_pylinkage_puts_it(name: str, tmp_pat
     assert largest_distance(linkage, steps, gear) < 1e-9
 
 
+def test_every_pin_and_every_point_on_guides_that_move_is_a_joint() -> None:
+    found = short_form_of(moving_guides(), **LIMITS)
+    assert set(found["joints"]) == {"O", "D", "E", "A", "B", "C", "P", "Q"}
+    assert found["output"] == {"position_of": "Q"}
+
+
 def test_a_json_file_gives_the_gear_of_its_mechanism(tmp_path: Path) -> None:
     linkage = server_crank_slider()
     mechanism_to_json(linkage, tmp_path / "theirs.json")
