@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.gear.directions import WorstCase
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
-    from mlg_troubleshoot.indices.index_table import IndexTable, load_index_table
+    from mlg_troubleshoot.indices.index_table import IndexTable
     from mlg_troubleshoot.misfit.simulation import diagnose_simulation
     from mlg_troubleshoot.misfit.simulation_result import SimulationDiagnosis, Suspect
     from mlg_troubleshoot.paper.study import StudyFindings, StudyOptions
@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     )
     from mlg_troubleshoot.workflows.forecast import forecast
     from mlg_troubleshoot.workflows.history import Lives
+    from mlg_troubleshoot.workflows.index_tables import load_index_table
     from mlg_troubleshoot.workflows.new_gear import WrittenGear, from_pylinkage, new_gear
     from mlg_troubleshoot.workflows.study import run_study
     from mlg_troubleshoot.workflows.survey import survey
@@ -91,7 +92,7 @@ _HOME = {
     "gear.gear": "Gear",
     "gear.directions": "WorstCase",
     "gear.gear_file": "load_gear shipped_gears",
-    "indices.index_table": "IndexTable load_index_table",
+    "indices.index_table": "IndexTable",
     "misfit.simulation": "diagnose_simulation",
     "misfit.simulation_result": "SimulationDiagnosis Suspect",
     "paper.study": "StudyFindings StudyOptions",
@@ -108,6 +109,7 @@ _HOME = {
     ),
     "workflows.forecast": "forecast",
     "workflows.history": "Lives",
+    "workflows.index_tables": "load_index_table",
     "workflows.new_gear": "WrittenGear from_pylinkage new_gear",
     "workflows.study": "run_study",
     "workflows.survey": "survey",

@@ -14,7 +14,7 @@ from hypothesis import settings
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.indices.index_table import IndexTable, load_index_table
+from mlg_troubleshoot.indices.index_table import IndexTable, read_index_table
 
 settings.register_profile(
     "everyday", deadline=None, max_examples=40, derandomize=True, database=None
@@ -77,4 +77,4 @@ def gear() -> Gear:
 @pytest.fixture(scope="session")
 def table(gear: Gear) -> IndexTable:
     """Its precomputed table of indices."""
-    return load_index_table(gear)
+    return read_index_table(gear)

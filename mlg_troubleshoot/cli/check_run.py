@@ -23,7 +23,7 @@ from mlg_troubleshoot.outputs import OutputFile
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
-from mlg_troubleshoot.workflows.index_tables import index_table
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.store import Record
@@ -71,7 +71,7 @@ class Run:
 
     def run(self) -> int:
         """Judge, show and keep; the exit code is returned."""
-        index_table(load_gear(self._asked.gear), lambda said: output.say(f"Note: {said}"))
+        load_index_table(load_gear(self._asked.gear), lambda said: output.say(f"Note: {said}"))
         if self._asks:
             result = self._ask()
         else:

@@ -29,7 +29,9 @@ def show(
     if context.invoked_subcommand is not None:
         return
     if as_json:
-        output.write_json(_as_json(load_gear(gear)))
+        from mlg_troubleshoot.reporting.json_form import gear_as_json
+
+        output.write_json(gear_as_json(load_gear(gear)))
     else:
         _show(load_gear(gear))
 
@@ -73,27 +75,6 @@ def _show(gear: Gear) -> None:
             cycle.add_row(state.plunger, state.flow, state.stage, state.result)
         console.print(cycle)
         console.print(f"{gear.cycle.source}; what it does not state is shown as not stated.")
-
-
-def _as_json(gear: Gear) -> dict[str, object]:
-    from mlg_troubleshoot.output_types import GearOutput, ShownJoint
-    from mlg_troubleshoot.reporting.json_form import written
-
-    return written(
-        GearOutput,
-        gear,
-        ensemble=[linkage.name for linkage in gear.ensemble],
-        calibration_rate=gear.model.rate,
-        release_stroke_in=gear.reference.stroke[1],
-        joints=[
-            written(ShownJoint, joint, joint=joint.number, acts_like=gear.alike[joint.number])
-            for joint in gear.joints
-        ],
-        points={
-            point.name: {"plane": point.plane, "at_in": [point.x, point.y], "fixed": point.fixed}
-            for point in gear.reference.mechanism.points
-        },
-    )
 
 
 def verify(

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Linkage
-from mlg_troubleshoot.geometry.mechanism import Dyad, Mechanism, Point, Slider, Step
+from mlg_troubleshoot.geometry.mechanism import Dyad, Guided, Mechanism, Point, Slider, Step
 
 
 class DesignSpace:
@@ -26,6 +27,12 @@ class DesignSpace:
     def __init__(self, given: Linkage) -> None:
         self.given = given
         self.mechanism = m = given.mechanism
+        for step in m.steps:
+            if isinstance(step, Guided):
+                raise UsageError(
+                    f"the guide of {step.joint} moves with the mechanism",
+                    "A linkage can be searched or surveyed only if its guides stand still.",
+                )
         base = [p for p in m.points if p.plane == m.planes[0].name]
         self.held = next((p for p in base if p.fixed and p.virtual_link is not None), base[0])
         others = [p for p in base if p is not self.held and _distance(p, self.held) > 0.0]

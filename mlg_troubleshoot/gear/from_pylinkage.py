@@ -19,16 +19,19 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import SourceKind
 from mlg_troubleshoot.units import LengthUnit
 
-_NO_COUNTERPART = "Replace it by a crank, links between pins, or a guide that stands still."
+_NO_COUNTERPART = "Replace it by a crank, links between pins, or a guide."
 
 
 class TheirJoint(Table, forbid_unknown_fields=False):
-    """A joint of their file; what is not needed is not read."""
+    """A joint of their file; what is not needed is not read. lines: that it slides on and that
+    move, which their file cannot hold.
+    """
 
     id: Name
     position: Pair
     type: Literal["ground", "revolute", "prismatic", "tracker"] = "revolute"
     axis: Pair = (1.0, 0.0)
+    lines: tuple[tuple[str, str], ...] = ()
     ref_joint1_id: str = ""
     ref_joint2_id: str = ""
 
@@ -79,6 +82,7 @@ def short_form_of(
         },
         "links": theirs.links,
         "guides_deg": theirs.guides,
+        "guides": theirs.lines,
         "slots": theirs.slots,
         "input": {"crank": driver.id, "travel": list(travel_deg)},
         "output": dict(output or theirs.output()),
@@ -97,7 +101,7 @@ def _read(linkage: Any) -> DataFile[TheirMechanism]:
         from pylinkage.mechanism.serialization import mechanism_to_dict
 
         values = mechanism_to_dict(linkage)
-    path = Path(str(values.get("name")) or "linkage")
+    path = Path(str(values.get("name") or "linkage"))
     values = msgspec.to_builtins(values)
     return DataFile(path, values, decode(path, values, TheirMechanism))
 
@@ -110,6 +114,7 @@ class _Theirs:
         self.mechanism = m = file.content
         self.places = {joint.id: joint.position for joint in m.joints}
         self.guides: dict[str, float] = {}
+        self.lines = {joint.id: joint.lines for joint in m.joints if joint.lines}
         self.slots: dict[str, str] = {}
         self.links: dict[str, list[str]] = {}
         for i, link in enumerate(m.links):
@@ -163,8 +168,8 @@ class _Theirs:
         return drivers[0]
 
     def output(self) -> dict[str, str]:
-        if self.guides:
-            return {"position_of": [*self.guides][-1]}
+        if self.guides or self.lines:
+            return {"position_of": [*self.lines, *self.guides][-1]}
         driver = self.driver().id
         others = [link for link in self.links if link != driver]
         on_ground = [x for x in others if set(self.links[x]) & set(self.ground)]
@@ -173,11 +178,12 @@ class _Theirs:
     def pins(self) -> list[str]:
         """Points where one link turns on another or on the ground, or slides."""
         on = {p: sum(p in ends for ends in self.links.values()) for p in self.places}
+        slides = dict.fromkeys(self.guides, 1) | {p: len(own) for p, own in self.lines.items()}
         arms = {self.links[arm][1] for arm in self.slots}
         return [
             p
             for p in self.places
-            if on[p] + (p in self.ground or p in self.guides) > 1 and p not in arms
+            if on[p] + slides.get(p, 0) + (p in self.ground) > 1 and p not in arms
         ]
 
 
@@ -207,15 +213,21 @@ def _of_components(linkage: Any) -> dict[str, Any]:
                 a, b = part.line_anchor1, part.line_anchor2
                 joint |= {"type": "prismatic", "axis": [b.x - a.x, b.y - a.y]}
                 links.append({"id": f"{end}-{part.name}", "joints": [end, part.name]})
+            case "RRPDyad":
+                (end,) = _names([part.revolute_anchor])
+                joint["lines"] = [_names([part.line_anchor1, part.line_anchor2])]
+                links.append({"id": f"{end}-{part.name}", "joints": [end, part.name]})
             case "PPDyad" if _stand_still(*part.anchors):
                 joint["type"] = "ground"
+            case "PPDyad":
+                first, second, third, fourth = _names(part.anchors)
+                joint["lines"] = [[first, second], [third, fourth]]
             case "FixedDyad" | "PointTracker":
                 first, second = _names([part.anchor1, part.anchor2])
                 joint |= {"type": "tracker", "ref_joint1_id": first, "ref_joint2_id": second}
             case kind:
                 raise GearFileError(
-                    f"{linkage.name}: {part.name}: a {kind} has no counterpart in a gear"
-                    " (of dyads RRP and PP: with a line that moves)",
+                    f"{linkage.name}: {part.name}: a {kind} has no counterpart in a gear",
                     _NO_COUNTERPART,
                 )
     return {"name": str(linkage.name), "joints": joints, "links": links}

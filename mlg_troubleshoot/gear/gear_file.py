@@ -46,6 +46,7 @@ from mlg_troubleshoot.gear.model import Calibration
 from mlg_troubleshoot.geometry.mechanism import (
     Crank,
     Dyad,
+    Guided,
     Lever,
     Mechanism,
     Output,
@@ -176,6 +177,12 @@ class SliderTable(SignedTable, tag="slider", kw_only=True):
     axis_deg: Angle
 
 
+class GuideTable(StepTable, tag="guide", kw_only=True):
+    upstream: Name
+    line: tuple[Name, Name | Angle]
+    across: Name | Angle | None = None
+
+
 class OutputTable(Table):
     """What a linkage is for."""
 
@@ -203,7 +210,7 @@ class GeometryTable(Table):
     input: InputTable
     planes: tuple[PlaneTable, ...]
     points: tuple[PointTable, ...]
-    steps: tuple[CrankTable | DyadTable | LeverTable | SlotTable | SliderTable, ...]
+    steps: tuple[CrankTable | DyadTable | LeverTable | SlotTable | SliderTable | GuideTable, ...]
     output: OutputTable
     calibration: CalibrationTable | None = None
 
@@ -345,6 +352,7 @@ _STEPS: dict[type[StepTable], type[Step]] = {
     LeverTable: Lever,
     SlotTable: Slot,
     SliderTable: Slider,
+    GuideTable: Guided,
 }
 
 
@@ -517,6 +525,10 @@ def _add_numbers(table: GeometryTable, numbers: _Numbers) -> None:
     for step in table.steps:
         if isinstance(step, SliderTable):
             numbers.add(step.axis_deg, "deg", step.source)
+        if isinstance(step, GuideTable):
+            for to in (step.line[1], step.across):
+                if isinstance(to, float):
+                    numbers.add(to, "deg", step.source)
 
 
 def linkage_of(table: GeometryTable, name: str) -> Linkage:
@@ -539,7 +551,15 @@ def _step(table: StepTable) -> Step:
     del values["source"]
     if isinstance(table, SliderTable):
         values["axis"] = float(np.radians(values.pop("axis_deg")))
+    if isinstance(table, GuideTable):
+        start, to = table.line
+        values.update(line=(start, _towards(to)), across=_towards(table.across))
     return _STEPS[type(table)](**values)
+
+
+def _towards(to: str | float | None) -> Any:
+    """A point that a line leads to, or its direction. [rad]"""
+    return float(np.radians(to)) if isinstance(to, float) else to
 
 
 def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:

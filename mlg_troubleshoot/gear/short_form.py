@@ -1,7 +1,8 @@
 """A gear from nothing: points, links and joints in the terms of the field, as a full gear file.
 
-A point is located by what it stands on, in this order: a driven crank; a guide (dyad RRP); a rigid
-link of which two points are located; a slot; two links (dyad RRR). So nobody writes an order.
+A point is located by what it stands on, in this order: a driven crank; two guides (dyad RPP); a
+guide and a link (RRP); a rigid link of which two points are located; a slot; two links (RRR). So
+nobody writes an order.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from mlg_troubleshoot.gear.model import Calibration, LinkageModel
 
 Place = tuple[Coordinate, Coordinate]
 Ends = Annotated[tuple[Name, ...], Meta(min_length=2)]
+# A line that moves: the point where it starts, and the one that it leads to or its direction. [deg]
+MovingLine = tuple[Name, Name | Angle]
 # What a gear file must state and a short form does not: changed there by who knows better.
 _ASSUMED = "Not stated in the short form: assumed by the authors of this tool."
 _PLANE = "base"
@@ -77,6 +80,7 @@ class ShortForm(Table):
     margin: Length
     source: Source
     guides_deg: dict[Name, Angle] = msgspec.field(default_factory=dict)
+    guides: dict[Name, tuple[MovingLine, ...]] = msgspec.field(default_factory=dict)
     slots: dict[Name, Name] = msgspec.field(default_factory=dict)
 
 
@@ -154,6 +158,12 @@ class _Builder:
             ),
             *((("slots", link), pin) for link, pin in form.slots.items()),
             *((("joints", point), point) for point in form.joints),
+            *(
+                (("guides", point, i), end)
+                for point, lines in form.guides.items()
+                for i, line in enumerate(lines)
+                for end in _points_of(line)
+            ),
         ]
         for place, point in named:
             if point not in points:
@@ -161,9 +171,12 @@ class _Builder:
         for point in form.ground:
             if point in form.moving:
                 raise self.file.fail(("moving", point), "a point that is not on the ground as well")
-        for point in form.guides_deg:
-            if point not in form.moving:
-                raise self.file.fail(("guides_deg", point), "a moving point")
+        for table, point in [
+            *(("guides_deg", p) for p in form.guides_deg),
+            *(("guides", p) for p in form.guides),
+        ]:
+            if point not in form.moving or len(self._lines(point)) > 2:
+                raise self.file.fail((table, point), "a moving point with at most two guides")
         drive, read = form.input, form.output
         links = [
             *((("slots", link), link) for link in form.slots),
@@ -178,8 +191,9 @@ class _Builder:
         if len(form.links[driven]) != 2 or (drive.crank and on_ground != 1):
             expected = "one point on the ground and one that moves" if drive.crank else "two points"
             raise self.file.fail(("links", driven), expected)
-        if read.position_of is not None and read.position_of not in form.guides_deg:
-            expected = f"a point with a guide: {', '.join(form.guides_deg) or 'there is none'}"
+        guided = form.guides_deg | form.guides
+        if read.position_of is not None and read.position_of not in guided:
+            expected = f"a point with a guide: {', '.join(guided) or 'there is none'}"
             raise self.file.fail(("output", "position_of"), expected)
         if not form.joints:
             raise self.file.fail(("joints",), "at least one point with its limit in inches")
@@ -209,9 +223,8 @@ class _Builder:
                 f"{form.input.crank} about {pivot}, turned by the input",
                 pivot=pivot,
             )
-        elif point in form.guides_deg and reach:
-            link, (end, *_) = next(iter(reach.items()))
-            self._slide(point, link, end)
+        elif self._is_guided(point, reach):
+            self._guide(point, reach)
         elif rigid:
             pivot, follows, *_ = reach[rigid[0]]
             words = f"rigid on {rigid[0]} with {pivot} and {follows}"
@@ -227,7 +240,35 @@ class _Builder:
     def _is_known(self, point: str) -> bool:
         return point in self.form.ground or point in self.steps
 
-    def _slide(self, point: str, link: str, end: str) -> None:
+    def _line_words(self, line: MovingLine) -> str:
+        start, to = line
+        if isinstance(to, str):
+            return f"guide from {start} to {to}"
+        return f"guide at {to:g}°" + ("" if start in self.form.ground else f" through {start}")
+
+    def _lines(self, point: str) -> list[MovingLine]:
+        """The guides of a point, one that stands still as a line from a point on the ground."""
+        moving = self.form.guides.get(point, ())
+        axis = self.form.guides_deg.get(point)
+        return [*moving] if axis is None else [(next(iter(self.form.ground)), axis), *moving]
+
+    def _is_guided(self, point: str, reach: Mapping[str, list[str]]) -> bool:
+        lines = self._lines(point)
+        is_held = len(lines) == 2 or (len(lines) == 1 and bool(reach))
+        return is_held and all(self._is_known(end) for line in lines for end in _points_of(line))
+
+    def _guide(self, point: str, reach: Mapping[str, list[str]]) -> None:
+        lines = self._lines(point)
+        if len(lines) == 2:
+            first, (upstream, across) = lines
+            words = f"dyad RPP: {self._line_words(first)}, {self._line_words(lines[1])}"
+            self._add(point, "guide", words, upstream=upstream, line=list(first), across=across)
+            return
+        link, (end, *_) = next(iter(reach.items()))
+        if point in self.form.guides:
+            words = f"dyad RRP: {link} from {end}, {self._line_words(lines[0])}"
+            self._add(point, "guide", words, upstream=end, line=list(lines[0]))
+            return
         axis = self.form.guides_deg[point]
         along = (self._at(point) - self._at(end)) * np.exp(-1j * np.radians(axis))
         words = f"dyad RRP: {link} from {end}, guide at {axis:g}°"
@@ -272,7 +313,7 @@ class _Builder:
         user = next(
             (s for s in self.steps.values() if point in (s.get("upstream"), s.get("pin"))), None
         )
-        step = own if own["type"] in ("dyad", "slider") else user or own
+        step = own if own["type"] in ("dyad", "slider", "guide") else user or own
         if step["type"] == "slot" and step is own:
             raise self.file.fail(
                 ("joints", point), "a joint that a link starts from: nothing is pinned to it"
@@ -362,3 +403,7 @@ class _Builder:
             f" {_HARD_LIMIT * largest:g} in is refused",
             "end float tilts over 1 in",
         )
+
+
+def _points_of(line: MovingLine) -> list[str]:
+    return [end for end in line if isinstance(end, str)]

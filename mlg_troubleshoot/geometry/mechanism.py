@@ -122,7 +122,28 @@ class Slider:
     virtual_links: tuple[int, ...] = ()
 
 
-Step = Crank | Dyad | Lever | Slot | Slider
+# A point of the mechanism that a line leads to, or the direction that it keeps. [rad]
+Towards = str | float
+
+
+@dataclass(frozen=True, slots=True)
+class Guided:
+    """A joint on a line that starts at a point of the mechanism, at the distance from it that the
+    coordinates give.
+
+    across: of a second line that starts at `upstream`, and the joint is where both meet (dyad RPP);
+    None for the end of a link from `upstream`, on the side where the coordinates put it (RRP).
+    virtual_links: they displace that second line, or that link.
+    """
+
+    joint: str
+    upstream: str
+    line: tuple[str, Towards]
+    across: Towards | None = None
+    virtual_links: tuple[int, ...] = ()
+
+
+Step = Crank | Dyad | Lever | Slot | Slider | Guided
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,3 +336,6 @@ def needs(step: Step) -> tuple[str, ...]:
             return (step.pin, step.pivot)
         case Slider():
             return (step.upstream,)
+        case Guided():
+            ends = (step.upstream, *step.line, step.across)
+            return tuple(end for end in ends if isinstance(end, str))

@@ -15,7 +15,18 @@ from typing import Any
 import numpy as np
 
 from mlg_troubleshoot.errors import MechanismError
-from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, Step
+from mlg_troubleshoot.geometry.mechanism import (
+    Crank,
+    Dyad,
+    Guided,
+    Lever,
+    Mechanism,
+    Slider,
+    Slot,
+    Step,
+    Towards,
+    needs,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +107,8 @@ class _Writer:
         self.joints: dict[str, tuple[str, str]] = {}
         self.closures: list[Closure] = []
         self.positions: dict[str, str] = {}
+        # Where a link that clearances displace starts, by its joint and the one it comes from.
+        self.starts: dict[tuple[str, str], tuple[str, str]] = {}
 
     def parameter(self, name: str, value: Any) -> str:
         if not np.array_equal(self.parameters.setdefault(name, value), value, equal_nan=True):
@@ -189,6 +202,8 @@ def write_program(mechanism: Mechanism) -> Program:
                 _slot(w, step)
             case Slider():
                 _slider(w, step)
+            case Guided():
+                _guided(w, step)
     output = _output(w)
     return Program(
         w.parameters,
@@ -225,7 +240,7 @@ def _dyad(w: _Writer, step: Dyad) -> None:
     w.same_side(step)
     sign = w.parameter(f"sign.{step.joint}", step.sign)
     seen, height = w.seen_from(step.upstream, plane)
-    ax, ay = w.shifted(seen, step.virtual_links)
+    ax, ay = w.starts[step.joint, step.upstream] = w.shifted(seen, step.virtual_links)
     bx, by = w.joints[step.downstream]
     reach = w.let(f"{first} + {_travel(w)}") if step.driven else first
     dx, dy = w.let(f"{bx} - {ax}"), w.let(f"{by} - {ay}")
@@ -296,23 +311,93 @@ def _slider(w: _Writer, step: Slider) -> None:
     ox = w.parameter(f"slider.{step.joint}.x", joint.x)
     oy = w.parameter(f"slider.{step.joint}.y", joint.y)
     seen, height = w.seen_from(step.upstream, joint.plane)
-    ux, uy = w.shifted(seen, step.virtual_links)
+    ux, uy = w.starts[step.joint, step.upstream] = w.shifted(seen, step.virtual_links)
     c, s = w.let(f"cos({axis})"), w.let(f"sin({axis})")
-    dx, dy = w.let(f"{ux} - {ox}"), w.let(f"{uy} - {oy}")
-    across = w.let(f"{c} * {dy} - {s} * {dx}")
     square = w.let(f"{length} * {length}" + (f" - {height} * {height}" if height else ""))
-    position = w.let(f"{c} * {dx} + {s} * {dy} + {sign} * sqrt({square} - {across} * {across})")
-    w.joints[step.joint] = (w.let(f"{ox} + {c} * {position}"), w.let(f"{oy} + {s} * {position}"))
-    w.positions[step.joint] = position
+    _slide(w, step.joint, (ox, oy, c, s), _reach((ox, oy, c, s), (ux, uy), square, sign, w))
+
+
+# A point of a line and its direction: the names of x, y, cosine and sine.
+_Line = tuple[str, str, str, str]
+
+
+def _slide(w: _Writer, joint: str, line: _Line, position: str) -> None:
+    """Place a joint on a line, `position` being from the line's point."""
+    x, y, c, s = line
+    w.joints[joint] = (w.let(f"{x} + {c} * {position}"), w.let(f"{y} + {s} * {position}"))
+    w.positions[joint] = position
+
+
+def _reach(line: _Line, end: tuple[str, str], square: str, sign: str, w: _Writer) -> str:
+    """Where a link from `end` reaches a line, as a distance along it; square: of its length."""
+    x, y, c, s = line
+    dx, dy = w.let(f"{end[0]} - {x}"), w.let(f"{end[1]} - {y}")
+    across = w.let(f"{c} * {dy} - {s} * {dx}")
+    return w.let(f"{c} * {dx} + {s} * {dy} + {sign} * sqrt({square} - {across} * {across})")
+
+
+def _guided(w: _Writer, step: Guided) -> None:
+    w.same_plane(step, *needs(step))
+    line, (cosine, sine) = _line_of(w, step, "line", *step.line, ())
+    if step.across is None:
+        length = w.length(step.upstream, step.joint)
+        joint, end = w.mechanism.point(step.joint), w.mechanism.point(step.upstream)
+        ahead = cosine * (joint.x - end.x) + sine * (joint.y - end.y)
+        sign = w.parameter(f"sign.{step.joint}", 1.0 if ahead >= 0.0 else -1.0)
+        end_at = w.shifted(w.joints[step.upstream], step.virtual_links)
+        w.starts[step.joint, step.upstream] = end_at
+        position = _reach(line, end_at, w.let(f"{length} * {length}"), sign, w)
+    else:
+        x, y, c, s = line
+        at_x, at_y, along, over = _line_of(
+            w, step, "across", step.upstream, step.across, step.virtual_links
+        )[0]
+        dx, dy = w.let(f"{at_x} - {x}"), w.let(f"{at_y} - {y}")
+        position = w.let(
+            f"({dx} * {over} - {dy} * {along}) * (1.0 / ({c} * {over} - {s} * {along}))"
+        )
+    _slide(w, step.joint, line, position)
+
+
+def _line_of(
+    w: _Writer, step: Guided, part: str, start: str, to: Towards, links: tuple[int, ...]
+) -> tuple[_Line, tuple[float, float]]:
+    """A line through a joint's reference position, carried by the points that it belongs to, and
+    its direction there.
+    """
+    joint, first = w.mechanism.point(step.joint), w.mechanism.point(start)
+    x, y = w.shifted(w.joints[start], links)
+    if isinstance(to, str):
+        second, length = w.mechanism.point(to), w.distance(start, to)
+        direction = (second.x - first.x) / length, (second.y - first.y) / length
+        to_x, to_y = w.shifted(w.joints[to], links)
+        dx, dy = w.let(f"{to_x} - {x}"), w.let(f"{to_y} - {y}")
+        inverse = w.let(f"1.0 / sqrt({dx} * {dx} + {dy} * {dy})")
+        c, s = w.let(f"{dx} * {inverse}"), w.let(f"{dy} * {inverse}")
+    else:
+        direction = float(np.cos(to)), float(np.sin(to))
+        angle = w.parameter(f"guide.{step.joint}.{part}.axis", to)
+        c, s = w.let(f"cos({angle})"), w.let(f"sin({angle})")
+    dx0, dy0 = joint.x - first.x, joint.y - first.y
+    name = f"guide.{step.joint}.{part}"
+    along = w.parameter(f"{name}.along", direction[0] * dx0 + direction[1] * dy0)
+    aside = w.parameter(f"{name}.aside", direction[0] * dy0 - direction[1] * dx0)
+    place = (
+        w.let(f"{x} + {c} * {along} - {s} * {aside}"),
+        w.let(f"{y} + {s} * {along} + {c} * {aside}"),
+    )
+    return (*place, c, s), direction
 
 
 def _output(w: _Writer) -> str:
     output = w.mechanism.output
     if output.kind == "position":
-        if not isinstance(w.mechanism.step(output.joint), Slider):
+        if output.joint not in w.positions:
             raise MechanismError(
                 f"The output is the position of {output.joint!r}, which is not a slider."
             )
         return w.positions[output.joint]
-    (jx, jy), (px, py) = w.joints[output.joint], w.joints[output.pivot]
+    ends = output.joint, output.pivot
+    jx, jy = w.starts.get(ends[::-1], w.joints[output.joint])
+    px, py = w.starts.get(ends, w.joints[output.pivot])
     return w.let(f"arctan2({jy} - {py}, {jx} - {px})")

@@ -8,12 +8,14 @@ clearance*, ``cos φ csc θ``) and by levers and slots (*rigid body*, ``sin φ �
 The stage of a clearance runs from its joint to the first joint of a higher number that moves:
 A_i,i+1 of Eq. 9. The two ends of one link act alike (Fig. 10), so both have the stage of the
 upstream end. Differs from the paper: a fixed pivot that has a clearance is not a case of Eq. 10;
-its stage is the exact derivative. In a slider the guide stands for an infinitely long second link,
+its stage is the exact derivative, and so is that of every joint to the output where a guide moves.
+In a slider the guide stands for an infinitely long second link,
 so that its csc θ is the secant of the angle between link and axis.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +26,7 @@ from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.geometry.mechanism import (
     Crank,
     Dyad,
+    Guided,
     Lever,
     Mechanism,
     Slider,
@@ -144,6 +147,8 @@ class _Chain:
         release.
         """
         first = next(group[0] for group in self.mechanism.alike if number in group)
+        if any(isinstance(step, Guided) for step in self.mechanism.steps):
+            return self._of_output(number), []
         entry = self._entry(first)
         path = self._path(entry)
         end = next(
@@ -219,7 +224,7 @@ class _Chain:
                 return csc(in_plane, np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1))
             case Slot():
                 return self._arms(step, step.pin)
-            case Crank() | Lever():
+            case Crank() | Lever() | Guided():
                 return np.ones(len(self.stroke))
 
     def _previous(self, step: Step) -> Array:
@@ -241,7 +246,7 @@ class _Chain:
                 return np.asarray(sine * self._arms(step, step.pin))
             case Lever():
                 return self._arms(step, step.follows)
-            case Crank():
+            case Crank() | Guided():
                 return np.ones(len(self.stroke))
 
     def _arms(self, step: Lever | Slot, other: str) -> Array:
@@ -251,14 +256,26 @@ class _Chain:
 
     def _derivative(self, number: int, joint: str) -> Array:
         """Largest movement of a joint per unit of one clearance over all directions."""
+        kernel = self.model.kernel
+        return self._largest(
+            number, lambda links: np.stack(kernel.positions(self.stroke, links)[joint], axis=-1)
+        )
+
+    def _of_output(self, number: int) -> Array:
+        """The same of the output, as a movement of its joint."""
+        kernel = self.model.kernel
+        moved = self._largest(number, lambda links: kernel.output(self.stroke, links)[:, None])
+        return np.asarray(moved / self.output_factor())
+
+    def _largest(self, number: int, place: Callable[[list[float]], Array]) -> Array:
         at = 2 * self.model.joint_numbers.index(number)
 
-        def place(axis: int, step: float) -> Array:
+        def moved_by(axis: int, step: float) -> Array:
             links = self.model.kernel.no_clearance()
             links[at + axis] = step
-            return np.stack(self.model.kernel.positions(self.stroke, links)[joint], axis=-1)
+            return place(links)
 
-        moved = [(place(axis, STEP) - place(axis, -STEP)) / (2 * STEP) for axis in (0, 1)]
+        moved = [(moved_by(axis, STEP) - moved_by(axis, -STEP)) / (2 * STEP) for axis in (0, 1)]
         return np.linalg.svd(np.stack(moved, axis=-1), compute_uv=False)[..., 0]
 
 

@@ -24,7 +24,6 @@ from mlg_troubleshoot.datafile import (
 )
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
 from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputKind, write_text
 from mlg_troubleshoot.results import Result
 
@@ -34,6 +33,8 @@ Growth = Annotated[float, Meta(ge=0, le=1e6)]
 Rank = Annotated[int, Meta(ge=1, le=MOST_ENTRIES)]
 # First-order indices closer than this are one rank: both ends of a link differ by less.
 _SAME_RANK = 1e-4
+_RENEWED = "The next check of an inspection computes it again."
+_NO_TABLE = "Move the file away: the next check of an inspection computes the table again."
 
 
 class StaleTableError(GearFileError):
@@ -128,7 +129,7 @@ def rank_ranges(ensemble_first_order: Array) -> list[tuple[int, int]]:
     ]
 
 
-def load_index_table(gear: Gear) -> IndexTable:
+def read_index_table(gear: Gear) -> IndexTable:
     """Load the precomputed table of a gear and refuse one that belongs to another geometry.
 
     Parameters
@@ -149,12 +150,12 @@ def load_index_table(gear: Gear) -> IndexTable:
     """
     path = gear.indices_file
     if not path.exists():
-        raise StaleTableError(f"{path.name}: the table of indices is missing", _remedy(gear))
+        raise StaleTableError(f"{path.name}: the table of indices is missing", _RENEWED)
     try:
         state = path.stat()
         table = _read_once(path, state.st_mtime_ns, state.st_size)
     except GearFileError as error:
-        raise GearFileError(error.message, _remedy(gear)) from error
+        raise GearFileError(error.message, _NO_TABLE) from error
     for what, found, wanted in (
         ("gear", table.gear.id, gear.id),
         ("geometry", table.gear.geometry_sha256, gear.geometry_sha256),
@@ -163,7 +164,7 @@ def load_index_table(gear: Gear) -> IndexTable:
         if found != wanted:
             raise StaleTableError(
                 f"{path.name}: was computed for another {what}: {found[:16]}, not {wanted[:16]}",
-                _remedy(gear),
+                _RENEWED,
             )
     limits = tuple((entry.joint, entry.limit_in) for entry in table.joints)
     wanted_limits = tuple((joint.number, joint.limit.value) for joint in gear.joints)
@@ -171,7 +172,7 @@ def load_index_table(gear: Gear) -> IndexTable:
         gone = sorted(set(limits) ^ set(wanted_limits))
         named = ", ".join(f"joint {number} at {limit:g} in" for number, limit in gone)
         raise StaleTableError(
-            f"{path.name}: was computed for other joints or limits: {named}", _remedy(gear)
+            f"{path.name}: was computed for other joints or limits: {named}", _RENEWED
         )
     return table
 
@@ -196,9 +197,3 @@ INDEX_TABLE = OutputKind.marked(
 def write_index_table(table: IndexTable, path: Path) -> None:
     """Write a table of indices, whole or not at all."""
     write_text(path, _text(msgspec.to_builtins(table)))
-
-
-def _remedy(gear: Gear) -> str:
-    shipped = gear.id in shipped_gears() and load_gear(gear.id).path == gear.path
-    name = gear.id if shipped else str(gear.path)
-    return f"Run: mlg study --gear {name} --write-table"

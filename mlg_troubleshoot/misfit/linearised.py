@@ -26,7 +26,9 @@ _SIZES = (1.0 / 3.0, 1.0, 3.0, 10.0, 30.0, 100.0)
 # Residual over the scatter of a reading from which it may be an entry error.
 _SLIP = 3.0
 # Share of the largest reading or effect that a number of it does not hold.
-_DIGITS = 1e-12
+_DIGITS = 1e-9
+# Residual over such a number's digits below which it is rounding, and says nothing.
+_ROUNDED = 0.01
 # Computing only: suspects that act together at most, and rounds until the same is likeliest again.
 _MOST, _ROUNDS = 12, 8
 _SUSPECT = "suspect"
@@ -112,19 +114,24 @@ class Study:
         predicted = runner.nominal_prediction()
         base = predicted[runner.row, runner.output]
         columns = runner.sensitivities(runner.nominal, base, range(len(runner.names)))
-        floor = _DIGITS * float(max(np.max(np.abs(runner.reading)), np.max(np.abs(columns))))
+        largest = float(max(np.max(np.abs(runner.reading)), np.max(np.abs(columns))))
+        floor, self.rounding = _DIGITS * largest, _ROUNDED * _DIGITS * largest
         self.readings = Readings(runner.row, self.outputs, group, own, max(floor, 1e-300))
         scale = np.ones(len(base)) if own is None else own.copy()
         for index in self.outputs if own is None else ():
             scale[index] = max(float(np.sqrt(np.mean(columns[index] ** 2))), 1e-300)
         seen = columns / scale[:, None]
         self.design = design_of(seen[:, :count], seen[:, count:])
-        self.nominal = FittedPoint(
-            runner.nominal, runner.reading - base, columns, runner.reading - base
-        )
+        rest = self._rest(base)
+        self.nominal = FittedPoint(runner.nominal, rest, columns, rest)
         wide = np.zeros((*runner.shape, count))
         wide[runner.row, runner.output] = seen[:, :count]
         self.contexts = self._contexts(predicted, wide.reshape(len(wide), -1))
+
+    def _rest(self, base: Array) -> Array:
+        """What a prediction leaves of the readings."""
+        rest = self.runner.reading - base
+        return np.where(np.abs(rest) < self.rounding, 0.0, rest)
 
     def _contexts(self, predicted: Array, sensitivities: Array) -> list[Context]:
         """Nothing, or a smooth discrepancy of some size, each output by itself."""
@@ -147,7 +154,7 @@ class Study:
         run = self.runner
         columns = run.sensitivities(values, base, range(len(values)))
         change = (values - run.nominal)[: self.count] / run.trial[: self.count]
-        rest = run.reading - base
+        rest = self._rest(base)
         return FittedPoint(values, rest, columns, rest + columns[:, : self.count] @ change)
 
     def fitted(self, at: JudgedPoint, chosen: Sequence[int], context: int) -> FittedPoint:

@@ -228,6 +228,8 @@ class _Report:
         ratio, left = noise.tail_ratios[-1], self.final.rest / self.at.unit
         weighed = noise.precision_times(left[:, None], ratio)[0][:, 0]
         variance = float(left @ weighed) / max(len(left) - noise.absorbed - len(self.causes), 1)
+        if variance == 0.0:
+            return 1.0
         patterns, chances = self.study.contexts[1 :: len(self.study.beliefs.sizes)], [1.0]
         for pattern in patterns:
             shape = pattern.shared_in

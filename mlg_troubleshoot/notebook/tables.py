@@ -10,12 +10,13 @@ import pandas as pd
 
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.diagnosis import Diagnosis
+from mlg_troubleshoot.diagnosis.causes import Catalogue
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.geometry.mechanism import Point
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.life.folding import lives
-from mlg_troubleshoot.output_types import GearIdentity
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.records.frames import frame_of, label_of
 from mlg_troubleshoot.records.headers import Joints
@@ -23,8 +24,8 @@ from mlg_troubleshoot.reporting.json_form import (
     assessment_as_json,
     check_as_json,
     diagnosis_as_json,
+    gear_as_json,
     plain,
-    written,
 )
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
 from mlg_troubleshoot.reporting.model_json import study_as_json, survey_as_json
@@ -90,11 +91,43 @@ def _(result: WorstCase) -> dict[str, Any]:
 
 @to_dict.register
 def _(result: Gear) -> dict[str, Any]:
-    return {**written(GearIdentity, result), "joints": plain(result.joints)}
+    return gear_as_json(result)
+
+
+@to_dict.register
+def _(result: Catalogue) -> dict[str, Any]:
+    names = ("name", "needs", "parameter", "trial", "plausible", "sign", "inspect", "separates")
+    return {
+        "causes": [
+            {"sentence": cause.words("…"), **{name: plain(getattr(cause, name)) for name in names}}
+            for cause in result
+        ]
+    }
 
 
 @to_dict.register
 def _(result: Lives) -> dict[str, Any]:
+    return fleet_as_json(result.lives, result.forecasts)
+
+
+@singledispatch
+def _more_tables(_result: Any) -> dict[str, list[Any]]:
+    """Tables that the JSON of a result does not hold."""
+    return {}
+
+
+@_more_tables.register
+def _(result: Gear) -> dict[str, list[Any]]:
+    points = [
+        {"linkage": linkage.name, "point": point.name, "plane": point.plane, **_place(point)}
+        for linkage in result.ensemble
+        for point in linkage.mechanism.points
+    ]
+    return {"ensemble": points}
+
+
+@_more_tables.register
+def _(result: Lives) -> dict[str, list[Any]]:
     one_by_one = [
         life_as_json(life, result.forecasts[life.key], result.gear) for life in result.lives
     ]
@@ -103,11 +136,15 @@ def _(result: Lives) -> dict[str, Any]:
         for each in one_by_one
         for joint in each["joints"]
     ]
-    return {**fleet_as_json(result.lives, result.forecasts), "joints": joints}
+    return {"joints": joints}
+
+
+def _place(point: Point) -> dict[str, Any]:
+    return {"x_in": float(point.x), "y_in": float(point.y), "fixed": point.fixed}
 
 
 def to_frame(result: Any, of: str = "") -> pd.DataFrame:
-    values = to_dict(result)
+    values = {**to_dict(result), **_more_tables(result)}
     lists = {name: rows for name, rows in values.items() if isinstance(rows, list)}
     name = of or next((name for name in _MAIN if lists.get(name)), "")
     if name in lists:

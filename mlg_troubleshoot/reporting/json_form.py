@@ -25,8 +25,10 @@ from mlg_troubleshoot.output_types import (
     ExtensionGain,
     FittedExtension,
     GearIdentity,
+    GearOutput,
     MisfitSize,
     NamedCauseOutput,
+    ShownJoint,
     SuspectCell,
 )
 from mlg_troubleshoot.outputs import SCHEMA_VERSION
@@ -146,6 +148,24 @@ def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:
         "joints": [{**unknown, "joint": joint.number, "name": joint.name} for joint in gear.joints],
         "warnings": list(judgement.warnings),
     }
+
+
+def gear_as_json(gear: Gear) -> dict[str, Any]:
+    return written(
+        GearOutput,
+        gear,
+        ensemble=[linkage.name for linkage in gear.ensemble],
+        calibration_rate=gear.model.rate,
+        release_stroke_in=gear.reference.stroke[1],
+        joints=[
+            written(ShownJoint, joint, joint=joint.number, acts_like=gear.alike[joint.number])
+            for joint in gear.joints
+        ],
+        points={
+            point.name: {"plane": point.plane, "at_in": [point.x, point.y], "fixed": point.fixed}
+            for point in gear.reference.mechanism.points
+        },
+    )
 
 
 def assessment_as_json(a: Assessment, joints: list[dict[str, Any]] | None = None) -> dict[str, Any]:

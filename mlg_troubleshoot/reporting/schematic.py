@@ -17,7 +17,17 @@ from markupsafe import Markup
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, needs
+from mlg_troubleshoot.geometry.mechanism import (
+    Crank,
+    Dyad,
+    Guided,
+    Lever,
+    Mechanism,
+    Slider,
+    Slot,
+    Towards,
+    needs,
+)
 from mlg_troubleshoot.reporting.figures import (
     INK,
     PALE,
@@ -306,6 +316,8 @@ class _PlaneDrawing:
                 case Slider():
                     segments += [_plunger(canvas, place, step.axis), (at[step.upstream], place)]
                     _bar(canvas, at[step.upstream], place)
+                case Guided():
+                    segments += _guides(canvas, step, at)
         return segments
 
     def _rigid_parts(self, canvas: Canvas, at: Mapping[str, complex]) -> list[Segment]:
@@ -410,6 +422,24 @@ def _plunger(canvas: Canvas, joint: complex, axis: float) -> Segment:
     _tube(canvas, tip, end, 24, PALE)
     _named(canvas, (tip + end) / 2 - (18 + 7j), "plunger", "end")
     return joint, end
+
+
+def _guides(canvas: Canvas, step: Guided, at: Mapping[str, complex]) -> list[Segment]:
+    """The lines that a joint slides on, broken where they keep a direction, and its link."""
+    place = at[step.joint]
+    lines: list[tuple[str, Towards | None]] = [step.line, (step.upstream, step.across)]
+    segments = []
+    for start, to in lines:
+        if isinstance(to, float):
+            along = cmath.rect(45.0, -to)
+            segments.append((place - along, place + along))
+            _line(canvas, *segments[-1], width=3)
+            if start == step.upstream:
+                _line(canvas, at[start], place)
+        else:
+            segments.append((at[start], place if to is None else at[to]))
+            (_bar if to is None else _line)(canvas, *segments[-1])
+    return segments
 
 
 def _named(canvas: Canvas, place: complex, name: str, anchor: Anchor) -> None:

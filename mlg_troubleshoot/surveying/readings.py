@@ -16,7 +16,7 @@ from mlg_troubleshoot.arrays import STEP, Array, Mask, central_slopes, central_s
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.geometry.kernel import Kernel
-from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Guided, Lever, Mechanism, Slider, Slot
 from mlg_troubleshoot.geometry.program import write_program
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
@@ -386,7 +386,7 @@ class SurveyedLinkage:
                         (step.pivot, step.pin),
                         (step.pin, step.joint),
                     ]
-                case Slider():
+                case Slider() | Guided():
                     pairs.append((step.upstream, step.joint))
                 case _:
                     pairs.append((step.pivot, step.joint))

@@ -23,7 +23,7 @@ from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-from mlg_troubleshoot.workflows.index_tables import index_table
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -221,7 +221,7 @@ def check(
         return check_files([inspection], asked)
     known = load_gear(gear)
     row = judge_again(inspection, ReadOptions.of(known))
-    table = index_table(known)
+    table = load_index_table(known)
     (judged,) = assess([row], known, table, advice=advice is not False, extension=extension)
     if not isinstance(judged, Assessment):
         raise TypeError(f"{type(inspection).__name__} is not an Inspection")
@@ -334,7 +334,7 @@ def read_inspections(
 def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice | None:
     """Say which joint's reading is most useful next, and whether one may stop measuring."""
     row = replace(trial_inspection(gear), clearance_in=dict(measured))
-    (judged,) = assess([row], gear, index_table(gear), advice=True)
+    (judged,) = assess([row], gear, load_index_table(gear), advice=True)
     return judged.measuring if isinstance(judged, Assessment) else None
 
 
@@ -372,7 +372,7 @@ def _judge(
     if fleet is not None:
         told["notes"] = (*told.get("notes", ()), fleet.text)
     as_they_count = since_repairs(rows, gear, store)
-    judgements = assess(as_they_count, gear, index_table(gear), **asked, progress=on_judged)
+    judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
     if as_they_count is not rows:
         # What is shown and kept of an inspection is what was found, whatever counts no more.
         judgements = tuple(
@@ -387,12 +387,12 @@ def _judge(
 def write_reports(
     result: CheckResult,
     options: CheckOptions,
-    directory: Path,
+    directory: Path | str,
     formats: Sequence[str] = ("html", "pdf"),
     page: str = "A4",
     on_written: Callable[[int, int], None] | None = None,
     *,
-    unit: LengthUnit = LengthUnit.INCH,
+    unit: LengthUnit | str = LengthUnit.INCH,
     before: Sequence[Sequence[PastInspection]] = (),
 ) -> tuple[WrittenReport, ...]:
     """Write a report for each inspection that was judged and, for a batch, its summary, in which
@@ -404,7 +404,7 @@ def write_reports(
         The check.
     options : CheckOptions
         What the user declared.
-    directory : Path
+    directory : Path or str
         Folder to write to; it is made if it does not exist.
     formats : sequence of str
         ``html``, ``pdf`` or both.
@@ -412,7 +412,7 @@ def write_reports(
         ``A4`` or ``Letter``.
     on_written : callable, optional
         Called with reports written and their number.
-    unit : LengthUnit
+    unit : LengthUnit or str
         The unit that its readers use.
     before : sequence, optional
         What each gear was like before, as `looking_back.seen_before` says it.
@@ -427,6 +427,7 @@ def write_reports(
     OutputError
         If the folder cannot be written to.
     """
+    directory, unit = Path(directory), LengthUnit.parse(unit)
     if directory.exists() and not directory.is_dir():
         raise OutputError(
             f"{directory} is a file, not a folder", "Give a folder that you may write to."

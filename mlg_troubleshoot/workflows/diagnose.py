@@ -35,19 +35,19 @@ class DiagnoseOptions(TableOptions):
         The gear, its shipped name, or a gear file.
     remembered : str or None
         What was remembered, in words for the report.
-    cause_files : tuple of Path
+    cause_files : tuple of Path or str
         Python files with the user's own causes.
     sure : float
         Probability from which a cause is named. [1]
-    beliefs_file : Path or None
+    beliefs_file : Path, str or None
         TOML file of what is believed beforehand; None for what the program believes.
     """
 
     gear: Gear | str | Path = DEFAULT_GEAR
     remembered: str | None = None
-    cause_files: tuple[Path, ...] = ()
+    cause_files: tuple[Path | str, ...] = ()
     sure: float = 0.9
-    beliefs_file: Path | None = None
+    beliefs_file: Path | str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -110,11 +110,11 @@ def diagnose_files(
 
     options = options or DiagnoseOptions()
     gear = load_gear(options.gear)
-    own = tuple(cause for file in options.cause_files for cause in load_causes(file))
+    own = tuple(cause for file in options.cause_files for cause in load_causes(Path(file)))
     beliefs = Beliefs(sure=options.sure)
     if options.beliefs_file is not None:
         names = {cause.name for cause in with_own(own)}
-        beliefs = load_beliefs(options.beliefs_file, options.sure, names)
+        beliefs = load_beliefs(Path(options.beliefs_file), options.sure, names)
     reading = replace(
         ReadOptions.of(gear, options),
         clearance_hard_max_in=_ANY_LENGTH_IN,
@@ -265,17 +265,17 @@ def write_diagnosis_report(
 
 
 def load_model_extension(
-    files: Sequence[Path], gear: str, cause_files: Sequence[Path] = ()
+    files: Sequence[Path | str], gear: str, cause_files: Sequence[Path | str] = ()
 ) -> ModelExtension | None:
     """Load the extensions that a check shall predict with.
 
     Parameters
     ----------
-    files : sequence of Path
+    files : sequence of Path or str
         Extension files; several are stacked.
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
-    cause_files : sequence of Path
+    cause_files : sequence of Path or str
         Python files with the user's own causes.
 
     Returns
@@ -287,5 +287,5 @@ def load_model_extension(
         return None
     from mlg_troubleshoot.diagnosis import load_causes, load_extension
 
-    own = tuple(cause for file in cause_files for cause in load_causes(file))
-    return load_extension(files, load_gear(gear), own)
+    own = tuple(cause for file in cause_files for cause in load_causes(Path(file)))
+    return load_extension([*map(Path, files)], load_gear(gear), own)

@@ -9,13 +9,13 @@ from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.workflows.check import (
     CheckOptions,
     check_inspection,
     trial_inspection,
     write_reports,
 )
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,10 @@ def examine_installation(gear: str = DEFAULT_GEAR) -> tuple[Ability, ...]:
         found.append(
             Ability("gear", f"{loaded.name}, geometry {loaded.geometry_sha256[:12]}", True)
         )
-        table = load_index_table(loaded)
-        found.append(Ability("precomputed indices", f"match the geometry ({table.design})", True))
+        renewed: list[str] = []
+        load_index_table(loaded, renewed.append)
+        said = "; ".join(renewed) or "match the geometry"
+        found.append(Ability("precomputed indices", said, True))
         result = check_inspection(trial_inspection(loaded), CheckOptions(gear=gear, advice=False))
         found.append(
             Ability("prediction", f"{result.counts[Verdict.OUTSIDE_MARGIN]} trial judged", True)

@@ -9,12 +9,12 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import (
     IndexTable,
     StaleTableError,
-    load_index_table,
+    read_index_table,
     write_index_table,
 )
 
 
-def index_table(gear: Gear, say: Callable[[str], object] | None = None) -> IndexTable:
+def load_index_table(gear: Gear, say: Callable[[str], object] | None = None) -> IndexTable:
     """Load the table of indices of a gear; one of another geometry is computed again and written.
 
     Parameters
@@ -37,7 +37,7 @@ def index_table(gear: Gear, say: Callable[[str], object] | None = None) -> Index
         If a table that no longer fits cannot be written again.
     """
     try:
-        return load_index_table(gear)
+        return read_index_table(gear)
     except StaleTableError as stale:
         from mlg_troubleshoot.paper.study import StudyOptions, run_study
 
@@ -47,4 +47,4 @@ def index_table(gear: Gear, say: Callable[[str], object] | None = None) -> Index
             warnings.warn(said, stacklevel=2)
         else:
             say(said)
-    return load_index_table(gear)
+    return read_index_table(gear)

@@ -14,7 +14,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.short_form import NewGear, read_short_form, short_form
 from mlg_troubleshoot.outputs import OutputKind, write_text
 from mlg_troubleshoot.units import LengthUnit
-from mlg_troubleshoot.workflows.index_tables import index_table
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 _HEADING = "# Written by mlg gear new.\n"
 NEW_GEAR = OutputKind.marked("is not a gear file that mlg gear new wrote", _HEADING)
@@ -73,7 +73,7 @@ def from_pylinkage(
     margin: float,
     travel_deg: tuple[float, float] = (-10.0, 0.0),
     output: Mapping[str, str] | None = None,
-    unit: LengthUnit = LengthUnit.INCH,
+    unit: LengthUnit | str = LengthUnit.INCH,
 ) -> Gear:
     """Write the gear of a linkage of pylinkage, and its table of indices.
 
@@ -90,7 +90,7 @@ def from_pylinkage(
         Travel of the crank from its present position; clearances act at its end. [deg]
     output : mapping, optional
         As in a short form; else the last point on a guide, or the last link on the ground.
-    unit : LengthUnit
+    unit : LengthUnit or str
         Unit of the coordinates, which a linkage does not state.
 
     Returns
@@ -105,7 +105,11 @@ def from_pylinkage(
     """
     from mlg_troubleshoot.gear.from_pylinkage import short_form_of
 
-    how: dict[str, Any] = {"travel_deg": travel_deg, "output": output, "unit": unit}
+    how: dict[str, Any] = {
+        "travel_deg": travel_deg,
+        "output": output,
+        "unit": LengthUnit.parse(unit),
+    }
     form = short_form_of(linkage, limit=limit, margin=margin, **how)
     return _write(short_form(form), Path(file)).gear
 
@@ -116,5 +120,5 @@ def _write(found: NewGear, file: Path) -> WrittenGear:
     found.closes()
     write_text(file, text)
     gear = load_gear(file)
-    index_table(gear, say=str)
+    load_index_table(gear, say=str)
     return WrittenGear(gear, found.steps, found.assumed)

@@ -56,7 +56,7 @@ def survey(
     table: Source,
     gear: str | Path | Gear = DEFAULT_GEAR,
     *,
-    write: Path | None = None,
+    write: Path | str | None = None,
     inspections: Source | None = None,
     seed: int = 0,
     on_progress: Callable[[int, int], None] = lambda *_: None,
@@ -72,7 +72,7 @@ def survey(
         The survey, with the columns of its template. [in, rad or as their names say]
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
-    write : Path, optional
+    write : Path or str, optional
         The gear file to write.
     inspections : Path or DataFrame, optional
         Inspections whose displacement the next reading narrows, in place of the indices.
@@ -101,8 +101,9 @@ def survey(
     from mlg_troubleshoot.surveying.tuned import FEW
 
     known = load_gear(gear)
-    if write is not None:
-        claim_outputs(known.files, written_with(write), force=True)
+    file = None if write is None else Path(write)
+    if file is not None:
+        claim_outputs(known.files, written_with(file), force=True)
     linkage = SurveyedLinkage(known)
     rng = np.random.default_rng(seed)
     cases = _clearances(inspections, known)
@@ -121,11 +122,11 @@ def survey(
         middle = found.modes[0].vector[None]
         interval = np.quantile(linkage.amplification(draws), [0.05, 0.95], axis=0).T
         warnings = assemblies(found)
-        if write is not None and found.contradicts:
+        if file is not None and found.contradicts:
             warnings += ("readings contradict each other, so that no gear file was written",)
-        elif write is not None:
+        elif file is not None:
             path = _write_gear(
-                known, found, write, f"{Path(source_label(table)).name}, SHA-256 {digest[:12]}"
+                known, found, file, f"{Path(source_label(table)).name}, SHA-256 {digest[:12]}"
             )
             warnings += _left_targets(known, path)
     clearance = np.array([c for _, c in cases]).reshape(len(cases), len(known.joints))

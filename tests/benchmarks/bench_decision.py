@@ -35,7 +35,7 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.indices.index_table import load_index_table
+from mlg_troubleshoot.indices.index_table import read_index_table
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.benchmarks import worn_gears
 
@@ -369,7 +369,7 @@ def repairs(n: int) -> None:
 def speed() -> None:
     """Time of one gear with repair sets, next joint, posterior."""
     gear = load_gear()
-    table = load_index_table(gear)
+    table = read_index_table(gear)
     rows = {1: 0.002, 2: 0.004, 3: 0.013, 5: 0.007, 6: 0.001}
     times = []
     for _ in range(4):

@@ -28,7 +28,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.indices.index_table import load_index_table
+from mlg_troubleshoot.indices.index_table import read_index_table
 from mlg_troubleshoot.life import folding
 from mlg_troubleshoot.life.forecast import fit_fleet, forecast
 from mlg_troubleshoot.life.unrecorded_work import suggestions
@@ -85,7 +85,7 @@ def lives(gears: int, visits: int, rng: np.random.Generator) -> list[list[Inspec
 def records(drawn: list[list[Inspection]], gear: Gear) -> list[Record]:
     """Turn inspections and their assessments into records, as keeping does."""
     flat = [inspection for own in drawn for inspection in own]
-    judged = assess(flat[::100], gear, load_index_table(gear))
+    judged = assess(flat[::100], gear, read_index_table(gear))
     found: list[Record] = []
     for n, inspection in enumerate(flat):
         of = judged[n // 100]

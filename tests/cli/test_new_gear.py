@@ -15,8 +15,9 @@ from mlg_troubleshoot.cli.prompts import Line
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.short_form import read_short_form
-from mlg_troubleshoot.indices.index_table import load_index_table
+from mlg_troubleshoot.indices.index_table import read_index_table
 from mlg_troubleshoot.workflows.check import next_joint
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 from mlg_troubleshoot.workflows.new_gear import from_pylinkage, new_gear
 from tests.cli.conftest import FAILURE, ROOT, mlg
 
@@ -66,7 +67,7 @@ def test_a_new_gear_says_how_each_point_was_understood_and_what_was_assumed(tmp_
 
 
 def test_a_new_gear_has_its_table_of_indices(gear: Path) -> None:
-    assert load_index_table(load_gear(gear)).first_order == pytest.approx([1 / 3] * 3, abs=0.01)
+    assert read_index_table(load_gear(gear)).first_order == pytest.approx([1 / 3] * 3, abs=0.01)
 
 
 def test_a_new_gear_is_drawn_with_all_its_joints(tmp_path: Path) -> None:
@@ -108,7 +109,7 @@ def test_from_python_a_linkage_becomes_a_gear_with_its_table(tmp_path: Path) -> 
     pylinkage = pytest.importorskip("pylinkage.mechanism")
     linkage = pylinkage.fourbar(1.0, 3.0, 3.0, 4.0, initial_angle=0.5)
     gear = from_pylinkage(linkage, tmp_path / "theirs.toml", limit=0.001, margin=0.01)
-    assert len(load_index_table(gear).joints) == 4
+    assert len(read_index_table(gear).joints) == 4
 
 
 def test_without_a_terminal_a_new_gear_needs_a_short_form(tmp_path: Path) -> None:
@@ -179,6 +180,22 @@ def test_an_edited_gear_is_checked_at_once_and_its_renewed_table_is_named(gear: 
     assert "was computed for another geometry" in found.err
     assert "computed again" in found.err
     assert "computed again" not in mlg("check", *hand, "--gear", gear).err
+
+
+def test_the_doctor_renews_the_table_of_an_edited_gear(gear: Path) -> None:
+    load_gear(gear).indices_file.unlink()
+    found = mlg("doctor", "--gear", gear)
+    assert found.code == 0
+    assert "is missing. It was computed again" in " ".join(found.out.split())
+    assert "mlg study" not in found.out + found.err
+
+
+def test_from_python_the_table_of_an_edited_gear_is_renewed(gear: Path) -> None:
+    loaded = load_gear(gear)
+    loaded.indices_file.unlink()
+    with pytest.warns(UserWarning, match="is missing. It was computed again"):
+        table = load_index_table(loaded)
+    assert table.gear.geometry_sha256 == loaded.geometry_sha256
 
 
 def test_from_python_a_renewed_table_is_warned_of(gear: Path) -> None:

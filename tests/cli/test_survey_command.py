@@ -12,7 +12,7 @@ import openpyxl
 import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.indices.index_table import load_index_table
+from mlg_troubleshoot.indices.index_table import read_index_table
 from mlg_troubleshoot.records.survey_table import read_survey, write_survey_template
 from mlg_troubleshoot.reporting.model_json import survey_as_json
 from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
@@ -127,7 +127,7 @@ def test_the_gear_file_is_a_gear_with_its_table_and_says_that_it_was_surveyed(
     gear = load_gear(surveyed[0])
     assert "surveyed" in gear.provenance
     assert len(gear.ensemble) == 12
-    assert load_index_table(gear).gear.id == "mine"
+    assert read_index_table(gear).gear.id == "mine"
     lengths = {frozenset(p[:2]): p[2] for p in GOOD if p[3] == ""}
     m = gear.reference.mechanism
     for pair, length in lengths.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from html import unescape
 from pathlib import Path
@@ -14,10 +14,11 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.diagnosis_lines import cause_words, seven_lines
+from mlg_troubleshoot.reporting.diagnosis_lines import cause_words, headline, seven_lines
 from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import publish
+from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 from mlg_troubleshoot.workflows.diagnose import write_diagnosis_report as report_of
 
@@ -198,6 +199,18 @@ def test_more_wrong_verdicts_are_not_shown_as_a_gain(named: Made) -> None:
     change = gain.false_outside_after - gain.false_outside_before
     assert ("none" if change == 0 else f"{abs(change)} {'more' if change > 0 else 'fewer'}") in row
     assert "→" not in named.text[: named.text.index("Verdicts that change")]
+
+
+@pytest.mark.parametrize(("after", "warned"), [(4, True), (3, False)])
+def test_more_rows_falsely_within_are_said_beside_the_verdict(
+    named: Made, after: int, warned: bool
+) -> None:
+    gain = named.diagnosis.gain
+    assert gain is not None
+    counted = replace(gain, false_within_before=3, false_within_after=after)
+    d = replace(named.diagnosis, gain=counted)
+    for text in (seven_lines(d)[2].text, headline(d, LengthUnit.INCH)):
+        assert (f"with the extension false WITHIN rises from 3 to {after}" in text) is warned
 
 
 def test_no_identifier_of_a_cause_stands_in_the_prose(named: Made, without_landings: Made) -> None:

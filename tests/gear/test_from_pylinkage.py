@@ -141,6 +141,17 @@ def arc_crank_with_arm() -> Linkage:
     return Linkage([o, d, crank, pin, arm], name="arm")
 
 
+def moving_guides() -> Linkage:
+    """A slider on the coupler of a four-bar, and where the coupler's line crosses the rocker's."""
+    o, d, e = (Ground(x, y, name=n) for x, y, n in ((0, 0, "O"), (3, 0, "D"), (2, 2.5, "E")))
+    crank = Crank(o, 1.0, angular_velocity=0.05, initial_angle=0.9, name="A")
+    pin = RRRDyad(crank.output, d, 3.6, 2.6, name="B")
+    slider = RRPDyad(e, crank, pin, distance=1.2, name="C")
+    crossing = PPDyad(crank, slider, pin, d, name="P")
+    corner = PPDyad(crank, pin, o, e, name="Q")
+    return Linkage([o, d, e, crank, pin, slider, crossing, corner], name="moving guides")
+
+
 EXAMPLES: dict[str, tuple[Callable[[], Any], int]] = {
     "server four-bar": (server_four_bar, 62),
     "server Chebyshev": (server_chebyshev, 10),
@@ -156,6 +167,7 @@ EXAMPLES: dict[str, tuple[Callable[[], Any], int]] = {
     "mechanism.fourbar": (lambda: fourbar(1.0, 3.0, 3.0, 4.0, initial_angle=0.5), 100),
     "mechanism.slider_crank": (lambda: slider_crank(1.0, 3.0, initial_angle=0.3), 100),
     "arc crank with an arm": (arc_crank_with_arm, 13),
+    "moving guides": (moving_guides, 20),
 }
 
 
@@ -202,6 +214,12 @@ def test_every_point_of_an_example_is_where_pylinkage_puts_it(name: str, tmp_pat
     gear = gear_of(linkage, tmp_path, travel_deg=(-1.0, 0.0))
     assert len(gear.reference.mechanism.points) >= 2
     assert largest_distance(linkage, steps, gear) < 1e-9
+
+
+def test_every_pin_and_every_point_on_guides_that_move_is_a_joint() -> None:
+    found = short_form_of(moving_guides(), **LIMITS)
+    assert set(found["joints"]) == {"O", "D", "E", "A", "B", "C", "P", "Q"}
+    assert found["output"] == {"position_of": "Q"}
 
 
 def test_a_json_file_gives_the_gear_of_its_mechanism(tmp_path: Path) -> None:

@@ -240,7 +240,7 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         (
             'type = "slot"',
             'type = "groove"',
-            r"steps\[3\]\.type: expected crank, dyad, lever, slider or slot",
+            r"steps\[3\]\.type: expected crank, dyad, guide, lever, slider or slot",
         ),
         ("axis_deg = 58.73", 'axis_deg = "up"', r"steps\[10\]\.axis_deg: expected"),
         ('kind = "position"', 'kind = "speed"', r"output\.kind: expected angle or position"),

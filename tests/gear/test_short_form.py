@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 import tomli_w
 
-from mlg_troubleshoot.errors import GearFileError, MechanismError
+from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
+from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.short_form import read_short_form, short_form
+from mlg_troubleshoot.indices.amplification import amplification
 
 FOUR_BAR: dict[str, Any] = {
     "name": "four-bar",
@@ -42,6 +44,30 @@ ACTUATOR = {
     "input": {"actuator": "jack", "travel": [-0.2, 0.0]},
     "output": {"position_of": "C"},
     "joints": {"1": 0.01, "2": 0.01, "3": 0.01, "C": 0.01},
+}
+
+
+PIN = [math.cos(1.0), math.sin(1.0)]
+# A Scotch yoke: the pin of the crank runs in the slot of a yoke that slides.
+YOKE: dict[str, Any] = {
+    "ground": {"O": [0.0, 0.0]},
+    "moving": {"A": PIN, "Y": [PIN[0], 0.3]},
+    "links": {"crank": ["O", "A"]},
+    "guides_deg": {"Y": 0.0},
+    "guides": {"Y": [["A", 90.0]]},
+    "input": {"crank": "crank", "travel": [-20.0, 0.0]},
+    "output": {"position_of": "Y"},
+    "joints": {"A": 0.005},
+}
+# A rod that slides on the coupler of the four-bar, C beside its line.
+SLIDING_ROD: dict[str, Any] = {
+    "ground": {**FOUR_BAR["ground"], "E": [-2.0, 4.0]},
+    "moving": {**FOUR_BAR["moving"], "C": [1.2, 3.0]},
+    "links": {**FOUR_BAR["links"], "rod": ["E", "C"]},
+    "guides": {"C": [["A", "B"]]},
+    "input": {"crank": "crank", "travel": [-10.0, 0.0]},
+    "output": {"angle_of": "rod"},
+    "joints": {"A": 0.01, "B": 0.01, "C": 0.01, "E": 0.01},
 }
 
 
@@ -162,3 +188,92 @@ def test_a_linkage_that_does_not_close_over_its_travel_is_refused() -> None:
     wide["input"]["travel"] = [0.0, 180.0]
     with pytest.raises(MechanismError, match="closes over only"):
         short_form(wide).closes()
+
+
+def test_a_yoke_on_a_guide_and_a_pin_moves_as_the_cosine_of_the_crank(tmp_path: Path) -> None:
+    kernel = gear_of(changed(**YOKE), tmp_path).model.kernel
+    turned = np.array([-0.3, 0.0, 0.2])
+    x, y = kernel.positions(turned, kernel.no_clearance())["Y"]
+    assert x == pytest.approx(np.cos(1.0 + turned), abs=1e-15)
+    assert y == pytest.approx(np.full(3, 0.3))
+    found = kernel.output(turned, kernel.no_clearance())
+    assert found == pytest.approx(np.cos(1.0 + turned) - math.cos(1.0), abs=1e-15)
+
+
+def test_clearance_of_the_pin_in_a_yoke_moves_the_yoke_by_as_much(tmp_path: Path) -> None:
+    worst = worst_case(gear_of(changed(**YOKE), tmp_path).model, np.array([[0.005]]))
+    assert (worst.over_in[0], worst.under_in[0]) == pytest.approx((0.005, -0.005))
+
+
+def test_a_slider_on_a_link_keeps_its_distance_from_the_link_and_its_rod(tmp_path: Path) -> None:
+    kernel = gear_of(changed(**SLIDING_ROD), tmp_path).model.kernel
+    rods, distances = [], []
+    for turned in (-0.2, 0.0, 0.1):
+        found = kernel.positions(turned, kernel.no_clearance())
+        a, b, c = (complex(*map(float, found[name])) for name in "ABC")
+        rods.append(abs(c - complex(-2.0, 4.0)))
+        distances.append(((c - a) * (b - a).conjugate()).imag / abs(b - a))
+    assert rods == pytest.approx([abs(complex(3.2, -1.0))] * 3)
+    assert distances == pytest.approx([distances[1]] * 3)
+
+
+def test_no_directions_move_a_sliding_rod_beyond_its_worst_case(tmp_path: Path) -> None:
+    model = gear_of(changed(**SLIDING_ROD), tmp_path).model
+    clearance = np.full((1, 4), 0.01)
+    worst = worst_case(model, clearance)
+    angles = np.random.default_rng(1).uniform(0.0, 2.0 * np.pi, (4, 20_000))
+    links = [part * 0.01 for angle in angles for part in (np.cos(angle), np.sin(angle))]
+    reached = model.displacement(links)
+    assert worst.under_in[0] - 1e-12 <= reached.min() < 0.9 * worst.under_in[0]
+    assert 0.9 * worst.over_in[0] < reached.max() <= worst.over_in[0] + 1e-12
+
+
+def test_the_amplification_of_a_sliding_rod_is_the_derivative_of_its_angle(
+    tmp_path: Path,
+) -> None:
+    gear = gear_of(changed(**SLIDING_ROD), tmp_path)
+    found = amplification(gear)
+    assert found.local_plunger == pytest.approx(found.exact, rel=1e-6)
+
+
+def test_guides_are_named_as_dyads() -> None:
+    said = [*short_form(changed(**YOKE)).steps, *short_form(changed(**SLIDING_ROD)).steps]
+    assert "Y: dyad RPP: guide at 0°, guide at 90° through A" in said
+    assert "C: dyad RRP: rod from E, guide from A to B" in said
+
+
+def test_a_third_guide_of_a_point_is_refused() -> None:
+    with pytest.raises(GearFileError, match=r"guides_deg\.Y: .* at most two guides"):
+        short_form(changed(**YOKE | {"guides": {"Y": [["A", 90.0], ["O", "A"]]}}))
+
+
+def test_a_guide_of_an_unknown_point_is_refused() -> None:
+    with pytest.raises(GearFileError, match=r"guides\.Y\[1\]: expected one of the points O, A, Y"):
+        short_form(changed(**YOKE | {"guides": {"Y": [["nobody", 90.0]]}}))
+
+
+def test_a_linkage_whose_guide_moves_is_not_surveyed(tmp_path: Path) -> None:
+    gear = gear_of(changed(**YOKE), tmp_path)
+    with pytest.raises(UsageError, match="the guide of Y moves"):
+        DesignSpace(gear.reference)
+
+
+def test_a_gear_with_guides_that_move_is_drawn_with_them(tmp_path: Path) -> None:
+    drawn = gear_of(changed(**YOKE), tmp_path).plot("linkage").svg
+    still = gear_of(changed(**ACTUATOR), tmp_path).plot("linkage").svg
+    assert drawn.count("<line") > 0 and "plunger" not in drawn and "plunger" in still
+
+
+@pytest.mark.parametrize("ends", [["A", "B"], ["B", "A"]])
+def test_clearance_turns_the_link_that_it_displaces(ends: list[str], tmp_path: Path) -> None:
+    """The pins' offsets add to the coupler: it starts beside the crank's tip."""
+    parts = {"output": {"angle_of": "coupler"}, "links": FOUR_BAR["links"] | {"coupler": ends}}
+    kernel = gear_of(changed(**parts), tmp_path).model.kernel
+    links = np.array([0.0, 0.0, 0.003, -0.004, 0.002, 0.006, 0.0, 0.0])
+    found = kernel.positions(0.1, links.tolist())
+    a, b = (complex(*map(float, found[name])) for name in ("A", "B"))
+    start = a + complex(0.005, 0.002)
+    assert abs(b - start) == pytest.approx(abs(complex(-2.0, 6.708203932499369)))
+    reached = b - start if ends[0] == "A" else start - b
+    angle = float(kernel.output(0.1, links.tolist()))
+    assert angle == pytest.approx(math.atan2(reached.imag, reached.real), abs=1e-12)

@@ -349,3 +349,26 @@ def test_what_a_caller_gets_wrong_is_refused_with_words(
     with pytest.raises(TroubleshootError) as caught:
         diagnose_simulation(**{**given, **changed})  # type: ignore[arg-type]
     assert says in f"{caught.value.message} {caught.value.remedy}"
+
+
+RAMP = np.linspace(1.0, 20.0, 40)
+
+
+@pytest.mark.parametrize("true", [10.0, 8.0])
+def test_readings_without_noise_give_the_value_that_they_were_made_with(true: float) -> None:
+    found = diagnose_simulation(
+        lambda p: RAMP / p["stiffness"], RAMP / true, [Suspect("stiffness", 10.0, 0.5)]
+    )
+    assert found.verdict is (Verdict.NONE if true == 10.0 else Verdict.NAMED)
+    assert found.parameters["stiffness"] == pytest.approx(true, rel=1e-9)
+    assert found.remainder_p == 1.0
+
+
+def test_rounding_in_readings_without_noise_is_no_cause() -> None:
+    found = diagnose_simulation(
+        lambda p: p["rate"] * RAMP + p["level"],
+        RAMP + 0.3,
+        [Suspect("rate", 1.0, 0.5)],
+        [Suspect("level", 0.0, 0.5)],
+    )
+    assert found.verdict is Verdict.NONE

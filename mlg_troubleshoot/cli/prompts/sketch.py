@@ -8,7 +8,7 @@ from itertools import zip_longest
 
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Slider, Slot, Step
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Guided, Lever, Slider, Slot, Step
 
 _LONGEST_BAR = 6
 
@@ -73,7 +73,7 @@ def _chain(steps: tuple[Step, ...]) -> _Chain | None:
                 start = step.pin
                 bar = _Bar("═", step.pivot)
                 rocker = ""
-            case Slider():
+            case Slider() | Guided():
                 start = step.upstream
                 bar = _Bar("─", None)
                 rocker = ""

@@ -28,25 +28,36 @@ from mlg_troubleshoot.diagnosis.causes.reading import (
 )
 from mlg_troubleshoot.diagnosis.causes.together import LoadDirections, OtherGeometry
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.results import Result
 
-CATALOGUE: tuple[Cause, ...] = (
-    OutOfPlaneTilt(),
-    ElasticCompliance(),
-    ThermalGrowth(),
-    DirectionNotWorstCase(),
-    OvalWear(),
-    UnlistedWear(),
-    RiggingOffset(),
-    DateStep(),
-    GaugeBias(),
-    TechnicianBias(),
-    SideDifference(),
-    CalibrationRate(),
-    ApproachHysteresis(),
-    JointContact(),
-    ConventionSlip(),
-    LoadDirections(),
-    OtherGeometry(),
+
+class Catalogue(Result, tuple[Cause, ...]):
+    """Causes, with a table of what each one says."""
+
+    def __repr__(self) -> str:
+        return f"Catalogue({', '.join(cause.name for cause in self)})"
+
+
+CATALOGUE = Catalogue(
+    (
+        OutOfPlaneTilt(),
+        ElasticCompliance(),
+        ThermalGrowth(),
+        DirectionNotWorstCase(),
+        OvalWear(),
+        UnlistedWear(),
+        RiggingOffset(),
+        DateStep(),
+        GaugeBias(),
+        TechnicianBias(),
+        SideDifference(),
+        CalibrationRate(),
+        ApproachHysteresis(),
+        JointContact(),
+        ConventionSlip(),
+        LoadDirections(),
+        OtherGeometry(),
+    )
 )
 
 
