@@ -91,7 +91,7 @@ def same(one: Any, other: Any) -> bool:
     if one is other:
         return True
     both_map = isinstance(one, Mapping) and isinstance(other, Mapping)
-    if type(one) is not type(other) and not both_map:
+    if not (both_map or isinstance(one, type(other)) or isinstance(other, type(one))):
         return False
     if isinstance(one, np.ndarray | float):
         return np.array_equal(one, other, equal_nan=np.asarray(one).dtype.kind == "f")

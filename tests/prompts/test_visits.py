@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from datetime import date
+from datetime import date, datetime, timedelta
+from functools import partial
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,7 @@ import pytest
 from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.check_run import Run
 from mlg_troubleshoot.cli.options import Tables
-from mlg_troubleshoot.cli.prompts import EntryInterruptedError, SessionStore
+from mlg_troubleshoot.cli.prompts import EntryInterruptedError, SessionStore, ask_inspection
 from mlg_troubleshoot.life.folding import GearLife, life_of
 from mlg_troubleshoot.store import RecordKind, Store
 from tests.cli.conftest import mlg
@@ -27,10 +29,16 @@ Visit = Callable[..., ScriptedTerminal]
 
 @pytest.fixture
 def visit(store: SessionStore, monkeypatch: pytest.MonkeyPatch) -> Visit:
-    """One run of ``mlg check`` on a terminal, ended with Enter; the screen is returned."""
+    """One run of ``mlg check`` on a terminal, ended with Enter; the screen is returned. A visit
+    begins at least a second after the one before: nobody types faster.
+    """
+    visits = count()
 
     def one(*typed: str, resume: bool = False, flags: Flags | None = None) -> ScriptedTerminal:
         terminal = ScriptedTerminal([*typed, ""])
+        later = timedelta(seconds=next(visits))
+        asked = partial(ask_inspection, now=lambda: datetime.now() + later)
+        monkeypatch.setattr("mlg_troubleshoot.cli.prompts.ask_inspection", asked)
         monkeypatch.setattr("mlg_troubleshoot.cli.prompts.RichTerminal", lambda: terminal)
         monkeypatch.setattr("mlg_troubleshoot.cli.output.can_ask", lambda: True)
         wanted = Wanted(store=str(store.place), resume=resume)
