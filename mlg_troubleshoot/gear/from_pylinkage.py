@@ -7,6 +7,7 @@ the link that both points are on, else it is an arm that a pin turns, as a slot 
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -19,7 +20,8 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import SourceKind
 from mlg_troubleshoot.units import LengthUnit
 
-_NO_COUNTERPART = "Replace it by a crank, links between pins, or a guide."
+_ONE_DRIVER = "Keep the one that moves the output and replace the others by points on the ground."
+_NO_COUNTERPART = "Replace it by a crank, a linear actuator, links between pins, or a guide."
 
 
 class TheirJoint(Table, forbid_unknown_fields=False):
@@ -37,12 +39,17 @@ class TheirJoint(Table, forbid_unknown_fields=False):
 
 
 class TheirLink(Table, forbid_unknown_fields=False):
-    """A link of their file; a driver turns about its motor joint."""
+    """A link of their file; a driver turns about its motor joint.
+
+    travel: of a linear actuator, which their file cannot hold, from the present position. Its
+    moving end is a prismatic joint.
+    """
 
     id: Name
     joints: tuple[str, ...]
-    type: Literal["ground", "driver", "arc_driver", "link"] = "link"
+    type: Literal["ground", "driver", "arc_driver", "linear_actuator", "link"] = "link"
     motor_joint: str | None = None
+    travel: Pair | None = None
 
 
 class TheirMechanism(Table, forbid_unknown_fields=False):
@@ -65,7 +72,7 @@ def short_form_of(
     """Return the short form of a linkage of pylinkage, of the values of its file, or of the file.
 
     limit, margin: of all joints, and of the output. [in, in or rad]
-    travel_deg: the crank, from its present position. [deg]
+    travel_deg: the crank, from its present position; an actuator has its stroke. [deg]
     output: as in a short form; else the last guide, or the last link on the ground.
     unit: of their coordinates, which have none.
     """
@@ -73,6 +80,9 @@ def short_form_of(
     theirs = _Theirs(file)
     inches = unit.per_inch
     driver = theirs.driver()
+    drive: dict[str, Any] = {"crank": driver.id, "travel": list(travel_deg)}
+    if driver.travel is not None:
+        drive = {"actuator": driver.id, "travel": [end / inches for end in driver.travel]}
     return {
         "name": theirs.mechanism.name[:40] or "linkage",
         "source": {"kind": str(SourceKind.ASSUMED), "text": "Positions of a pylinkage linkage."},
@@ -84,7 +94,7 @@ def short_form_of(
         "guides_deg": theirs.guides,
         "guides": theirs.lines,
         "slots": theirs.slots,
-        "input": {"crank": driver.id, "travel": list(travel_deg)},
+        "input": drive,
         "output": dict(output or theirs.output()),
         "joints": dict.fromkeys(theirs.pins(), limit),
         "margin": margin,
@@ -162,22 +172,33 @@ class _Theirs:
             self.slots[arm] = ends[1]
 
     def driver(self) -> TheirLink:
-        drivers = [link for link in self.mechanism.links if "driver" in link.type]
+        drivers = [x for x in self.mechanism.links if x.type not in ("ground", "link")]
         if len(drivers) != 1:
-            raise self.file.fail(("links",), f"one driver instead of {len(drivers)}")
-        return drivers[0]
+            named = ", ".join(link.id for link in drivers) or "none"
+            expected = f"one driver, because a gear has one input, instead of {named}"
+            raise GearFileError(f"{self.file.path.name}: links: expected {expected}", _ONE_DRIVER)
+        (driver,) = drivers
+        if (driver.type == "linear_actuator") != (driver.travel is not None):
+            place = ("links", self.mechanism.links.index(driver), "travel")
+            raise self.file.fail(place, "two numbers, of a linear_actuator only")
+        return driver
 
     def output(self) -> dict[str, str]:
-        if self.guides or self.lines:
-            return {"position_of": [*self.lines, *self.guides][-1]}
-        driver = self.driver().id
-        others = [link for link in self.links if link != driver]
+        driver = self.driver()
+        guided = [p for p in (*self.lines, *self.guides) if p not in driver.joints]
+        if guided:
+            return {"position_of": guided[-1]}
+        others = [link for link in self.links if link != driver.id]
         on_ground = [x for x in others if set(self.links[x]) & set(self.ground)]
         return {"angle_of": [*(others or self.links), *on_ground][-1]}
 
     def pins(self) -> list[str]:
         """Points where one link turns on another or on the ground, or slides."""
-        on = {p: sum(p in ends for ends in self.links.values()) for p in self.places}
+        driver = self.driver()
+        # The housing of an actuator is fixed to the ground.
+        fixed = driver.id if driver.travel else None
+        turning = [ends for link, ends in self.links.items() if link != fixed]
+        on = {p: sum(p in ends for ends in turning) for p in self.places}
         slides = dict.fromkeys(self.guides, 1) | {p: len(own) for p, own in self.lines.items()}
         arms = {self.links[arm][1] for arm in self.slots}
         return [
@@ -189,10 +210,9 @@ class _Theirs:
 
 def _of_components(linkage: Any) -> dict[str, Any]:
     """A `simulation.Linkage` in the form of their file, where its own dimensions put its points."""
-    before = linkage.get_coords()
+    linkage = copy.deepcopy(linkage)
     next(iter(linkage.step(iterations=1, dt=0)))
     places = linkage.get_coords()
-    linkage.set_coords(before)
     joints: list[dict[str, Any]] = []
     links: list[dict[str, Any]] = []
     for part, place in zip(linkage.components, places, strict=True):
@@ -205,6 +225,12 @@ def _of_components(linkage: Any) -> dict[str, Any]:
                 (pivot,) = _names([part.anchor])
                 link = {"id": f"{part.name} crank", "joints": [pivot, part.name]}
                 links.append(link | {"type": "driver", "motor_joint": pivot})
+            case "LinearActuator":
+                (base,) = _names([part.anchor])
+                joint |= {"type": "prismatic", "axis": [math.cos(part.angle), math.sin(part.angle)]}
+                travel = [-part.extension, part.stroke - part.extension]
+                link = {"id": f"{part.name} actuator", "joints": [base, part.name]}
+                links.append(link | {"type": "linear_actuator", "travel": travel})
             case "RRRDyad":
                 ends = _names([part.anchor1, part.anchor2])
                 links += [{"id": f"{p}-{part.name}", "joints": [p, part.name]} for p in ends]
@@ -227,7 +253,8 @@ def _of_components(linkage: Any) -> dict[str, Any]:
                 joint |= {"type": "tracker", "ref_joint1_id": first, "ref_joint2_id": second}
             case kind:
                 raise GearFileError(
-                    f"{linkage.name}: {part.name}: a {kind} has no counterpart in a gear",
+                    f"{linkage.name}: {part.name}: a {kind} has no counterpart in a gear, whose"
+                    " parts are rigid links, guides and one input",
                     _NO_COUNTERPART,
                 )
     return {"name": str(linkage.name), "joints": joints, "links": links}

@@ -181,6 +181,11 @@ class GuideTable(StepTable, tag="guide", kw_only=True):
     upstream: Name
     line: tuple[Name, Name | Angle]
     across: Name | Angle | None = None
+    driven: bool = False
+
+    def __post_init__(self) -> None:
+        if self.driven and self.across is not None:
+            raise RefusedValueError("across", "no second line of a driven point")
 
 
 class OutputTable(Table):

@@ -1,8 +1,8 @@
 """A gear from nothing: points, links and joints in the terms of the field, as a full gear file.
 
-A point is located by what it stands on, in this order: a driven crank; two guides (dyad RPP); a
-guide and a link (RRP); a rigid link of which two points are located; a slot; two links (RRR). So
-nobody writes an order.
+A point is located by what it stands on, in this order: a driven crank; an actuator along a
+guide; two guides (dyad RPP); a guide and a link (RRP); a rigid link of which two points are
+located; a slot; two links (RRR). So nobody writes an order.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ _ASSUMED = "Not stated in the short form: assumed by the authors of this tool."
 _PLANE = "base"
 # A reading above twice the largest limit is asked again, one above five times is refused. [1]
 _CONFIRM_ABOVE, _HARD_LIMIT = 2.0, 5.0
+# How far the end of an actuator may be drawn beside its guide. [in]
+_IN_LINE = 1e-6
 
 
 class DriveTable(Table):
@@ -259,6 +261,9 @@ class _Builder:
 
     def _guide(self, point: str, reach: Mapping[str, list[str]]) -> None:
         lines = self._lines(point)
+        if self.form.input.actuator in reach:
+            self._push(point, self.form.input.actuator, reach)
+            return
         if len(lines) == 2:
             first, (upstream, across) = lines
             words = f"dyad RPP: {self._line_words(first)}, {self._line_words(lines[1])}"
@@ -274,6 +279,20 @@ class _Builder:
         words = f"dyad RRP: {link} from {end}, guide at {axis:g}°"
         sign = 1 if along.real >= 0.0 else -1
         self._add(point, "slider", words, upstream=end, axis_deg=axis, sign=sign)
+
+    def _push(self, point: str, actuator: str, reach: Mapping[str, list[str]]) -> None:
+        """Locate the end of an actuator that its guide keeps in line with its other end."""
+        base = reach[actuator][0]
+        axis = self.form.guides_deg.get(point)
+        if axis is None or point in self.form.guides or base not in self.form.ground:
+            expected = f"one guide, in guides_deg, and {base} on the ground: {actuator} pushes it"
+            raise self.file.fail(("moving", point), expected)
+        arm = (self._at(point) - self._at(base)) * np.exp(-1j * np.radians(axis))
+        if abs(arm - abs(arm)) > _IN_LINE:
+            expected = f"the direction from {base} to {point}: {actuator} pushes along it"
+            raise self.file.fail(("guides_deg", point), expected)
+        words = f"{actuator} from {base} at {axis:g}°, extended by the input"
+        self._add(point, "guide", words, upstream=base, line=[base, axis], driven=True)
 
     def _dyad(self, point: str, reach: Mapping[str, list[str]]) -> None:
         """The link that carries further points, or else the one on the ground, is the downstream

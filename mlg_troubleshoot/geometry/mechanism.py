@@ -133,7 +133,8 @@ class Guided:
 
     across: of a second line that starts at `upstream`, and the joint is where both meet (dyad RPP);
     None for the end of a link from `upstream`, on the side where the coordinates put it (RRP).
-    virtual_links: they displace that second line, or that link.
+    virtual_links: they displace that second line, or that link. driven: true if the joint is the
+    end of an actuator along the line, whose extension is the input; they then displace the joint.
     """
 
     joint: str
@@ -141,6 +142,7 @@ class Guided:
     line: tuple[str, Towards]
     across: Towards | None = None
     virtual_links: tuple[int, ...] = ()
+    driven: bool = False
 
 
 Step = Crank | Dyad | Lever | Slot | Slider | Guided

@@ -338,8 +338,11 @@ def _reach(line: _Line, end: tuple[str, str], square: str, sign: str, w: _Writer
 
 def _guided(w: _Writer, step: Guided) -> None:
     w.same_plane(step, *needs(step))
-    line, (cosine, sine) = _line_of(w, step, "line", *step.line, ())
-    if step.across is None:
+    own = step.virtual_links if step.driven else ()
+    line, (cosine, sine) = _line_of(w, step, "line", *step.line, own)
+    if step.driven:
+        position = _travel(w)
+    elif step.across is None:
         length = w.length(step.upstream, step.joint)
         joint, end = w.mechanism.point(step.joint), w.mechanism.point(step.upstream)
         ahead = cosine * (joint.x - end.x) + sine * (joint.y - end.y)

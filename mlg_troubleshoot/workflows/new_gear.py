@@ -87,7 +87,8 @@ def from_pylinkage(
     limit, margin : float
         Limit of every joint, and allowed displacement of the output. [in, in or rad]
     travel_deg : tuple of float
-        Travel of the crank from its present position; clearances act at its end. [deg]
+        Travel of the crank from its present position; clearances act at its end. A linear
+        actuator travels over its stroke instead, to its full extension. [deg]
     output : mapping, optional
         As in a short form; else the last point on a guide, or the last link on the ground.
     unit : LengthUnit or str

@@ -15,8 +15,10 @@ import numpy as np
 import pytest
 import tomli_w
 from pylinkage.actuators import ArcCrank, Crank, LinearActuator
+from pylinkage.cam.motion_laws import HarmonicMotionLaw
+from pylinkage.cam.profiles import FunctionProfile
 from pylinkage.components import Ground, PointTracker
-from pylinkage.dyads import FixedDyad, PPDyad, RRPDyad, RRRDyad
+from pylinkage.dyads import FixedDyad, PPDyad, RRPDyad, RRRDyad, TranslatingCamFollower
 from pylinkage.mechanism import MechanismBuilder, fourbar, slider_crank
 from pylinkage.mechanism.serialization import mechanism_to_json
 from pylinkage.simulation import Linkage
@@ -152,6 +154,26 @@ def moving_guides() -> Linkage:
     return Linkage([o, d, e, crank, pin, slider, crossing, corner], name="moving guides")
 
 
+def toggle_press() -> Linkage:
+    """A cylinder whose rod moves a toggle: its lower link pushes a ram down a guide."""
+    base, top = Ground(-2.0, 0.4, name="base"), Ground(0.6, 2.0, name="top")
+    low, high = Ground(0.5, -3.0, name="low"), Ground(0.5, 3.0, name="high")
+    rod = LinearActuator(
+        base, angle=0.3, stroke=1.5, speed=0.07, initial_extension=0.4, name="cylinder"
+    )
+    knee = RRRDyad(rod.output, top, distance1=1.6, distance2=1.9, name="knee")
+    ram = RRPDyad(knee, high, low, distance=2.1, name="ram")
+    return Linkage([base, top, low, high, rod, knee, ram], name="press")
+
+
+def pushed_rocker() -> Linkage:
+    """From the retracted end, where the end of the actuator is at its anchor."""
+    base, pivot = Ground(0.0, 0.0, name="base"), Ground(3.0, 1.0, name="pivot")
+    rod = LinearActuator(base, angle=-0.2, stroke=1.2, speed=0.1, name="rod")
+    pin = RRRDyad(rod.output, pivot, distance1=2.0, distance2=1.7, name="pin")
+    return Linkage([base, pivot, rod, pin], name="rocker")
+
+
 EXAMPLES: dict[str, tuple[Callable[[], Any], int]] = {
     "server four-bar": (server_four_bar, 62),
     "server Chebyshev": (server_chebyshev, 10),
@@ -168,6 +190,8 @@ EXAMPLES: dict[str, tuple[Callable[[], Any], int]] = {
     "mechanism.slider_crank": (lambda: slider_crank(1.0, 3.0, initial_angle=0.3), 100),
     "arc crank with an arm": (arc_crank_with_arm, 13),
     "moving guides": (moving_guides, 20),
+    "linear actuator": (toggle_press, 60),
+    "linear actuator at its retracted end": (pushed_rocker, 30),
 }
 
 
@@ -185,8 +209,11 @@ def parts_of(linkage: Any) -> list[tuple[str, Any]]:
 
 
 def driven(linkage: Any) -> Callable[[], float]:
-    """The angle of their crank, from its two points."""
+    """The angle of their crank, from its two points, or the extension of their actuator."""
     if isinstance(linkage, Linkage):
+        for part in linkage.components:
+            if isinstance(part, LinearActuator):
+                return lambda: part.extension
         crank = next(p for p in linkage.components if isinstance(p, Crank | ArcCrank))
         pivot, tip = crank.anchor, crank
     else:
@@ -241,6 +268,81 @@ def test_coordinates_in_millimetres_become_inches(tmp_path: Path) -> None:
     assert pivot.x == pytest.approx(100 / 25.4)
 
 
+def test_an_actuator_is_driven_over_its_stroke_from_its_present_extension(tmp_path: Path) -> None:
+    assert gear_of(toggle_press(), tmp_path).model.stroke == pytest.approx((-0.4, 1.1))
+
+
+def test_the_stroke_of_an_actuator_in_millimetres_becomes_inches(tmp_path: Path) -> None:
+    gear = gear_of(toggle_press(), tmp_path, unit=LengthUnit.MILLIMETRE)
+    assert gear.model.stroke == pytest.approx((-0.4 / 25.4, 1.1 / 25.4))
+
+
+def test_the_housing_of_an_actuator_is_no_joint_and_its_end_is_one() -> None:
+    found = short_form_of(toggle_press(), **LIMITS)
+    assert set(found["joints"]) == {"cylinder", "knee", "top", "ram"}
+
+
+def test_the_end_of_an_actuator_is_not_the_output() -> None:
+    assert short_form_of(toggle_press(), **LIMITS)["output"] == {"position_of": "ram"}
+    assert short_form_of(pushed_rocker(), **LIMITS)["output"] == {"angle_of": "pivot-pin"}
+
+
+def test_clearance_of_the_end_of_an_actuator_moves_it_as_far(tmp_path: Path) -> None:
+    gear = gear_of(toggle_press(), tmp_path)
+    kernel = gear.model.kernel
+    number = next(j.number for j in gear.joints if j.point == "cylinder")
+    links = kernel.no_clearance()
+    links[2 * number - 2 : 2 * number] = [3e-3, 4e-3]
+    place, rest = (kernel.positions(0.1, v)["cylinder"] for v in (links, kernel.no_clearance()))
+    assert [float(a - b) for a, b in zip(place, rest, strict=True)] == pytest.approx([3e-3, 4e-3])
+
+
+def actuator_file() -> dict[str, Any]:
+    """A file with what theirs cannot hold: an actuator that pushes a rocker."""
+    joints = [
+        {"id": "base", "position": [0, 0], "type": "ground"},
+        {"id": "pivot", "position": [3, 1], "type": "ground"},
+        {"id": "rod", "position": [0.5, 0], "type": "prismatic", "axis": [1, 0]},
+        {"id": "pin", "position": [2, 2]},
+    ]
+    ram = {"id": "ram", "joints": ["base", "rod"], "type": "linear_actuator", "travel": [-0.2, 0.3]}
+    links = [{"id": f"{p}-pin", "joints": [p, "pin"]} for p in ("rod", "pivot")]
+    return {"name": "theirs", "joints": joints, "links": [ram, *links]}
+
+
+def test_a_json_file_may_have_an_actuator_as_a_link_with_its_travel(tmp_path: Path) -> None:
+    (tmp_path / "theirs.json").write_text(json.dumps(actuator_file()))
+    kernel = gear_of(tmp_path / "theirs.json", tmp_path).model.kernel
+    place = kernel.positions(0.25, kernel.no_clearance())["rod"]
+    assert [float(v) for v in place] == pytest.approx([0.75, 0.0], abs=1e-15)
+
+
+def test_an_actuator_of_a_file_without_travel_is_refused() -> None:
+    file = actuator_file()
+    del file["links"][0]["travel"]
+    with pytest.raises(GearFileError, match=r"theirs: links\[1\]\.travel: expected two numbers"):
+        short_form_of(file, **LIMITS)
+
+
+def test_several_inputs_are_refused_by_name() -> None:
+    linkage = toggle_press()
+    crank = Crank(linkage.components[1], 1.0, name="handle")
+    both = Linkage([*linkage.components, crank], name="press")
+    words = "one input, instead of cylinder actuator, handle crank"
+    with pytest.raises(GearFileError, match=words):
+        short_form_of(both, **LIMITS)
+
+
+def test_an_actuator_that_is_retracting_goes_on_retracting() -> None:
+    linkage = toggle_press()
+    list(linkage.step(iterations=20))
+    rod = linkage.components[4]
+    before = rod.extension
+    short_form_of(linkage, **LIMITS)
+    next(iter(linkage.step(iterations=1)))
+    assert rod.extension < before
+
+
 def test_a_linkage_is_left_as_it_was() -> None:
     linkage = strider()
     before = linkage.get_coords()
@@ -258,9 +360,12 @@ def test_a_flat_position_is_refused_because_it_fits_two_assemblies() -> None:
 
 def test_a_part_without_counterpart_is_named() -> None:
     o = Ground(0.0, 0.0, name="O")
-    pushed = LinearActuator(o, angle=0.0, stroke=2.0, name="ram")
-    with pytest.raises(GearFileError, match="ram: a LinearActuator has no counterpart"):
-        short_form_of(Linkage([o, pushed], name="press"), **LIMITS)
+    crank = Crank(o, 1.0, name="shaft")
+    lift = FunctionProfile(HarmonicMotionLaw(), base_radius=1.0, total_lift=0.5)
+    follower = TranslatingCamFollower(crank, lift, o, name="valve")
+    words = "valve: a TranslatingCamFollower has no counterpart in a gear, whose parts are rigid"
+    with pytest.raises(GearFileError, match=words):
+        short_form_of(Linkage([o, crank, follower], name="engine"), **LIMITS)
 
 
 def test_lines_that_stand_still_meet_in_a_point_on_the_ground() -> None:
@@ -282,7 +387,7 @@ def test_lines_that_stand_still_meet_in_a_point_on_the_ground() -> None:
             {"joints": [{"id": "A", "position": [0, 0], "type": "Static"}]},
             "ground, prismatic, revolute or tracker, found 'Static'",
         ),
-        ({"links": []}, "links: expected one driver instead of 0"),
+        ({"links": []}, "links: expected one driver.* instead of none"),
         ({"joints": 3}, "joints: expected an array of tables, found 3"),
     ],
 )

@@ -47,6 +47,16 @@ ACTUATOR = {
 }
 
 
+# A ram fixed to the ground, whose end pushes a rocker.
+RAM: dict[str, Any] = {
+    "ground": {"F": [0.0, 0.0], "D": [3.0, 1.0]},
+    "moving": {"R": [0.3, 0.4], "P": [1.5, 2.0]},
+    "links": {"ram": ["F", "R"], "rod": ["R", "P"], "rocker": ["D", "P"]},
+    "guides_deg": {"R": math.degrees(math.atan2(4.0, 3.0))},
+    "input": {"actuator": "ram", "travel": [-0.5, 0.2]},
+    "output": {"angle_of": "rocker"},
+    "joints": {"R": 0.01, "P": 0.01, "D": 0.01},
+}
 PIN = [math.cos(1.0), math.sin(1.0)]
 # A Scotch yoke: the pin of the crank runs in the slot of a yoke that slides.
 YOKE: dict[str, Any] = {
@@ -111,6 +121,30 @@ def test_the_actuator_keeps_the_length_that_it_is_driven_to(tmp_path: Path) -> N
     assert reach == pytest.approx(math.dist((-3.0, -2.0), (-2.0, 1.5)) - 0.1)
 
 
+def test_an_actuator_on_a_guide_extends_along_it(tmp_path: Path) -> None:
+    kernel = gear_of(changed(**RAM), tmp_path).model.kernel
+    extended = np.array([-0.5, -0.2, 0.2])
+    x, y = kernel.positions(extended, kernel.no_clearance())["R"]
+    assert x == pytest.approx(0.6 * (0.5 + extended), abs=1e-15)
+    assert y == pytest.approx(0.8 * (0.5 + extended), abs=1e-15)
+
+
+def test_an_actuator_on_a_guide_is_said_to_be_extended_by_the_input() -> None:
+    assert short_form(changed(**RAM)).steps[0] == "R: ram from F at 53.1301°, extended by the input"
+
+
+def test_a_gear_with_an_actuator_on_a_guide_is_drawn(tmp_path: Path) -> None:
+    assert gear_of(changed(**RAM), tmp_path).plot()._repr_svg_().startswith("<svg")
+
+
+def test_a_driven_point_of_a_gear_file_has_no_second_line(tmp_path: Path) -> None:
+    values = short_form(changed(**RAM)).values
+    values["steps"][0]["across"] = 10.0
+    (tmp_path / "gear.toml").write_text(tomli_w.dumps(values))
+    with pytest.raises(GearFileError, match=r"steps\[R\]\.across: expected no second line"):
+        load_gear(tmp_path / "gear.toml")
+
+
 def test_clearance_of_a_lever_is_at_the_link_that_it_moves(tmp_path: Path) -> None:
     mechanism = gear_of(changed(**ACTUATOR), tmp_path).reference.mechanism
     links = {step.joint: step.virtual_links for step in mechanism.steps}
@@ -167,6 +201,14 @@ def test_an_assumed_number_is_not_counted_as_a_given_one(tmp_path: Path) -> None
         ({"guides_deg": {"O2": 0.0}}, r"guides_deg\.O2: expected a moving point"),
         ({"slots": {"crank": "nobody"}}, r"slots\.crank: expected one of the points"),
         ({"slots": {"nobody": "A"}}, r"slots\.nobody: expected one of the links"),
+        (
+            RAM | {"guides_deg": {"R": 10.0}},
+            r"guides_deg\.R: expected the direction from F to R: ram pushes along it",
+        ),
+        (
+            RAM | {"guides_deg": {}, "guides": {"R": [["F", "D"]]}},
+            r"moving\.R: expected one guide, in guides_deg, and F on the ground",
+        ),
         ({"masses": {}}, "masses: expected a known key"),
         ({"name": "a\nb"}, "name"),
     ],
