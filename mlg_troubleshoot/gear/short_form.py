@@ -261,8 +261,9 @@ class _Builder:
 
     def _guide(self, point: str, reach: Mapping[str, list[str]]) -> None:
         lines = self._lines(point)
-        if self.form.input.actuator in reach:
-            self._push(point, self.form.input.actuator, reach)
+        actuator = self.form.input.actuator
+        if actuator is not None and actuator in reach:
+            self._push(point, actuator, reach)
             return
         if len(lines) == 2:
             first, (upstream, across) = lines
