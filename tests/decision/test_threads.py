@@ -8,13 +8,13 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from mlg_troubleshoot.decision import judge_rows
-from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.indices.index_table import load_index_table
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import inspected
 
 
 def test_matrix_products_of_a_judgement_wait_for_no_other_threads(
-    monkeypatch: pytest.MonkeyPatch,
+    gear: Gear, table: IndexTable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[int] = []
     judge = judge_rows._assess_valid
@@ -24,6 +24,5 @@ def test_matrix_products_of_a_judgement_wait_for_no_other_threads(
         return judge(*given)
 
     monkeypatch.setattr(judge_rows, "_assess_valid", watched)
-    gear = load_gear()
-    judge_rows.assess([inspected({3: 0.013})], gear, load_index_table(gear))
+    judge_rows.assess([inspected({3: 0.013})], gear, table)
     assert set(seen) == {1}

@@ -178,7 +178,7 @@ class CalibrationRate(Cause):
     name: ClassVar[str] = "calibration_rate"
     parameter: ClassVar[str] = "rate_change"
     trial: ClassVar[float] = 0.01
-    plausible: ClassVar[float | None] = 0.05
+    plausible: ClassVar[float | None] = 0.02
     sentence: ClassVar[str] = (
         "The calibration rate of the model is off, or the gauge of all rows reads too much or too"
         " little by the same share: every prediction is scaled"
