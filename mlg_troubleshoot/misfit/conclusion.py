@@ -98,9 +98,10 @@ class Conclusion:
         if self.verdict is Verdict.AMBIGUOUS or (self.verdict is Verdict.NAMED and further >= 0.5):
             # At least one of the set acts, as sure as anything that is said.
             for name in rest:
-                unsure = self.any_of(names) < self.beliefs.sure * further
-                if self.listed[name] > 1.0 - self.beliefs.sure or unsure:
-                    names.append(name)
+                rare = self.listed[name] <= 1.0 - self.beliefs.sure
+                if rare and self.any_of(names) >= self.beliefs.sure * further:
+                    break
+                names.append(name)
         if self.verdict in {Verdict.NAMED, Verdict.AMBIGUOUS}:
             names += [n for n in rest if n in self._alike and n not in names]
         return tuple(names)
