@@ -85,10 +85,13 @@ def gear(desk: Desk) -> Case:
 
 
 def beside(desk: Desk) -> Case:
-    """A good gear file with a damaged ensemble or table of indices."""
+    """A good gear file with a damaged ensemble or table of indices, which is computed again where it
+    is of another geometry.
+    """
     desk.take(*GEAR_FILES, "own.toml")
     desk.spoil(desk.rng.choice(("hawker-800xp-ensemble.toml", "hawker-800xp-indices.json")))
-    return Case("beside", [["check", FAILURE, "--gear", "own.toml", "--json"]])
+    line = ["check", FAILURE, "--gear", "own.toml", "--json"]
+    return Case("beside", [line], frozenset({"work/hawker-800xp-indices.json"}))
 
 
 def targets(desk: Desk) -> Case:
