@@ -85,8 +85,8 @@ def gear(desk: Desk) -> Case:
 
 
 def beside(desk: Desk) -> Case:
-    """A good gear file with a damaged ensemble or table of indices, which is computed again where it
-    is of another geometry.
+    """A good gear file with a damaged ensemble or table of indices; a table of another geometry is
+    computed again.
     """
     desk.take(*GEAR_FILES, "own.toml")
     desk.spoil(desk.rng.choice(("hawker-800xp-ensemble.toml", "hawker-800xp-indices.json")))
