@@ -137,18 +137,18 @@ def _show_gears(found: Sequence[GearLife], place: str) -> None:
         "last seen",
         "landings",
         "verdict",
-        "look at",
-        "inspections",
+        "joint",
+        "seen",
         "repairs",
     )
-    table = output.plain_table(console, *headings, right=("landings", "inspections", "repairs"))
+    table = output.plain_table(console, *headings, right=("landings", "seen", "repairs"))
     for life in found:
         state = ["-", "-", "-", "-"]
         if life.latest is not None:
             state = [
                 life.latest.record.day or "no date",
                 _count(life.latest.inspection.gear_landings),
-                str(life.latest.result.get("verdict")),
+                str(life.latest.result.get("verdict")).removesuffix("_MARGIN"),
                 output.joint(life.latest.worst_joint),
             ]
         seen = str(len(life.inspections)), str(len(life.repairs))

@@ -175,7 +175,8 @@ def plain_table(
         title_justify="left",
     )
     for heading in headings:
-        table.add_column(heading, justify="right" if heading in right else "left")
+        # What does not fit goes on below: nothing is cut.
+        table.add_column(heading, justify="right" if heading in right else "left", overflow="fold")
     return table
 
 

@@ -103,3 +103,13 @@ def test_a_life_is_not_cut_at_60_columns(tmp_path: Path, monkeypatch: pytest.Mon
     lines = mlg("history", "N123", "LH", "--store", store, "--no-forecast").out.splitlines()
     assert max(map(len, lines)) <= 60
     assert sum("OUTSIDE MARGIN, worst case 0.0" in line for line in lines) == 4
+
+
+def test_the_list_of_gears_that_are_kept_is_cut_nowhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    store = tmp_path / "kept.sqlite"
+    dated = row(tail_no="G-ABCD", inspection_date="2026-03-04", gear_landings="1500")
+    mlg("check", table(tmp_path, dated), "--keep", "--store", store)
+    assert "…" not in mlg("history", "--store", store).out
