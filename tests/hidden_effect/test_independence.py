@@ -34,6 +34,7 @@ def test_the_simulator_imports_nothing_of_the_product(file: Path) -> None:
         "dataclasses",
         "datetime",
         "functools",
+        "itertools",
         "json",
         "math",
         "numpy",
