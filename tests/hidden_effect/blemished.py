@@ -91,7 +91,7 @@ def run(numbered: tuple[int, Task]) -> Record:
         start = time.process_time()
         code, found = command("diagnose", str(file), "--write-extension", str(extension))
         seconds = time.process_time() - start
-        left = (None, None)
+        left: tuple[float | None, float | None] = (None, None)
         if extension.exists():
             left = (
                 unseen_rms(truth.unseen, Path(place)),
