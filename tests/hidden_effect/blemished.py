@@ -109,17 +109,22 @@ def run(numbered: tuple[int, Task]) -> Record:
         "unseen": left,
         "named": [(c["cause"], c["target"]) for c in found.get("causes", [])],
         "condition": sorted({c["kind"] for c in found.get("data_condition", [])}),
-        **judged(found.get("verdict"), found.get("causes", []), also, truth),
+        **judged(found.get("verdict"), found.get("causes", []), also, truth, beside),
     }
 
 
 def judged(
-    verdict: str | None, causes: list[Record], also: list[Record], truth: Truth
+    verdict: str | None,
+    causes: list[Record],
+    also: list[Record],
+    truth: Truth,
+    beside: str | None = None,
 ) -> dict[str, Any]:
-    """What was said, against what is true."""
+    """What was said, against what is true; beside a blemish only the listed cause is asked for."""
     named = [(c["cause"], c["target"]) for c in causes]
     offered = [*named, *((c["cause"], c["target"]) for c in also)]
-    true = {t[0]: [u for u in truth.causes if u[0] == t[0]] for t in truth.causes}
+    due = truth.causes if beside is None else truth.causes[-1:]
+    true = {t[0]: [u for u in due if u[0] == t[0]] for t in due}
 
     def hit(name: tuple[str, str | None]) -> bool:
         return any(study._same(name, t) for t in truth.causes)

@@ -42,6 +42,12 @@ def test_a_name_that_is_partly_true_is_near_and_not_wrong() -> None:
     assert (found["right"], found["near"], found["wrong"]) == (False, True, False)
 
 
+def test_beside_a_blemish_only_the_listed_cause_is_asked_for() -> None:
+    hidden = truth(("gauge_drift", None), ("date_step", None))
+    found = judged("NAMED", said(("date_step", None)), [], hidden, "date_step")
+    assert (found["right"], found["wrong"]) == (True, False)
+
+
 def test_any_name_in_a_fleet_without_a_cause_is_wrong() -> None:
     assert judged("NAMED", said(("date_step", None)), [], truth())["wrong"]
 
