@@ -257,6 +257,26 @@ class Remainder(TypedDict):
     expected_from_gauges_in: Size | None
 
 
+class ConditionOfData(TypedDict):
+    """One thing that is to be known of the data: what it does to the answer, and what to record."""
+
+    kind: Literal[
+        "rounded",
+        "censored",
+        "blank_not_at_random",
+        "copied",
+        "duplicate",
+        "limit_written",
+        "selected",
+        "landings_fall",
+        "identical_cells",
+    ]
+    where: str
+    share: Probability
+    effect: str
+    record_next: str
+
+
 class DiagnoseOutput(TypedDict):
     """Output of mlg diagnose --json.
 
@@ -286,6 +306,7 @@ class DiagnoseOutput(TypedDict):
     smallest_detectable_rms_in: Size | None
     extension: FittedExtension | None
     gain: ExtensionGain
+    data_condition: list[ConditionOfData]
     remainder: Remainder
     warnings: list[str]
 

@@ -90,10 +90,14 @@ def surely_later(one: date | None, other: date | None) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class EnteredClearance:
-    """A clearance reading exactly as it was entered, for the report."""
+    """A clearance reading exactly as it was entered, for the report.
+
+    bound: ``<`` or ``>`` where only an end of it was found.
+    """
 
     text: str
     unit: LengthUnit
+    bound: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@ gain.
 """
 
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Cause, Scene, load_causes
+from mlg_troubleshoot.diagnosis.condition import DataCondition, data_condition
 from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
 from mlg_troubleshoot.diagnosis.extension import (
     EXTENSION,
@@ -26,6 +27,7 @@ __all__ = [
     "EXTENSION",
     "Candidate",
     "Cause",
+    "DataCondition",
     "Diagnosis",
     "DiagnosisTable",
     "HeldOutGain",
@@ -38,6 +40,7 @@ __all__ = [
     "Term",
     "Verdict",
     "causes",
+    "data_condition",
     "diagnose",
     "diagnose_simulation",
     "extension",

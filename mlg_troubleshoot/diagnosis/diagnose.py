@@ -20,6 +20,7 @@ from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
+from mlg_troubleshoot.diagnosis.condition import DataCondition
 from mlg_troubleshoot.diagnosis.explain import Finding, MisfitProblem, explain, p_value_of
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
@@ -193,6 +194,8 @@ class Diagnosis(Result):
         Prediction and misfit of these rows. [in]
     beliefs : Beliefs
         What was believed beforehand.
+    condition : tuple of DataCondition
+        How the readings were written down, where it bears on the answer; empty for a table alone.
     """
 
     verdict: Verdict
@@ -231,6 +234,7 @@ class Diagnosis(Result):
     predicted_in: Array
     misfit_in: Array
     beliefs: Beliefs
+    condition: tuple[DataCondition, ...] = ()
 
 
 def diagnose(

@@ -64,6 +64,8 @@ class DiagnosisTable(Result):
         Date of day 0, ISO 8601.
     plunger_gauge_u_in : ndarray, shape (n,), or None
         Declared repeatability of one reading. [in]
+    below : ndarray of bool, shape (n, n_joints), or None
+        Clearances of which only an upper end was read: half of it stands for them.
     """
 
     clearance_in: Array
@@ -77,6 +79,7 @@ class DiagnosisTable(Result):
     axial_float_in: Array | None = None
     first_day: str | None = None
     plunger_gauge_u_in: Array | None = None
+    below: Mask | None = None
 
     def __len__(self) -> int:
         return len(self.clearance_in)
@@ -140,6 +143,7 @@ class DiagnosisTable(Result):
             plunger_gauge_u_in=(
                 None if self.plunger_gauge_u_in is None else self.plunger_gauge_u_in[places]
             ),
+            below=None if self.below is None else self.below[places],
         )
 
 
@@ -179,14 +183,18 @@ def table_from_inspections(
     n, numbers = len(inspections), gear.joint_numbers
     clearance = np.full((n, len(numbers)), np.nan)
     floats = np.full((n, len(numbers)), np.nan)
+    below = np.zeros((n, len(numbers)), bool)
     width = max((len(i.readings_in) for i in inspections), default=0)
     readings = np.full((n, max(width, 1)), np.nan)
     for row, inspection in enumerate(inspections):
         for j, number in enumerate(numbers):
             clearance[row, j] = inspection.clearance_in.get(number, np.nan)
             floats[row, j] = inspection.axial_float_in.get(number, np.nan)
+            entered = inspection.entered.get(number)
+            below[row, j] = entered is not None and entered.bound == "<"
         if row < len(at_mid):
             readings[row, : len(inspection.readings_in)] = inspection.readings_in
+    clearance[below] *= 0.5
     readings[len(at_mid) :, 0] = [i.plunger_position_in for i in positions]
     readings[len(at_mid) :, 0] -= np.nan_to_num(gear.model.plunger(stroke[len(at_mid) :]))
     days = [
@@ -223,4 +231,5 @@ def table_from_inspections(
         axial_float_in=floats if np.isfinite(floats).any() else None,
         first_day=None if first is None else date.fromordinal(first).isoformat(),
         plunger_gauge_u_in=np.array(declared) if np.isfinite(declared).any() else None,
+        below=below if below.any() else None,
     )

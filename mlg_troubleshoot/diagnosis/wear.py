@@ -54,6 +54,9 @@ UNREAD_IN, HEAVY_LEAD = (0.003, 0.006), 3.0
 # over that. Of 100 sound simulated fleets (seeds 20,000 and on) two alarmed, seven where wear was
 # half as much again. [1]
 FLEET_TOGETHER, GEARS_TOGETHER = 0.5, 0.25
+# Where landings fall in a larger share of visits they do not follow the dates: half of them would
+# fall by chance. [1]
+_MOST_FALLS = 1.0 / 3.0
 # Share of the largest variance below which one is but rounding. [1]
 _NEGLIGIBLE = 1e-9
 # How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the
@@ -160,8 +163,41 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
 
 
 def gears_of(table: DiagnosisTable) -> Places:
-    """Number of the single gear of each row."""
-    return np.unique(table.gears, return_inverse=True)[1]
+    """Number of the single gear of each row; from an overhaul on, where its landings begin anew, a
+    gear is another.
+    """
+    of_gear = np.unique(table.gears, return_inverse=True)[1]
+    begun, falls = np.zeros(len(table), np.intp), 0
+    landings = table.quantities.get("gear_landings")
+    if landings is not None and "day" in table.quantities:
+        order = visits(table).values()
+        for rows in order:
+            known = rows[np.isfinite(landings[rows])]
+            begun[known] = _overhauls(landings[known])
+            falls += int(np.sum(np.diff(landings[known]) < 0.0))
+        if falls > _MOST_FALLS * max(len(table) - len(order), 1):
+            begun[:] = 0
+    numbers = of_gear + (of_gear.max(initial=0) + 1) * begun
+    found: Places = np.unique(numbers, return_inverse=True)[1]
+    return found
+
+
+def visits(table: DiagnosisTable) -> dict[str, Places]:
+    """Rows of each gear in the order of their dates, else as they stand."""
+    day = np.nan_to_num(table.quantities.get("day", np.zeros(len(table))), nan=-np.inf)
+    order = np.lexsort((np.arange(len(table)), day, table.gears))
+    starts = np.flatnonzero(np.r_[True, table.gears[order][1:] != table.gears[order][:-1]])
+    return {str(table.gears[rows[0]]): rows for rows in np.split(order, starts[1:])}
+
+
+def _overhauls(landings: Array) -> Places:
+    """How often landings began anew: the two before a fall are above the two after it, so that a
+    single mistyped number begins nothing.
+    """
+    padded = np.r_[np.inf, landings, -np.inf]
+    low = np.minimum(padded[:-3], padded[1:-2])
+    after = np.maximum(padded[2:-1], padded[3:])
+    return np.concatenate([np.zeros(1, np.intp), np.cumsum(low > after, dtype=np.intp)])
 
 
 def landings_of(landings: Array | None, gears: Places) -> tuple[Array, Mask]:
@@ -221,9 +257,13 @@ def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
         np.array([_resolution(column[np.isfinite(column)]) for column in readings[:, worn].T]) ** 2
         / 12.0
     )
+    declared = table.gauge_u_in[:, None] ** 2 + rounded
+    if table.below is not None:
+        # Anything from 0 to twice the value is as likely.
+        declared = declared + np.where(table.below, readings**2 / 3.0, 0.0)[:, worn]
     told = np.where(landed[:, None], readings, np.nan)[:, worn]
     told = np.where(np.isfinite(told).any(axis=0), told, readings[:, worn])
-    own = wear_history(told, gears, kilo, table.gauge_u_in[:, None] ** 2 + rounded)
+    own = wear_history(told, gears, kilo, declared)
     parts = (own.expected_in, own.unsure_in2, own.scatter_in2, np.maximum(own.reading_in2, rounded))
     every = np.zeros((len(parts), *readings.shape))
     every[:, :, worn] = parts

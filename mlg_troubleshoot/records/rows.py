@@ -94,6 +94,11 @@ def place_in_file(record_id: str) -> str:
     return "" if made is None else made[0]
 
 
+# A clearance of which only an end was found; a no-go gauge did not enter, a go gauge did.
+_END = re.compile(r"(?:(?P<below><=?|≤|no[ -]?go)|(?:>=?|≥|go))\s*(?=[\d.,])", re.IGNORECASE)
+_NO_END = "Measure with a gauge that reaches further, or leave it blank if it was not measured."
+
+
 class _WaitingDate(NamedTuple):
     place: CellPlace
     raw: Cell
@@ -324,6 +329,12 @@ class RowReader:
                 self._fault(index, fault)
                 continue
             number = field.number or 0
+            if entered.bound:
+                told, end = self._at_an_end(number, length, entered)
+                warnings.append(told)
+                if end is None:
+                    continue
+                length = end
             found.lengths.setdefault(kind.column, {})[number] = length
             if kind.column is CLEARANCE:
                 found.entered[number] = entered
@@ -524,9 +535,14 @@ class RowReader:
             return f"{what} from {shown.from_inches(low):.4g} to {top}"
 
         stated = unit or row_unit or LengthUnit.INCH
+        bound, number = "", cell
+        if is_clearance and isinstance(cell, str) and (end := _END.match(plain_text(cell))):
+            bound, number = "<" if end["below"] else ">", plain_text(cell)[end.end() :]
+        if bound == ">" and self._options.asks:
+            raise CellFaultError("not_a_length", expected(stated), _NO_END)
         try:
             value_in, found, text = read_length(
-                cell,
+                number,
                 unit,
                 row_unit,
                 signed=column.signed,
@@ -552,8 +568,22 @@ class RowReader:
                 slip or f"{again} the unit and the decimal point.",
             )
         return (value_in / factor if is_clearance else value_in) + 0.0, EnteredClearance(
-            text, found
+            text, found, bound
         )
+
+    def _at_an_end(
+        self, joint: int, radial_in: float, text: EnteredClearance
+    ) -> tuple[str, float | None]:
+        """What is counted where only an end of a clearance was found, and its words: the upper end;
+        nothing if that is not known and the joint may be within its limit. [in]
+        """
+        shown = f"joint {joint}: {text.bound}{text.text}"
+        if text.bound == "<":
+            return f"{shown} is counted as {text.text}, its upper end", radial_in
+        if radial_in < self._options.limit_in.get(joint, 0.0) - ROUNDING_IN:
+            return f"{shown} may be anything above it: counted as not measured", None
+        more = radial_in + 2.0 * ROUNDING_IN
+        return f"{shown} is over the limit; how far is not known", more
 
     def _confirm_text(
         self, joint: int, radial_in: float, text: EnteredClearance, scale: ClearanceConvention

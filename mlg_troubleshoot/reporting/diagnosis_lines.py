@@ -21,6 +21,17 @@ _KINDS = {
     "implausible": "implausible",
     "other_convention": "the other convention",
 }
+_CONDITIONS = {
+    "rounded": "Rounded values",
+    "censored": "Values at an end",
+    "blank_not_at_random": "Blanks not at random",
+    "copied": "Copied from the inspection before",
+    "duplicate": "Written twice",
+    "limit_written": "Limits in place of readings",
+    "selected": "Selected gears",
+    "landings_fall": "Landings that fall",
+    "identical_cells": "Identical cells",
+}
 _VARIABLES = {c.variable: c.said for c in (*COVARIATES, AXIAL_FLOAT)}
 
 
@@ -40,6 +51,10 @@ class DiagnosisLine:
 
 def kind_words(kind: str) -> str:
     return _KINDS.get(kind, kind.replace("_", " "))
+
+
+def condition_words(kind: str) -> str:
+    return _CONDITIONS[kind]
 
 
 def column_words(name: str) -> str:
@@ -161,4 +176,5 @@ environment().filters.update(
     name_words=name_words,
     cause_words=cause_words,
     column_words=column_words,
+    condition_words=condition_words,
 )

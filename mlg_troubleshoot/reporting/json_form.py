@@ -21,6 +21,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.output_types import (
     CheckedInspection,
     CheckedJoint,
+    ConditionOfData,
     DiagnoseOutput,
     ExtensionGain,
     FittedExtension,
@@ -224,6 +225,7 @@ def diagnosis_as_json(
         smallest_detectable_rms_in=d.smallest_rms_in,
         extension=None if extension is None else _extension(extension),
         gain=_gain(d),
+        data_condition=[written(ConditionOfData, c) for c in d.condition],
         remainder={
             "p_value": d.remainder_p,
             "p_something_else": d.p_left,

@@ -32,7 +32,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _plain(each) for key, each in value.items()}
     if isinstance(value, EnteredClearance):
-        return [value.text, value.unit.value]
+        return [value.text, value.unit.value, *filter(None, (value.bound,))]
     if isinstance(value, RowSource):
         return [value.file, value.sheet, value.row]
     return [_plain(each) for each in value] if isinstance(value, tuple) else value
@@ -72,7 +72,8 @@ _READ: dict[str, Callable[[Any], Any]] = {
         _BY_JOINT, lambda found: {int(number): value for number, value in found.items()}
     ),
     "entered": lambda found: {
-        int(n): EnteredClearance(text, LengthUnit(unit)) for n, (text, unit) in found.items()
+        int(n): EnteredClearance(text, LengthUnit(unit), *bound)
+        for n, (text, unit, *bound) in found.items()
     },
     "source": lambda found: RowSource(*found),
     **{column.filled: date.fromisoformat for column in COLUMNS if column.holds is Holds.DATE},

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.sentences import joint_list
-from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.errors import InconclusiveDataError, Problem
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -99,6 +99,7 @@ def diagnose_files(
     """
     from mlg_troubleshoot.diagnosis import (
         ModelExtension,
+        data_condition,
         load_causes,
         table_from_inspections,
     )
@@ -123,20 +124,12 @@ def diagnose_files(
     read = read_many(sources, reading)
     valid = read.inspections
     if not valid:
-        first = read.problems[0] if read.problems else None
-        why = (
-            "no row could be read"
-            if first is None
-            else f"{first.place()}: expected {first.expected}"
-        )
-        raise InconclusiveDataError(
-            f"nothing to diagnose: {why}", "" if first is None else first.remedy
-        )
-    # The same inspection again is not further evidence. Rows that share an id and differ were
-    # refused.
-    once = list({(i.source.file, i.record_id): i for i in reversed(valid)}.values())[::-1]
+        raise _nothing_read(read.problems)
+    once = _once(valid)
     notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
-    table = table_from_inspections(once, gear, along=True)
+    whole = table_from_inspections(once, gear, along=True)
+    condition, aside = data_condition(whole, gear)
+    table = whole.take(~aside)
     with in_own_cause(own, table.columns):
         diagnosis = diagnosed(
             gear.model,
@@ -149,7 +142,7 @@ def diagnose_files(
         )
     by_record = {inspection.record_id: inspection for inspection in once}
     faults = tuple(_as_written(fault, by_record[fault.record_id]) for fault in diagnosis.faults)
-    diagnosis = replace(diagnosis, rows_read=len(read.rows), faults=faults)
+    diagnosis = replace(diagnosis, rows_read=len(read.rows), faults=faults, condition=condition)
     extension = None
     if diagnosis.terms:
         extension = ModelExtension(
@@ -168,6 +161,22 @@ def diagnose_files(
         notes=notes,
         inputs_sha256=read.inputs_sha256,
     )
+
+
+def _nothing_read(problems: Sequence[Problem]) -> InconclusiveDataError:
+    """Say why there is nothing to diagnose, by the first problem."""
+    if not problems:
+        return InconclusiveDataError("nothing to diagnose: no row could be read", "")
+    first = problems[0]
+    why = f"{first.place()}: expected {first.expected}"
+    return InconclusiveDataError(f"nothing to diagnose: {why}", first.remedy)
+
+
+def _once(valid: Sequence[Inspection]) -> list[Inspection]:
+    """Each inspection once: again it is not further evidence. Rows that share an id and differ were
+    refused.
+    """
+    return list({(i.source.file, i.record_id): i for i in reversed(valid)}.values())[::-1]
 
 
 def diagnose(

@@ -213,6 +213,7 @@ def test_the_simulator_imports_nothing_of_the_program_under_test(path: Path) -> 
         "dataclasses",
         "datetime",
         "functools",
+        "itertools",
         "json",
         "numpy",
     }

@@ -51,12 +51,15 @@ def _from_day_on(scene: Scene, setting: Mapping[str, Any]) -> NDArray[np.bool_]:
 
 
 def _change_days(days: Array, least: int, most: int) -> list[float]:
-    """Days between which a change may lie, so that enough rows stand on both sides."""
+    """Days between which a change may lie, so that enough rows of two days at least stand on both
+    sides: one visit alone is more likely misread.
+    """
     known = np.sort(days[np.isfinite(days)])
+    seen = np.r_[0, np.cumsum(np.diff(known) > 0.0)] if len(known) else known
     places = [
         i
         for i in range(least, len(known) - least + 1)
-        if i < len(known) and known[i] > known[i - 1]
+        if i < len(known) and known[i] > known[i - 1] and 2 <= seen[i] <= seen[-1] - 1
     ]
     if len(places) > most:
         places = [places[k] for k in np.linspace(0, len(places) - 1, most).round().astype(int)]

@@ -1,0 +1,351 @@
+"""The condition of the data: how the readings were written down, before anything is made of them.
+
+Nothing here knows what the model predicts wrongly. Rows that stand twice, were copied from an
+earlier sheet, or hold limits in place of readings tell nothing further and are set aside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import mannwhitneyu, poisson, spearmanr
+
+from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
+from mlg_troubleshoot.decision.prediction import DEFAULT_PLUNGER_U_IN
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.wear import visits
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.units import MM_PER_IN
+
+# Steps to which people round, inches and millimetres. [in]
+_STEPS_IN = tuple(
+    sorted((*(1e-3 * n for n in (1, 2, 2.5, 5, 10)), *(n / MM_PER_IN for n in (0.05, 0.1, 0.2))))
+)
+# Share of values on a step, or of rows that show a habit, that may be exceptions. [1]
+_EXCEPTIONS = 0.05
+# With fewer values, or rows, nothing is said of them; a value is a multiple within this. [1]
+_LEAST_VALUES, _LEAST_ROWS, _LEAST_JOINTS, _ON_STEP = 20, 5, 5, 0.02
+# Chance of a false statement about the data of a table. [1]
+_BY_CHANCE = 0.001
+
+
+@dataclass(frozen=True, slots=True)
+class DataCondition:
+    """One thing that is to be known of the data before the verdict is read.
+
+    Parameters
+    ----------
+    kind : str
+        rounded, censored, blank_not_at_random, copied, duplicate, limit_written, selected,
+        landings_fall or identical_cells.
+    where : str
+        Which values, rows or gears.
+    share : float
+        Share of the values, rows or gears that it concerns. [1]
+    effect : str
+        What it does to the answer.
+    record_next : str
+        What to record next time.
+    """
+
+    kind: str
+    where: str
+    share: float
+    effect: str
+    record_next: str
+
+
+def data_condition(table: DiagnosisTable, gear: Gear) -> tuple[tuple[DataCondition, ...], Mask]:
+    """Look at a table before anything is made of it.
+
+    Parameters
+    ----------
+    table : DiagnosisTable
+        All rows, with and without a measured displacement.
+    gear : Gear
+        The gear: its limits, and its linkage for the selection by displacement.
+
+    Returns
+    -------
+    tuple of DataCondition, ndarray of bool of shape (n,)
+        What was seen, and the rows that tell nothing further.
+    """
+    twice, copies = _duplicates(table), _copies(table)
+    equal = _identical(table)
+    limits = equal & _at_limits(table, gear)
+    # Where most rows are like that it is how the gears are, not how one was written.
+    doubtful = equal & ~limits & ~twice & bool(2 * equal.sum() < len(table))
+    aside = (twice, copies & ~twice & ~equal, limits & ~twice, doubtful)
+    found = (
+        *_rounded(table, ~np.any(aside, axis=0)),
+        *_piled(table),
+        *_blanks(table),
+        *_of_rows("copied", table, aside[1]),
+        *_of_rows("duplicate", table, twice),
+        *_of_rows("limit_written", table, aside[2]),
+        *_of_rows("identical_cells", table, doubtful),
+        *_selected(table, gear),
+        *_falls(table),
+    )
+    return found, np.any(aside, axis=0)
+
+
+_SAID = {
+    "copied": (
+        "all clearances are those of the gear's inspection before: the rows are not used",
+        "every joint anew at each inspection; blank what was not read",
+    ),
+    "duplicate": ("the rows stand twice: each counts once", "each inspection once"),
+    "limit_written": (
+        "every cell holds the joint's limit, not a reading: the rows are not used",
+        "the value read; <0.004 where only a limit gauge was tried",
+    ),
+    "identical_cells": (
+        "all joints have one value, hardly a reading of each: the rows are not used",
+        "the value read at each joint",
+    ),
+}
+
+
+def _of_rows(kind: str, table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
+    if rows.any():
+        yield DataCondition(kind, _listed(table, rows), float(np.mean(rows)), *_SAID[kind])
+
+
+def _listed(table: DiagnosisTable, rows: Mask) -> str:
+    """Name rows: by who wrote them if one did, and by their numbers."""
+    numbers = [str(int(n)) for n in table.row[rows][:8]]
+    more = f" and {int(rows.sum()) - 8} more" if rows.sum() > 8 else ""
+    people = set(table.factors.get(TECHNICIAN_ID.variable, np.array([""]))[rows]) - {""}
+    whose = f" of technician {people.pop()}" if len(people) == 1 and rows.sum() > 1 else ""
+    return f"row{'s' if rows.sum() > 1 else ''} {', '.join(numbers)}{more}{whose}"
+
+
+def _at_mid(table: DiagnosisTable) -> Mask:
+    """Rows at mid-position: rows along the stroke repeat the clearances of one inspection."""
+    return ~table.along
+
+
+def _duplicates(table: DiagnosisTable) -> Mask:
+    """Rows that say what an earlier one says, but for their identity, shape (n,)."""
+    texts = [np.unique(t, return_inverse=True)[1] for t in table.factors.values()]
+    parts = [table.clearance_in, table.readings_in, *table.quantities.values(), *texts]
+    whole = np.column_stack([np.nan_to_num(part, nan=-1.0) for part in parts])
+    _rows, first = np.unique(whole, axis=0, return_index=True)
+    again = np.ones(len(table), bool)
+    again[first] = False
+    # A row that says hardly anything is not known to stand twice.
+    read = np.isfinite(table.clearance_in).sum(axis=1) + np.isfinite(table.readings_in).sum(axis=1)
+    return np.asarray(again & (read >= _LEAST_JOINTS))
+
+
+def _before(table: DiagnosisTable) -> Places:
+    """The gear's inspection before each row's, -1 where there is none, shape (n,)."""
+    found = np.full(len(table), -1)
+    for rows in visits(table).values():
+        found[rows[1:]] = rows[:-1]
+    return found
+
+
+def _copies(table: DiagnosisTable) -> Mask:
+    """Rows whose clearances are those of the gear's inspection before, more than chance allows."""
+    before, values = _before(table), table.clearance_in
+    later = before >= 0
+    # The least value may stand for all that are smaller.
+    least = np.min(values[values > 0.0], initial=np.inf)
+    both = (values > least) & (values[before] > 0.0) & later[:, None]
+    same = both & (values == values[before])
+    count = both.sum(axis=1)
+    full = (same.sum(axis=1) == count) & (count >= _LEAST_JOINTS) & _at_mid(table)
+    full &= ~np.any(np.nan_to_num(values) != np.nan_to_num(values[before]), axis=1)
+    others = both & ~full[:, None]
+    usual = (same & others).sum(axis=0) / np.maximum(others.sum(axis=0), 1)
+    expected = float(np.sum(np.prod(np.where(both, usual, 1.0), axis=1)[later & (count > 0)]))
+    return np.asarray(full & (poisson.sf(full.sum() - 1, expected) < _BY_CHANCE))
+
+
+def _identical(table: DiagnosisTable) -> Mask:
+    """Rows in which many joints were read and all have one value that is not zero, more than chance
+    allows of the values of the other rows.
+    """
+    values, known = table.clearance_in, np.isfinite(table.clearance_in)
+    low = np.where(known, values, np.inf).min(axis=1)
+    count = known.sum(axis=1)
+    same = (np.where(known, values, -np.inf).max(axis=1) == low) & (low > 0.0)
+    same &= (count >= _LEAST_JOINTS) & _at_mid(table)
+    _found, often = np.unique(values[known & ~same[:, None]], return_counts=True)
+    alike = float(np.sum((often / max(often.sum(), 1)) ** 2))
+    return np.asarray(same & (len(values) * alike ** np.maximum(count - 1.0, 0.0) < _BY_CHANCE))
+
+
+def _at_limits(table: DiagnosisTable, gear: Gear) -> Mask:
+    """Rows in which every value read is its joint's limit."""
+    away = np.abs(table.clearance_in - gear.limits_in) > 1e-7
+    return np.asarray(~(away & np.isfinite(table.clearance_in)).any(axis=1))
+
+
+def _step(values: Array, least: float) -> float:
+    """The coarsest step that nearly all values lie on, 0 if none is coarse. [in]"""
+    values = values[np.isfinite(values) & (values != 0.0)]
+    if len(values) < _LEAST_VALUES:
+        return 0.0
+    on = [
+        step
+        for step in _STEPS_IN
+        if step >= least * (1.0 - 1e-9)
+        and np.mean(np.abs(values / step - np.rint(values / step)) > _ON_STEP) <= _EXCEPTIONS
+    ]
+    return max(on, default=0.0)
+
+
+def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
+    """Values on a step of twice their standard uncertainty or more: half a step is as large."""
+    use = rows & _at_mid(table)
+    people = table.factors.get(TECHNICIAN_ID.variable, np.full(len(table), ""))
+    least = 2.0 * float(np.median(table.gauge_u_in))
+    steps = {p: _step(table.clearance_in[use & (people == p)].ravel(), least) for p in set(people)}
+    for step in sorted({s for s in steps.values() if s > 0.0}):
+        own = sorted(p for p, s in steps.items() if s == step)
+        where = f"clearances, to {step:.4g} in"
+        if len(own) < len(steps):
+            where += f", technician {', '.join(own)}"
+        yield DataCondition(
+            "rounded",
+            where,
+            float(np.mean(np.isin(people[use], own))),
+            f"each is known to ± {0.5 * step:.4g} in only; small effects of joints are not told",
+            "the value as the gauge shows it, to 0.0005 in",
+        )
+    plunger = table.readings_in[use]
+    known = table.plunger_gauge_u_in
+    least = 2.0 * (DEFAULT_PLUNGER_U_IN if known is None else float(np.nanmedian(known)))
+    if (step := _step(plunger.ravel(), least)) > 0.0:
+        yield DataCondition(
+            "rounded",
+            f"plunger readings, to {step:.4g} in",
+            1.0,
+            f"each is known to ± {0.5 * step:.4g} in only",
+            "the plunger to 0.001 in",
+        )
+
+
+def _piled(table: DiagnosisTable) -> Iterator[DataCondition]:
+    """The least or the largest value stands for what lies beyond it: none is as frequent."""
+    if table.below is not None:
+        yield DataCondition(
+            "censored",
+            "clearances below an end of the gauge",
+            float(table.below.sum() / np.isfinite(table.clearance_in).sum()),
+            "half of the end stands for each, and anything up to it is as likely",
+            "the value, with a gauge that reaches further",
+        )
+    values = table.clearance_in[_at_mid(table) & ~_identical(table)]
+    if table.below is not None:
+        values = values[~table.below[_at_mid(table) & ~_identical(table)]]
+    found, counts = np.unique(np.round(values[np.isfinite(values)], 7), return_counts=True)
+    if len(found) < _LEAST_JOINTS:
+        return
+    ends = (
+        (0, "<", "less", found[0] >= 2.0 * float(np.median(table.gauge_u_in)), counts.max()),
+        (-1, ">", "more", True, counts[-2] / 2),
+    )
+    for end, sign, side, large, least in ends:
+        if large and counts[end] >= max(least, _LEAST_VALUES):
+            yield DataCondition(
+                "censored",
+                f"clearances of {found[end]:.4g} in",
+                float(counts[end] / counts.sum()),
+                f"some of them are {side} than this: it is where the gauge or the sheet ends",
+                f"{sign}{found[end]:.4g} where no value was read",
+            )
+
+
+def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
+    """Blanks that depend on what would have been read."""
+    use = np.isfinite(table.clearance_in).any(axis=1) & _at_mid(table)
+    values = table.clearance_in[use]
+    blank = np.isnan(values)
+    blank[:, blank.all(axis=0)] = False
+    partly = blank.any(axis=1)
+    if partly.sum() < _LEAST_ROWS:
+        return
+    where, share = "blank clearances", float(blank.mean())
+    # Read in order until one is worn: that one is the largest.
+    joints = values.shape[1]
+    last = joints - 1 - np.argmax(~np.isnan(values)[:, ::-1], axis=1)
+    stopped = partly & (blank.sum(axis=1) == joints - 1 - last)
+    stopped &= values[np.arange(len(values)), last] >= np.nanmax(values, axis=1)
+    if stopped.sum() >= (1.0 - 2.0 * _EXCEPTIONS) * partly.sum():
+        yield DataCondition(
+            "blank_not_at_random",
+            f"{where}: joints were read until the first that is worn",
+            share,
+            "worn joints are over-represented; what the blanks add is not known",
+            "every joint, also after a worn one",
+        )
+    elif _only_worn(table, use):
+        yield DataCondition(
+            "blank_not_at_random",
+            f"{where}: worn joints were written, sound ones were not",
+            share,
+            "the blanks are smaller than what was written: names of joints and of scale may be"
+            " wrong",
+            "every joint that was read, also the sound ones",
+        )
+
+
+def _only_worn(table: DiagnosisTable, use: Mask) -> bool:
+    """No small value was written, and rows with fewer landings have more blanks."""
+    landings = table.quantities.get("gear_landings")
+    least = float(np.nanmin(table.clearance_in[use]))
+    if landings is None or least <= 2.0 * float(np.median(table.gauge_u_in)):
+        return False
+    use = use & np.isfinite(landings)
+    blanks = np.isnan(table.clearance_in[use]).sum(axis=1)
+    return bool(spearmanr(landings[use], blanks, alternative="less").pvalue < _BY_CHANCE)
+
+
+def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
+    """Whether the plunger was read depends on the displacement that is predicted."""
+    use = np.isfinite(table.clearance_in).any(axis=1) & _at_mid(table)
+    read = np.isfinite(table.readings_in[use]).any(axis=1)
+    if min(read.sum(), (~read).sum()) < 2 * _LEAST_ROWS:
+        return
+    over = worst_case(gear.model, np.nan_to_num(table.clearance_in[use])).over_in
+    known = np.isfinite(over)
+    one, other = over[known & read], over[known & ~read]
+    if mannwhitneyu(one, other).pvalue < _BY_CHANCE:
+        more = "more" if np.median(one) > np.median(other) else "less"
+        yield DataCondition(
+            "selected",
+            f"plunger readings: of gears that are {more} worn",
+            float(np.mean(read)),
+            "the mean misfit is that of the gears chosen, not of the fleet",
+            "the plunger at every inspection, also of gears that retract",
+        )
+
+
+def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
+    """Landings of a gear that fall over time."""
+    landings = table.quantities.get("gear_landings")
+    if landings is None or "day" not in table.quantities:
+        return
+    order = visits(table)
+    fell = [
+        name
+        for name, rows in order.items()
+        if np.any(np.diff(landings[rows][np.isfinite(landings[rows])]) < 0.0)
+    ]
+    if fell:
+        more = f" and {len(fell) - 8} more" if len(fell) > 8 else ""
+        yield DataCondition(
+            "landings_fall",
+            f"gears {', '.join(fell[:8])}{more}",
+            len(fell) / len(order),
+            "new bushings, or a slip: where they stay lower the wear of the gear begins anew",
+            "landings since overhaul, and the date of the overhaul",
+        )

@@ -1,0 +1,249 @@
+"""The condition of the data: how readings were written down, said before the verdict is read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.diagnosis.causes import RiggingOffset
+from mlg_troubleshoot.diagnosis.condition import data_condition
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
+from mlg_troubleshoot.diagnosis.wear import gears_of
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records import ReadOptions, read_many
+from tests.cli.conftest import mlg
+from tests.diagnosis.conftest import scene_of
+from tests.hidden_effect.simulator import blemished_fleet, write_rows
+
+Change = Callable[[NDArray[np.float64], NDArray[np.float64]], None]
+
+
+def histories(gear: Gear, **columns: NDArray[np.float64]) -> DiagnosisTable:
+    """Twenty gears at six visits each, all joints read to 0.0001 in."""
+    rng = np.random.default_rng(5)
+    number = np.repeat(np.arange(20), 6)
+    landings = np.tile(np.arange(1.0, 7.0) * 300.0, 20) + rng.uniform(0.0, 90.0, 120)
+    rate = rng.uniform(0.0006, 0.0025, (20, len(gear.joint_numbers)))
+    clearance = 0.0006 + rate[number] * landings[:, None] / 1000.0
+    clearance = np.round(clearance + rng.normal(0.0, 0.0003, clearance.shape), 4).clip(0.0001)
+    table = DiagnosisTable(
+        clearance_in=clearance,
+        readings_in=rng.normal(0.02, 0.005, (120, 1)).round(4),
+        record_id=tuple(f"R{k}" for k in range(120)),
+        row=np.arange(2, 122),
+        margin_in=np.full(120, 0.03),
+        gauge_u_in=np.full(120, 0.0005),
+        quantities={"gear_landings": landings, "day": landings / 3.0},
+        factors={
+            "tail_no": np.array([f"N{100 + k}" for k in number]),
+            "technician_id": np.array([f"T-{k % 3}" for k in range(120)]),
+        },
+        first_day="2023-02-01",
+    )
+    return replace(table, **columns)
+
+
+def kinds(table: DiagnosisTable, gear: Gear) -> set[str]:
+    return {found.kind for found in data_condition(table, gear)[0]}
+
+
+def test_of_clean_data_nothing_is_said(gear: Gear) -> None:
+    assert kinds(histories(gear), gear) == set()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_of_a_simulated_sound_fleet_nothing_is_said_but_of_overhauls(
+    seed: int, tmp_path: Path
+) -> None:
+    rows, _truth = blemished_fleet("sound", "mild", 61_000 + seed, rows=100)
+    write_rows(rows, tmp_path / "sound.csv")
+    said = mlg("diagnose", tmp_path / "sound.csv", "--convention", "RADIAL", "--json").json
+    assert {found["kind"] for found in said["data_condition"]} <= {"landings_fall"}
+
+
+def changed(gear: Gear, change: Change) -> DiagnosisTable:
+    clearance, readings = histories(gear).clearance_in, histories(gear).readings_in
+    change(clearance, readings)
+    return histories(gear, clearance_in=clearance, readings_in=readings)
+
+
+def to_a_thousandth(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+    clearance[:] = np.round(clearance, 3)
+
+
+def plunger_to_five_thousandths(
+    _clearance: NDArray[np.float64], readings: NDArray[np.float64]
+) -> None:
+    readings[:] = np.round(readings / 0.005) * 0.005
+
+
+def no_smaller_than_two_thousandths(
+    clearance: NDArray[np.float64], _readings: NDArray[np.float64]
+) -> None:
+    clearance[:] = np.maximum(clearance, 0.002)
+
+
+def only_worn(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+    clearance[clearance < 0.0025] = np.nan
+
+
+def until_the_first_worn(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+    for row in clearance:
+        worn = np.flatnonzero(row > 0.0025)
+        if worn.size:
+            row[worn[0] + 1 :] = np.nan
+
+
+def copied(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+    clearance[3::12] = clearance[2::12]
+
+
+def all_alike(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+    clearance[4::30] = 0.004
+
+
+def at_the_limit(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+    clearance[4::30] = 0.0075
+
+
+def plunger_of_worn_gears(clearance: NDArray[np.float64], readings: NDArray[np.float64]) -> None:
+    worn = clearance.mean(axis=1)
+    readings[worn < np.median(worn)] = np.nan
+
+
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        (to_a_thousandth, "rounded"),
+        (plunger_to_five_thousandths, "rounded"),
+        (no_smaller_than_two_thousandths, "censored"),
+        (only_worn, "blank_not_at_random"),
+        (until_the_first_worn, "blank_not_at_random"),
+        (copied, "copied"),
+        (all_alike, "identical_cells"),
+        (at_the_limit, "limit_written"),
+        (plunger_of_worn_gears, "selected"),
+    ],
+)
+def test_what_was_done_to_the_data_is_said(gear: Gear, change: Change, kind: str) -> None:
+    assert kind in kinds(changed(gear, change), gear)
+
+
+def test_blanks_at_random_are_not_remarked_on(gear: Gear) -> None:
+    def blanks(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+        clearance[np.random.default_rng(3).random(clearance.shape) < 0.3] = np.nan
+
+    assert kinds(changed(gear, blanks), gear) == set()
+
+
+def test_rows_that_stand_twice_count_once(gear: Gear) -> None:
+    twice = histories(gear).take(np.r_[np.arange(120), 7, 30])
+    found, aside = data_condition(twice, gear)
+    assert [f.kind for f in found] == ["duplicate"]
+    assert np.flatnonzero(aside).tolist() == [120, 121]
+
+
+@pytest.mark.parametrize("change", [copied, all_alike, at_the_limit])
+def test_rows_without_readings_of_their_own_are_set_aside(gear: Gear, change: Change) -> None:
+    touched = changed(gear, change)
+    expected = np.any(touched.clearance_in != histories(gear).clearance_in, axis=1)
+    assert np.array_equal(data_condition(touched, gear)[1], expected)
+
+
+def test_steps_are_said_of_the_technician_who_rounds(gear: Gear) -> None:
+    def one_rounds(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+        clearance[1::3] = np.round(clearance[1::3], 3)
+
+    (found,) = data_condition(changed(gear, one_rounds), gear)[0]
+    assert found.where == "clearances, to 0.001 in, technician T-1"
+    assert found.share == pytest.approx(1 / 3)
+
+
+def test_landings_that_fall_are_said_with_their_gear(gear: Gear) -> None:
+    landings = histories(gear).quantities["gear_landings"].copy()
+    landings[4:6] -= 1200.0
+    table = histories(gear)
+    fallen = replace(table, quantities={**table.quantities, "gear_landings": landings})
+    (found,) = data_condition(fallen, gear)[0]
+    assert (found.kind, found.where) == ("landings_fall", "gears N100")
+
+
+def test_the_wear_of_a_gear_begins_anew_at_an_overhaul(gear: Gear) -> None:
+    table = histories(gear)
+    landings = table.quantities["gear_landings"].copy()
+    landings[3:6] -= 1000.0
+    anew = replace(table, quantities={**table.quantities, "gear_landings": landings})
+    assert [len(set(gears_of(t)[:6].tolist())) for t in (table, anew)] == [1, 2]
+
+
+def test_one_mistyped_number_of_landings_is_no_overhaul(gear: Gear) -> None:
+    table = histories(gear)
+    for place, wrong in ((2, 9000.0), (3, 12.0)):
+        landings = table.quantities["gear_landings"].copy()
+        landings[place] = wrong
+        typed = replace(table, quantities={**table.quantities, "gear_landings": landings})
+        assert len(set(gears_of(typed)[:6].tolist())) == 1
+
+
+def test_landings_that_do_not_follow_the_dates_split_no_gear(gear: Gear) -> None:
+    table = histories(gear)
+    any_order = np.random.default_rng(1).permutation(table.quantities["gear_landings"])
+    shuffled = replace(table, quantities={**table.quantities, "gear_landings": any_order})
+    assert np.array_equal(gears_of(shuffled), gears_of(table))
+
+
+def test_the_screen_says_it_before_the_verdict_with_what_to_record(tmp_path: Path) -> None:
+    rows, _truth = blemished_fleet("dup", "strong", 61_000, rows=100)
+    write_rows(rows, tmp_path / "twice.csv")
+    out = " ".join(mlg("diagnose", tmp_path / "twice.csv", "--convention", "RADIAL").out.split())
+    assert "Written twice: rows" in out.split("MISFIT")[0]
+    assert "Record next time: each inspection once." in out
+
+
+def test_rows_that_tell_nothing_further_are_counted_as_set_aside(tmp_path: Path) -> None:
+    rows, _truth = blemished_fleet("dup", "strong", 61_000, rows=100)
+    write_rows(rows, tmp_path / "twice.csv")
+    said = mlg("diagnose", tmp_path / "twice.csv", "--convention", "RADIAL", "--json").json
+    (again,) = (f for f in said["data_condition"] if f["kind"] == "duplicate")
+    assert said["rows"]["set_aside"] >= round(again["share"] * said["rows"]["read"]) > 0
+    assert json.dumps(again)
+
+
+def test_readings_below_an_end_are_said_and_used(tmp_path: Path) -> None:
+    rows, _truth = blemished_fleet("gonogo", "mild", 61_000, rows=100)
+    write_rows(rows, tmp_path / "ends.csv")
+    said = mlg("diagnose", tmp_path / "ends.csv", "--convention", "RADIAL", "--json").json
+    assert "censored" in {found["kind"] for found in said["data_condition"]}
+    assert said["rows"]["used"] >= 95
+
+
+def test_half_of_an_upper_end_stands_for_a_reading_below_it(gear: Gear) -> None:
+    inspection = read_rows(gear, "<0.002")[0]
+    table = table_from_inspections([inspection], gear)
+    assert table.clearance_in[0, 2] == pytest.approx(0.001)
+    assert table.below is not None
+    assert np.flatnonzero(table.below[0]).tolist() == [2]
+
+
+def read_rows(gear: Gear, cell: str) -> list[Inspection]:
+    row = {"tail_no": "N1", "side": "LH", "clearance_3_in": cell, "clearance_convention": "RADIAL"}
+    return list(read_many([pd.DataFrame([row])], ReadOptions.of(gear)).inspections)
+
+
+def test_a_dated_change_needs_two_days_on_either_side(gear: Gear) -> None:
+    days = histories(gear).quantities["day"][:6]
+    scene = scene_of(gear.model, histories(gear), gear.discrepancies)
+    begins = {
+        c.setting["day"]
+        for c in RiggingOffset().candidates(scene)
+        if c.target == "tail N100" and c.setting["day"] is not None
+    }
+    assert begins == set(days[2:5])
