@@ -29,6 +29,8 @@ _STEPS_IN = tuple(
 _EXCEPTIONS = 0.05
 # With fewer values, or rows, nothing is said of them; a value is a multiple within this. [1]
 _LEAST_VALUES, _LEAST_ROWS, _LEAST_JOINTS, _ON_STEP = 20, 5, 5, 0.02
+# Share of clearances that are known to be cut off, from which their effects are. [1]
+_MANY_CUT = 0.1
 # Chance of a false statement about the data of a table. [1]
 _BY_CHANCE = 0.001
 
@@ -92,6 +94,29 @@ def data_condition(table: DiagnosisTable, gear: Gear) -> tuple[tuple[DataConditi
         *_falls(table),
     )
     return found, np.any(aside, axis=0)
+
+
+def doubt_of(found: tuple[DataCondition, ...]) -> str:
+    """Say why nothing that depends on the clearances can be named.
+
+    Parameters
+    ----------
+    found : tuple of DataCondition
+        What was seen of the data.
+
+    Returns
+    -------
+    str
+        The reason, empty if there is none.
+    """
+    cut = [
+        c.where
+        for c in found
+        if c.kind == "blank_not_at_random" or (c.kind == "censored" and c.share > _MANY_CUT)
+    ]
+    if not cut:
+        return ""
+    return f"Causes of joints, of scale, of wear and of rigging are not named: {'; '.join(cut)}."
 
 
 _SAID = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -373,6 +373,8 @@ def _explained(
     table, (testable, blind) = scene.table, causes
     candidates = [candidate for cause in testable for candidate in cause.candidates(scene)]
     candidates += [candidate for cause in blind for candidate in cause.stand_ins(scene)]
+    if table.doubt:
+        candidates = [replace(c, stands_in=not c.cause.is_distinct()) for c in candidates]
     columns = effect_columns(scene, candidates)
     moving = np.isfinite(columns).all(axis=0) & (np.abs(columns).max(axis=0) > 0.0)
     candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]
@@ -400,6 +402,7 @@ def _explained(
         (*testable, *blind),
         columns_in,
         beliefs,
+        bool(table.doubt),
     )
     finding = explain(problem)
     best, effects = finding.best, finding.posterior.effects
@@ -525,8 +528,8 @@ def _explained_by_clearances(
 
 
 def _unsaid(table: DiagnosisTable) -> tuple[str, ...]:
-    """What a table cannot say that only a curve along the stroke keeps from being refused."""
-    found = []
+    """What a table cannot say, though it is not refused."""
+    found = [table.doubt] if table.doubt else []
     if len(np.unique(table.tails)) < LEAST_TAILS:
         found.append(
             f"With fewer than {LEAST_TAILS} aircraft it cannot be said whether other gears do the"

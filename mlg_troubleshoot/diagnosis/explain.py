@@ -39,9 +39,12 @@ _BY = " × "
 class MisfitProblem:
     """The data of one table with all that may explain them.
 
-    misfit, shape (n,): measured less predicted. [in] columns, shape (n, n_candidates): effects of
-    the candidates. [in / unit] blocks: all-joint effects. causes: all causes, those that the table
-    cannot test included. columns_in: effects of the candidates in another linkage. [in / unit]
+    misfit, shape (n,): measured less predicted. [in]
+    columns, shape (n, n_candidates): effects of the candidates. [in / unit]
+    blocks: all-joint effects.
+    causes: all causes, those that the table cannot test included.
+    columns_in: effects of the candidates in another linkage. [in / unit]
+    doubtful: True if all-joint effects cannot be named, because clearances are missing or cut off.
     """
 
     misfit: Array
@@ -53,6 +56,7 @@ class MisfitProblem:
     causes: Sequence[Cause]
     columns_in: Callable[[LinkageModel], Array]
     beliefs: Beliefs
+    doubtful: bool = False
 
     @property
     def expected(self) -> Array:
@@ -226,6 +230,8 @@ def _said(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> 
     """What is sure, what is open, and what is ruled out."""
     blocks = frozenset((b.cause.name, None) for b in problem.blocks)
     rivals_only = frozenset(c.key for c in problem.candidates if c.stands_in)
+    if problem.doubtful:
+        rivals_only |= blocks
     follows = Conclusion(found, problem.beliefs, blocks, rivals_only)
     said, aliases = follows.sure, follows.aliases
     if follows.verdict in {Verdict.NONE, Verdict.UNLISTED}:

@@ -66,6 +66,8 @@ class DiagnosisTable(Result):
         Declared repeatability of one reading. [in]
     below : ndarray of bool, shape (n, n_joints), or None
         Clearances of which only an upper end was read: half of it stands for them.
+    doubt : str
+        Why nothing that depends on the clearances can be named; empty if it can.
     """
 
     clearance_in: Array
@@ -80,6 +82,7 @@ class DiagnosisTable(Result):
     first_day: str | None = None
     plunger_gauge_u_in: Array | None = None
     below: Mask | None = None
+    doubt: str = ""
 
     def __len__(self) -> int:
         return len(self.clearance_in)

@@ -260,7 +260,9 @@ def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
     declared = table.gauge_u_in[:, None] ** 2 + rounded
     if table.below is not None:
         # Anything from 0 to twice the value is as likely.
-        declared = declared + np.where(table.below, readings**2 / 3.0, 0.0)[:, worn]
+        declared = (
+            declared + np.where(table.below, np.nan_to_num(readings) ** 2 / 3.0, 0.0)[:, worn]
+        )
     told = np.where(landed[:, None], readings, np.nan)[:, worn]
     told = np.where(np.isfinite(told).any(axis=0), told, readings[:, worn])
     own = wear_history(told, gears, kilo, declared)

@@ -92,9 +92,8 @@ def cause_words(cause: NamedCause) -> str:
         words += f" (these rows cannot distinguish it from {others})"
     if not candidate.stands_in:
         return words
-    return (
-        f"{words} (not testable without {' and '.join(map(column_words, candidate.cause.needs))})"
-    )
+    needed = " and ".join(map(column_words, candidate.cause.needs)) or "every joint as read"
+    return f"{words} (not testable without {needed})"
 
 
 def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[DiagnosisLine, ...]:

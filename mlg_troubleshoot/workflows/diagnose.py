@@ -100,6 +100,7 @@ def diagnose_files(
     from mlg_troubleshoot.diagnosis import (
         ModelExtension,
         data_condition,
+        doubt_of,
         load_causes,
         table_from_inspections,
     )
@@ -129,7 +130,7 @@ def diagnose_files(
     notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
     whole = table_from_inspections(once, gear, along=True)
     condition, aside = data_condition(whole, gear)
-    table = whole.take(~aside)
+    table = replace(whole.take(~aside), doubt=doubt_of(condition))
     with in_own_cause(own, table.columns):
         diagnosis = diagnosed(
             gear.model,

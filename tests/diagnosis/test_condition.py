@@ -13,10 +13,12 @@ import pytest
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.diagnosis import diagnose
 from mlg_troubleshoot.diagnosis.causes import RiggingOffset
 from mlg_troubleshoot.diagnosis.condition import data_condition
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.diagnosis.wear import gears_of
+from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions, read_many
 from tests.cli.conftest import mlg
@@ -247,3 +249,38 @@ def test_a_dated_change_needs_two_days_on_either_side(gear: Gear) -> None:
         if c.target == "tail N100" and c.setting["day"] is not None
     }
     assert begins == set(days[2:5])
+
+
+@pytest.mark.parametrize(("case", "form"), [("mnar", "strong"), ("gonogo", "strong")])
+def test_what_depends_on_clearances_that_are_cut_off_is_not_named(
+    case: str, form: str, tmp_path: Path
+) -> None:
+    for seed in (61_000, 61_001):
+        rows, _truth = blemished_fleet(case, form, seed, rows=200)
+        write_rows(rows, tmp_path / "cut.csv")
+        said = mlg("diagnose", tmp_path / "cut.csv", "--convention", "RADIAL", "--json").json
+        assert said["causes"] == []
+        assert any(t.startswith("Causes of joints, of scale") for t in said["cannot_say"])
+
+
+def test_a_gauge_is_named_though_clearances_are_cut_off(gear: Gear) -> None:
+    table = histories(gear)
+    over = worst_case(gear.model, table.clearance_in).over_in
+    first = np.arange(120) % 4 == 0
+    noise = np.random.default_rng(2).normal(0.0, 0.0015, 120)
+    readings = (over + 0.004 * first + noise)[:, None]
+    gauges = {**table.factors, "gauge_id": np.where(first, "G-1", "G-2")}
+    shifted = replace(table, readings_in=readings, factors=gauges, doubt="cut off")
+    found = diagnose(gear.model, shifted, gear.discrepancies)
+    assert [c.candidate.cause.name for c in found.causes] == ["gauge_bias"]
+
+
+def test_a_scale_is_not_named_where_clearances_are_cut_off(gear: Gear) -> None:
+    table = histories(gear)
+    over = worst_case(gear.model, table.clearance_in).over_in
+    noise = np.random.default_rng(2).normal(0.0, 0.0005, 120)
+    scaled = replace(table, readings_in=(1.06 * over + noise)[:, None])
+    sure = diagnose(gear.model, scaled, gear.discrepancies)
+    doubted = diagnose(gear.model, replace(scaled, doubt="cut off"), gear.discrepancies)
+    assert [c.candidate.cause.name for c in sure.causes] == ["calibration_rate"]
+    assert doubted.causes == ()

@@ -62,6 +62,10 @@ class Scene:
         return bool(np.isfinite(self.table.clearance_in[:, self.place(joint)]).any())
 
 
+# What a cause must vary with to be distinguished from clearances that are missing or cut off.
+_APART_FROM_WEAR = frozenset(
+    ("gauge_id", "technician_id", "side", "approach", "temperature_c", "hydraulic_pressure_psi")
+)
 # Where joints that were not read are more than this share of what all could move the plunger by,
 # their wear may be the effect. [1]
 MOST_UNREAD = 0.15
@@ -97,7 +101,7 @@ class Candidate:
     @property
     def separates(self) -> str:
         """The one reading that would separate it from its rivals."""
-        if self.stands_in and self.setting:
+        if self.stands_in and (self.setting or not self.cause.needs):
             return "the same inspections with every joint read"
         if self.stands_in:
             return f"the same inspections with {' and '.join(self.cause.needs)} recorded for each"
@@ -137,6 +141,10 @@ class Cause(ABC):
     """What to inspect if it is named."""
     separates: ClassVar[str]
     """The one reading that would separate it from its rivals."""
+
+    def is_distinct(self) -> bool:
+        """Whether it can be distinguished from clearances that are missing or cut off."""
+        return bool(_APART_FROM_WEAR.intersection(self.needs))
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield the cause with each target and setting that the table allows."""
