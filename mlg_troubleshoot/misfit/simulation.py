@@ -96,8 +96,8 @@ def _diagnosed(study: Study) -> SimulationDiagnosis:
     open_ = study.chosen(at.follows.open_beside([key_of(names[k]) for k in causes]))
     verdict, found = at.follows.verdict, at.follows.posterior
     if verdict is Verdict.NAMED and not causes:
-        # Something is wrong, and no suspect explains unseen rows.
-        verdict = Verdict.UNLISTED
+        # Held-out rows veto what these rows name.
+        verdict, open_ = Verdict.AMBIGUOUS, study.chosen(at.follows.sure)
     often, n = study.often, len(at.unit)
     smallest = study.beliefs.seen_from(often, n) * float(np.sqrt(np.mean(at.unit**2) / n))
     described = [report.describe(k) for k in causes]

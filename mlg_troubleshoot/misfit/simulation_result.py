@@ -112,13 +112,13 @@ class SimulationDiagnosis(Result):
     Parameters
     ----------
     verdict : Verdict
-        NONE, NAMED, AMBIGUOUS (the data leave rivals) or UNLISTED (more is left than the suspects
-        explain).
+        NONE, NAMED, AMBIGUOUS (the data leave rivals, or what they name makes held-out rows no
+        better) or UNLISTED (more is left than the suspects explain).
     causes : tuple of SuspectFound
         All that are sure and make held-out rows smaller, whatever the verdict, by effect.
     also_possible : tuple of SuspectFound
-        The whole set that the data leave possible, where there are rivals that no alias class says;
-        else empty.
+        The whole set that the data leave possible, where there are rivals that no alias class says,
+        or what held-out rows speak against; else empty.
     aliases : tuple of tuple of str
         Classes of suspects that these rows cannot distinguish, known before a measured value is
         looked at.

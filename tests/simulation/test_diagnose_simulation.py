@@ -247,7 +247,8 @@ def test_what_helps_no_other_group_is_not_named_however_clearly_it_stands_out() 
         found = diagnose_simulation(
             lambda p, way=way: (p["play"] * way)[:, None], read, play, groups=groups
         )  # type: ignore[misc]
-        assert found.causes == ()
+        assert found.verdict is Verdict.AMBIGUOUS
+        assert (found.causes, [s.name for s in found.also_possible]) == ((), ["play"])
 
 
 def test_what_is_small_beside_an_unlisted_curve_is_found_where_it_alternates_often_enough() -> None:
