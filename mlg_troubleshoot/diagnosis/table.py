@@ -14,6 +14,7 @@ from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.decision.columns import (
     ACTUATOR_EXTENSION,
     AXIAL_FLOAT,
+    COLUMNS,
     COVARIATES,
     DATE,
     SIDE,
@@ -29,6 +30,8 @@ Texts = NDArray[np.str_]
 _TEXTS = tuple(c for c in COVARIATES if c.holds in (Holds.TEXT, Holds.CHOICE))
 ALONG = ACTUATOR_EXTENSION.filled
 FACTORS = tuple(column.variable for column in _TEXTS)
+# Values from which on a column of a table's own does not group its rows. [1]
+_MOST_VALUES = 6
 QUANTITIES = tuple(c.variable for c in COVARIATES if c not in (*_TEXTS, ACTUATOR_EXTENSION))
 
 
@@ -113,6 +116,11 @@ class DiagnosisTable(Result):
         return (*self.quantities, *self.factors, *floats)
 
     @property
+    def own_factors(self) -> tuple[str, ...]:
+        """Names of the texts that only this table has: a modification, a base, a shop."""
+        return tuple(name for name in self.factors if name not in FACTORS)
+
+    @property
     def gears(self) -> Texts:
         """The single gear of each row, tail and side, shape (n,)."""
         tail = self.factors.get(TAIL_NO.variable)
@@ -154,6 +162,14 @@ def _read_along(inspection: Inspection) -> bool:
     return (
         inspection.actuator_extension_in is not None and inspection.plunger_position_in is not None
     )
+
+
+def _own_texts(inspections: Sequence[Inspection]) -> dict[str, list[str]]:
+    """Columns that only this source has and that group its rows: few values, each written often."""
+    known = {column.name for column in COLUMNS}
+    names = {name for i in inspections for name in i.carried} - known
+    texts = {name: [i.carried.get(name, "").strip() for i in inspections] for name in sorted(names)}
+    return {name: own for name, own in texts.items() if len({*own} - {""}) <= _MOST_VALUES}
 
 
 def table_from_inspections(
@@ -211,6 +227,7 @@ def table_from_inspections(
     given[DATE.variable] = [None if day is None or first is None else day - first for day in days]
     given[ALONG] = [None if np.isnan(at) else at for at in stroke.tolist()]
     factors = {c.variable: [str(i.value(c.filled) or "") for i in inspections] for c in _TEXTS}
+    factors |= _own_texts(inspections)
     declared = [
         np.nan if i.plunger_gauge_u_in is None else i.plunger_gauge_u_in for i in inspections
     ]

@@ -10,6 +10,11 @@ from traceback import walk_tb
 
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip
+from mlg_troubleshoot.diagnosis.causes.gradual import (
+    GaugeDrift,
+    Modification,
+    TechnicianLearning,
+)
 from mlg_troubleshoot.diagnosis.causes.joint import DirectionNotWorstCase, JointContact, OvalWear
 from mlg_troubleshoot.diagnosis.causes.linkage import (
     CalibrationRate,
@@ -50,6 +55,9 @@ CATALOGUE = Catalogue(
         DateStep(),
         GaugeBias(),
         TechnicianBias(),
+        GaugeDrift(),
+        TechnicianLearning(),
+        Modification(),
         SideDifference(),
         CalibrationRate(),
         ApproachHysteresis(),

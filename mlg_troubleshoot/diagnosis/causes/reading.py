@@ -24,7 +24,8 @@ from mlg_troubleshoot.gear.adjustment import Adjustment
 _LEAST_ROWS = 3
 
 
-def _date(scene: Scene, day: float) -> str | None:
+def change_date(scene: Scene, day: float) -> str | None:
+    """Date of a day of the table, ISO 8601; None if the table has no dates."""
     first = scene.table.first_day
     return (
         None
@@ -33,21 +34,24 @@ def _date(scene: Scene, day: float) -> str | None:
     )
 
 
-def _from_day_on(scene: Scene, setting: Mapping[str, Any]) -> NDArray[np.bool_]:
-    """Rows from the setting's day on; all rows if it has none. The day is found by its date in any
-    table.
+def days_since(scene: Scene, setting: Mapping[str, Any]) -> Array:
+    """Days of each row since the setting's day, which is found by its date in any table; NaN where
+    a row has no date, shape (n,). [d]
     """
-    if setting.get("day") is None:
-        return np.ones(len(scene.table), bool)
-    days = scene.table.quantities.get("day")
-    if days is None:
-        return np.zeros(len(scene.table), bool)
+    days = scene.table.quantities.get("day", np.full(len(scene.table), np.nan))
     start = setting["day"]
     if setting.get("since") is not None and scene.table.first_day is not None:
         start = (
             date.fromisoformat(setting["since"]) - date.fromisoformat(scene.table.first_day)
         ).days
-    return np.asarray(days >= start)
+    return np.asarray(days - start)
+
+
+def _from_day_on(scene: Scene, setting: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Rows from the setting's day on; all rows if it has none."""
+    if setting.get("day") is None:
+        return np.ones(len(scene.table), bool)
+    return np.asarray(days_since(scene, setting) >= 0.0)
 
 
 def _change_days(days: Array, least: int, most: int) -> list[float]:
@@ -175,7 +179,7 @@ class DateStep(Cause):
         """Yield one candidate for each day on which the change may have come."""
         days = scene.table.quantities["day"]
         for day in _change_days(days, max(_LEAST_ROWS, len(days) // 25), 400):
-            yield Candidate(self, None, {"day": day, "since": _date(scene, day)})
+            yield Candidate(self, None, {"day": day, "since": change_date(scene, day)})
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Shift the rows from that day on."""
@@ -224,7 +228,7 @@ class RiggingOffset(Cause):
                     share_never_read(scene, rows if day is None else rows & (days >= day))
                     <= MOST_UNREAD
                 ):
-                    since = None if day is None else _date(scene, day)
+                    since = None if day is None else change_date(scene, day)
                     yield Candidate(self, label, {**setting, "day": day, "since": since})
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
