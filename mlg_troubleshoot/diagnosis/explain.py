@@ -77,10 +77,12 @@ class MisfitProblem:
         shares = self._shares()
         targets = Counter(name for name, _target in {c.key for c in self.candidates})
         variants = Counter(c.key for c in self.candidates)
-        often = [
-            shares[c.cause.name] / (targets[c.cause.name] * variants[c.key])
-            for c in self.candidates
-        ]
+        often = np.array(
+            [
+                np.log(shares[c.cause.name] / (targets[c.cause.name] * variants[c.key])) + c.rarity
+                for c in self.candidates
+            ]
+        )
         acting = np.sqrt(
             np.sum(self.columns**2, axis=0) / np.maximum(np.sum(self.columns != 0.0, axis=0), 1)
         )
@@ -92,7 +94,7 @@ class MisfitProblem:
             self.columns,
             [c.key for c in self.candidates],
             np.ones(len(often), bool),
-            np.log(np.array(often)) if often else np.empty(0),
+            often,
             np.where(exact != 0.0, beliefs.exact * np.abs(exact), plausible),
             exact == 0.0,
             np.where(exact == 0.0, usual * min(beliefs.sizes), 0.0),

@@ -86,12 +86,16 @@ class Candidate:
     stands_in : bool
         True if it can be a rival, never a name: its column is missing and something else stands for
         it, or joints that nobody read may be the cause as well.
+    rarity : float
+        Logarithm of the chance of this setting among all that its name could have, where it was
+        looked for in the rows and the others are not offered. [1]
     """
 
     cause: Cause
     target: str | None = None
     setting: Mapping[str, Any] = field(default_factory=dict)
     stands_in: bool = False
+    rarity: float = 0.0
 
     @property
     def key(self) -> tuple[str, str | None]:

@@ -9,13 +9,25 @@ from typing import ClassVar
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Mask
-from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, levels, offset
-from mlg_troubleshoot.diagnosis.causes.reading import change_date, days_since
+from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.diagnosis.causes.base import (
+    MOST_UNREAD,
+    Candidate,
+    Cause,
+    Scene,
+    levels,
+    offset,
+    share_never_read,
+)
+from mlg_troubleshoot.diagnosis.causes.reading import change_date, change_days, days_since
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
 # A gauge is calibrated once a year; in which month is not known.
 _YEAR_DAYS, _MONTHS = 365.25, 12
+# Aircraft from which on a step is one of several; days offered for each, as for its rigging; turns
+# in which steps and their size settle. [1]
+_LEAST_AIRCRAFT, _MOST_DAYS, _TURNS = 3, 12, 20
+_TAILS, _PER_TAIL = "tails ", ("tails", "days", "since")
 # Times in which a beginner comes down to a third of what he was off, a season to a year. [d]
 _LEARNING_DAYS = (60.0, 120.0, 240.0, 480.0)
 
@@ -90,7 +102,9 @@ class TechnicianLearning(Cause):
 
 
 class Modification(Cause):
-    """Rows that a column of the table's own sets apart: a modification, a base, a shop."""
+    """Rows of some gears are shifted: those that a column of the table's own sets apart (a
+    modification, a base, a shop), or those of some aircraft, each from a date of its own.
+    """
 
     name: ClassVar[str] = "modification"
     parameter: ClassVar[str] = "offset_in"
@@ -102,19 +116,85 @@ class Modification(Cause):
     )
 
     def is_distinct(self) -> bool:
-        """A column of the table's own does not follow the clearances."""
+        """A column of the table's own does not follow the clearances; aircraft are not offered
+        where it matters.
+        """
         return True
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield each value of each column that only this table has."""
-        for column in scene.table.own_factors:
-            found = levels(scene.table.factors[column])
-            for value in found:
+        """Yield each value of each column that only this table has, and the aircraft and dates that
+        a common step up or down fits best.
+        """
+        table = scene.table
+        for column in table.own_factors:
+            for value in levels(table.factors[column]):
                 yield Candidate(self, f"{column} {value}", {"column": column, "value": value})
+        dated = "tail_no" in table.factors and "day" in table.quantities and not table.doubt
+        if dated and share_never_read(scene) <= MOST_UNREAD:
+            yield from self._of_aircraft(scene)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Shift the rows with that value."""
-        return offset(scene, _of_value(scene, candidate.setting["column"], candidate), value)
+        """Shift the rows with that value, or those of the aircraft from its date on."""
+        setting, table = candidate.setting, scene.table
+        if "column" in setting:
+            return offset(scene, _of_value(scene, setting["column"], candidate), value)
+        after = np.zeros(len(table), bool)
+        for tail, day, since in zip(*(setting[key] for key in _PER_TAIL), strict=True):
+            after |= (table.tails == tail) & (days_since(scene, {"day": day, "since": since}) >= 0)
+        return offset(scene, after, value)
+
+    def words(self, target: str | None) -> str:
+        """Say whose readings they are."""
+        of_aircraft = target is not None and target.startswith(_TAILS)
+        each = ", each from its own date on" if of_aircraft else ""
+        return f"Readings {'of' if of_aircraft else 'with'} {target} are shifted{each}"
+
+    def _of_aircraft(self, scene: Scene) -> Iterator[Candidate]:
+        misfit = scene.table.measured_in - scene.over_in
+        for direction in (1.0, -1.0):
+            steps, rarity = _likeliest_steps(scene, direction * misfit)
+            if len(steps) >= _LEAST_AIRCRAFT:
+                setting = {
+                    "tails": [*steps],
+                    "days": [*steps.values()],
+                    "since": [change_date(scene, day) for day in steps.values()],
+                }
+                yield Candidate(self, _TAILS + ",".join(steps), setting, rarity=rarity)
+
+
+def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], float]:
+    """Which aircraft have a step up of one size, and from which day on.
+
+    Each is modified or not with equal chance, on each of its days with equal chance.
+
+    Returns
+    -------
+    tuple
+        The day of each modified aircraft, and the logarithm of the chance of just these.
+    """
+    days, tails = scene.table.quantities["day"], scene.table.tails
+    rows = {t: np.flatnonzero((tails == t) & np.isfinite(days + misfit)) for t in levels(tails)}
+    offered = {t: change_days(days[own], 1, _MOST_DAYS) for t, own in rows.items()}
+    after: Mask = misfit > np.nanmedian(misfit)
+    steps: dict[str, float] = {}
+    rarity = 0.0
+    for _turn in range(_TURNS):
+        level = np.nanmean(misfit[~after])
+        size = np.nanmean(misfit[after]) - level
+        scatter = np.nanstd(misfit - level - size * after)
+        gain = size * (misfit - level - 0.5 * size) / scatter**2
+        steps, rarity = {}, 0.0
+        last, after = after, np.zeros(len(tails), bool)
+        for tail, own in rows.items():
+            gains = [float(np.sum(gain[own][days[own] >= day])) for day in offered[tail]]
+            rarity -= np.log(2.0)
+            if gains and max(gains) > np.log(len(gains)):
+                steps[tail] = offered[tail][int(np.argmax(gains))]
+                after[own] = days[own] >= steps[tail]
+                rarity -= np.log(len(gains))
+        if not after.any() or after.all() or np.array_equal(after, last):
+            break
+    return steps, float(rarity)
 
 
 def _of_value(scene: Scene, factor: str, candidate: Candidate) -> Mask:
