@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 import numpy as np
+from scipy.special import logsumexp
 
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.causes.base import (
@@ -19,14 +20,13 @@ from mlg_troubleshoot.diagnosis.causes.base import (
     offset,
     share_never_read,
 )
-from mlg_troubleshoot.diagnosis.causes.reading import change_date, change_days, days_since
+from mlg_troubleshoot.diagnosis.causes.reading import change_date, days_since
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
 # A gauge is calibrated once a year; in which month is not known.
 _YEAR_DAYS, _MONTHS = 365.25, 12
-# Aircraft from which on a step is one of several; days offered for each, as for its rigging; turns
-# in which steps and their size settle. [1]
-_LEAST_AIRCRAFT, _MOST_DAYS, _TURNS = 3, 12, 20
+# Aircraft from which on a step is one of several; turns in which steps and their size settle. [1]
+_LEAST_AIRCRAFT, _TURNS = 3, 20
 _TAILS, _PER_TAIL = "tails ", ("tails", "days", "since")
 # Times in which a beginner comes down to a third of what he was off, a season to a year. [d]
 _LEARNING_DAYS = (60.0, 120.0, 240.0, 480.0)
@@ -165,36 +165,45 @@ class Modification(Cause):
 def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], float]:
     """Which aircraft have a step up of one size, and from which day on.
 
-    Each is modified or not with equal chance, on each of its days with equal chance.
+    Each is modified or not with equal chance, on each of its days with equal chance; size, level
+    and scatter by expectation and maximisation.
 
     Returns
     -------
     tuple
-        The day of each modified aircraft, and the logarithm of the chance of just these.
+        The day of each modified aircraft, and the logarithm of the chance of all steps, weighted
+        with the likelihood over that of just these.
     """
     days, tails = scene.table.quantities["day"], scene.table.tails
     rows = {t: np.flatnonzero((tails == t) & np.isfinite(days + misfit)) for t in levels(tails)}
-    offered = {t: change_days(days[own], 1, _MOST_DAYS) for t, own in rows.items()}
-    after: Mask = misfit > np.nanmedian(misfit)
+    # One visit after it is enough: that other aircraft have the same step holds it.
+    offered = {t: np.unique(days[own])[1:].tolist() for t, own in rows.items()}
+    known = np.isfinite(misfit)
+    chance = (misfit > np.nanmedian(misfit)).astype(float)
     steps: dict[str, float] = {}
     rarity = 0.0
     for _turn in range(_TURNS):
-        level = np.nanmean(misfit[~after])
-        size = np.nanmean(misfit[after]) - level
-        scatter = np.nanstd(misfit - level - size * after)
+        if not 0.0 < chance[known].sum() < known.sum():
+            return {}, 0.0
+        level = np.average(misfit[known], weights=1.0 - chance[known])
+        size = np.average(misfit[known], weights=chance[known]) - level
+        if size <= 0.0:
+            return {}, 0.0
+        scatter = np.nanstd(misfit - level - size * chance)
         gain = size * (misfit - level - 0.5 * size) / scatter**2
-        steps, rarity = {}, 0.0
-        last, after = after, np.zeros(len(tails), bool)
+        steps, rarity, chance = {}, 0.0, np.zeros(len(tails))
         for tail, own in rows.items():
-            gains = [float(np.sum(gain[own][days[own] >= day])) for day in offered[tail]]
-            rarity -= np.log(2.0)
-            if gains and max(gains) > np.log(len(gains)):
-                steps[tail] = offered[tail][int(np.argmax(gains))]
-                after[own] = days[own] >= steps[tail]
-                rarity -= np.log(len(gains))
-        if not after.any() or after.all() or np.array_equal(after, last):
-            break
-    return steps, float(rarity)
+            after = np.array([days[own] >= day for day in offered[tail]]).reshape(-1, len(own))
+            gains = np.r_[0.0, after @ gain[own]]
+            each = np.log(0.5) + gains - np.r_[0.0, np.full(len(after), np.log(max(len(after), 1)))]
+            total = float(logsumexp(each))
+            chance[own] = np.exp(each[1:] - total) @ after
+            modified = len(after) > 0 and each[0] - total < np.log(0.5)
+            best = 1 + int(np.argmax(each[1:])) if modified else 0
+            rarity += total - float(gains[best])
+            if modified:
+                steps[tail] = offered[tail][best - 1]
+    return steps, rarity
 
 
 def _of_value(scene: Scene, factor: str, candidate: Candidate) -> Mask:

@@ -54,7 +54,7 @@ def _from_day_on(scene: Scene, setting: Mapping[str, Any]) -> NDArray[np.bool_]:
     return np.asarray(days_since(scene, setting) >= 0.0)
 
 
-def change_days(days: Array, least: int, most: int) -> list[float]:
+def _change_days(days: Array, least: int, most: int) -> list[float]:
     """Days between which a change may lie, so that enough rows of two days at least stand on both
     sides: one visit alone is more likely misread.
     """
@@ -178,7 +178,7 @@ class DateStep(Cause):
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate for each day on which the change may have come."""
         days = scene.table.quantities["day"]
-        for day in change_days(days, max(_LEAST_ROWS, len(days) // 25), 400):
+        for day in _change_days(days, max(_LEAST_ROWS, len(days) // 25), 400):
             yield Candidate(self, None, {"day": day, "since": change_date(scene, day)})
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
@@ -222,7 +222,7 @@ class RiggingOffset(Cause):
                 if np.unique(gears[tails == tails[gears == v][0]]).size > 1
             ]
         for label, setting, rows in groups:
-            for day in (None, *change_days(days[rows], 1, 12)):
+            for day in (None, *_change_days(days[rows], 1, 12)):
                 # What was not read in any of its rows may be worn instead.
                 if (
                     share_never_read(scene, rows if day is None else rows & (days >= day))
