@@ -77,12 +77,11 @@ class MisfitProblem:
         shares = self._shares()
         targets = Counter(name for name, _target in {c.key for c in self.candidates})
         variants = Counter(c.key for c in self.candidates)
-        often = np.array(
-            [
-                np.log(shares[c.cause.name] / (targets[c.cause.name] * variants[c.key])) + c.rarity
-                for c in self.candidates
-            ]
-        )
+        often = [
+            shares[c.cause.name] / (targets[c.cause.name] * variants[c.key])
+            for c in self.candidates
+        ]
+        rarity = np.array([c.rarity for c in self.candidates])
         acting = np.sqrt(
             np.sum(self.columns**2, axis=0) / np.maximum(np.sum(self.columns != 0.0, axis=0), 1)
         )
@@ -94,7 +93,7 @@ class MisfitProblem:
             self.columns,
             [c.key for c in self.candidates],
             np.ones(len(often), bool),
-            often,
+            np.log(often) + rarity,
             np.where(exact != 0.0, beliefs.exact * np.abs(exact), plausible),
             exact == 0.0,
             np.where(exact == 0.0, usual * min(beliefs.sizes), 0.0),
@@ -102,6 +101,7 @@ class MisfitProblem:
                 [0.0 if e else c.cause.sign for c, e in zip(self.candidates, exact, strict=True)]
             ),
             exact,
+            rarity,
         )
         shapes = np.column_stack([self.bank.columns, np.ones(n)])
         shapes = shapes / np.sqrt(

@@ -65,7 +65,7 @@ class Conclusion:
         found, effects = self.posterior, self.posterior.effects
         places = np.flatnonzero(effects.listed).tolist()
         names = [effects.names[k] for k in places]
-        columns, prior = effects.columns[:, places], effects.log_prior[places]
+        columns, prior = effects.columns[:, places], (effects.log_prior - effects.rarity)[places]
         unit = columns / np.linalg.norm(columns, axis=0)
         evidence = np.log(np.maximum(found.of_effect[places], 1e-300)) - prior
         alike: set[Key] = set()

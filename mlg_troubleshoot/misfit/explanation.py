@@ -25,7 +25,8 @@ class Effects:
     expected in a set of data. size, shape (p,): standard deviation of its size. scales, shape (p,):
     True where that is one of several. least, shape (p,): what is smaller does not matter. sign,
     shape (p,): +1 or −1 where it can have one sign only, else 0. mean, shape (p,): the only size
-    that it can have, 0 where it is free.
+    that it can have, 0 where it is free. rarity: the part of log_prior that is not belief, shape
+    (p,): variants that the rows were searched for and that are not listed.
     """
 
     columns: Array
@@ -37,6 +38,7 @@ class Effects:
     least: Array
     sign: Array
     mean: Array
+    rarity: Array | float = 0.0
 
     @staticmethod
     def joined(parts: Sequence[Effects]) -> Effects:
@@ -48,6 +50,7 @@ class Effects:
                 np.concatenate([getattr(e, what) for e in parts])
                 for what in ("listed", "log_prior", "size", "scales", "least", "sign", "mean")
             ),
+            rarity=np.concatenate([np.broadcast_to(e.rarity, len(e.names)) for e in parts]),
         )
 
     @staticmethod

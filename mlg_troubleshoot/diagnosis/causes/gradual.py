@@ -85,7 +85,7 @@ class TechnicianLearning(Cause):
                 continue
             first = float(own.min())
             for time in _LEARNING_DAYS:
-                if time < np.ptp(own):
+                if 2.0 * time < np.ptp(own):
                     setting = {
                         "value": person,
                         "day": first,
@@ -127,7 +127,7 @@ class Modification(Cause):
         """
         table = scene.table
         for column in table.own_factors:
-            for value in levels(table.factors[column]):
+            for value in _apart(scene, column):
                 yield Candidate(self, f"{column} {value}", {"column": column, "value": value})
         dated = "tail_no" in table.factors and "day" in table.quantities and not table.doubt
         if dated and share_never_read(scene) <= MOST_UNREAD:
@@ -160,6 +160,15 @@ class Modification(Cause):
                     "since": [change_date(scene, day) for day in steps.values()],
                 }
                 yield Candidate(self, _TAILS + ",".join(steps), setting, rarity=rarity)
+
+
+def _apart(scene: Scene, column: str) -> list[str]:
+    """Values that a column sets apart: of two the one that came later; the other is the rest."""
+    texts, found = scene.table.factors[column], [*levels(scene.table.factors[column])]
+    days = scene.table.quantities.get("day", scene.table.row.astype(float))
+    if len({*texts} - {""}) == 2 and len(found) == 2:
+        return [max(found, key=lambda value: float(np.nanmean(days[texts == value])))]
+    return found
 
 
 def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], float]:

@@ -1,0 +1,105 @@
+"""What comes gradually, or to some gears only, is named as such."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.diagnosis import CATALOGUE, diagnose
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.units import ClearanceConvention as Convention
+
+from .conftest import Array, fleet, scene_of
+
+BY_NAME = {cause.name: cause for cause in CATALOGUE}
+MODIFIED = {"N101": 150, "N104": 420, "N105": 240, "N108": 510}
+
+
+def names(gear: Gear, table: DiagnosisTable) -> list[tuple[str, str | None]]:
+    return [
+        (c.candidate.cause.name, c.candidate.target)
+        for c in diagnose(gear.model, table, gear.discrepancies).causes
+    ]
+
+
+def creeping(table: DiagnosisTable, _over: Array) -> Array:
+    year = (table.quantities["day"] + 100.0) % 365.0 / 365.0
+    return 0.008 * year * (table.factors["gauge_id"] == "G-2")
+
+
+def learning(table: DiagnosisTable, _over: Array) -> Array:
+    own = table.factors["technician_id"] == "T-1"
+    return 0.01 * np.exp(-table.quantities["day"] / 150.0) * own
+
+
+def modified(table: DiagnosisTable, _over: Array) -> Array:
+    since = np.array([MODIFIED.get(tail, 10_000) for tail in table.tails])
+    return 0.006 * (table.quantities["day"] >= since)
+
+
+def own_column(table: DiagnosisTable, over: Array) -> DiagnosisTable:
+    texts = np.where(modified(table, over) > 0.0, "POST", "PRE")
+    return replace(table, factors={**table.factors, "mod_status": texts})
+
+
+def test_a_gauge_that_creeps_is_named(gear: Gear) -> None:
+    assert names(gear, fleet(gear.model, creeping, rows=200)) == [("gauge_drift", "gauge G-2")]
+
+
+def test_a_technician_who_learns_is_named(gear: Gear) -> None:
+    assert names(gear, fleet(gear.model, learning, rows=200)) == [
+        ("technician_learning", "technician T-1")
+    ]
+
+
+def test_aircraft_that_change_on_dates_of_their_own_are_named_together(gear: Gear) -> None:
+    assert names(gear, fleet(gear.model, modified, rows=200)) == [
+        ("modification", "tails N101,N104,N105,N108")
+    ]
+
+
+def test_a_column_of_the_tables_own_is_named_with_its_value(gear: Gear) -> None:
+    table = fleet(gear.model, modified, rows=200)
+    assert names(gear, own_column(table, np.zeros(200))) == [("modification", "mod_status POST")]
+
+
+def test_a_step_of_all_aircraft_is_no_modification(gear: Gear) -> None:
+    def all_from(table: DiagnosisTable, _over: Array) -> Array:
+        return 0.006 * (table.quantities["day"] >= 350)
+
+    assert names(gear, fleet(gear.model, all_from, rows=200)) == [("date_step", None)]
+
+
+@pytest.mark.parametrize("name", ["gauge_drift", "technician_learning", "modification"])
+def test_a_gradual_cause_acts_on_the_same_dates_in_another_table(name: str, gear: Gear) -> None:
+    shift = {"gauge_drift": creeping, "technician_learning": learning, "modification": modified}
+    table = fleet(gear.model, shift[name], rows=200)
+    scene = scene_of(gear.model, table, gear.discrepancies)
+    candidate = next(c for c in BY_NAME[name].candidates(scene) if c.target is not None)
+    later = table.take(table.quantities["day"] >= 200)
+    days = later.quantities["day"] - 200
+    moved = replace(later, quantities={**later.quantities, "day": days}, first_day="2023-08-20")
+    other = replace(scene, table=moved, clearance_in=scene.clearance_in[-len(moved) :])
+    assert np.allclose(
+        candidate.cause.adjust(other, candidate, 0.01).offset_in,
+        candidate.cause.adjust(scene, candidate, 0.01).offset_in[table.quantities["day"] >= 200],
+    )
+
+
+def test_a_column_with_many_values_does_not_group_the_rows(gear: Gear) -> None:
+    rows = [
+        Inspection(
+            f"R{k}",
+            "N1",
+            Side.LH,
+            Convention.RADIAL,
+            {3: 0.002},
+            carried={"mod_status": "PRE", "squawk": f"note {k}"},
+        )
+        for k in range(9)
+    ]
+    assert table_from_inspections(rows, gear).own_factors == ("mod_status",)
