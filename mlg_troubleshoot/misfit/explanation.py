@@ -15,6 +15,9 @@ Key = tuple[str, str | None]
 UNLISTED = "unlisted"
 
 
+_OF_EACH = ("listed", "log_prior", "size", "scales", "least", "sign", "mean", "rarity")
+
+
 @dataclass(frozen=True)
 class Effects:
     """Effects that may act, several variants under one name; each has a size that is not known.
@@ -47,10 +50,9 @@ class Effects:
             np.hstack([e.columns for e in parts]),
             [name for e in parts for name in e.names],
             *(
-                np.concatenate([getattr(e, what) for e in parts])
-                for what in ("listed", "log_prior", "size", "scales", "least", "sign", "mean")
+                np.concatenate([np.broadcast_to(getattr(e, what), len(e.names)) for e in parts])
+                for what in _OF_EACH
             ),
-            rarity=np.concatenate([np.broadcast_to(e.rarity, len(e.names)) for e in parts]),
         )
 
     @staticmethod
