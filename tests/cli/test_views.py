@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from mlg_troubleshoot.cli.views.notes import show_notes
 from tests.cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 
 WIDTHS = pytest.mark.parametrize("width", [80, 110])
@@ -234,3 +235,10 @@ def test_no_chance_passes_one_by_rounding(table: Table) -> None:
         "check", table(row(**tight, tail_no="7", plunger_displacement_in="-0.04")), "--json"
     )
     assert found.json["inspections"][0]["posterior"]["no_joint_worn"] <= 1.0
+
+
+def test_of_many_notes_the_first_and_the_last_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    show_notes([f"note {n} of a fleet" for n in range(30)])
+    said = capsys.readouterr().err
+    assert re.findall(r"note (\d+) of", said) == [*map(str, range(8)), *map(str, range(26, 30))]
+    assert "18 more notes; --json" in said

@@ -44,6 +44,12 @@ STRETCH = term("elastic_compliance", 2e-6, length="length.F-1")
 RATE = term("calibration_rate", 0.05)
 GAUGE = term("gauge_bias", 0.004, "gauge G-1", value="G-1")
 RIGGED = term("rigging_offset", -0.01, "tail N1", tail="N1", day=12.0, since="2024-03-05")
+DRIFT = term("gauge_drift", 0.004, "gauge G-1", value="G-1", day=12.0, since="2023-11-05")
+LEARNING = term(
+    *("technician_learning", 0.004, "technician T-1"),
+    **{"value": "T-1", "day": 3.0, "since": "2024-02-01", "learning_days": 60.0},
+)
+MODIFIED = term("modification", 0.004, "tails N1,N2,N3", steps={"N1": "2024-03-05", "N2": 9.0})
 CONTACT = term("joint_contact", 0.8, "joints 3,5", pair=(3, 5), room_in=None)
 
 
@@ -61,6 +67,7 @@ def inspection(**changes: object) -> Inspection:
         hydraulic_pressure_psi=1000.0,
         inspection_date=date(2024, 3, 6),
         gauge_id="G-1",
+        technician_id="T-1",
     )
     return replace(plain, **changes)
 
@@ -80,7 +87,9 @@ def offset_of(gear: Gear, terms: tuple[Term, ...], **changes: object) -> float:
 
 
 @pytest.mark.parametrize(
-    "saved", [STRETCH, RATE, GAUGE, RIGGED, CONTACT], ids=lambda t: t.candidate.cause.name
+    "saved",
+    [STRETCH, RATE, GAUGE, RIGGED, DRIFT, LEARNING, MODIFIED, CONTACT],
+    ids=lambda t: t.candidate.cause.name,
 )
 def test_a_term_comes_back_from_its_file_as_it_was(saved: Term, gear: Gear, tmp_path: Path) -> None:
     write_extension(extension(gear, saved), tmp_path / "e.toml")

@@ -12,13 +12,21 @@ from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.errors import Problem, ProblemGroup, grouped
 
 _LINES_OF_PROBLEMS = 40
+_LINES_OF_NOTES = (8, 4)
 _PROBLEM_COLUMN = 22
 
 
 def show_notes(notes: Sequence[str]) -> None:
+    """Show notes on stderr; of many the first and the last, which are about the whole."""
     console = output.console(to_stderr=True)
-    for note in notes:
+    folded = len(notes) - sum(_LINES_OF_NOTES)
+    first, last = (_LINES_OF_NOTES[0], -_LINES_OF_NOTES[1]) if folded > 1 else (len(notes), None)
+    for note in notes[:first]:
         _message(console, f"Note: {note}")
+    if last is not None:
+        _message(console, f"… and {folded} more notes; --json lists all of them.")
+        for note in notes[last:]:
+            _message(console, f"Note: {note}")
 
 
 def show_problems(problems: Sequence[Problem]) -> None:

@@ -27,7 +27,7 @@ from mlg_troubleshoot.gear.adjustment import Adjustment
 _YEAR_DAYS, _MONTHS = 365.25, 12
 # Aircraft from which on a step is one of several; turns in which steps and their size settle. [1]
 _LEAST_AIRCRAFT, _TURNS = 3, 20
-_TAILS, _PER_TAIL = "tails ", ("tails", "days", "since")
+_TAILS = "tails "
 # Times in which a beginner comes down to a third of what he was off, a season to a year. [d]
 _LEARNING_DAYS = (60.0, 120.0, 240.0, 480.0)
 
@@ -139,8 +139,10 @@ class Modification(Cause):
         if "column" in setting:
             return offset(scene, _of_value(scene, setting["column"], candidate), value)
         after = np.zeros(len(table), bool)
-        for tail, day, since in zip(*(setting[key] for key in _PER_TAIL), strict=True):
-            after |= (table.tails == tail) & (days_since(scene, {"day": day, "since": since}) >= 0)
+        for tail, step in setting["steps"].items():
+            dated = isinstance(step, str)
+            from_day = {"day": np.nan if dated else step, "since": step if dated else None}
+            after |= (table.tails == tail) & (days_since(scene, from_day) >= 0)
         return offset(scene, after, value)
 
     def words(self, target: str | None) -> str:
@@ -154,11 +156,8 @@ class Modification(Cause):
         for direction in (1.0, -1.0):
             steps, rarity = _likeliest_steps(scene, direction * misfit)
             if len(steps) >= _LEAST_AIRCRAFT:
-                setting = {
-                    "tails": [*steps],
-                    "days": [*steps.values()],
-                    "since": [change_date(scene, day) for day in steps.values()],
-                }
+                dated = {tail: change_date(scene, day) or day for tail, day in steps.items()}
+                setting = {"steps": dated}
                 yield Candidate(self, _TAILS + ",".join(steps), setting, rarity=rarity)
 
 
@@ -180,8 +179,8 @@ def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], flo
     Returns
     -------
     tuple
-        The day of each modified aircraft, and the logarithm of the chance of all steps, weighted
-        with the likelihood over that of just these.
+        The day of each modified aircraft, and the logarithm of the chance of just these steps: no
+        more than what all that are as likely have together.
     """
     days, tails = scene.table.quantities["day"], scene.table.tails
     rows = {t: np.flatnonzero((tails == t) & np.isfinite(days + misfit)) for t in levels(tails)}
@@ -209,7 +208,7 @@ def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], flo
             chance[own] = np.exp(each[1:] - total) @ after
             modified = len(after) > 0 and each[0] - total < np.log(0.5)
             best = 1 + int(np.argmax(each[1:])) if modified else 0
-            rarity += total - float(gains[best])
+            rarity += float(each[best] - gains[best])
             if modified:
                 steps[tail] = offered[tail][best - 1]
     return steps, rarity
