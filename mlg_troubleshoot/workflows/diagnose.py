@@ -127,7 +127,10 @@ def diagnose_files(
     if not valid:
         raise _nothing_read(read.problems)
     once = _once(valid)
-    notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
+    # What a check says of single rows is said of the data as a whole: landings that fall.
+    of_rows = {warning for inspection in valid for warning in inspection.warnings}
+    general = (note for note in read.notes if note not in of_rows)
+    notes = (*general, *_evidence_notes(once, len(valid) - len(once), gear))
     whole = table_from_inspections(once, gear, along=True)
     condition, aside = data_condition(whole, gear)
     table = replace(whole.take(~aside), doubt=doubt_of(condition))

@@ -284,3 +284,11 @@ def test_a_scale_is_not_named_where_clearances_are_cut_off(gear: Gear) -> None:
     doubted = diagnose(gear.model, replace(scaled, doubt="cut off"), gear.discrepancies)
     assert [c.candidate.cause.name for c in sure.causes] == ["calibration_rate"]
     assert doubted.causes == ()
+
+
+def test_landings_that_fall_are_said_of_the_data_and_not_row_by_row(tmp_path: Path) -> None:
+    rows, _truth = blemished_fleet("overhaul", "strong", 61_000, rows=200)
+    write_rows(rows, tmp_path / "overhaul.csv")
+    said = mlg("diagnose", tmp_path / "overhaul.csv", "--convention", "RADIAL", "--json").json
+    assert "landings_fall" in {found["kind"] for found in said["data_condition"]}
+    assert not [note for note in said["warnings"] if "never fall" in note]
