@@ -371,7 +371,7 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
             "landings_fall",
             f"gears {', '.join(fell[:8])}{more}",
             len(fell) / len(order),
-            "new bushings, or a slip (`mlg check` names the cells): where they stay lower the wear"
+            "new bushings, or a slip (mlg check names the cells): where they stay lower the wear"
             " of the gear begins anew",
             "landings since overhaul, and the date of the overhaul",
         )

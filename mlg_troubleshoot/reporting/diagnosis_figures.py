@@ -11,7 +11,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask
-from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, CLEARANCE, COVARIATES
+from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, CLEARANCE, COVARIATES, TAIL_NO
 from mlg_troubleshoot.diagnosis import Candidate, Diagnosis
 from mlg_troubleshoot.diagnosis.table import ALONG
 from mlg_troubleshoot.reporting.diagnosis_lines import column_words
@@ -27,6 +27,8 @@ _BAR = 150
 _BAR_HIGH = 10
 _BINS = 8
 _FEWEST_IN_A_BIN = 5
+# Length of a legend's text. [characters]
+_MARKED = 24
 MOST_TAILS = 36
 _UNITS = {c.variable: "in" if c.is_length else c.unit for c in COVARIATES}
 
@@ -56,6 +58,12 @@ class Residuals:
         table = self.diagnosis.used
         clearances = (CLEARANCE.header(joint) for joint in self.joints)
         return ("predicted", *table.quantities, *table.factors, *clearances)
+
+    @property
+    def covariates(self) -> tuple[str, ...]:
+        """Columns beside clearances and prediction, but for the aircraft."""
+        table = self.diagnosis.used
+        return (*table.quantities, *(name for name in table.factors if name != TAIL_NO.variable))
 
     @property
     def before_in(self) -> Array:
@@ -109,22 +117,31 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
         return ResidualAxis(
             f"{'smaller ' if len(joints) > 1 else ''}clearance of {named}, {residuals.unit}", least
         )
-    if "tail" in setting and "day" in table.quantities:
-        rows = table.factors["tail_no"] == setting["tail"]
-        if "side" in setting:
-            rows = rows & (table.factors["side"] == setting["side"])
-        return ResidualAxis(
-            _day_label(residuals),
-            table.quantities["day"],
-            marked=rows,
-            marked_label=candidate.target or "",
-        )
+    if "column" in setting:
+        return against_column(residuals, setting["column"])
+    dated = "steps" in setting or ("since" in setting and {"tail", "value"} & set(setting))
+    if dated and "day" in table.quantities:
+        return _over_time(residuals, candidate, effect_in)
     for need in candidate.cause.needs:
         if need == AXIAL_FLOAT.variable and table.axial_float_in is not None:
             return _most_correlated_float(residuals, table.axial_float_in, effect_in)
         if need in table.quantities or need in table.factors:
             return against_column(residuals, need)
     return against_column(residuals, ALONG if table.along.any() else "predicted")
+
+
+def _over_time(residuals: Residuals, candidate: Candidate, effect_in: Array) -> ResidualAxis:
+    """The days, with the rows of the cause marked: of an aircraft all, else those that it moves."""
+    table, setting = residuals.diagnosis.used, candidate.setting
+    rows = effect_in != 0.0
+    if "tail" in setting:
+        rows = table.factors["tail_no"] == setting["tail"]
+        if "side" in setting:
+            rows = rows & (table.factors["side"] == setting["side"])
+    label = short(candidate.target or "all gauges", _MARKED)
+    return ResidualAxis(
+        _day_label(residuals), table.quantities["day"], marked=rows, marked_label=label
+    )
 
 
 def against_column(residuals: Residuals, name: str) -> ResidualAxis:

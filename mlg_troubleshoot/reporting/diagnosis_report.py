@@ -100,6 +100,7 @@ def _context(
         "plots": _plots(residuals),
         "scatter": drawn.measured_against_predicted(residuals),
         "strips": drawn.tail_strips(residuals),
+        "columns": _against_each(residuals),
         "tails": len(np.unique(d.used.tails)),
         "most_tails": drawn.MOST_TAILS,
         "model": fitted_numbers(d, lengths),
@@ -177,6 +178,22 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
         return [_unlisted_plots(residuals, d.unlisted_variables, scatter)]
     left = drawn.residual_plot(residuals, drawn.against_column(residuals, "predicted"), "")
     return [(left, scatter, "Against the prediction")]
+
+
+def _against_each(residuals: Residuals) -> list[tuple[Markup, Markup | None]]:
+    """Plots against each column that varies, before and, where the model was extended, after."""
+    d = residuals.diagnosis
+    axes = [drawn.against_column(residuals, name) for name in residuals.covariates]
+    varied = [axis for axis in axes if len(np.unique(axis.values[np.isfinite(axis.values)])) > 1]
+    return [
+        (
+            drawn.residual_plot(residuals, axis, "before"),
+            drawn.residual_plot(residuals, axis, "with the extension", after=True)
+            if d.causes
+            else None,
+        )
+        for axis in varied
+    ]
 
 
 def _unlisted_plots(residuals: Residuals, variables: tuple[str, ...], scatter: Markup) -> PlotPair:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from mlg_troubleshoot.diagnosis import CATALOGUE, diagnose
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention as Convention
+from tests.cli.conftest import mlg
+from tests.hidden_effect.simulator import blemished_fleet, write_rows
 
 from .conftest import Array, fleet, scene_of
 
@@ -103,3 +106,13 @@ def test_a_column_with_many_values_does_not_group_the_rows(gear: Gear) -> None:
         for k in range(9)
     ]
     assert table_from_inspections(rows, gear).own_factors == ("mod_status",)
+
+
+def test_the_report_draws_the_residuals_against_every_column(tmp_path: Path) -> None:
+    rows, _truth = blemished_fleet("modification_col", "strong", 61_001, rows=80)
+    write_rows(rows, tmp_path / "fleet.csv")
+    mlg("diagnose", tmp_path / "fleet.csv", "--convention", "RADIAL", "--report", tmp_path)
+    page = next(tmp_path.glob("*.html")).read_text(encoding="utf-8")
+    section = page[page.index('id="columns"') :]
+    labels = ("temperature, °C", "hydraulic pressure, psi", "days since", "gauge", "mod status")
+    assert [label for label in labels if f"against {label}" not in section] == []
