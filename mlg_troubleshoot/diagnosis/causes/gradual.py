@@ -46,9 +46,10 @@ class GaugeDrift(Cause):
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield each gauge, and all together, with each month of calibration."""
         days = scene.table.quantities["day"]
-        if not np.nanmax(days) - np.nanmin(days) > 0.5 * _YEAR_DAYS:
+        known = days[np.isfinite(days)]
+        if len(known) == 0 or np.ptp(known) <= 0.5 * _YEAR_DAYS:
             return
-        first = float(np.nanmin(days))
+        first = float(known.min())
         for gauge in (None, *levels(scene.table.factors["gauge_id"])):
             for month in range(_MONTHS):
                 day = round(first - month * _YEAR_DAYS / _MONTHS)
@@ -187,7 +188,9 @@ def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], flo
     # One visit after it is enough: that other aircraft have the same step holds it.
     offered = {t: np.unique(days[own])[1:].tolist() for t, own in rows.items()}
     known = np.isfinite(misfit)
-    chance = (misfit > np.nanmedian(misfit)).astype(float)
+    if not known.any():
+        return {}, 0.0
+    chance = (misfit > np.median(misfit[known])).astype(float)
     steps: dict[str, float] = {}
     rarity = 0.0
     for _turn in range(_TURNS):
