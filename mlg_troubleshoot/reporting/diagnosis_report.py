@@ -100,7 +100,7 @@ def _context(
         "plots": _plots(residuals),
         "scatter": drawn.measured_against_predicted(residuals),
         "strips": drawn.tail_strips(residuals),
-        "columns": _against_each(residuals),
+        "by_column": _against_each(residuals),
         "tails": len(np.unique(d.used.tails)),
         "most_tails": drawn.MOST_TAILS,
         "model": fitted_numbers(d, lengths),

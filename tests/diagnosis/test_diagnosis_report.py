@@ -222,9 +222,10 @@ def test_no_identifier_of_a_cause_stands_in_the_prose(named: Made, without_landi
 
 
 def test_residuals_are_drawn_against_the_named_column_before_and_after(named: Made) -> None:
-    titles = re.findall(r"<title>(before|with the extension)</title>", named.html)
+    first = named.html[: named.html.index('id="columns"')]
+    titles = re.findall(r"<title>(before|with the extension)</title>", first)
     assert titles == ["before", "with the extension"]
-    assert "against technician" in named.html
+    assert "against technician" in first
 
 
 def test_residuals_are_drawn_against_the_prediction_where_nothing_is_named(nothing: Made) -> None:
