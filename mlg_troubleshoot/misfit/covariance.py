@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -20,7 +21,10 @@ class NoiseModel:
     units of the common one. [1] floor_in: scatter that every row has at least. [in] gear_ratio:
     scatter between the gears of one tail over the scatter of a row. [1] tail_ratios: ratios of the
     scatter between tails to the scatter of a row that are tried. [1] scale_in: the common standard
-    deviation as it was estimated. [in]
+    deviation as it was estimated. [in] chain, shape (n,): number of the series in which a
+    row follows others, if rows do. time, shape (n,): when, in usual steps of a series. correlation:
+    of the own scatter of two rows of a series one usual step apart; rows further apart are less
+    alike by a power of it (a process that forgets, Jones 1980). [1]
     """
 
     relative: Array
@@ -33,6 +37,9 @@ class NoiseModel:
     scale_in: float
     absorbed: int = 0
     tail_chances: tuple[float, ...] = ()
+    chain: Wholes | None = None
+    time: Array | None = None
+    correlation: float = 0.0
     _roots: dict[float, tuple[Array, float]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -65,7 +72,46 @@ class NoiseModel:
             tails=self.tails[rows],
             gears=self.gears[rows],
             loadings=self.loadings[rows],
+            chain=None if self.chain is None else self.chain[rows],
+            time=None if self.time is None else self.time[rows],
         )
+
+    @property
+    def worth(self) -> float:
+        """Independent rows that would say as much of a constant. [1]"""
+        return len(self.relative) * (1.0 - self.correlation) / (1.0 + self.correlation)
+
+    @cached_property
+    def _steps(self) -> tuple[Wholes, Wholes, Array]:
+        """Rows that follow one of their series, the rows that they follow, and how alike the two
+        are.
+        """
+        if self.chain is None or self.time is None or self.correlation == 0.0:
+            return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+        order = np.lexsort((self.time, self.chain))
+        follows = np.diff(self.chain[order]) == 0
+        row, before = order[1:][follows], order[:-1][follows]
+        return row, before, self.correlation ** (self.time[row] - self.time[before])
+
+    def own(self, columns: Array) -> Array:
+        """What of some columns is new in each row, over its scatter: independent of the others."""
+        row, before, alike = self._steps
+        scaled = columns / self.relative[:, None]
+        fresh = scaled.copy()
+        fresh[row] -= alike[:, None] * scaled[before]
+        fresh[row] /= np.sqrt(1.0 - alike**2)[:, None]
+        return np.asarray(fresh)
+
+    def _own_precision_times(self, columns: Array) -> Array:
+        """Multiply columns by the inverse covariance of the rows' own scatter."""
+        row, before, alike = self._steps
+        if not len(row):
+            return np.asarray(columns / self.relative[:, None] ** 2)
+        fresh = self.own(columns)
+        fresh[row] /= np.sqrt(1.0 - alike**2)[:, None]
+        product = fresh.copy()
+        product[before] -= alike[:, None] * fresh[row]
+        return np.asarray(product / self.relative[:, None])
 
     def beside(self, effects_in: Array) -> NoiseModel:
         """Add effects of unknown size, each at one standard deviation."""
@@ -82,6 +128,11 @@ class NoiseModel:
         """What each row scatters by itself, all that rows have in common taken out, and the share
         of the rows that is left to tell it. [in, 1]
         """
+        if self.correlation:
+            held = self.own(self.factors(self.tail_ratios[-1]))
+            free = replace(NoiseModel.white(len(data)), loadings=held)
+            own, share = free.own_part(self.own(data[:, None])[:, 0])
+            return self.relative * own, share
         root, _log = self._root(self.tail_ratios[-1])
         own = data - self.relative**2 * (root.T @ (root @ data))
         return own, float(1.0 - np.mean(self.relative**2 * np.sum(root**2, axis=0)))
@@ -97,12 +148,12 @@ class NoiseModel:
     def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
         """Multiply columns by the inverse covariance (Woodbury)."""
         root, log_determinant = self._root(tail_ratio)
-        return columns / self.relative[:, None] ** 2 - root.T @ (root @ columns), log_determinant
+        return self._own_precision_times(columns) - root.T @ (root @ columns), log_determinant
 
     def square(self, data: Array, tail_ratio: float) -> Array:
         """Squared length of data sets under the inverse covariance."""
         root, _log = self._root(tail_ratio)
-        own, common = data / self.relative[:, None], root @ data
+        own, common = self.own(data), root @ data
         return np.asarray(np.einsum("ij,ij->j", own, own) - np.einsum("ij,ij->j", common, common))
 
     def _root(self, tail_ratio: float) -> tuple[Array, float]:
@@ -112,11 +163,12 @@ class NoiseModel:
             self._roots[tail_ratio] = np.vstack([self._root(0.0)[0], root]), log_determinant
         elif tail_ratio not in self._roots:
             low = self.factors(0.0)
-            scaled = low / self.relative[:, None] ** 2
+            scaled = self._own_precision_times(low)
             lower = np.linalg.cholesky(np.eye(low.shape[1]) + low.T @ scaled)
             log_determinant = 2.0 * float(
                 np.sum(np.log(np.diag(lower))) + np.sum(np.log(self.relative))
             )
+            log_determinant += float(np.sum(np.log1p(-(self._steps[2] ** 2))))
             self._roots[tail_ratio] = solve_triangular(lower, scaled.T, lower=True), log_determinant
         return self._roots[tail_ratio]
 

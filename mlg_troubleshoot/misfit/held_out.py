@@ -29,6 +29,18 @@ def folds_of(
     return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
 
 
+def blocks_of(chain: Wholes, time: Array) -> Wholes:
+    """Number the fold in which each row is held out with those that it follows: whole series where
+    there are as many as folds, else as many stretches of all series together.
+    """
+    many = int(chain.max()) + 1
+    if many >= _FOLDS:
+        return np.asarray(chain % _FOLDS)
+    place = np.empty(len(chain), np.int64)
+    place[np.lexsort((time, chain))] = np.arange(len(chain))
+    return np.asarray(place * _FOLDS // len(chain))
+
+
 def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bool:
     """Tell whether the residual of held-out rows is likelier after than before, what a fold has in
     common being noise.

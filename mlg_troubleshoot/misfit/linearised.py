@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.misfit.beliefs import Beliefs
@@ -31,6 +32,8 @@ _DIGITS = 1e-9
 _ROUNDED = 0.01
 # Computing only: suspects that act together at most, and rounds until the same is likeliest again.
 _MOST, _ROUNDS = 12, 8
+# Correlation of rows that follow each other at most, and how near the likeliest one is sought.
+_CORRELATED, _NEAR = 0.99, 0.02
 _SUSPECT = "suspect"
 
 
@@ -103,6 +106,7 @@ class Study:
         declared: Array | None,
         group: Wholes | None,
         beliefs: Beliefs,
+        series: tuple[Wholes, Array] | None = None,
     ) -> None:
         self.runner, self.count, self.group = runner, count, group
         self.beliefs = beliefs
@@ -111,12 +115,14 @@ class Study:
         own = None if declared is None else declared[runner.row, runner.output]
         # Rows are dealt to folds in an order that no pattern of the rows has.
         self.fold = np.random.default_rng(0).permutation(runner.shape[0])
+        self.series = series
         predicted = runner.nominal_prediction()
         base = predicted[runner.row, runner.output]
         columns = runner.sensitivities(runner.nominal, base, range(len(runner.names)))
         largest = float(max(np.max(np.abs(runner.reading)), np.max(np.abs(columns))))
         floor, self.rounding = _DIGITS * largest, _ROUNDED * _DIGITS * largest
-        self.readings = Readings(runner.row, self.outputs, group, own, max(floor, 1e-300))
+        least = max(floor, 1e-300)
+        self.readings = Readings(runner.row, self.outputs, group, own, least, series)
         scale = np.ones(len(base)) if own is None else own.copy()
         for index in self.outputs if own is None else ():
             scale[index] = max(float(np.sqrt(np.mean(columns[index] ** 2))), 1e-300)
@@ -251,20 +257,43 @@ class Study:
         scale = self.readings.first_scale(start.columns, free, start.rest)
         beliefs = replace(self.beliefs, sizes=_SIZES)
         while True:
-            noise, unit = self.readings.noise(scale, point.columns[:, self.nuisance])
-            effects = self.effects(point, noise, unit)
-            data = point.whole / unit
-            found = posterior(noise, data, effects, self.contexts, beliefs, (), _MOST)
-            at = JudgedPoint(point, noise, unit, Conclusion(found, beliefs), self.contexts)
+            at = self._likeliest(point, scale, beliefs)
+            found = at.follows.posterior
             chosen, context = self.chosen(found.names_of(at.likeliest)), at.likeliest.context
             state = (context, *sorted(chosen))
             if state in tried or len(tried) == _ROUNDS:
                 return at
             tried.add(state)
             point = self.fitted(at, chosen, context)
-            left, spare = at.settled(chosen, context).own_part(point.rest / unit)
+            left, spare = at.settled(chosen, context).own_part(point.rest / at.unit)
             spare = max(spare - len(chosen) / len(left), 1.0 / len(left))
-            scale = self.readings.scale_of(left * unit, spare)
+            scale = self.readings.scale_of(left * at.unit, spare)
+
+    def _likeliest(self, point: FittedPoint, scale: Array, beliefs: Beliefs) -> JudgedPoint:
+        """Judge a point, rows that follow each other as alike as all explanations together make
+        likeliest; beforehand rows that forget soon are likelier than rows that never do.
+        """
+
+        def judged(correlation: float) -> JudgedPoint:
+            free = point.columns[:, self.nuisance]
+            noise, unit = self.readings.noise(scale, free, correlation)
+            effects, data = self.effects(point, noise, unit), point.whole / unit
+            found = posterior(noise, data, effects, self.contexts, beliefs, (), _MOST)
+            return JudgedPoint(point, noise, unit, Conclusion(found, beliefs), self.contexts)
+
+        if self.series is None:
+            return judged(0.0)
+        tried = dict[float, JudgedPoint]()
+
+        def unlikely(correlation: float) -> float:
+            tried[correlation] = at = judged(correlation)
+            return -at.follows.posterior.log_evidence - float(np.log1p(-(correlation**2)))
+
+        limits = (0.0, _CORRELATED)
+        likeliest = minimize_scalar(
+            unlikely, bounds=limits, method="bounded", options={"xatol": _NEAR}
+        )
+        return tried[float(likeliest.x)]
 
     def chosen(self, names: Iterable[Key]) -> list[int]:
         """Places of the suspects among some names."""

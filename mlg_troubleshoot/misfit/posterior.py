@@ -30,7 +30,8 @@ class MisfitPosterior:
     nothing of any name does. unlisted: that something acts that is on no list. together:
     probability of each set of names. of_effect, shape (p,): of each effect. over_nothing, shape
     (p,): logarithm of the odds of each alone against nothing at all. expected_in, shape (n,):
-    expected effect on each row of all that acts but slips.
+    expected effect on each row of all that acts but slips. log_evidence: logarithm of the
+    likelihood of the data under all that was looked at, up to a constant of the rows.
     """
 
     effects: Effects
@@ -43,6 +44,7 @@ class MisfitPosterior:
     nothing: float
     unlisted: float
     expected_in: Array
+    log_evidence: float = 0.0
 
     def names_of(self, found: Explanation) -> frozenset[Key]:
         """Names of what an explanation has, slips left out."""
@@ -277,4 +279,5 @@ class _Search:
             nothing,
             unlisted,
             expected,
+            whole,
         )

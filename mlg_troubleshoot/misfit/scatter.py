@@ -40,6 +40,8 @@ class Readings:
     """Where readings stand: their outputs, groups, and declared standard uncertainty.
 
     floor: scatter that each has at least, as a number of limited digits. [unit of the readings]
+    series: number of the series in which each row follows others, and when in usual steps; None
+    where rows stand alone.
     """
 
     row: Wholes
@@ -47,12 +49,18 @@ class Readings:
     group: Wholes | None
     declared: Array | None
     floor: float = 1e-300
+    series: tuple[Wholes, Array] | None = None
 
-    def noise(self, scale: Array, free: Array) -> tuple[NoiseModel, Array]:
+    def noise(
+        self, scale: Array, free: Array, correlation: float = 0.0
+    ) -> tuple[NoiseModel, Array]:
         """Noise in the unit of each output's scatter, free columns absorbed, and these units."""
         unit, tails = np.empty(len(scale)), np.zeros(len(scale), np.int64)
+        chain = None if self.series is None else self.series[0][self.row] * len(self.outputs)
         for place, index in enumerate(self.outputs):
             unit[index] = np.median(scale[index])
+            if chain is not None:
+                chain[index] += place
             if self.group is not None:
                 tails[index] = self.group[self.row[index]] * len(self.outputs) + place
         relative, grouped = scale / unit, self.group is not None
@@ -70,6 +78,9 @@ class Readings:
             scale_in=1.0,
             absorbed=basis.shape[1],
             tail_chances=tuple(chances.tolist()) if grouped else (),
+            chain=chain,
+            time=None if self.series is None else self.series[1][self.row],
+            correlation=correlation,
         )
         return noise, unit
 

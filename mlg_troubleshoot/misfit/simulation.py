@@ -14,10 +14,10 @@ from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.held_out import folds_of
+from mlg_troubleshoot.misfit.held_out import blocks_of, folds_of
 from mlg_troubleshoot.misfit.linearised import FittedPoint, JudgedPoint, Study, key_of
 from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
-from mlg_troubleshoot.misfit.simulation_inputs import checked
+from mlg_troubleshoot.misfit.simulation_inputs import checked, followed
 from mlg_troubleshoot.misfit.simulation_result import (
     HeldOutGain,
     SimulationDiagnosis,
@@ -28,6 +28,8 @@ from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 # Share of the squared misfit that a cause takes away beside a discrepancy: most of it.
 _MOST_OF_IT = 0.5
+# Standard errors by which a row resembles the one before it, that chance exceeds once in 1,000.
+_ALIKE = 3.1
 
 
 def diagnose_simulation(
@@ -38,6 +40,9 @@ def diagnose_simulation(
     groups: ArrayLike | None = None,
     reading_u: ArrayLike | None = None,
     beliefs: Beliefs | None = None,
+    *,
+    series: ArrayLike | None = None,
+    time: ArrayLike | None = None,
 ) -> SimulationDiagnosis:
     """Find which parameters of a simulation its measured data show to be wrong.
 
@@ -67,6 +72,12 @@ def diagnose_simulation(
     beliefs : Beliefs, optional
         What is believed before a measured value is looked at, and from which probability a cause is
         named.
+    series : array_like, shape (n,), optional
+        Labels of rows that follow each other: their scatter is correlated, the more the nearer they
+        stand, by an amount that is estimated. Stretches of rows are held out for the gain.
+    time : array_like, shape (n,), optional
+        When each row of a series was read, numbers or dates; without it steps are equal, in the
+        order given.
 
     Returns
     -------
@@ -80,10 +91,12 @@ def diagnose_simulation(
         gives no number.
     """
     data, declared, group = checked(measured, suspects, nuisance, groups, reading_u)
+    follows = followed(series, time, len(data))
     runner = Runner(predict, data, [*suspects, *nuisance])
     # The matrices are small: threads that wait for each other cost several times what they save.
     with threadpool_limits(1, "blas"):
-        return _diagnosed(Study(runner, len(suspects), declared, group, beliefs or Beliefs()))
+        study = Study(runner, len(suspects), declared, group, beliefs or Beliefs(), follows)
+        return _diagnosed(study)
 
 
 def _diagnosed(study: Study) -> SimulationDiagnosis:
@@ -119,6 +132,8 @@ def _diagnosed(study: Study) -> SimulationDiagnosis:
             float(np.median(at.weight[own])) if np.any(own := runner.output == k) else float("nan")
             for k in range(runner.shape[1])
         ),
+        correlation=at.noise.correlation,
+        in_sequence=report.in_sequence(),
         calls=runner.calls,
     )
 
@@ -139,7 +154,8 @@ def _causes(study: Study, at: JudgedPoint) -> list[int]:
     for k in causes[::-1]:
         others = [j for j in causes if j != k]
         before, after = (
-            _held_out(study, at, at.point, fitted, causes)[0] for fitted in (others, causes)
+            _held_out(study, at, at.point, fitted, causes, whole=False)[0]
+            for fitted in (others, causes)
         )
         change = abs(float(at.linear([k, *others], 0).values[0]))
         if after @ after >= before @ before or change < _reach(study, at, k, others):
@@ -152,7 +168,7 @@ def _reach(study: Study, at: JudgedPoint, k: int, others: Sequence[int]) -> floa
     [trials]
     """
     context = at.follows.reported([key_of(study.runner.names[k])]).context
-    degrees = max(len(at.unit) - at.noise.absorbed - len(others) - 1, 1)
+    degrees = max(at.noise.worth - at.noise.absorbed - len(others) - 1, 1.0)
     return float(student.ppf(0.975, degrees) * at.linear([k, *others], context).errors[0])
 
 
@@ -170,14 +186,23 @@ def _share(at: JudgedPoint, others: Sequence[int], k: int) -> float:
 
 
 def _held_out(
-    study: Study, at: JudgedPoint, point: FittedPoint, fitted: Sequence[int], acting: Sequence[int]
+    study: Study,
+    at: JudgedPoint,
+    point: FittedPoint,
+    fitted: Sequence[int],
+    acting: Sequence[int],
+    whole: bool = True,
 ) -> tuple[Array, str]:
-    """Misfit of rows held out over their scatter, some causes fitted to the others; rows are held
-    out by group as long as the others teach what acts.
+    """Misfit of rows held out over their scatter, some causes fitted to the others, or what of it
+    is new in each row; rows are held out by group as long as the others teach what acts.
     """
-    columns = point.columns / at.weight[:, None]
-    part, by = folds_of(study.runner.row, study.group, columns[:, list(acting)], study.fold)
-    return held_out(columns, point.whole / at.weight, fitted, study.nuisance, part), by
+    row, both = study.runner.row, np.column_stack([point.columns, point.whole]) / at.unit[:, None]
+    both = both / at.noise.relative[:, None] if whole else at.noise.own(both)
+    columns, rest = both[:, :-1], both[:, -1]
+    part, by = folds_of(row, study.group, columns[:, list(acting)], study.fold)
+    if by == "row" and study.series is not None:
+        part, by = blocks_of(*study.series)[row], "block"
+    return held_out(columns, rest, fitted, study.nuisance, part), by
 
 
 @dataclass(frozen=True)
@@ -219,6 +244,15 @@ class _Report:
         after, by = _held_out(self.study, self.at, self.final, self.causes, self.causes)
         rms = [float(np.sqrt(np.mean((left * self.at.weight) ** 2))) for left in (before, after)]
         return HeldOutGain(rms[0], rms[1], by)
+
+    def in_sequence(self) -> bool:
+        """True if what is new in a row still resembles what is new in the row before it."""
+        own, _spare = self.at.settled(self.causes, 0).own_part(self.final.rest / self.at.unit)
+        own, along, square = own / self.at.noise.relative, 0.0, 0.0
+        for index in self.study.outputs:
+            along += float(own[index][1:] @ own[index][:-1])
+            square += float(own[index] @ own[index])
+        return along > _ALIKE * square / np.sqrt(len(own))
 
     def remainder_p(self) -> float:
         """p-value of the smooth shape that stands out most in the residual, as one of all of them

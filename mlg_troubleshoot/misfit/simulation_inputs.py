@@ -43,6 +43,57 @@ def checked(
     return data, _declared(reading_u, data), _groups(groups, len(data))
 
 
+def followed(
+    series: ArrayLike | None, time: ArrayLike | None, n: int
+) -> tuple[Wholes, Array] | None:
+    """Series of each row as numbers, and when it was read in usual steps of a series."""
+    if series is None:
+        if time is not None:
+            raise UsageError(
+                "time was given without series", "say with series= which rows follow each other"
+            )
+        return None
+    chain, when = _labels(series, n, "series"), _times(time, n)
+    order = np.lexsort((when, chain))
+    step = np.diff(when[order])[np.diff(chain[order]) == 0]
+    if np.any(step <= 0.0):
+        place = order[:-1][np.diff(chain[order]) == 0][int(np.argmin(step))]
+        raise UsageError(
+            f"two rows of one series were read at the same time, row {place} (counted from 0)"
+            " and another",
+            "give each a time of its own, or a series of its own",
+        )
+    usual = float(np.median(step)) if len(step) else 1.0
+    return chain, when / usual
+
+
+def _times(time: ArrayLike | None, n: int) -> Array:
+    """When rows were read, as numbers; in the order given where nobody says."""
+    if time is None:
+        return np.arange(n, dtype=float)
+    given = np.asarray(time)
+    if given.dtype.kind == "M":
+        given = (given - given.min()) / np.timedelta64(1, "s")
+    when = _numbers(given, "time")
+    if when.shape != (n,) or not np.isfinite(when).all():
+        raise UsageError(
+            f"time has shape {when.shape} and {int((~np.isfinite(when)).sum())} values that are no"
+            f" number; there are {n} rows",
+            "give one number or one date for each row",
+        )
+    return when
+
+
+def _labels(labels: ArrayLike, n: int, name: str) -> Wholes:
+    """One number for each different label."""
+    given = np.asarray(labels)
+    if given.shape != (n,):
+        raise UsageError(
+            f"{name} has shape {given.shape}, there are {n} rows", "give one label for each row"
+        )
+    return np.unique(given.astype(str), return_inverse=True)[1].astype(np.int64)
+
+
 def _numbers(values: ArrayLike, name: str) -> Array:
     try:
         return np.array(values, float)
@@ -98,10 +149,5 @@ def _declared(reading_u: ArrayLike | None, data: Array) -> Array | None:
 def _groups(groups: ArrayLike | None, n: int) -> Wholes | None:
     if groups is None:
         return None
-    labels = np.asarray(groups)
-    if labels.shape != (n,):
-        raise UsageError(
-            f"groups has shape {labels.shape}, there are {n} rows", "give one label for each row"
-        )
-    numbers = np.unique(labels.astype(str), return_inverse=True)[1].astype(np.int64)
+    numbers = _labels(groups, n, "groups")
     return numbers if numbers.max() > 0 else None

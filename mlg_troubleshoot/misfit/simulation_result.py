@@ -97,7 +97,7 @@ class HeldOutGain:
     rms_after : float
         The same with the causes fitted. [unit of the readings]
     held_out_by : str
-        What was held out together: ``group`` or ``row``.
+        What was held out together: ``group``, ``row``, or ``block``: rows that follow each other.
     """
 
     rms_before: float
@@ -140,6 +140,12 @@ class SimulationDiagnosis(Result):
     noise : tuple of float
         Standard deviation of a reading of each output, as it is estimated with all suspects fitted.
         [unit of the readings]
+    correlation : float
+        Of the scatter of two rows of a series, one usual step apart; 0 where no series was given.
+        [1]
+    in_sequence : bool
+        True if what is left of a row resembles what is left of the row before it, in the order
+        given, although no series says so: then chances are too sharp, and `series` should be given.
     calls : int
         Times that the simulation was called.
     """
@@ -156,6 +162,8 @@ class SimulationDiagnosis(Result):
     remainder_p: float
     smallest_detectable_rms: float
     noise: tuple[float, ...]
+    correlation: float
+    in_sequence: bool
     calls: int
 
     @property
