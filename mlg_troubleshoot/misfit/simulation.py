@@ -32,7 +32,7 @@ _MOST_OF_IT = 0.5
 _ALIKE = 3.1
 
 
-def diagnose_simulation(
+def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong, how rows belong together
     predict: Callable[[Mapping[str, float]], Any],
     measured: ArrayLike,
     suspects: Sequence[Suspect],
@@ -252,7 +252,7 @@ class _Report:
         for index in self.study.outputs:
             along += float(own[index][1:] @ own[index][:-1])
             square += float(own[index] @ own[index])
-        return along > _ALIKE * square / np.sqrt(len(own))
+        return bool(along > _ALIKE * square / np.sqrt(len(own)))
 
     def remainder_p(self) -> float:
         """p-value of the smooth shape that stands out most in the residual, as one of all of them

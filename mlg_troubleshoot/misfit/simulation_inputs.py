@@ -77,8 +77,8 @@ def _times(time: ArrayLike | None, n: int) -> Array:
     when = _numbers(given, "time")
     if when.shape != (n,) or not np.isfinite(when).all():
         raise UsageError(
-            f"time has shape {when.shape} and {int((~np.isfinite(when)).sum())} values that are no"
-            f" number; there are {n} rows",
+            f"time has shape {when.shape}, {int((~np.isfinite(when)).sum())} of its values are not"
+            f" finite; there are {n} rows",
             "give one number or one date for each row",
         )
     return when

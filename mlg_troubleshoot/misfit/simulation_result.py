@@ -144,8 +144,8 @@ class SimulationDiagnosis(Result):
         Of the scatter of two rows of a series, one usual step apart; 0 where no series was given.
         [1]
     in_sequence : bool
-        True if what is left of a row resembles what is left of the row before it, in the order
-        given, although no series says so: then chances are too sharp, and `series` should be given.
+        True if residuals of neighbouring rows are correlated in the order given, although no series
+        says so: then probabilities are too sharp, and `series` should be given.
     calls : int
         Times that the simulation was called.
     """
