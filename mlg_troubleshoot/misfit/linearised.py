@@ -283,17 +283,19 @@ class Study:
 
         if self.series is None:
             return judged(0.0)
-        tried = dict[float, JudgedPoint]()
 
         def unlikely(correlation: float) -> float:
-            tried[correlation] = at = judged(correlation)
-            return -at.follows.posterior.log_evidence - float(np.log1p(-(correlation**2)))
+            evidence = judged(correlation).follows.posterior.log_evidence
+            return -evidence - float(np.log1p(-(correlation**2)))
 
         limits = (0.0, _CORRELATED)
         likeliest = minimize_scalar(
             unlikely, bounds=limits, method="bounded", options={"xatol": _NEAR}
         )
-        return tried[float(likeliest.x)]
+        # One standard error more (Fisher's z): too little would make everything too sure.
+        follow = len(point.rest) - len(self.outputs) * len(np.unique(self.series[0]))
+        z = float(np.arctanh(likeliest.x)) + 1.0 / np.sqrt(max(follow, 1))
+        return judged(min(float(np.tanh(z)), _CORRELATED))
 
     def chosen(self, names: Iterable[Key]) -> list[int]:
         """Places of the suspects among some names."""

@@ -112,6 +112,7 @@ def _diagnosed(study: Study) -> SimulationDiagnosis:
         # Held-out rows veto what these rows name.
         verdict, open_ = Verdict.AMBIGUOUS, study.chosen(at.follows.sure)
     often, n = study.often, len(at.unit)
+    in_sequence = report.in_sequence()
     smallest = study.beliefs.seen_from(often, n) * float(np.sqrt(np.mean(at.unit**2) / n))
     described = [report.describe(k) for k in causes]
     return SimulationDiagnosis(
@@ -133,9 +134,26 @@ def _diagnosed(study: Study) -> SimulationDiagnosis:
             for k in range(runner.shape[1])
         ),
         correlation=at.noise.correlation,
-        in_sequence=report.in_sequence(),
+        in_sequence=in_sequence,
+        notes=_notes(study, in_sequence),
         calls=runner.calls,
     )
+
+
+def _notes(study: Study, in_sequence: bool) -> tuple[str, ...]:
+    """What a reader must know before the numbers are used, as sentences."""
+    notes = []
+    if in_sequence and study.series is None:
+        notes.append(
+            "Residuals of neighbouring rows are correlated: probabilities and intervals are too"
+            " sharp. State with series= (and time=) which rows follow each other."
+        )
+    elif in_sequence:
+        notes.append(
+            "Residuals are correlated further than one correlation from row to row explains:"
+            " probabilities and intervals may be too sharp."
+        )
+    return tuple(notes)
 
 
 def _causes(study: Study, at: JudgedPoint) -> list[int]:
@@ -246,9 +264,14 @@ class _Report:
         return HeldOutGain(rms[0], rms[1], by)
 
     def in_sequence(self) -> bool:
-        """True if what is new in a row still resembles what is new in the row before it."""
-        own, _spare = self.at.settled(self.causes, 0).own_part(self.final.rest / self.at.unit)
-        own, along, square = own / self.at.noise.relative, 0.0, 0.0
+        """True if what the likeliest explanation leaves of a row resembles what it leaves of the
+        row before it, the known correlation taken out.
+        """
+        at = self.at
+        chosen = self.study.chosen(at.follows.posterior.names_of(at.likeliest))
+        noise = at.settled(chosen, 0 if self.study.series is None else at.likeliest.context)
+        own, _spare = noise.own_part(at.point.rest / at.unit)
+        own, along, square = own / at.noise.relative, 0.0, 0.0
         for index in self.study.outputs:
             along += float(own[index][1:] @ own[index][:-1])
             square += float(own[index] @ own[index])

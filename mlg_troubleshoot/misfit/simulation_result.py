@@ -141,11 +141,13 @@ class SimulationDiagnosis(Result):
         Standard deviation of a reading of each output, as it is estimated with all suspects fitted.
         [unit of the readings]
     correlation : float
-        Of the scatter of two rows of a series, one usual step apart; 0 where no series was given.
-        [1]
+        Of the scatter of two rows of a series one usual step apart, one standard error more than is
+        likeliest; 0 where no series was given. [1]
     in_sequence : bool
-        True if residuals of neighbouring rows are correlated in the order given, although no series
-        says so: then probabilities are too sharp, and `series` should be given.
+        True if residuals of neighbouring rows are correlated in the order given, beyond what
+        `series` accounts for: then probabilities are too sharp.
+    notes : tuple of str
+        What to know before these numbers are used, one sentence or two each; empty if nothing.
     calls : int
         Times that the simulation was called.
     """
@@ -164,6 +166,7 @@ class SimulationDiagnosis(Result):
     noise: tuple[float, ...]
     correlation: float
     in_sequence: bool
+    notes: tuple[str, ...]
     calls: int
 
     @property
