@@ -15,7 +15,7 @@ import pytest
 from mlg_troubleshoot import schemas
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.output_types import CheckedInspection, CheckedJoint, CheckOutput
+from mlg_troubleshoot.json_outputs import CheckedInspection, CheckedJoint, CheckOutput
 from mlg_troubleshoot.store import RecordKind
 from tests.cli.conftest import FAILURE, FLEET, HAND, mlg, row
 from tests.hidden_effect.simulator.generate import draw_fleet, write_csv

@@ -44,7 +44,9 @@ class Run:
             output.say("Note: --format is for reports: without --report DIR none is written.")
         extensions = wanted.extension or ()
         causes = wanted.causes or ()
-        self._files, self._flags, self._wanted = files, flags, wanted
+        self._files = files
+        self._flags = flags
+        self._wanted = wanted
         self._asks = not (files or flags.values)
         outputs = [OutputFile("--csv", wanted.csv, task.VERDICTS)]
         if wanted.annotate is not None:
@@ -132,7 +134,8 @@ class Run:
         )
         entry = ask(given, saved=saved)
         while True:
-            inspection, visit = entry.inspection, entry.visit
+            inspection = entry.inspection
+            visit = entry.visit
             answers = entry.session.answers if visit is None else visit.answers
             before = None
             if visit is None and answers.continues:

@@ -64,7 +64,7 @@ def diagnose(
     from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
     from mlg_troubleshoot.diagnosis import EXTENSION
     from mlg_troubleshoot.diagnosis import write_extension as keep_extension
-    from mlg_troubleshoot.output_types import NotConcluded
+    from mlg_troubleshoot.json_outputs import NotConcluded
     from mlg_troubleshoot.outputs import OutputFile
     from mlg_troubleshoot.reporting.json_form import diagnosis_as_json, written
     from mlg_troubleshoot.workflows import diagnose as task

@@ -21,7 +21,7 @@ def doctor(
 
     findings = task.examine_installation(gear)
     if as_json:
-        from mlg_troubleshoot.output_types import DoctorOutput
+        from mlg_troubleshoot.json_outputs import DoctorOutput
         from mlg_troubleshoot.reporting.json_form import written
 
         output.write_json(written(DoctorOutput, abilities=findings))

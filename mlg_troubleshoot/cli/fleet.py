@@ -28,7 +28,7 @@ def _verdict(text: str) -> str:
 
 
 def _order(text: str) -> str:
-    from mlg_troubleshoot.life.outlook import Order
+    from mlg_troubleshoot.life.landings_left import Order
 
     return options.one_of(Order, text, "--sort")
 
@@ -68,7 +68,7 @@ def fleet(
     """
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.life.outlook import Order
+    from mlg_troubleshoot.life.landings_left import Order
     from mlg_troubleshoot.life.unrecorded_work import suggestions
     from mlg_troubleshoot.reporting.life_json import FLEET_CSV, fleet_as_json
     from mlg_troubleshoot.workflows.history import show_fleet
@@ -100,7 +100,7 @@ def fleet(
 
 def _show(found: Lives) -> None:
     from mlg_troubleshoot.cli.views.tables import STYLES, Cell, lines_of
-    from mlg_troubleshoot.life.outlook import fleet_lines, landings_shown, work_sentence
+    from mlg_troubleshoot.life.landings_left import fleet_lines, landings_shown, work_sentence
 
     console = output.console()
     gear = found.gear
@@ -143,7 +143,7 @@ def _show(found: Lives) -> None:
 
 
 def _left(ends: Quantiles | None, gear: Gear) -> str:
-    from mlg_troubleshoot.life.outlook import landings_shown
+    from mlg_troubleshoot.life.landings_left import landings_shown
 
     if ends is None:
         return "-"

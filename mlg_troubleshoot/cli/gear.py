@@ -90,7 +90,7 @@ def verify(
     numbers = verification.verify(gear)
     failed = [n for n in numbers if n.target.expected and not n.holds]
     if as_json:
-        from mlg_troubleshoot.output_types import VerifyOutput
+        from mlg_troubleshoot.json_outputs import VerifyOutput
         from mlg_troubleshoot.reporting.json_form import written
 
         output.write_json(
@@ -124,7 +124,7 @@ def verify(
 
 
 def _number(n: Computed) -> dict[str, object]:
-    from mlg_troubleshoot.output_types import VerifiedNumber
+    from mlg_troubleshoot.json_outputs import VerifiedNumber
     from mlg_troubleshoot.reporting.json_form import written
 
     own = {"computed": n.computed, "status": n.status, "holds": n.holds}

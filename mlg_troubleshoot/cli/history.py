@@ -175,8 +175,8 @@ def _show_advice(console: output.DataConsole, advice: Advice) -> None:
 
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
     from mlg_troubleshoot.cli.views.tables import lines_of
+    from mlg_troubleshoot.life.landings_left import outlook_sentence
     from mlg_troubleshoot.life.looking_back import Advice
-    from mlg_troubleshoot.life.outlook import outlook_sentence
     from mlg_troubleshoot.reporting.life_json import life_as_json
 
     console = output.console(unit=unit)
@@ -212,7 +212,7 @@ def _show_joints(
     from mlg_troubleshoot.cli.views.tables import lines_of
     from mlg_troubleshoot.cli.views.wear import wear_lines
     from mlg_troubleshoot.decision.sentences import joint_list
-    from mlg_troubleshoot.life.outlook import span
+    from mlg_troubleshoot.life.landings_left import span
     from mlg_troubleshoot.life.wear_paths import stretches
 
     headings = (

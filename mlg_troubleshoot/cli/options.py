@@ -278,7 +278,8 @@ def _in_panel(hint: Any, panel: str | None) -> Any:
     """An option in a panel of the help."""
     if panel is None:
         return hint
-    kind, option = hint.__origin__, copy(hint.__metadata__[0])
+    kind = hint.__origin__
+    option = copy(hint.__metadata__[0])
     option.rich_help_panel = panel
     return Annotated[kind, option]
 

@@ -38,7 +38,7 @@ def separable(
     gear = context.obj or DEFAULT_GEAR
     causes = planned(gear, names)
     if as_json:
-        from mlg_troubleshoot.output_types import SeparableOutput
+        from mlg_troubleshoot.json_outputs import SeparableOutput
         from mlg_troubleshoot.reporting.json_form import written
 
         output.write_json(written(SeparableOutput, columns=names, causes=causes))

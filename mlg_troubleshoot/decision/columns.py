@@ -290,7 +290,7 @@ LANDINGS = Column(
     name="gear_landings",
     holds=Holds.NUMBER,
     meaning="Landings since overhaul, 0 or more.",
-    high=1e6,
+    high=1_000_000,
     unit="landings",
     expected="landings since overhaul, {low:g} or more",
     spellings=(
@@ -337,7 +337,7 @@ ACTUATOR_EXTENSION = Column(
         "Extension of the actuator from Down Lock of a reading along the stroke; of use only with"
         " plunger_position."
     ),
-    high=5.0,
+    high=5,
     in_template=False,
     covariate=10,
     effort=10,
@@ -349,8 +349,8 @@ PLUNGER_POSITION = Column(
         "Plunger position of a reading along the stroke, zero as for plunger_down_lock; of use only"
         " with actuator_extension."
     ),
-    low=-2.0,
-    high=2.0,
+    low=-2,
+    high=2,
     in_template=False,
 )
 MARGIN = Column(
@@ -384,8 +384,8 @@ TEMPERATURE = Column(
     name="temperature_c",
     holds=Holds.NUMBER,
     meaning="Temperature in degrees Celsius, {low:g} to {high:g}.",
-    low=-60.0,
-    high=60.0,
+    low=-60,
+    high=60,
     unit="°C",
     expected="a temperature from {low:g} to {high:g} degrees Celsius",
     spellings="temp c",
@@ -397,7 +397,7 @@ PRESSURE = Column(
     name="hydraulic_pressure_psi",
     holds=Holds.NUMBER,
     meaning="Hydraulic pressure in psi, {low:g} to {high:g}.",
-    high=4000.0,
+    high=4000,
     unit="psi",
     expected="a pressure from {low:g} to {high:g} psi",
     spellings="pressure psi",

@@ -14,7 +14,7 @@ from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.decision.wear_levels import TOO_CLOSE, Unread, level_chances
 
 # At a conformance probability of 95 % one wrong WITHIN weighs as much as this many wrong OUTSIDE.
-COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
+COST_OF_WRONG_WITHIN = CONFORMANCE / (1 - CONFORMANCE)
 # A drop in risk below this is rounding: the reading has no value of its own.
 _NO_VALUE = 1e-6
 # An expectation is enough where being wrong costs at most this share of what a just conforming

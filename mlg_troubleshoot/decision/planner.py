@@ -49,7 +49,7 @@ _MOST_EXTRA = 2
 # They are chosen among as many joints, those that move the plunger most.
 _MOST_TRIED = 6
 # What one repair may be above the chance that the shop accepts over all: most are far below it. [1]
-_FOR_ONE_REPAIR = 3.0
+_FOR_ONE_REPAIR = 3
 
 
 def _correction(text: str) -> Plan:

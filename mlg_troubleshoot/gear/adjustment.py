@@ -73,14 +73,17 @@ def adjusted_worst_case(model: LinkageModel, adjustment: Adjustment) -> WorstCas
     loaded, twice.
     """
     plain = worst_case(model, adjustment.clearance_in, adjustment.numbers(model))
-    over, under = plain.over_in, plain.under_in
+    over = plain.over_in
+    under = plain.under_in
     if adjustment.direction_factors is not None:
         links = links_from(adjustment.acting_in, plain.over_directions)
         over = under = model.displacement(links, adjustment.numbers(model))
     if adjustment.rate_factor is not None:
-        over, under = over * adjustment.rate_factor, under * adjustment.rate_factor
+        over = over * adjustment.rate_factor
+        under = under * adjustment.rate_factor
     if adjustment.offset_in is not None:
-        over, under = over + adjustment.offset_in, under + adjustment.offset_in
+        over = over + adjustment.offset_in
+        under = under + adjustment.offset_in
     return WorstCase(over, under, plain.over_directions, plain.under_directions)
 
 
@@ -88,8 +91,10 @@ def adjusted_slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCas
     """Amplification of each clearance to the plunger at the clearances that act, directions held,
     shape (n, n_joints): central differences. [1]
     """
-    clearance, joints = adjustment.clearance_in, adjustment.clearance_in.shape[1]
-    directions, changed = worst.governing_directions, adjustment.numbers(model)
+    clearance = adjustment.clearance_in
+    joints = adjustment.clearance_in.shape[1]
+    directions = worst.governing_directions
+    changed = adjustment.numbers(model)
     steps = STEP * np.concatenate([np.eye(joints), -np.eye(joints)])[:, None, :]
     factors = 1.0 if adjustment.direction_factors is None else adjustment.direction_factors
     slopes = np.empty_like(clearance)

@@ -61,18 +61,21 @@ class DesignSpace:
         place.
         """
         m = linkage.mechanism
-        held, guide = m.point(self.held.name), m.point(self.guide.name)
+        held = m.point(self.held.name)
+        guide = m.point(self.guide.name)
         base = m.planes[0].name
         turn = np.arctan2(self.guide.y - self.held.y, self.guide.x - self.held.x)
         back = turn - np.arctan2(guide.y - held.y, guide.x - held.x)
         values: list[float] = [_distance(guide, held)]
         for point in map(m.point, self.points):
-            x, y = point.x, point.y
+            x = point.x
+            y = point.y
             if point.plane == base and (back or (held.x, held.y) != (self.held.x, self.held.y)):
                 moved = complex(x - held.x, y - held.y) * np.exp(1j * back) + complex(
                     self.held.x, self.held.y
                 )
-                x, y = moved.real, moved.imag
+                x = moved.real
+                y = moved.imag
             values += [x, y]
         for plane in m.planes:
             if plane.parent is not None:

@@ -20,7 +20,7 @@ from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.results import Result
 
 # Directions around a joint among which the worst one is bracketed. [rad]
-_ANGLES = 2.0 * np.pi * np.arange(8) / 8
+_ANGLES = np.pi * np.arange(8) / 4
 _ROOT_HALF = np.sqrt(0.5)
 # A joint without clearance still has a direction in which it would act: found with this length.
 _PROBE_IN = STEP
@@ -94,7 +94,9 @@ def worst_of_sense(
     """
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
     n, joints = clearance.shape
-    moved, angles, senses = np.empty(n), np.empty((n, joints)), np.broadcast_to(sense, n)
+    moved = np.empty(n)
+    angles = np.empty((n, joints))
+    senses = np.broadcast_to(sense, n)
     for start in range(0, n, _ROWS):
         rows = slice(start, min(start + _ROWS, n))
         part = {name: np.asarray(value)[rows] for name, value in (changed or {}).items()}
@@ -131,10 +133,12 @@ def _argmax_on_circle(sampled: Array) -> Array:
     angle: Array = _ANGLES[np.argmax(sampled, axis=0)]
     real, imaginary = _harmonics(np.nan_to_num(sampled))
     for _ in range(4):
-        c, s = np.cos(angle), np.sin(angle)
+        c = np.cos(angle)
+        s = np.sin(angle)
         cosines = (c, c * c - s * s, c * (c * c - 3.0 * (s * s)))
         sines = (s, 2.0 * (s * c), s * (3.0 * (c * c) - s * s))
-        slope, curvature = np.zeros_like(angle), np.zeros_like(angle)
+        slope = np.zeros_like(angle)
+        curvature = np.zeros_like(angle)
         for k in range(3):
             slope -= (k + 1) * (real[k] * sines[k] + imaginary[k] * cosines[k])
             curvature -= (k + 1) ** 2 * (real[k] * cosines[k] - imaginary[k] * sines[k])
@@ -147,8 +151,10 @@ def _harmonics(sampled: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     """Real and imaginary parts of the first three terms of the discrete Fourier transform of eight
     samples.
     """
-    even, odd = sampled[:4] + sampled[4:], sampled[:4] - sampled[4:]
-    near, far = (odd[1] - odd[3]) * _ROOT_HALF, (odd[1] + odd[3]) * _ROOT_HALF
+    even = sampled[:4] + sampled[4:]
+    odd = sampled[:4] - sampled[4:]
+    near = (odd[1] - odd[3]) * _ROOT_HALF
+    far = (odd[1] + odd[3]) * _ROOT_HALF
     return (odd[0] + near, even[0] - even[2], odd[0] - near), (
         -odd[2] - far,
         even[3] - even[1],
@@ -191,7 +197,8 @@ def chance_beyond(
     """
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
     turns = random_directions(clearance.shape[1], n)
-    cosines, sines = np.ascontiguousarray(np.cos(turns).T), np.ascontiguousarray(np.sin(turns).T)
+    cosines = np.ascontiguousarray(np.cos(turns).T)
+    sines = np.ascontiguousarray(np.sin(turns).T)
     chance = np.empty(len(clearance))
     margin = np.asarray(margin_in)
     rows = max(1, IN_CACHE // n)

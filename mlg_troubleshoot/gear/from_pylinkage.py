@@ -236,7 +236,8 @@ def _of_components(linkage: Any) -> dict[str, Any]:
                 links += [{"id": f"{p}-{part.name}", "joints": [p, part.name]} for p in ends]
             case "RRPDyad" if _stand_still(part.line_anchor1, part.line_anchor2):
                 (end,) = _names([part.revolute_anchor])
-                a, b = part.line_anchor1, part.line_anchor2
+                a = part.line_anchor1
+                b = part.line_anchor2
                 joint |= {"type": "prismatic", "axis": [b.x - a.x, b.y - a.y]}
                 links.append({"id": f"{end}-{part.name}", "joints": [end, part.name]})
             case "RRPDyad":

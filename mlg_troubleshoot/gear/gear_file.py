@@ -73,10 +73,10 @@ _RESTORE_MIN = 120.0
 
 # Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
 # overflow.
-Coordinate = Annotated[float, Meta(ge=-1e4, le=1e4)]
-Length = Annotated[float, Meta(gt=0, le=1e4)]
+Coordinate = Annotated[float, Meta(ge=-10_000, le=10_000)]
+Length = Annotated[float, Meta(gt=0, le=10_000)]
 Angle = Annotated[float, Meta(ge=-720, le=720)]
-Minutes = Annotated[float, Meta(gt=0, le=1e5)]
+Minutes = Annotated[float, Meta(gt=0, le=100_000)]
 LinkNumber = Annotated[int, Meta(ge=1, le=999)]
 
 
@@ -119,7 +119,8 @@ class PlaneTable(Table):
                 raise RefusedValueError(key, expected if self.parent else "it with a parent only")
 
     def plane(self) -> Plane:
-        direction, dihedral = self.hinge_direction_deg or 0.0, self.dihedral_deg or 0.0
+        direction = self.hinge_direction_deg or 0.0
+        dihedral = self.dihedral_deg or 0.0
         turned = float(np.radians(direction)), float(np.radians(dihedral))
         return Plane(self.name, self.parent, self.hinge_point or "", *turned)
 

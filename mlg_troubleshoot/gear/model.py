@@ -75,7 +75,8 @@ class LinkageModel:
             strokes = np.linspace(low, high, 101)
             along = direction * self.kernel.output(strokes, self.kernel.no_clearance())
             least = int(np.argmin(along))
-            low, high = strokes[max(least - 1, 0)], strokes[min(least + 1, 100)]
+            low = strokes[max(least - 1, 0)]
+            high = strokes[min(least + 1, 100)]
         return float(direction * travel_in / (direction * self.mid - along[least]))
 
     def numbers(self, changed: Mapping[str, Any] | None) -> Sequence[Any] | None:
@@ -127,5 +128,6 @@ def links_from(clearance_in: Array, directions: Array) -> list[Array]:
     directions, shape (..., n_joints): directions in the plane of each joint. [rad]
     Returns: x and y of each joint in turn, each of the broadcast shape. [in]
     """
-    x, y = clearance_in * np.cos(directions), clearance_in * np.sin(directions)
+    x = clearance_in * np.cos(directions)
+    y = clearance_in * np.sin(directions)
     return [part[..., j] for j in range(x.shape[-1]) for part in (x, y)]

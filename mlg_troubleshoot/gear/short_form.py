@@ -30,7 +30,8 @@ MovingLine = tuple[Name, Name | Angle]
 _ASSUMED = "Not stated in the short form: assumed by the authors of this tool."
 _PLANE = "base"
 # A reading above twice the largest limit is asked again, one above five times is refused. [1]
-_CONFIRM_ABOVE, _HARD_LIMIT = 2.0, 5.0
+_CONFIRM_ABOVE = 2
+_HARD_LIMIT = 5
 # How far the end of an actuator may be drawn beside its guide. [in]
 _IN_LINE = 1e-6
 
@@ -179,7 +180,8 @@ class _Builder:
         ]:
             if point not in form.moving or len(self._lines(point)) > 2:
                 raise self.file.fail((table, point), "a moving point with at most two guides")
-        drive, read = form.input, form.output
+        drive = form.input
+        read = form.output
         links = [
             *((("slots", link), link) for link in form.slots),
             *((("input", key), getattr(drive, key)) for key in ("crank", "actuator")),
@@ -232,7 +234,8 @@ class _Builder:
             words = f"rigid on {rigid[0]} with {pivot} and {follows}"
             self._add(point, "lever", words, pivot=pivot, follows=follows)
         elif slotted:
-            link, pin = slotted[0], form.slots[slotted[0]]
+            link = slotted[0]
+            pin = form.slots[slotted[0]]
             words = f"{link} about {reach[link][0]}, turned by pin {pin} in its slot"
             self._add(point, "slot", words, pivot=reach[link][0], pin=pin)
         elif len(reach) > 1:
@@ -306,8 +309,10 @@ class _Builder:
             return link != drive, len(self.form.links[link]) > 2, ground
 
         first, second = sorted(list(reach)[:2], key=downstream_last)
-        upstream, downstream = reach[first][0], reach[second][0]
-        base, arm = self._at(downstream) - self._at(upstream), self._at(point) - self._at(upstream)
+        upstream = reach[first][0]
+        downstream = reach[second][0]
+        base = self._at(downstream) - self._at(upstream)
+        arm = self._at(point) - self._at(upstream)
         side = (base.conjugate() * arm).imag
         if abs(side) <= 1e-9 * abs(base) * abs(arm):
             expected = f"a place off the line from {upstream} to {downstream}: in line it may snap"

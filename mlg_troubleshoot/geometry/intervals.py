@@ -343,7 +343,8 @@ def cosine_range(angle: Interval) -> Interval:
     """Range of the cosine over ranges of angles. [rad, 1]"""
     # The margins cover the rounding of shifted angles and of the library's cosine.
     slack = 1e-15 + 4.0 * np.spacing(angle.magnitude)
-    low, high = angle.low - slack, angle.high + slack
+    low = angle.low - slack
+    high = angle.high + slack
     ends = np.cos(low), np.cos(high)
     top = np.floor(high / (2 * np.pi)) > np.floor(low / (2 * np.pi))
     bottom = np.floor((high - np.pi) / (2 * np.pi)) > np.floor((low - np.pi) / (2 * np.pi))

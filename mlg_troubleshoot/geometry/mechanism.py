@@ -281,13 +281,15 @@ class Mechanism:
             raise MechanismError(
                 f"Plane {plane!r} is hinged at {hinge.name!r}, which is not in {found.parent!r}."
             )
-        x, y, normal = axes[..., 0, :], axes[..., 1, :], axes[..., 2, :]
-        cosine, sine = (
-            _column(np.cos(found.hinge_direction)),
-            _column(np.sin(found.hinge_direction)),
-        )
-        turned, tilted = _column(np.cos(found.dihedral)), _column(np.sin(found.dihedral))
-        first, flat = cosine * x + sine * y, cosine * y - sine * x
+        x = axes[..., 0, :]
+        y = axes[..., 1, :]
+        normal = axes[..., 2, :]
+        cosine = _column(np.cos(found.hinge_direction))
+        sine = _column(np.sin(found.hinge_direction))
+        turned = _column(np.cos(found.dihedral))
+        tilted = _column(np.sin(found.dihedral))
+        first = cosine * x + sine * y
+        flat = cosine * y - sine * x
         new = np.broadcast_arrays(
             first, turned * flat + tilted * normal, turned * normal - tilted * flat
         )

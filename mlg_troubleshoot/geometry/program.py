@@ -221,7 +221,8 @@ def _travel(w: _Writer) -> str:
 
 def _crank(w: _Writer, step: Crank) -> None:
     w.same_plane(step, step.pivot)
-    joint, pivot = w.mechanism.point(step.joint), w.mechanism.point(step.pivot)
+    joint = w.mechanism.point(step.joint)
+    pivot = w.mechanism.point(step.pivot)
     length = w.length(step.pivot, step.joint)
     start = w.parameter(
         f"crank.{step.joint}.angle", np.arctan2(joint.y - pivot.y, joint.x - pivot.x)
@@ -243,13 +244,15 @@ def _dyad(w: _Writer, step: Dyad) -> None:
     ax, ay = w.starts[step.joint, step.upstream] = w.shifted(seen, step.virtual_links)
     bx, by = w.joints[step.downstream]
     reach = w.let(f"{first} + {_travel(w)}") if step.driven else first
-    dx, dy = w.let(f"{bx} - {ax}"), w.let(f"{by} - {ay}")
+    dx = w.let(f"{bx} - {ax}")
+    dy = w.let(f"{by} - {ay}")
     apart = w.let(f"{dx} * {dx} + {dy} * {dy}")
     inverse = w.let(f"1.0 / {apart}")
     if height is None:
         square = f"{reach} * {reach}"
         # Eq. 3 in factors (Heron): nothing cancels where the two links lie almost in line.
-        more, less = w.let(f"{reach} + {second}"), w.let(f"{reach} - {second}")
+        more = w.let(f"{reach} + {second}")
+        less = w.let(f"{reach} - {second}")
         along = w.let(f"0.5 + 0.5 * ({more} * {less}) * {inverse}")
         factors = w.let(f"({more} * {more} - {apart}) * ({apart} - {less} * {less})")
     else:
@@ -276,7 +279,8 @@ def _lever(w: _Writer, step: Lever) -> None:
     along = w.parameter(f"lever.{step.joint}.along", ratio.real)
     across = w.parameter(f"lever.{step.joint}.across", ratio.imag)
     (px, py), (fx, fy) = w.joints[step.pivot], w.joints[step.follows]
-    dx, dy = w.let(f"{fx} - {px}"), w.let(f"{fy} - {py}")
+    dx = w.let(f"{fx} - {px}")
+    dy = w.let(f"{fy} - {py}")
     place = (
         w.let(f"{px} + {along} * {dx} - {across} * {dy}"),
         w.let(f"{py} + {along} * {dy} + {across} * {dx}"),
@@ -294,7 +298,8 @@ def _slot(w: _Writer, step: Slot) -> None:
     across = w.parameter(f"arm.{step.joint}.across", arm.imag)
     px, py = w.joints[step.pivot]
     qx, qy = w.shifted(w.joints[step.pin], step.virtual_links)
-    dx, dy = w.let(f"{qx} - {px}"), w.let(f"{qy} - {py}")
+    dx = w.let(f"{qx} - {px}")
+    dy = w.let(f"{qy} - {py}")
     inverse = w.let(f"1.0 / sqrt({dx} * {dx} + {dy} * {dy})")
     w.joints[step.joint] = (
         w.let(f"{px} + ({along} * {dx} - {across} * {dy}) * {inverse}"),
@@ -312,7 +317,8 @@ def _slider(w: _Writer, step: Slider) -> None:
     oy = w.parameter(f"slider.{step.joint}.y", joint.y)
     seen, height = w.seen_from(step.upstream, joint.plane)
     ux, uy = w.starts[step.joint, step.upstream] = w.shifted(seen, step.virtual_links)
-    c, s = w.let(f"cos({axis})"), w.let(f"sin({axis})")
+    c = w.let(f"cos({axis})")
+    s = w.let(f"sin({axis})")
     square = w.let(f"{length} * {length}" + (f" - {height} * {height}" if height else ""))
     _slide(w, step.joint, (ox, oy, c, s), _reach((ox, oy, c, s), (ux, uy), square, sign, w))
 
@@ -331,7 +337,8 @@ def _slide(w: _Writer, joint: str, line: _Line, position: str) -> None:
 def _reach(line: _Line, end: tuple[str, str], square: str, sign: str, w: _Writer) -> str:
     """Where a link from `end` reaches a line, as a distance along it; square: of its length."""
     x, y, c, s = line
-    dx, dy = w.let(f"{end[0]} - {x}"), w.let(f"{end[1]} - {y}")
+    dx = w.let(f"{end[0]} - {x}")
+    dy = w.let(f"{end[1]} - {y}")
     across = w.let(f"{c} * {dy} - {s} * {dx}")
     return w.let(f"{c} * {dx} + {s} * {dy} + {sign} * sqrt({square} - {across} * {across})")
 
@@ -344,7 +351,8 @@ def _guided(w: _Writer, step: Guided) -> None:
         position = _travel(w)
     elif step.across is None:
         length = w.length(step.upstream, step.joint)
-        joint, end = w.mechanism.point(step.joint), w.mechanism.point(step.upstream)
+        joint = w.mechanism.point(step.joint)
+        end = w.mechanism.point(step.upstream)
         ahead = cosine * (joint.x - end.x) + sine * (joint.y - end.y)
         sign = w.parameter(f"sign.{step.joint}", 1.0 if ahead >= 0.0 else -1.0)
         end_at = w.shifted(w.joints[step.upstream], step.virtual_links)
@@ -355,7 +363,8 @@ def _guided(w: _Writer, step: Guided) -> None:
         at_x, at_y, along, over = _line_of(
             w, step, "across", step.upstream, step.across, step.virtual_links
         )[0]
-        dx, dy = w.let(f"{at_x} - {x}"), w.let(f"{at_y} - {y}")
+        dx = w.let(f"{at_x} - {x}")
+        dy = w.let(f"{at_y} - {y}")
         position = w.let(
             f"({dx} * {over} - {dy} * {along}) * (1.0 / ({c} * {over} - {s} * {along}))"
         )
@@ -368,20 +377,26 @@ def _line_of(
     """A line through a joint's reference position, carried by the points that it belongs to, and
     its direction there.
     """
-    joint, first = w.mechanism.point(step.joint), w.mechanism.point(start)
+    joint = w.mechanism.point(step.joint)
+    first = w.mechanism.point(start)
     x, y = w.shifted(w.joints[start], links)
     if isinstance(to, str):
-        second, length = w.mechanism.point(to), w.distance(start, to)
+        second = w.mechanism.point(to)
+        length = w.distance(start, to)
         direction = (second.x - first.x) / length, (second.y - first.y) / length
         to_x, to_y = w.shifted(w.joints[to], links)
-        dx, dy = w.let(f"{to_x} - {x}"), w.let(f"{to_y} - {y}")
+        dx = w.let(f"{to_x} - {x}")
+        dy = w.let(f"{to_y} - {y}")
         inverse = w.let(f"1.0 / sqrt({dx} * {dx} + {dy} * {dy})")
-        c, s = w.let(f"{dx} * {inverse}"), w.let(f"{dy} * {inverse}")
+        c = w.let(f"{dx} * {inverse}")
+        s = w.let(f"{dy} * {inverse}")
     else:
         direction = float(np.cos(to)), float(np.sin(to))
         angle = w.parameter(f"guide.{step.joint}.{part}.axis", to)
-        c, s = w.let(f"cos({angle})"), w.let(f"sin({angle})")
-    dx0, dy0 = joint.x - first.x, joint.y - first.y
+        c = w.let(f"cos({angle})")
+        s = w.let(f"sin({angle})")
+    dx0 = joint.x - first.x
+    dy0 = joint.y - first.y
     name = f"guide.{step.joint}.{part}"
     along = w.parameter(f"{name}.along", direction[0] * dx0 + direction[1] * dy0)
     aside = w.parameter(f"{name}.aside", direction[0] * dy0 - direction[1] * dx0)

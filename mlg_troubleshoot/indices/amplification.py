@@ -101,7 +101,9 @@ def amplification(
     """
     linkage = gear.model if model is None else model
     chain = _Chain(linkage, {joint.number: joint.point for joint in gear.joints}, n_strokes)
-    stage, onward, of_maxima = [], [], []
+    stage = []
+    onward = []
+    of_maxima = []
     for number in gear.joint_numbers:
         own, later = chain.stage_and_later(number)
         stage.append(own)
@@ -197,7 +199,8 @@ class _Chain:
 
     def _tangent(self, step: Step) -> Array:
         """Unit vector along which a step's joint moves when only the mechanism's input changes."""
-        axes, place = self._axes(step), self.place[step.joint]
+        axes = self._axes(step)
+        place = self.place[step.joint]
         if isinstance(step, Slider):
             return np.broadcast_to(
                 np.cos(step.axis) * axes[0] + np.sin(step.axis) * axes[1], place.shape

@@ -21,9 +21,11 @@ from mlg_troubleshoot.indices.estimators import Indices, without_numbers
 from mlg_troubleshoot.indices.inputs import Response
 
 # Points held out inside the range and at its corners to judge an expansion by. [1]
-_HELD_OUT, _CORNERS = 48, 16
+_HELD_OUT = 48
+_CORNERS = 16
 # Terms of an expansion at most, and points for each term at least. [1]
-_MOST_TERMS, _PER_TERM = 500, 1.3
+_MOST_TERMS = 500
+_PER_TERM = 1.3
 # A fit that follows the inside of the range but misses a corner by more than this share of the
 # standard deviation has met a kink.
 _CORNER_MISS = 0.1
@@ -79,7 +81,8 @@ def chaos_indices(
     # few.
     points = _latin(rng, max(128, 2 * len(total_degree(n, 2))), n)
     values = response(np.concatenate([checks, points]))
-    check_values, values = values[: len(checks)], values[len(checks) :]
+    check_values = values[: len(checks)]
+    values = values[len(checks) :]
     best: ChaosFit | None = None
     while True:
         used = len(check_values) + len(values)
@@ -104,7 +107,8 @@ def chaos_indices(
             mean = float(values.mean())
             return without_numbers(design, seed, n, used, note, mean=mean), None
         more = _latin(rng, len(values), n)
-        points, values = np.concatenate([points, more]), np.concatenate([values, response(more)])
+        points = np.concatenate([points, more])
+        values = np.concatenate([values, response(more)])
 
 
 def _latin(rng: Generator, count: int, n: int) -> Array:
@@ -126,7 +130,8 @@ def _best_fit(
         if len(exponents) * _PER_TERM > len(points) or len(exponents) > _MOST_TERMS:
             break
         matrix = legendre_terms(points, exponents)
-        gram, right = matrix.T @ matrix, matrix.T @ values
+        gram = matrix.T @ matrix
+        right = matrix.T @ values
         try:
             coefficients = np.linalg.solve(gram, right)
         except np.linalg.LinAlgError:

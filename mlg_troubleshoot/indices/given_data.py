@@ -60,11 +60,13 @@ def given_data_indices(
             f"Indices from data need at least {_FEWEST}.",
         )
     n = clearance_in.shape[1]
-    first, bounds = np.full(n, np.nan), np.full((n, 2), np.nan)
+    first = np.full(n, np.nan)
+    bounds = np.full((n, 2), np.nan)
     rows = np.zeros(n, dtype=np.int64)
     for j in range(n):
         usable = measured & np.isfinite(clearance_in[:, j])
-        x, y = clearance_in[usable, j], displacement_in[usable]
+        x = clearance_in[usable, j]
+        y = displacement_in[usable]
         rows[j] = len(x)
         if len(x) < _FEWEST or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
             continue

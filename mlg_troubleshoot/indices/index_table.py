@@ -29,7 +29,7 @@ from mlg_troubleshoot.results import Result
 
 # A sampled index may lie a little outside 0 to 1, its interval further.
 Index = Annotated[float, Meta(ge=-2, le=3)]
-Growth = Annotated[float, Meta(ge=0, le=1e6)]
+Growth = Annotated[float, Meta(ge=0, le=1_000_000)]
 Rank = Annotated[int, Meta(ge=1, le=MOST_ENTRIES)]
 # First-order indices closer than this are one rank: both ends of a link differ by less.
 _SAME_RANK = 1e-4

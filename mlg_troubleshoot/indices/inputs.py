@@ -60,7 +60,8 @@ def worst_directions(model: LinkageModel, limits_in: Array) -> HeldDirections:
     the directions anew for every sample changes no index of the shipped linkages by more than 5e-4.
     """
     worst = worst_case(model, limits_in[None, :])
-    over, under = worst.over_in[0], -worst.under_in[0]
+    over = worst.over_in[0]
+    under = -worst.under_in[0]
     # A sense in which the linkage does not close governs: its samples must be seen to fail.
     is_over = bool(np.isnan(over) or (over >= under))
     directions = (worst.over_directions if is_over else worst.under_directions)[0]
@@ -82,7 +83,7 @@ def _half_normal(u: Array) -> Array:
 
 _QUANTILES: dict[str, Callable[[Array], Array]] = {
     "uniform": lambda u: u,
-    "falling": lambda u: 1.0 - np.sqrt(1.0 - u),
+    "falling": lambda u: 1 - np.sqrt(1 - u),
     "rising": np.sqrt,
     "half-normal": _half_normal,
 }

@@ -22,7 +22,8 @@ from mlg_troubleshoot.indices.inputs import Response
 # Independent scrambles of the Sobol points: their spread gives the interval. [1]
 SCRAMBLES = 8
 # Points evaluated at once, and the power of two that the first estimate begins with. [1]
-_ROWS, _FIRST_POWER = 1 << 14, 8
+_ROWS = 1 << 14
+_FIRST_POWER = 8
 
 
 def saltelli_indices(  # noqa: PLR0913 - what is asked, where it stops, what a first attempt by another route hands on
@@ -94,12 +95,14 @@ class _Sums:
         self, response: Response, a: Array, b: Array, groups: tuple[tuple[int, ...], ...]
     ) -> int:
         count = len(a)
-        ya, yb = response(a), response(b)
+        ya = response(a)
+        yb = response(b)
         self.failed += int(np.count_nonzero(~np.isfinite(ya)) + np.count_nonzero(~np.isfinite(yb)))
         if self.shift is None:
             # Moments about a value near the mean lose no digits.
             self.shift = float(np.mean(np.concatenate([ya, yb])))
-        ya, yb = ya - self.shift, yb - self.shift
+        ya = ya - self.shift
+        yb = yb - self.shift
         self.total += float(ya.sum() + yb.sum())
         self.squares += float((ya**2).sum() + (yb**2).sum())
         for i, group in enumerate(groups):
@@ -123,7 +126,8 @@ def _pooled(sums: list[_Sums], design: str, seed: int, used: int, note: str) -> 
     variance = moments[:, 1]
     if np.any(variance <= 0.0):
         note = "the response does not vary"
-        n, mean = len(sums[0].partial), moments[0, 0]
+        n = len(sums[0].partial)
+        mean = moments[0, 0]
         return without_numbers(design, seed, n, used, note, mean=mean, variance=0.0)
     first = np.array(
         [each.partial / each.count / v for each, v in zip(sums, variance, strict=True)]

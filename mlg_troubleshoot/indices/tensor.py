@@ -15,7 +15,8 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.indices.inputs import Response
 
 # Points of a tensor at most, and those evaluated at once. [1]
-_MOST_POINTS, _ROWS = 2_000_000, 1 << 16
+_MOST_POINTS = 2_000_000
+_ROWS = 1 << 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,8 @@ def tensor_indices(
     n = len(limits)
     if nodes is None:
         points, weights = np.polynomial.legendre.leggauss(order)
-        points, weights = (points + 1.0) / 2.0, weights / 2.0
+        points = (points + 1.0) / 2.0
+        weights = weights / 2.0
     else:
         points, weights = nodes
     m = len(points)

@@ -132,7 +132,9 @@ class TotalOrder:
 
 def compute_block(study: BlockStudy, block: StudyBlock) -> BlockSums:
     response = replace(study.response, compiled=numba_is_installed())
-    n, n1, n2 = study.n, study.n1, study.n2
+    n = study.n
+    n1 = study.n1
+    n2 = study.n2
     levels = _levels(n, n1, n2, study.seed, block.iteration)
     within = np.zeros(n)
     total = squares = 0.0

@@ -31,9 +31,12 @@ _FAR = 50
 # Decimals of a coordinate, as the paper prints them. [1]
 _DECIMALS = 4
 # Linkages drawn at a time, how many of them are polished, and dampings tried in a step. [1]
-_WAVE, _POLISHED, _DAMPINGS = 150, 4, 12
+_WAVE = 150
+_POLISHED = 4
+_DAMPINGS = 12
 # Links outside these lengths are not of a landing gear of this size, assumed. [in]
-_SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22
+_SMALL_LENGTH_IN = 0.4
+_LARGE_IN = 22
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +114,8 @@ def random_vector(space: DesignSpace, rng: Generator) -> Array:
     driven = next((s for s in space.mechanism.steps if isinstance(s, Dyad) and s.driven), None)
     if driven is not None and f"{driven.upstream}.x" in space.names:
         i = space.names.index(f"{driven.upstream}.x")
-        turn, length = rng.uniform(-np.pi, np.pi), rng.uniform(10.0, 18.0)
+        turn = rng.uniform(-np.pi, np.pi)
+        length = rng.uniform(10.0, 18.0)
         vector[i : i + 2] = length * np.cos(turn), length * np.sin(turn)
     return vector
 
@@ -188,7 +192,9 @@ class _Search:
                 step *= min(1.0, 1.5 / float(np.abs(step).max()))
                 trial = self.residuals(vector + step)
                 if np.sum(np.log1p(trial**2)) < np.sum(np.log1p(value**2)):
-                    vector, value, improved = vector + step, trial, True
+                    vector = vector + step
+                    value = trial
+                    improved = True
                     damping = max(damping / 4.0, 1e-9)
                     break
                 damping *= 6.0
@@ -208,7 +214,8 @@ class _Search:
         facts = Facts(self.gear, self.gear.model_of(linkage))
         met = tuple(Computed(target, facts.measure(target)) for target in self.targets)
         rows = self._binding_slopes(vector, met)
-        determined, loosest = 0, tuple((name, 1.0) for name in self.space.names[:5])
+        determined = 0
+        loosest = tuple((name, 1.0) for name in self.space.names[:5])
         if len(rows):
             _, sizes, turned = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))
             determined = int(np.count_nonzero(sizes > 1e-6))
@@ -236,7 +243,8 @@ class _Search:
 def _miss(target: Target, computed: float) -> float:
     """Distance from what is accepted, in tolerances; limits are met with a little to spare."""
     if np.isfinite(target.low) and np.isfinite(target.high):
-        middle, half = (target.low + target.high) / 2.0, (target.high - target.low) / 2.0
+        middle = (target.low + target.high) / 2.0
+        half = (target.high - target.low) / 2.0
         return (computed - middle) / half
     sense, bound = (1.0, target.low) if np.isfinite(target.low) else (-1.0, target.high)
     spare = INSIDE * max(abs(bound), 0.05)

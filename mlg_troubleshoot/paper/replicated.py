@@ -95,7 +95,8 @@ def first_order_design(n: int, n1: int, n2: int, ccd: Array | None, rng: Generat
     ccd, shape (n_ccd, n): composite points added to every replicate. [1]
     """
     levels = replicated_levels(n, n1, n2, rng)
-    points, places = middle_of_level(levels, max(n2, 1)), levels
+    points = middle_of_level(levels, max(n2, 1))
+    places = levels
     if ccd is not None:
         tie = rng.random((n1, len(ccd), n))
         order = np.lexsort((tie, np.broadcast_to(ccd, tie.shape)), axis=1)

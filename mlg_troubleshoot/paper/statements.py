@@ -53,7 +53,8 @@ class Statement:
         """
         parts = []
         for each in self.evidence:
-            low, high = min(each.values), max(each.values)
+            low = min(each.values)
+            high = max(each.values)
             unit = f" {each.unit}" if each.unit else ""
             parts.append(
                 f"{each.quantity[0].upper()}{each.quantity[1:]}: {each.values[0]:.4g}{unit} on"

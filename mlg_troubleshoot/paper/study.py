@@ -206,7 +206,8 @@ def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = Non
         run = _paper(gear, inputs, options, on_stage)
     else:
         run = _on_linkage(gear, inputs, options, 0, on_stage("samples"))
-    found, advance = [run.indices], on_stage("ensemble")
+    found = [run.indices]
+    advance = on_stage("ensemble")
     finished = run.finished and "interrupted" not in run.indices.note
     for k in range(1, len(gear.ensemble)):
         try:
@@ -233,7 +234,8 @@ def _response(
     n = len(inputs.limits_in)
     cube: Response
     if options.directions is Directions.RANDOM:
-        cube, n = with_random_directions(model, inputs), 2 * n
+        cube = with_random_directions(model, inputs)
+        n = 2 * n
     else:
         cube = inputs.on_unit_cube(_held(model, inputs, options))
     if options.beyond_margin:
@@ -265,11 +267,13 @@ def _on_linkage(
     """
     cube, n = _response(gear, gear.ensemble_models[k], inputs, options)
     stream = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(k,)))
-    accuracy, most = options.accuracy, options.most
+    accuracy = options.accuracy
+    most = options.most
     advance = None if on_stage is None else (lambda done, _width: on_stage(done, None))
     if options.directions is Directions.RANDOM:
         if k:
-            accuracy, most = max(accuracy, 3e-3), 1 << 20
+            accuracy = max(accuracy, 3e-3)
+            most = 1 << 20
         sets = joint_groups(len(inputs.limits_in))
         return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, sets, advance))
     if options.design is StudyDesign.TENSOR:
@@ -287,16 +291,17 @@ def _on_linkage(
 
 
 def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -> Indices:
-    first, total, evaluations, note = tensor.first_order, tensor.total_order, tensor.evaluations, ""
+    first = tensor.first_order
+    total = tensor.total_order
+    evaluations = tensor.evaluations
+    note = ""
     half = np.zeros((2, len(first)))
     if coarse is not None:
         half = np.abs([first - coarse.first_order, total - coarse.total_order])
         evaluations += coarse.evaluations
         note = "intervals are the difference to two Gauss points per joint"
-    design, estimates = (
-        f"tensor of {len(tensor.weights)} Gauss points per joint",
-        ((first, half[0]), (total, half[1])),
-    )
+    design = f"tensor of {len(tensor.weights)} Gauss points per joint"
+    estimates = ((first, half[0]), (total, half[1]))
     return Indices.around(
         design, seed, *estimates, tensor.mean, tensor.variance, evaluations, tensor.failed, note
     )
@@ -314,14 +319,18 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, on_stage: Stages) 
         )
     cube, n = _response(gear, gear.model, inputs, options)
     design = _sized(PAPER_DESIGNS[str(options.design)], n, options)
-    n1, n2 = design.n1, design.n2
+    n1 = design.n1
+    n2 = design.n2
     iterations = ITERATIONS if options.iterations is None else options.iterations
     found = replicated_first_order(
         cube, n, design, options.seed, iterations, on_stage("first order")
     )
     half = student_half(found.scatter, found.iterations)
-    total, spread = np.full(n, np.nan), np.full(n, np.nan)
-    evaluations, failed, finished = found.evaluations, found.failed, found.iterations == iterations
+    total = np.full(n, np.nan)
+    spread = np.full(n, np.nan)
+    evaluations = found.evaluations
+    failed = found.failed
+    finished = found.iterations == iterations
     note = f"first order corrected for the bias (1 - S)/{n1}"
     if options.design is StudyDesign.LHS and finished and not options.beyond_margin:
         response = _held(gear.model, inputs, options)
@@ -329,8 +338,10 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, on_stage: Stages) 
         totals = total_order_study(
             study, options.workers, options.state, options.scheduler, on_stage("total order")
         )
-        total, spread = totals.total_order, student_half(totals.scatter, totals.iterations)
-        evaluations, failed = evaluations + totals.evaluations, failed + totals.failed
+        total = totals.total_order
+        spread = student_half(totals.scatter, totals.iterations)
+        evaluations = evaluations + totals.evaluations
+        failed = failed + totals.failed
         finished = totals.iterations == iterations
         if totals.note:
             note += f"; {totals.note}"
@@ -393,7 +404,8 @@ def _table(
     """The table of the reference, the first that was found, with the spread over all."""
     reference = found[0]
     orders = np.array([[each.first_order, each.total_order] for each in found])
-    places, spans = ranks(orders[0, 0]), rank_ranges(orders[:, 0])
+    places = ranks(orders[0, 0])
+    spans = rank_ranges(orders[:, 0])
     ends = np.array([orders.min(axis=0), orders.max(axis=0)])
     joints = tuple(
         JointIndices(

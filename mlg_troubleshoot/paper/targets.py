@@ -132,7 +132,8 @@ class Computed:
         """True if it determines the linkage: a printed value, or a limit that the linkage lies
         at.
         """
-        low, high = self.target.low, self.target.high
+        low = self.target.low
+        high = self.target.high
         if np.isfinite(low) and np.isfinite(high):
             return True
         bound = low if np.isfinite(low) else high

@@ -19,7 +19,8 @@ from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.targets import Computed, Target, load_targets, targets_file
 
 # Strokes of a curve: of the answer, and while a linkage is still sought. [1]
-_CURVE, _QUICK_CURVE = 401, 61
+_CURVE = 401
+_QUICK_CURVE = 61
 # Nodes and weights of a two-point rule: the response at no clearance and at the limit. [1]
 _CORNERS = (np.array([0, 1], float), np.array([0.5, 0.5]))
 
@@ -136,9 +137,11 @@ def _least(stroke: Array, position: Array) -> tuple[float, float]:
 
 
 def _sharpening(facts: Facts, target: Target) -> float:
-    whole, corners = facts.indices.first_order, facts.corner_indices.first_order
+    whole = facts.indices.first_order
+    corners = facts.corner_indices.first_order
     if target.reading != "raw":
-        whole, corners = whole / whole.sum(), corners / corners.sum()
+        whole = whole / whole.sum()
+        corners = corners / corners.sum()
     return float(facts.of(corners - whole, target.joints).sum())
 
 
@@ -154,7 +157,8 @@ def _interaction(facts: Facts) -> Array:
 
 
 def _interaction_order(facts: Facts, target: Target) -> float:
-    near, far = target.joints, facts.others(target.joints)
+    near = target.joints
+    far = facts.others(target.joints)
     return float(
         facts.of(_interaction(facts), near).min() - facts.of(_interaction(facts), far).max()
     )

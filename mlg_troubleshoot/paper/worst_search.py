@@ -29,7 +29,9 @@ from mlg_troubleshoot.geometry.intervals import Interval, Range, cosine_range, v
 
 # Parts of the stroke that the search begins with, boxes contracted at once, and boxes examined at
 # most. [1]
-_STROKES, _BATCH, _MOST_BOXES = 64, 64, 4000
+_STROKES = 64
+_BATCH = 64
+_MOST_BOXES = 4000
 # Wanted difference of the bound and the best that was found. [in]
 _GAP_IN = 1e-6
 
@@ -58,9 +60,11 @@ def certified_bound(
     """Enclose the largest displacement over all directions and the whole release stroke."""
     search = _Search(model, np.asarray(clearance_in, float), sense)
     waiting = search.start()
-    settled, examined = -np.inf, 0
+    settled = -np.inf
+    examined = 0
     while waiting.low.size and examined < most_boxes:
-        boxes, waiting = waiting[:, -_BATCH:], waiting[:, :-_BATCH]
+        boxes = waiting[:, -_BATCH:]
+        waiting = waiting[:, :-_BATCH]
         examined += boxes.low.shape[1]
         boxes, bounds, smear = search.contract(boxes)
         within = bounds <= search.best + _GAP_IN
@@ -83,7 +87,8 @@ def _halves(boxes: Interval, smear: Array) -> tuple[Interval, Interval]:
     blind = ~np.any(known > 0.0, axis=0)
     widest = np.where(blind, np.argmax(boxes.width, axis=0), np.argmax(known, axis=0))
     place = widest, np.arange(boxes.low.shape[1])
-    low, high = boxes.low.copy(), boxes.high.copy()
+    low = boxes.low.copy()
+    high = boxes.high.copy()
     low[place] = high[place] = boxes.middle[place]
     return Interval(boxes.low, high), Interval(low, boxes.high)
 
@@ -131,23 +136,28 @@ class _Search:
             smear = moved.slope.magnitude * width
             boxes = self._narrowed(boxes, moved.slope)
             possible = np.all(boxes.low <= boxes.high, axis=0)
-            boxes, bounds = boxes[:, possible], bounds[possible]
+            boxes = boxes[:, possible]
+            bounds = bounds[possible]
             self._try(boxes)
             promising = ~(bounds <= self.best)
-            boxes, bounds = boxes[:, promising], bounds[promising]
+            boxes = boxes[:, promising]
+            bounds = bounds[promising]
             width, smear = (each[:, possible][:, promising] for each in (width, smear))
-            shrunk, before = boxes.width.sum(axis=0), width.sum(axis=0)
+            shrunk = boxes.width.sum(axis=0)
+            before = width.sum(axis=0)
             if not shrunk.size or np.all((shrunk > 0.7 * before) | (bounds <= self.best + 1e-12)):
                 return boxes, np.where(np.isnan(bounds), np.inf, bounds), smear
 
     def _narrowed(self, boxes: Interval, slope: Interval) -> Interval:
         """Intersect boxes with what the gradients allow at a greatest displacement."""
-        low, high = boxes.low.copy(), boxes.high.copy()
+        low = boxes.low.copy()
+        high = boxes.high.copy()
         for k, length in enumerate(self.reach):
             rows = slice(2 * k, 2 * k + 2)
             arc = boxes[rows] & _arc(slope[rows], float(length))
             low[rows], high[rows] = arc.low, arc.high
-        grows, falls = slope.low[-1] > 0.0, slope.high[-1] < 0.0
+        grows = slope.low[-1] > 0.0
+        falls = slope.high[-1] < 0.0
         low[-1] = np.where(grows, high[-1], low[-1])
         high[-1] = np.where(falls, boxes.low[-1], high[-1])
         # A part of the stroke that is not its end hands its own end to the next part.

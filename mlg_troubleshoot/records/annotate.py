@@ -40,7 +40,10 @@ _UNDECIDED_FILL = "FFFFEB9C"
 _AUTHOR = "mlg check"
 # Widths of columns, and what fits on a line of the widest: its letters are narrower than digits.
 # [characters]
-_TEXT_WIDTH, _NUMBER_WIDTH, _LONG_WIDTH, _ON_A_LINE = 17, 11, 52, 58
+_TEXT_WIDTH = 17
+_NUMBER_WIDTH = 11
+_LONG_WIDTH = 52
+_ON_A_LINE = 58
 # At which the verdicts fit on the width of a landscape page. [%]
 _LANDSCAPE_SCALE = 55
 
@@ -281,7 +284,8 @@ def _print_well(sheet: Worksheet, layout: SheetLayout, free: int) -> None:
         or (pages is not None and pages.fitToPage)
     ):
         return
-    sheet.page_setup.orientation, sheet.page_setup.scale = "landscape", _LANDSCAPE_SCALE
+    sheet.page_setup.orientation = "landscape"
+    sheet.page_setup.scale = _LANDSCAPE_SCALE
     sheet.print_title_rows = f"{layout.header_row}:{layout.header_row}"
     named = [layout.index_of(column.name) for column in IDENTITY]
     last = max((index for index in named if index is not None and index < len(named)), default=0)
@@ -328,7 +332,8 @@ def _results(sheet: XlsxSheet) -> dict[str, tuple[str, str]]:
     found = {}
     for row in sheet.elements():
         for cell in row:
-            kind, result = cell.get("t", "n"), cell.findtext(VALUE_TAG)
+            kind = cell.get("t", "n")
+            result = cell.findtext(VALUE_TAG)
             if result and kind != "s" and cell.find(FORMULA_TAG) is not None:
                 found[cell.get("r", "")] = kind, result
     return found

@@ -158,7 +158,8 @@ class NumberFormat:
         return OddCell(OddKind.WORDED if self.sections else OddKind.PADDED, text, None, number)
 
     def _worded(self, number: float) -> str:
-        signed, size = show_number(number), show_number(abs(number))
+        signed = show_number(number)
+        size = show_number(abs(number))
         if self.has_conditions:
             # Which section is meant is not guessed: where they differ, no unit is understood.
             return " or ".join(

@@ -35,7 +35,8 @@ def decode(data: bytes) -> tuple[str, list[str]]:
         return _strictly(data, "utf-16"), ["read as UTF-16 text"]
     elif len(data) >= 4:
         head = data[:4096]
-        even, odd = head[0::2].count(0), head[1::2].count(0)
+        even = head[0::2].count(0)
+        odd = head[1::2].count(0)
         for order, own, other in (("little", odd, even), ("big", even, odd)):
             if own > len(head) * 0.3 and other < len(head) * 0.05:
                 note = f"read as UTF-16 text ({order}-endian, without a byte order mark)"
@@ -160,7 +161,8 @@ def csv_book(data: bytes, header_score: Callable[[Cells], int]) -> Workbook:
     if match is None:
         delimiter = _find_delimiter(head, header_score)
     else:
-        delimiter, text = match[1], text[match.end() :]
+        delimiter = match[1]
+        text = text[match.end() :]
         notes.append(
             f"the first line names the separator {delimiter!r} and is not counted as a row"
         )

@@ -84,7 +84,8 @@ def read_form(
     form: Form, options: ReadOptions, *, file: str | None, sheet: str | None
 ) -> Collected:
     out = Collected()
-    letters, values = column_letters(form.label_column), column_letters(form.value_column)
+    letters = column_letters(form.label_column)
+    values = column_letters(form.value_column)
     labels = [label for _, label, _ in form.lines]
     label_places = [(row, f"{letters}{row}") for row, _, _ in form.lines]
     value_places = [(row, f"{values}{row}") for row, _, _ in form.lines]

@@ -390,7 +390,8 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
 
 def _check_name(field: Field, after: list[str], joints: Joints) -> Recognition:
     """Accept a joint's name behind its number only if it is this joint's, not another's."""
-    nearest, number = field.name, field.number
+    nearest = field.name
+    number = field.number
     said = set(after) - _FILLERS
     if said - joints.vocabulary:
         return _doubt(f"{' '.join(after)!r} may mean something other than the clearance", nearest)
@@ -441,7 +442,8 @@ def parse_target(name: str, joints: Joints) -> Field | None:
 
 def _columns_like(text: str, joints: Joints) -> list[str]:
     """Name every column, with the joint and the unit that a text states."""
-    number, unit = re.search(r"\d+", text), re.search(r"(in|thou|mm)$", text)
+    number = re.search(r"\d+", text)
+    unit = re.search(r"(in|thou|mm)$", text)
     joint = int(number[0]) if number else joints.numbers[0]
     said = None if unit is None else LengthUnit(unit[1])
     return [

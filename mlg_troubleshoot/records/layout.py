@@ -144,7 +144,8 @@ def _two_row_header(
         texts = _joined(upper, above, below, ranges)
         score = header_score(texts, options)
         if score > single:
-            single, best = score, Header(upper + 1, tuple(texts), (upper, upper + 1))
+            single = score
+            best = Header(upper + 1, tuple(texts), (upper, upper + 1))
     return best
 
 

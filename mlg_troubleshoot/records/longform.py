@@ -85,7 +85,8 @@ class LongReader:
     def _same_elsewhere(self, group: _Group, row: int, filled: Cells) -> None:
         """Check that what belongs to the whole inspection is the same in each of its rows."""
         for p in self._placed:
-            here, there = filled[p.index], group.cells[p.index]
+            here = filled[p.index]
+            there = group.cells[p.index]
             if p in self._own or here is None or here == there:
                 continue
             if there is None:

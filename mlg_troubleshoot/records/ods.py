@@ -88,13 +88,15 @@ class _OdsSheet(Sheet):
 
     def _read(self) -> Iterator[NumberedRow]:
         self._merged.clear()
-        table, last = -1, 0
+        table = -1
+        last = 0
         with damage(f"sheet {self.name!r} cannot be read"):
             for event, element in _elements(self._zip):
                 if event == "start":
                     table += element.tag == f"{_TABLE}table"
                 elif table == self._index and element.tag == f"{_TABLE}table-row":
-                    row, last = last + 1, last + _count(element, "rows-repeated")
+                    row = last + 1
+                    last = last + _count(element, "rows-repeated")
                     cells = self._cells(element, row)
                     if not any(cell is not None for cell in cells):
                         continue
@@ -111,8 +113,10 @@ class _OdsSheet(Sheet):
         for each in element:
             if each.tag not in (f"{_TABLE}table-cell", f"{_TABLE}covered-table-cell"):
                 continue
-            first, column = column, column + _count(each, "columns-repeated")
-            across, down = _count(each, "columns-spanned"), _count(each, "rows-spanned")
+            first = column
+            column = column + _count(each, "columns-repeated")
+            across = _count(each, "columns-spanned")
+            down = _count(each, "rows-spanned")
             if across > 1 or down > 1:
                 self._merged.append((row, first, row + down - 1, first + across - 1))
             cell = _value(each)

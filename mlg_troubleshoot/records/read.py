@@ -76,7 +76,8 @@ def read_many(
     sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None
 ) -> ReadResult:
     """Read the inspections of several files, folders and patterns as one batch."""
-    given, done = list(sources), 0
+    given = list(sources)
+    done = 0
 
     def ticker(rows: int) -> None:
         nonlocal done
@@ -367,7 +368,8 @@ def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) 
     ]
     if not by_name:
         names = ", ".join(repr(s.name) for s in book.sheets)
-        known, remedy = f"one of its sheets: {names}", "Correct the name given with --sheet."
+        known = f"one of its sheets: {names}"
+        remedy = "Correct the name given with --sheet."
         raise FileRefusedError("sheet_unknown", f"there is no sheet {wanted!r}", known, remedy)
     sheet = by_name[0]
     if sheet.hidden:
@@ -422,7 +424,8 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         source: content for _, found in results for source, content in found.invalid_content.items()
     }
     problems += settle_duplicates(rows, layouts, contents)
-    slips, backwards = history_warnings(rows), order_warnings(rows, layouts)
+    slips = history_warnings(rows)
+    backwards = order_warnings(rows, layouts)
     for place in {*slips, *backwards}:
         said = filter(None, (slips.get(place), backwards.get(place)))
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *said))

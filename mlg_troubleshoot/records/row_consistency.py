@@ -94,8 +94,10 @@ def _problem(
 # follow the wear.
 _NEIGHBOURS = 3
 _FEWEST = 2
+# Readings of one joint agree at least within the default uncertainty of their difference, rounded
+# up; those that differ by so many times as much are unusual. Both assumed. [in, 1]
 _FIT_IN = 0.0008
-_CLEARLY_OFF = 3.0
+_CLEARLY_OFF = 3
 _SCALES: tuple[tuple[float, str], ...] = tuple(
     (factor, f"{words} (factor {slip.factor:g})")
     for slip in SLIPS.values()

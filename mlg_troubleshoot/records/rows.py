@@ -226,7 +226,8 @@ class RowReader:
         """Read one row; every bad cell is reported once."""
         self._begin(row, cells, places)
         warnings: list[str] = []
-        convention, unit = self._read_convention(), self._read_row_unit()
+        convention = self._read_convention()
+        unit = self._read_row_unit()
         found = self._read_cells(convention, unit, warnings)
         question = self._unit_question(found, convention, warnings)
         source = self._table.source(row)
@@ -418,7 +419,8 @@ class RowReader:
     def faulty(
         self, row: int, cells: Cells, why: FileRefusedError, record_id: str | None = None
     ) -> InvalidRow:
-        shown, told = quote(",".join(map(show, cells)), 80), why.problem
+        shown = quote(",".join(map(show, cells)), 80)
+        told = why.problem
         self._table.tell(told.code, f"{why}: {shown}", told.expected, told.remedy, CellPlace(row))
         return InvalidRow(record_id, None, None, ("row",), (), self._table.source(row))
 
@@ -434,7 +436,9 @@ class RowReader:
             if cell.__class__ is str and cell.strip().casefold() in NOT_MEASURED:
                 self.not_measured[cell.strip()] += 1
                 cells[index] = None
-        self._row, self._places, self._cells = row, places, cells
+        self._row = row
+        self._places = places
+        self._cells = cells
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
 
@@ -459,7 +463,8 @@ class RowReader:
         return f"{'stdin' if name == '-' else name}-{self._row}-{content:08x}"
 
     def _read_convention(self) -> ClearanceConvention | None:
-        index, declared = self._at.get(CONVENTION), self._options.convention
+        index = self._at.get(CONVENTION)
+        declared = self._options.convention
         if index is not None and self._cells[index] is not None:
             found: ClearanceConvention | None = self._noted(CONVENTION, index)
             return found
@@ -535,9 +540,11 @@ class RowReader:
             return f"{what} from {shown.from_inches(low):.4g} to {top}"
 
         stated = unit or row_unit or LengthUnit.INCH
-        bound, number = "", cell
+        bound = ""
+        number = cell
         if is_clearance and isinstance(cell, str) and (end := _END.match(plain_text(cell))):
-            bound, number = "<" if end["below"] else ">", plain_text(cell)[end.end() :]
+            bound = "<" if end["below"] else ">"
+            number = plain_text(cell)[end.end() :]
         if bound == ">" and self._options.asks:
             raise CellFaultError("not_a_length", expected(stated), _NO_END)
         try:

@@ -53,7 +53,8 @@ _KIND = Column(name="kind", holds=Holds.CHOICE, choices=ReadingKind)
 _HEADER_WITHIN = 30
 _KINDS = {kind: kind for kind in ReadingKind if kind not in (ReadingKind.TRAVEL, ReadingKind.ORDER)}
 # No linkage of a landing gear is longer than this; angles are read within one turn.
-_LONGEST_IN, _WIDEST_DEG = 500.0, 360.0
+_LONGEST_IN = 500
+_WIDEST_DEG = 360
 _DEGREES: tuple[str, ...] = ("°", "deg", "degrees")
 _HOW = {
     ReadingKind.DISTANCE: (
@@ -128,7 +129,10 @@ def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:
     line = 2
     for k, plane in enumerate(mechanism.planes):
         chart = ScatterChart()
-        chart.title, chart.style, chart.height, chart.width = f"plane {plane.name}", 13, 14, 20
+        chart.title = f"plane {plane.name}"
+        chart.style = 13
+        chart.height = 14
+        chart.width = 20
         places = {p.name: (p.x, p.y) for p in mechanism.points if p.plane == plane.name}
         for pair in linkage.rigid:
             if pair <= places.keys():
@@ -170,12 +174,15 @@ def read_survey(
         if is_frame(table):
             framed = FrameSheet(as_frame(table))
             sheets: Sequence[Sheet] = (framed,)
-            labels, digest, delimiter = framed.labels, "", None
+            labels = framed.labels
+            digest = ""
+            delimiter = None
         else:
             data = load_bytes(cast("File", table))
             digest = hashlib.sha256(data).hexdigest()
             book = open_book(data, label, ReadOptions())
-            sheets, delimiter = book.sheets, book.delimiter
+            sheets = book.sheets
+            delimiter = book.delimiter
         for sheet in sheets:
             rows = list(sheet.rows())
             header = next(
@@ -212,7 +219,9 @@ class _Rows:
     """Reads the rows of one sheet and tells what is wrong with them."""
 
     def __init__(self, table: TableInHand, header: list[str], linkage: SurveyedLinkage) -> None:
-        self.table, self.header, self.linkage = table, header, linkage
+        self.table = table
+        self.header = header
+        self.linkage = linkage
         self.points = [p.name for p in linkage.space.mechanism.points]
         self.row: dict[str, Filled] = {}
         self.column = ""
@@ -252,23 +261,27 @@ class _Rows:
         value = self._quantity(given[0], kind in (ReadingKind.PLUNGER, ReadingKind.ANGLE))
         u = default_u(kind, is_angle=is_angle)
         for unit in _UNITS:
-            column, expected = f"u_{unit}", "an uncertainty in the unit of the value"
+            column = f"u_{unit}"
+            expected = "an uncertainty in the unit of the value"
             if column in self.row:
                 fits = (unit == "deg") == is_angle
                 self._require(fits, column, expected, "Move the number.", "unit_of_u")
                 u = self._quantity(column, False)
-        extension, ends = self._extension(), self._ends(kind)
+        extension = self._extension()
+        ends = self._ends(kind)
         driven_in = self.linkage.driven_in
         return SurveyReading(kind, *ends, value, u, extension, number, is_angle, driven_in)
 
     def _quantity(self, column: str, signed: bool) -> float:
         name, unit = column.split("_")
         if unit == "deg":
-            most, units = _WIDEST_DEG, _DEGREES
+            most: float = _WIDEST_DEG
+            units = _DEGREES
             expected = f"an angle from {-most if signed else 0:g} to {most:g} degrees"
         else:
             length = LengthUnit.parse(unit)
-            most, units = length.from_inches(_LONGEST_IN), length.spellings
+            most = length.from_inches(_LONGEST_IN)
+            units = length.spellings
             expected = f"a length up to {most:g} {unit}"
         low = -most if signed else 0.0
         number = self._number(column, low, most, expected, units)
@@ -281,7 +294,8 @@ class _Rows:
         extension = None
         reach = 3.0 * abs(self.linkage.gear.reference.stroke[1] - self.linkage.low)
         for unit in (LengthUnit.INCH, LengthUnit.MILLIMETRE):
-            column, most = f"extension_{unit}", unit.from_inches(reach)
+            column = f"extension_{unit}"
+            most = unit.from_inches(reach)
             if column in self.row:
                 one = extension is None and (
                     unit is LengthUnit.INCH or self.linkage.driven_in == "in"
@@ -298,7 +312,8 @@ class _Rows:
         self, column: str, low: float, most: float, expected: str, units: tuple[str, ...]
     ) -> float:
         """Read a number, which may be followed by the unit of its column."""
-        self.column, comma = column, self.table.decimal_comma
+        self.column = column
+        comma = self.table.decimal_comma
         cell = self.row[column]
         return read_number(cell, low, most, decimal_comma=comma, expected=expected, units=units)
 

@@ -163,7 +163,8 @@ class _Table:
             return
         if self._stands_aside(number, cells):
             return
-        width, collect = self._width, self._out.rows.append
+        width = self._width
+        collect = self._out.rows.append
         if width is not None and len(cells) != width and (len(cells) < width or any(cells[width:])):
             collect(self._reader.ragged(number, cells, width))
         elif number in self._faulty:
@@ -244,7 +245,8 @@ class _Table:
 
 def _hidden_notes(sheet: Sheet, columns: Columns, header_row: int) -> list[str]:
     notes: list[str] = []
-    facts, width = sheet.facts, len(columns.placed)
+    facts = sheet.facts
+    width = len(columns.placed)
     hidden = sum(1 for row in facts.hidden_rows if row > header_row)
     if hidden:
         notes.append(

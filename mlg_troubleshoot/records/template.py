@@ -37,14 +37,15 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _ROWS = 500
 # Where a workbook says who saved it last, and the most that is read of it. [bytes]
-_PROPERTIES, _MOST_BYTES = "docProps/core.xml", 100_000
+_PROPERTIES = "docProps/core.xml"
+_MOST_BYTES = 100_000
 # The fonts and the colour of headers of what this program writes into workbooks.
 FONT = "Calibri"
 BOLD = Font(name=FONT, bold=True)
 HEADER_FILL = "FFD9E2EC"
 _TITLE = Font(name=FONT, bold=True, size=14)
 _WRAPPED = Alignment(wrap_text=True, vertical="top")
-_LINE_PT = 15.0
+_LINE_PT = 15
 _LINE = Side(style="thin", color="FF9AA5B1")
 _REQUIRED_FILL = "FFFFE9A8"
 _FORMATS = {Holds.TEXT: "@", Holds.DATE: "yyyy-mm-dd"}
@@ -237,12 +238,11 @@ def _table(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     sheet.row_dimensions[1].height = 45
     sheet.freeze_panes = "D2"
     # On paper: which gear on every page, and its clearances together on the first.
-    sheet.print_title_rows, sheet.print_title_cols = "1:1", "A:C"
-    sheet.page_setup.paperSize, sheet.page_setup.orientation, sheet.page_setup.scale = (
-        9,
-        "landscape",
-        53,
-    )
+    sheet.print_title_rows = "1:1"
+    sheet.print_title_cols = "A:C"
+    sheet.page_setup.paperSize = 9
+    sheet.page_setup.orientation = "landscape"
+    sheet.page_setup.scale = 53
     for after in (CLEARANCE, MARGIN_U, REMARKS):
         sheet.col_breaks.append(
             Break(id=max(i for i, field in enumerate(fields, 1) if field.column is after))
@@ -285,7 +285,9 @@ def _form(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     for letters, width in (("A", 28), ("B", 24), ("C", 66)):
         sheet.column_dimensions[letters].width = width
     for row, field in enumerate(_fields(gear, None), 4):
-        label, value, hint = sheet.cell(row, 1, field.label), sheet.cell(row, 2), sheet.cell(row, 3)
+        label = sheet.cell(row, 1, field.label)
+        value = sheet.cell(row, 2)
+        hint = sheet.cell(row, 3)
         must = _is_must(field.column)
         value.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if must else "FFFFFFFF")
         value.border = Border(left=_LINE, right=_LINE, top=_LINE, bottom=_LINE)

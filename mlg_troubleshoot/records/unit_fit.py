@@ -30,7 +30,8 @@ from mlg_troubleshoot.units import (
 _TOO_SMALL = 0.6
 # Fewer readings than this do not show what the others of the row were read in.
 _FEWEST = 3
-# A plunger reading of this size or less would be that of a failure in a larger unit. [in]
+# A plunger reading of this size or less would be that of a failure in a larger unit: 0.06 mm is
+# 0.0025 in, and 0.06 in is twice the margin. [in]
 _PLUNGER_NEAR_ZERO_IN = 0.0025
 # No reading of a clearance is smaller. [in]
 _SMALLEST_IN = 0.0001
@@ -77,7 +78,8 @@ def judge_unit(
     ratios = {joint: value / options.new_part_in[joint] for joint, value in read.items()}
     units = [entered[joint].unit for joint in read]
     stated = max(LengthUnit, key=units.count)
-    mean, enough = sum(ratios.values()) / len(ratios), len(read) >= _FEWEST
+    mean = sum(ratios.values()) / len(ratios)
+    enough = len(read) >= _FEWEST
     small = tuple(joint for joint, ratio in ratios.items() if ratio < _TOO_SMALL)
     scale = UnitFit.FITS
     if stated is LengthUnit.INCH:

@@ -156,7 +156,9 @@ def read_length(
         text = plain_text(cell)
         value, written = _written_length(text, decimal_comma, expected, unit)
     else:
-        text, value, written = show(cell), _number_of(cell, expected), None
+        text = show(cell)
+        value = _number_of(cell, expected)
+        written = None
         if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED:
             _, written = _written_length(cell.text, False, expected, unit)
     if not math.isfinite(value):
@@ -165,9 +167,11 @@ def read_length(
         raise CellFaultError("length_negative", expected)
     if written is not None and unit is not None and written is not unit:
         same = f"{unit.from_inches(written.to_inches(value)):.6g}"
-        who, plain = "cell", "enter the number without a unit"
+        who = "cell"
+        plain = "enter the number without a unit"
         if not isinstance(cell, str):
-            who, plain = "number format of the cell", "format the cell as a plain number"
+            who = "number format of the cell"
+            plain = "format the cell as a plain number"
         raise CellFaultError(
             "unit_contradiction",
             f"{expected}, in the unit of the column ({unit.value})",

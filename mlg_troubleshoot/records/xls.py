@@ -41,10 +41,8 @@ def xls_book(data: bytes) -> Workbook:
     if "EncryptedPackage".encode(_UTF16) in data:
         raise password_protected()
     if len(data) > MAX_BYTES:
-        found, expected = (
-            f"an .xls workbook of {len(data) / 1e6:.0f} MB",
-            f"at most {MAX_BYTES // 1_000_000} MB",
-        )
+        found = f"an .xls workbook of {len(data) / 1e6:.0f} MB"
+        expected = f"at most {MAX_BYTES // 1_000_000} MB"
         raise FileRefusedError("file_too_large", found, expected, COPY_THE_TABLE)
     return Workbook("xls", _sheets(data), [MACROS] if "_VBA_PROJECT".encode(_UTF16) in data else [])
 
@@ -99,7 +97,8 @@ class _XlsSheet(Sheet):
             yield place + 1, cells
 
     def _cell(self, row: int, column: int) -> Cell:
-        kind, value = self._sheet.cell_type(row, column), self._sheet.cell_value(row, column)
+        kind = self._sheet.cell_type(row, column)
+        value = self._sheet.cell_value(row, column)
         if kind in (xlrd.XL_CELL_EMPTY, xlrd.XL_CELL_BLANK):
             return None
         if kind == xlrd.XL_CELL_TEXT:

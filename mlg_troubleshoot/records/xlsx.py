@@ -250,7 +250,8 @@ class _Rows(WorkSheetParser):
     def parse_cell(self, element: Element) -> Any:
         """Return the column, counted from 0, and the content of a cell."""
         index = self._column(element.get("r"))
-        value, formula = element.findtext(VALUE_TAG), element.find(FORMULA_TAG) is not None
+        value = element.findtext(VALUE_TAG)
+        formula = element.find(FORMULA_TAG) is not None
         if value or formula:
             cell = self._value(element.get("t", "n"), element.get("s"), value)
         else:

@@ -132,7 +132,8 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
 
 def _over_time(residuals: Residuals, candidate: Candidate, effect_in: Array) -> ResidualAxis:
     """The days, with the rows of the cause marked: of an aircraft all, else those that it moves."""
-    table, setting = residuals.diagnosis.used, candidate.setting
+    table = residuals.diagnosis.used
+    setting = candidate.setting
     rows = effect_in != 0.0
     if "tail" in setting:
         rows = table.factors["tail_no"] == setting["tail"]

@@ -51,7 +51,8 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             stream = io.BytesIO()
             if job["kind"] == "png":
                 book.write_to_png_stream(stream, int(2 * job["width"]))
-                pdf, boxes = stream.getvalue(), False
+                pdf = stream.getvalue()
+                boxes = False
             else:
                 book.write_to_pdf_stream(stream)
                 about = job["sections"], job["title"], job["created"]

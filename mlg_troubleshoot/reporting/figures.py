@@ -247,7 +247,8 @@ class Plot:
         bottom: float = 38.0,
     ) -> None:
         self.canvas = canvas
-        self.x, self.y = x, y
+        self.x = x
+        self.y = y
         self.area = (left, top, canvas.width - right, canvas.height - bottom)
 
     def at(self, x: float, y: float) -> tuple[float, float]:

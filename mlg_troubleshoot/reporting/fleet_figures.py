@@ -38,8 +38,9 @@ _MARKS: dict[str, tuple[Marker, str]] = {
     "WITHIN_MARGIN": ("ring", "#1d6b2a"),
 }
 _WIDE = 940
-_WORST_SHOWN = 4.0
-_PANEL_WIDE, _PANEL_HIGH = 350, 132
+_WORST_SHOWN = 4
+_PANEL_WIDE = 350
+_PANEL_HIGH = 132
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,12 +174,14 @@ def _panel(
     wear: WearInTime,
     lengths: Lengths,
 ) -> None:
-    between, end = wear.between[number], wear.end
+    between = wear.between[number]
+    end = wear.end
     joint = gear.joint(number)
     shown = lengths.unit.from_inches
     limit = shown(joint.limit.value)
     most = max(shown(value) for each in between for _at, value, _u in each.placed)
-    x, y = _PANEL_WIDE * (place % 2), _PANEL_HIGH * (place // 2)
+    x = _PANEL_WIDE * (place % 2)
+    y = _PANEL_HIGH * (place // 2)
     plot = Plot(canvas, Axis("landings", 0.0, end), Axis("", 0.0, 1.15 * max(limit, most)))
     plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
     canvas.text(x + 52, y + 13, f"#{number} {joint.name}, {lengths.unit}", bold=True)
@@ -198,7 +201,8 @@ def _panel(
     for each in between:
         placed = [(at, shown(value)) for at, value, _u in each.placed]
         if each.begun:
-            base, top_y = plot.at(each.begun, 0.0), plot.at(each.begun, plot.y.high)
+            base = plot.at(each.begun, 0.0)
+            top_y = plot.at(each.begun, plot.y.high)
             canvas.line(*base, *top_y, colour=SOFT, dash="1 3")
             canvas.marker("triangle", *base, 4.5)
         plot.draw(Series("", tuple(at for at, _ in placed), tuple(value for _, value in placed)))

@@ -11,8 +11,8 @@ from markupsafe import Markup
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
+from mlg_troubleshoot.life.landings_left import Order, fleet_lines, outlook_sentence, work_sentence
 from mlg_troubleshoot.life.looking_back import Advice, side_by_side
-from mlg_troubleshoot.life.outlook import Order, fleet_lines, outlook_sentence, work_sentence
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
 from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture, wear_figure
 from mlg_troubleshoot.reporting.formats import ABSENT, Lengths, landings

@@ -86,7 +86,11 @@ class _Gauge:
     def __init__(
         self, extent: float, margin: float, lanes: int, description: str, lengths: Lengths
     ) -> None:
-        self.left, self.right, self.top, self.row, self.width = 150.0, 556.0, 36.0, 21.0, 690.0
+        self.left = 150.0
+        self.right = 556.0
+        self.top = 36.0
+        self.row = 21.0
+        self.width = 690.0
         self.bottom = self.top + self.row * lanes + 4
         self.centre = (self.left + self.right) / 2
         self.scale = (self.right - self.left) / 2 / (extent * 1.06)

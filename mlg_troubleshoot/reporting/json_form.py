@@ -18,7 +18,7 @@ import numpy as np
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.output_types import (
+from mlg_troubleshoot.json_outputs import (
     CheckedInspection,
     CheckedJoint,
     ConditionOfData,

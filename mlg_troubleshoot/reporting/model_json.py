@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from mlg_troubleshoot.indices.given_data import GivenDataResult
-from mlg_troubleshoot.output_types import (
+from mlg_troubleshoot.json_outputs import (
     MetTarget,
     ReconstructOutput,
     StudiedAmplification,

@@ -39,7 +39,8 @@ class PdfEngine:
         self._process: subprocess.Popen[bytes] | None = None
 
     def close(self) -> None:
-        process, self._process = self._process, None
+        process = self._process
+        self._process = None
         if process is None:
             return
         process.kill()

@@ -47,7 +47,8 @@ class Picture:
         for drawing in drawings:
             wide, high = (float(_attribute(drawing, name)) for name in ("width", "height"))
             placed.append(drawing.replace("<svg ", Markup(f'<svg x="{x:g}" '), 1))
-            x, height = x + wide + _GAP, max(height, high)
+            x = x + wide + _GAP
+            height = max(height, high)
         width = x - _GAP
         svg = (
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '

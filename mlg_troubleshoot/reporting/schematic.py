@@ -208,7 +208,8 @@ class _PlaneDrawing:
                 complex(end(p.real for p in places), end(p.imag for p in places))
                 for end in (min, max)
             )
-            self.low, self.size = low, high - low
+            self.low = low
+            self.size = high - low
 
     def _shorten(self) -> None:
         """Draw only the near end of the actuator: its anchor lies far from everything else."""

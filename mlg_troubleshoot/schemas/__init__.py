@@ -56,7 +56,8 @@ def schema(name: str) -> dict[str, Any]:
     for part in parts.values():
         _close(part)
     if name == "check":
-        row, joint = parts["CheckedInspection"], parts["CheckedJoint"]
+        row = parts["CheckedInspection"]
+        joint = parts["CheckedJoint"]
         row.update(_of_an_invalid_row(row, joint))
     if name == "diagnose":
         parts["DiagnoseOutput"]["allOf"] = _by_verdict()
@@ -69,7 +70,7 @@ def schema(name: str) -> dict[str, Any]:
 
 
 def _kinds(name: str) -> list[Any]:
-    from mlg_troubleshoot import output_types as outputs
+    from mlg_troubleshoot import json_outputs as outputs
 
     if name in FILES:
         from mlg_troubleshoot.cli.remembered import SettingsFile

@@ -33,7 +33,8 @@ def surveyed_values(before: Mapping[str, Any], found: Survey, source: str) -> di
     uncertainty.
     """
     values = deepcopy(dict(before))
-    linkage, mode = found.linkage, found.modes[0]
+    linkage = found.linkage
+    mode = found.modes[0]
     new = member_values(linkage.linkage(np.round(mode.vector, _DECIMALS), "A"))
     spread = dict(zip(linkage.names, np.std(found.draws, axis=0), strict=True))
     sources = values["sources"]

@@ -75,7 +75,8 @@ class _Design:
             slopes = linkage.slopes(self.pool, points)[1] / u[:, None] @ prior.root
             wanted = linkage.log_slopes(points, quantity) @ prior.root
         sound = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=(1, 2))
-        self.slopes, self.wanted = slopes[sound], wanted[sound]
+        self.slopes = slopes[sound]
+        self.wanted = wanted[sound]
         self.given = [i for i, r in enumerate(self.pool) if r.kind is not ReadingKind.DISTANCE]
         self.free = [i for i, r in enumerate(self.pool) if r.kind is ReadingKind.DISTANCE]
         self.known = np.eye(slopes.shape[2])
@@ -103,7 +104,8 @@ class _Design:
         were found: the covariance, how each other reading moves the variables, and its variance in
         units of its own.
         """
-        covariance, g = self.covariance(rows), self.slopes[:, others]
+        covariance = self.covariance(rows)
+        g = self.slopes[:, others]
         moved = np.swapaxes(g @ covariance, 1, 2)
         size = 1.0 + (np.swapaxes(g, 1, 2) * moved).sum(axis=1)[:, None, :]
         wanted = (self.wanted @ covariance * self.wanted).sum(axis=2)[:, :, None] - (
@@ -113,7 +115,8 @@ class _Design:
 
     def best(self, taken: list[int]) -> int:
         """The distance to read in addition to those taken."""
-        rows, others = [*self.given, *taken], [j for j in self.free if j not in taken]
+        rows = [*self.given, *taken]
+        others = [j for j in self.free if j not in taken]
         wanted, covariance, moved, size = self.after(rows, others)
         known = self.slopes[:, rows]
         held = (
@@ -150,7 +153,8 @@ def suggested_early(
     the next: this is the linear estimate on average over the linkages of the ensemble and between
     them, as for a template.
     """
-    design, known = _Design(linkage, taken, quantity), {r.what for r in taken}
+    design = _Design(linkage, taken, quantity)
+    known = {r.what for r in taken}
     first = len(design.pool) - len(taken)
     others = [j for j in range(first) if design.pool[j].what not in known]
     rows = list(range(first, len(design.pool)))
@@ -189,9 +193,11 @@ def suggested(
     with np.errstate(all="ignore"):
         y = linkage.predicted(candidates, draws)
     reached = np.isfinite(y).mean(axis=0) >= 1.0 - tuned.MOST_OPEN
-    candidates, y = tuple(c for c, r in zip(candidates, reached, strict=True) if r), y[:, reached]
+    candidates = tuple(c for c, r in zip(candidates, reached, strict=True) if r)
+    y = y[:, reached]
     sound = np.isfinite(y).all(axis=1) & np.isfinite(wanted).all(axis=1)
-    y, q = y[sound] - y[sound].mean(axis=0), wanted[sound] - wanted[sound].mean(axis=0)
+    y = y[sound] - y[sound].mean(axis=0)
+    q = wanted[sound] - wanted[sound].mean(axis=0)
     total = float((q * q).sum())
     if total <= 0.0 or len(y) < 3 or not candidates:
         return None

@@ -24,7 +24,8 @@ from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 Quantity = Callable[[Array], Array]
 # Positions over the stroke among which the plunger's least displacement is sought, and plunger
 # positions to read.
-_POSITIONS, _PLUNGER_READINGS = 25, 9
+_POSITIONS = 25
+_PLUNGER_READINGS = 9
 
 
 class ReadingKind(StrEnum):
@@ -47,10 +48,10 @@ class ReadingKind(StrEnum):
 DEFAULT_U = {
     ReadingKind.DISTANCE: 0.01,
     ReadingKind.PLUNGER: 0.0015,
-    ReadingKind.ANGLE: float(np.radians(1.0)),
+    ReadingKind.ANGLE: float(np.radians(1)),
     ReadingKind.EXTENSION: 0.005,
     ReadingKind.TRAVEL: 0.005,
-    ReadingKind.ORDER: 1.0,
+    ReadingKind.ORDER: 1,
 }
 
 
@@ -187,7 +188,8 @@ class SurveyedLinkage:
         along = direction * raw
         i = np.clip(np.argmin(along, axis=1), 1, _POSITIONS - 2)[:, None] + np.arange(-1, 2)
         before, least, after = np.take_along_axis(along, i, 1).T
-        slope, bend = (after - before) / 2.0, after - 2.0 * least + before
+        slope = (after - before) / 2.0
+        bend = after - 2.0 * least + before
         step = np.clip(-slope / np.maximum(bend, 1e-12), -1.0, 1.0)
         least = least + step * (slope + step * bend / 2.0)
         return direction * vectors[:, -1:] / (along[:, -1:] - least[:, None])
@@ -301,7 +303,8 @@ class SurveyedLinkage:
             np.maximum(np.hypot(gradient[:, 0::2], gradient[:, 1::2]), 1e-12), 2, axis=1
         )
         link = np.repeat(clearance_in, 2, axis=1)[None] * (gradient / length)[:, None]
-        at, none = reference + self._beyond, self.kernel.no_clearance()
+        at = reference + self._beyond
+        none = self.kernel.no_clearance()
         zero = self.kernel.output(at, none, numbers)
         ends = [
             self.kernel.output(at, [*np.moveaxis(sense * link, -1, 0)], numbers) - zero

@@ -99,7 +99,8 @@ class Survey:
     @property
     def words(self) -> str:
         """How many were read, and how many of them fit."""
-        read, wrong = len(self.read), len(self.misfits)
+        read = len(self.read)
+        wrong = len(self.misfits)
         fit = f"{wrong} do{'es' if wrong == 1 else ''} not fit" if wrong else "all of them fit"
         return f"{read} reading{'' if read == 1 else 's'}, {fit}."
 
@@ -133,7 +134,8 @@ class Prior:
         members[:, angles] -= (
             2 * np.pi * np.round((members[:, angles] - members[0, angles]) / (2 * np.pi))
         )
-        self.members, self.linkage = members, linkage
+        self.members = members
+        self.linkage = linkage
         size = float(np.std([c for p in gear.reference.mechanism.points for c in (p.x, p.y)]))
         alone = np.where(angles, np.radians(tuned.ALONE_ANGLE), tuned.ALONE_SIZE * size)
         least = tuned.LEAST_SPREAD * alone
@@ -214,7 +216,9 @@ class Fitting:
     """The readings of one survey against one prior."""
 
     def __init__(self, linkage: SurveyedLinkage, prior: Prior, readings: Readings) -> None:
-        self.linkage, self.prior, self.readings = linkage, prior, readings
+        self.linkage = linkage
+        self.prior = prior
+        self.readings = readings
         self.value = np.array([r.value for r in readings])
         self.u = np.array([r.u for r in readings])
 
@@ -260,18 +264,22 @@ class Fitting:
         """Damped least squares of all fits at once, in variables in which the prior is the unit
         sphere.
         """
-        points, loss = fits.points.copy(), self.loss(fits, widened, robust)
+        points = fits.points.copy()
+        loss = self.loss(fits, widened, robust)
         damping = np.full(len(points), 1e-2)
-        moving, n = np.arange(len(points)), points.shape[1]
+        moving = np.arange(len(points))
+        n = points.shape[1]
         for _ in range(steps):
-            here, before = replace(fits, points=points)[moving], loss[moving]
+            here = replace(fits, points=points)[moving]
+            before = loss[moving]
             r, g = self.linear(here.points, widened)
             r = np.where(here.kept, (r - here.noise) / widened, 0.0)
             weight = _robust(r)[1] if robust else np.ones_like(r)
             g = np.where(here.kept[..., None], g, 0.0) @ self.prior.root
             # A position that does not close pulls nowhere.
             bad = ~(np.isfinite(g).all(axis=2) & np.isfinite(r))
-            r, g = np.where(bad, 0.0, r), np.where(bad[..., None], 0.0, g)
+            r = np.where(bad, 0.0, r)
+            g = np.where(bad[..., None], 0.0, g)
             gram = np.swapaxes(g, 1, 2) @ (weight[..., None] * g) + np.eye(n)
             down = (
                 np.einsum("smi,sm->si", g, weight * r)
@@ -279,7 +287,8 @@ class Fitting:
             )
             left = np.arange(len(moving))
             for _ in range(4 if robust else tuned.DAMPINGS):
-                at, trial = moving[left], here[left]
+                at = moving[left]
+                trial = here[left]
                 step = np.linalg.solve(
                     gram[left] + damping[at, None, None] * np.eye(n), down[left][..., None]
                 )[..., 0]
@@ -338,13 +347,15 @@ class Fitting:
         uncertainties shrink. Returns the likeliest few, each with the readings that it keeps and
         how far it takes them to be off.
         """
-        still, part = self.still, self._standing()
+        still = self.still
+        part = self._standing()
         lengths = [i for i, r in enumerate(part.readings) if r.kind is ReadingKind.DISTANCE]
         pairs = list(combinations(lengths, 2))
         kept = np.concatenate(
             [~np.eye(len(still), dtype=bool), np.ones((len(pairs), len(still)), dtype=bool)]
         )
-        noise, starts = np.zeros(kept.shape), starts[: max(1, tuned.MOST_RESIDUALS // kept.size)]
+        noise = np.zeros(kept.shape)
+        starts = starts[: max(1, tuned.MOST_RESIDUALS // kept.size)]
         for row, (i, j) in zip(noise[len(still) :], pairs, strict=True):
             row[[i, j]] = np.array([1.0, -1.0]) * (part.value[j] - part.value[i]) / part.u[[i, j]]
         points = np.tile(starts, (len(kept), 1))
@@ -379,7 +390,8 @@ class Fitting:
         is_plain = (fits.kept & (fits.noise == 0.0)).all()
         tried = tuned.FITTED_AGAIN if is_plain else tuned.TRIED_AROUND
         count, n = fits.points.shape
-        around, near = [fits], fits[np.repeat(np.arange(count), tried)]
+        around = [fits]
+        near = fits[np.repeat(np.arange(count), tried)]
         for widened in tuned.REHEATED:
             z = rng.standard_normal((count, tried, n))
             z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
@@ -419,9 +431,11 @@ class Fitting:
         posterior and evidence.
         """
         fits = self.descend(self.begun(points, means, kept), 1.0, tuned.LAST_STEPS, False)
-        points, loss = fits.points, fits.loss
+        points = fits.points
+        loss = fits.loss
         residuals, slopes = self.linear(points)
-        closes, index = self.linkage.closes(points), self.linkage.amplification(points)
+        closes = self.linkage.closes(points)
+        index = self.linkage.amplification(points)
         own: list[Array] = []
         modes: list[Mode] = []
         evidence: list[float] = []
@@ -475,13 +489,16 @@ class Fitting:
         The ensemble's side says nothing of this gear's: the prior's middle is mirrored with its
         joint. A linkage that a crank drives moves otherwise if all of it is mirrored.
         """
-        best, names = modes[0], list(self.linkage.names)
-        points, means = [m.vector for m in modes], [m.mean for m in modes]
+        best = modes[0]
+        names = list(self.linkage.names)
+        points = [m.vector for m in modes]
+        means = [m.mean for m in modes]
         m = self.linkage.space.assembled(best.vector[: len(self.linkage.space.names)])
         for step in m.steps:
             if not isinstance(step, (Dyad, Slider)) or f"{step.joint}.x" not in names:
                 continue
-            plane, i = m.point(step.joint).plane, names.index(f"{step.joint}.x")
+            plane = m.point(step.joint).plane
+            i = names.index(f"{step.joint}.x")
             arm = np.array(m.seen_in_plane(plane, step.upstream, step.joint))
             if isinstance(step, Slider):
                 across = np.array([np.cos(step.axis), np.sin(step.axis)])
@@ -549,7 +566,8 @@ class Fitting:
         that.
         """
         found, slopes = self.linkage.slopes(self.readings, mode.vector[None])
-        gap, g = self.value - found[0], slopes[0]
+        gap = self.value - found[0]
+        g = slopes[0]
         known = np.einsum("mi,ij,mj->m", g, mode.covariance, g) / self.u**2
         # With the reading among those kept its own weight is taken out; else the prediction's is
         # added.
@@ -579,8 +597,10 @@ class Fitting:
         """What would make a misfit fit, and whether that says that this reading is the wrong
         one.
         """
-        reading, near = self.readings[i], 3.5 * float(spread[i])
-        value, expected = reading.value, reading.value - float(gap[i])
+        reading = self.readings[i]
+        near = 3.5 * float(spread[i])
+        value = reading.value
+        expected = reading.value - float(gap[i])
         for j in map(int, np.flatnonzero(out)):
             other = self.readings[j]
             if j != i and other.row is not None and other.kind is reading.kind:
@@ -640,7 +660,8 @@ class Fitting:
 
     def draws(self, modes: tuple[Mode, ...], kept: Mask, rng: Generator) -> Array:
         """Draws from the posterior, all of which close: of each mode its share."""
-        prior, n = self.prior, len(self.prior.mean)
+        prior = self.prior
+        n = len(self.prior.mean)
         begun = []
         for mode in modes:
             count = max(1, round(tuned.DRAWS * mode.weight))
@@ -663,7 +684,8 @@ class Fitting:
         # The remaining loss of a draw that arrived is chi-squared, with as many degrees as
         # readings.
         enough = kept.sum() + tuned.FAR * np.sqrt(2.0 * kept.sum())
-        points, loss = fits.points, np.full(len(fits.points), np.inf)
+        points = fits.points
+        loss = np.full(len(fits.points), np.inf)
         late = np.arange(len(points))
         for _ in range(tuned.DRAW_ROUNDS):
             found = self.descend(fits[late], 1.0, tuned.DRAW_STEPS, False)
@@ -723,7 +745,8 @@ def fit(
     kept = np.abs(fitting.residuals(fits.points[:1])[0]) < tuned.TRUSTED
     if not kept.all() and fitting.still:
         # What does not fit is a slip or another valley.
-        found, others = fits.points[: tuned.MOST_MODES], fitting.suspected(starts)
+        found = fits.points[: tuned.MOST_MODES]
+        others = fitting.suspected(starts)
         others = replace(others, means=np.broadcast_to(prior.mean, others.points.shape))
         fits = fitting.reheated(Fits.joined(fitting.begun(found), others), rng)
         kept = np.abs(fitting.residuals(fits.points[:1])[0]) < tuned.TRUSTED

@@ -427,7 +427,8 @@ def write_reports(
     OutputError
         If the folder cannot be written to.
     """
-    directory, unit = Path(directory), LengthUnit.parse(unit)
+    directory = Path(directory)
+    unit = LengthUnit.parse(unit)
     if directory.exists() and not directory.is_dir():
         raise OutputError(
             f"{directory} is a file, not a folder", "Give a folder that you may write to."

@@ -25,7 +25,7 @@ from mlg_troubleshoot.life.folding import (
     lives,
     lives_of,
 )
-from mlg_troubleshoot.life.outlook import Order
+from mlg_troubleshoot.life.landings_left import Order
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.records import ReadOptions, admit
 from mlg_troubleshoot.records.gate import judge_text

@@ -119,7 +119,8 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
     said = _with_lengths(str(step.get("text", "")))
     if restored:
         names = ", ".join(f"#{joint}" for joint in restored)
-        action, todo = Action.MEASURE, restored
+        action = Action.MEASURE
+        todo = restored
         said = Sentence(f"Restored since, as the records say: {names}. Enter the new clearances.")
     versions = _versions(life, latest.record)
     verdict = latest.result.get("verdict")
