@@ -4,7 +4,7 @@ explanation is there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,11 +14,11 @@ from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.conclusion import Conclusion
 from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.design import beside, design_of
+from mlg_troubleshoot.misfit.design import Design, beside, design_of
 from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
 from mlg_troubleshoot.misfit.fitting import Fit, fit
 from mlg_troubleshoot.misfit.posterior import posterior
-from mlg_troubleshoot.misfit.runner import Runner
+from mlg_troubleshoot.misfit.runner import Fitted, Runner, least_squares
 from mlg_troubleshoot.misfit.scatter import Readings, smooth_shapes
 
 # Sizes of a suspect that does not state its own, over the usual one: equally likely, as nobody
@@ -32,6 +32,8 @@ _DIGITS = 1e-9
 _ROUNDED = 0.01
 # Computing only: suspects that act together at most, and rounds until the same is likeliest again.
 _MOST, _ROUNDS = 12, 8
+# Computing only: where a nominal value may be far off, in trials, and how many of these are tried.
+_FAR_TRIALS, _STARTS = (-30.0, -10.0, -3.0, 3.0, 10.0, 30.0), 3
 # Correlation of rows that follow each other at most, and how near the likeliest one is sought.
 _CORRELATED, _NEAR = 0.99, 0.02
 _SUSPECT = "suspect"
@@ -48,13 +50,15 @@ class FittedPoint:
 
     values: of all parameters. rest, shape (N,): reading less prediction. columns, shape (N, p):
     change of each reading for one trial of each parameter. whole, shape (N,): misfit with all
-    suspects at nominal, as far as the columns say.
+    suspects at nominal, as far as the columns say. arrived, condition: of the fit, as in `Fitted`.
     """
 
     values: Array
     rest: Array
     columns: Array
     whole: Array
+    arrived: bool = True
+    condition: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -119,6 +123,9 @@ class Study:
         predicted = runner.nominal_prediction()
         base = predicted[runner.row, runner.output]
         columns = runner.sensitivities(runner.nominal, base, range(len(runner.names)))
+        runner.refuse_silent(range(count))
+        for k in self.nuisance:
+            runner.refuse_silent([k])
         largest = float(max(np.max(np.abs(runner.reading)), np.max(np.abs(columns))))
         floor, self.rounding = _DIGITS * largest, _ROUNDED * _DIGITS * largest
         least = max(floor, 1e-300)
@@ -155,13 +162,15 @@ class Study:
             contexts += [Context(name, log, size * placed, listed=False) for size in sizes]
         return contexts
 
-    def at(self, values: Array, base: Array) -> FittedPoint:
-        """Linearise the simulation at some values."""
-        run = self.runner
-        columns = run.sensitivities(values, base, range(len(values)))
+    def at(self, found: Fitted) -> FittedPoint:
+        """Linearise the simulation where a fit ended; what does nothing there as at nominal."""
+        run, values = self.runner, found.values
+        columns = run.sensitivities(values, found.base, range(len(values)))
+        columns = np.where(np.any(columns != 0.0, axis=0), columns, self.nominal.columns)
         change = (values - run.nominal)[: self.count] / run.trial[: self.count]
-        rest = self._rest(base)
-        return FittedPoint(values, rest, columns, rest + columns[:, : self.count] @ change)
+        rest = self._rest(found.base)
+        whole = rest + columns[:, : self.count] @ change
+        return FittedPoint(values, rest, columns, whole, found.arrived, found.condition)
 
     def fitted(self, at: JudgedPoint, chosen: Sequence[int], context: int) -> FittedPoint:
         """Fit some suspects and all nuisance parameters, the other suspects nominal."""
@@ -179,7 +188,7 @@ class Study:
             weighed, _log = noise.precision_times(columns / unit[:, None], noise.tail_ratios[-1])
             return weighed / unit[:, None]
 
-        return self.at(*self.runner.fit(values, [*chosen, *self.nuisance], weigh))
+        return self.at(self.runner.fit(values, [*chosen, *self.nuisance], weigh))
 
     def start(self) -> FittedPoint:
         """The nuisance parameters fitted; what they absorb shows only there."""
@@ -193,6 +202,14 @@ class Study:
             _left, seen = beside(columns[:, : self.count], columns[:, self.count :])
             self.design = self.design.within(seen)
         return point
+
+    def _look_again(self, point: FittedPoint, unit: Array) -> None:
+        """Ask for suspects that did nothing at the nominal values and do something here."""
+        columns = point.columns / unit[:, None]
+        _left, seen = beside(columns[:, : self.count], columns[:, self.count :])
+        idle = ~np.any(self.nominal.columns[:, : self.count] != 0.0, axis=0)
+        new = set(np.flatnonzero(seen & idle).tolist()) - self.design.testable
+        self.design = Design((*self.design.classes, *((k,) for k in sorted(new))))
 
     @property
     def often(self) -> float:
@@ -212,6 +229,8 @@ class Study:
             for k, sd, own in zip(first, stated, acting, strict=True)
         ]
         none = np.zeros(len(first))
+        # A suspect whose nominal value is one of its bounds can move in one way only.
+        way = (run.nominal == run.low).astype(float) - (run.nominal == run.high)
         suspects = Effects(
             columns=columns,
             names=[key_of(run.names[k]) for k in first],
@@ -220,7 +239,7 @@ class Study:
             size=np.array(size),
             scales=np.array([sd is None for sd in stated], bool),
             least=none,
-            sign=none,
+            sign=(way * np.sign(run.trial))[first],
             mean=none,
         )
         far = self._far(point.rest / unit, noise.relative)
@@ -239,7 +258,7 @@ class Study:
 
     def judged(self, start: FittedPoint) -> JudgedPoint:
         """Search from nothing; where that ends with a discrepancy, also from what explains most
-        without one, which may be the bend of a large change.
+        without one, which may be the bend of a large change, and from far away.
         """
         at = self._searched(start)
         if not at.likeliest.context:
@@ -248,7 +267,35 @@ class Study:
         plain = (e for e in found.likeliest if e.members and not e.context)
         chosen = self.chosen(found.names_of(next(plain, at.likeliest)))
         again = self._searched(self.fitted(at, chosen, 0))
+        for point in self._far_starts(start, at) if again.likeliest.context else ():
+            again = self._searched(point)
+            if not again.likeliest.context:
+                break
         return at if again.likeliest.context else again
+
+    def _far_starts(self, start: FittedPoint, at: JudgedPoint) -> Iterator[FittedPoint]:
+        """Fits of single suspects from values far from nominal that come nearer to the readings
+        than nominal does, the nearest first.
+        """
+        run = self.runner
+        tried = [
+            (k, run.within(start.values + np.eye(len(start.values))[k] * far * run.trial[k]))
+            for k in (members[0] for members in self.design.classes)
+            for far in _FAR_TRIALS
+        ]
+        run.ask(values for _k, values in tried)
+        rests = np.column_stack([start.rest, *(run.reading - run.at(v) for _k, v in tried)])
+        rests, free = rests / at.unit[:, None], at.columns[:, self.nuisance]
+        rests[:, ~np.isfinite(rests).all(axis=0)] = np.inf
+        usable = np.isfinite(rests[0])
+        rests[:, usable] -= free @ least_squares(free, rests[:, usable])
+        cost = np.where(usable, np.sum(np.where(usable, rests, 0.0) ** 2, axis=0), np.inf)
+        noise = at.settled((), 0)
+        for place in np.argsort(cost)[:_STARTS]:
+            if place == 0:
+                break
+            k, values = tried[place - 1]
+            yield self._fit(values, [k], noise, at.unit)
 
     def _searched(self, start: FittedPoint) -> JudgedPoint:
         """Search, fit what is likeliest and linearise there, until the same is likeliest again."""
@@ -265,6 +312,7 @@ class Study:
                 return at
             tried.add(state)
             point = self.fitted(at, chosen, context)
+            self._look_again(point, at.unit)
             left, spare = at.settled(chosen, context).own_part(point.rest / at.unit)
             spare = max(spare - len(chosen) / len(left), 1.0 / len(left))
             scale = self.readings.scale_of(left * at.unit, spare)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.held_out import blocks_of, folds_of
 from mlg_troubleshoot.misfit.linearised import FittedPoint, JudgedPoint, Study, key_of
@@ -34,7 +35,7 @@ _ALIKE = 3.1
 
 def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong, how rows belong together
     predict: Callable[[Mapping[str, float]], Any],
-    measured: ArrayLike,
+    measured: ArrayLike | Mapping[str, ArrayLike],
     suspects: Sequence[Suspect],
     nuisance: Sequence[Suspect] = (),
     groups: ArrayLike | None = None,
@@ -43,6 +44,9 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     *,
     series: ArrayLike | None = None,
     time: ArrayLike | None = None,
+    most_calls: int = 400,
+    progress: Callable[[int, int], object] | None = None,
+    workers: int | Callable[..., Iterable[Any]] = 1,
 ) -> SimulationDiagnosis:
     """Find which parameters of a simulation its measured data show to be wrong.
 
@@ -56,8 +60,11 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     Parameters
     ----------
     predict : callable
-        Takes the parameters by name, returns the prediction of all rows and outputs, shape (n, m).
-    measured : array_like, shape (n, m) or (n,)
+        Takes the parameters by name, returns the prediction of all rows and outputs, shape (n, m),
+        or a mapping or DataFrame of channels by name. Where it raises an ArithmeticError, a
+        ValueError or a RuntimeError, or returns NaN, the values are avoided, counted and told;
+        other exceptions are passed on.
+    measured : array_like, shape (n, m) or (n,), or mapping or DataFrame of channels, each (n,)
         Readings, NaN where not read.
     suspects : sequence of Suspect
         Parameters that may be wrong.
@@ -78,6 +85,14 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     time : array_like, shape (n,), optional
         When each row of a series was read, numbers or dates; without it steps are equal, in the
         order given.
+    most_calls : int, optional
+        Calls of the simulation up to which the gain is measured by fitting it again without each
+        fold; what needs more is taken for linear there. The search itself is not cut off.
+    progress : callable, optional
+        Called with the number of calls so far and `most_calls` after each round of calls.
+    workers : int or callable, optional
+        Threads that call the simulation at once, or a function like ``map`` (of a process pool):
+        the result is the same.
 
     Returns
     -------
@@ -90,22 +105,39 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
         If the arrays do not fit together, a name stands twice, a trial is 0, or the simulation
         gives no number.
     """
-    data, declared, group = checked(measured, suspects, nuisance, groups, reading_u)
+    data, channels, declared, group = checked(measured, suspects, nuisance, groups, reading_u)
     follows = followed(series, time, len(data))
-    runner = Runner(predict, data, [*suspects, *nuisance])
-    # The matrices are small: threads that wait for each other cost several times what they save.
-    with threadpool_limits(1, "blas"):
-        study = Study(runner, len(suspects), declared, group, beliefs or Beliefs(), follows)
-        return _diagnosed(study)
+
+    def diagnosed(call: Callable[..., Iterable[Any]]) -> SimulationDiagnosis:
+        runner = Runner(predict, data, [*suspects, *nuisance], channels, call)
+        if progress is not None:
+            runner.progress = lambda: progress(runner.calls, most_calls)
+        # The matrices are small: threads that wait for each other cost several times what they
+        # save.
+        with threadpool_limits(1, "blas"):
+            study = Study(runner, len(suspects), declared, group, beliefs or Beliefs(), follows)
+            return _diagnosed(study, most_calls)
+
+    if callable(workers):
+        return diagnosed(workers)
+    if workers == 1:
+        return diagnosed(map)
+    with ThreadPoolExecutor(workers) as pool:
+        return diagnosed(pool.map)
 
 
-def _diagnosed(study: Study) -> SimulationDiagnosis:
+def _diagnosed(study: Study, most_calls: int) -> SimulationDiagnosis:
     """Say what is wrong, what may be, what that gains, and the residual."""
     runner, names = study.runner, study.runner.names
     start = study.start()
     at = study.judged(start)
     causes = _causes(study, at)
-    report = _Report(study, at, study.fitted(at, causes, 0), tuple(causes))
+    final = study.fitted(at, causes, 0)
+    moved = [k for k in causes if final.values[k] != runner.nominal[k]]
+    if moved != causes:
+        # What would only move beyond its bound is no cause.
+        causes, final = moved, study.fitted(at, moved, 0)
+    report = _Report(study, at, final, tuple(causes))
     open_ = study.chosen(at.follows.open_beside([key_of(names[k]) for k in causes]))
     verdict, found = at.follows.verdict, at.follows.posterior
     if verdict is Verdict.NAMED and not causes:
@@ -115,6 +147,7 @@ def _diagnosed(study: Study) -> SimulationDiagnosis:
     in_sequence = report.in_sequence()
     smallest = study.beliefs.seen_from(often, n) * float(np.sqrt(np.mean(at.unit**2) / n))
     described = [report.describe(k) for k in causes]
+    gain, untestable = report.gain(start, most_calls), report.untestable({*causes, *open_})
     return SimulationDiagnosis(
         verdict=verdict,
         causes=tuple(sorted(described, key=lambda c: -c.effect_rms)),
@@ -122,10 +155,11 @@ def _diagnosed(study: Study) -> SimulationDiagnosis:
         aliases=tuple(
             tuple(names[k] for k in members) for members in study.design.classes if len(members) > 1
         ),
-        untestable=tuple(names[k] for k in range(study.count) if k not in study.design.testable),
+        untestable=tuple(untestable),
+        why_untestable=untestable,
         p_nothing=found.nothing,
         p_unlisted=min(found.unlisted, 1.0),
-        gain=report.gain(start),
+        gain=gain,
         parameters=dict(zip(names, report.final.values.tolist(), strict=True)),
         remainder_p=report.remainder_p(),
         smallest_detectable_rms=smallest,
@@ -135,25 +169,12 @@ def _diagnosed(study: Study) -> SimulationDiagnosis:
         ),
         correlation=at.noise.correlation,
         in_sequence=in_sequence,
-        notes=_notes(study, in_sequence),
+        notes=report.notes(in_sequence),
         calls=runner.calls,
+        failed=runner.failed,
+        arrived=final.arrived,
+        condition=final.condition,
     )
-
-
-def _notes(study: Study, in_sequence: bool) -> tuple[str, ...]:
-    """What a reader must know before the numbers are used, as sentences."""
-    notes = []
-    if in_sequence and study.series is None:
-        notes.append(
-            "Residuals of neighbouring rows are correlated: probabilities and intervals are too"
-            " sharp. State with series= (and time=) which rows follow each other."
-        )
-    elif in_sequence:
-        notes.append(
-            "Residuals are correlated further than one correlation from row to row explains:"
-            " probabilities and intervals may be too sharp."
-        )
-    return tuple(notes)
 
 
 def _causes(study: Study, at: JudgedPoint) -> list[int]:
@@ -210,7 +231,7 @@ def _held_out(
     fitted: Sequence[int],
     acting: Sequence[int],
     whole: bool = True,
-) -> tuple[Array, str]:
+) -> tuple[Array, str, Wholes]:
     """Misfit of rows held out over their scatter, some causes fitted to the others, or what of it
     is new in each row; rows are held out by group as long as the others teach what acts.
     """
@@ -220,7 +241,18 @@ def _held_out(
     part, by = folds_of(row, study.group, columns[:, list(acting)], study.fold)
     if by == "row" and study.series is not None:
         part, by = blocks_of(*study.series)[row], "block"
-    return held_out(columns, rest, fitted, study.nuisance, part), by
+    return held_out(columns, rest, fitted, study.nuisance, part), by, part
+
+
+def _stated(s: Suspect) -> float:
+    """Largest change that is stated to be possible; two standard deviations. [unit]"""
+    bounds = (
+        s.nominal - s.low if s.low is not None else None,
+        s.high - s.nominal if s.high is not None else None,
+    )
+    ranges = [] if None in bounds else [max(b for b in bounds if b is not None)]
+    ranges += [] if s.prior_sd is None else [2.0 * s.prior_sd]
+    return min(ranges, default=float("inf"))
 
 
 @dataclass(frozen=True)
@@ -246,22 +278,104 @@ class _Report:
         seen = whole / at.weight
         seen = (seen - held @ least_squares(held, seen)) * at.weight
         reach = _reach(self.study, at, k, others) * float(abs(run.trial[k]))
-        value = float(run.nominal[k] + change)
+        value = float(np.clip(run.nominal[k] + change, run.low[k], run.high[k]))
         return SuspectFound(
             suspect=run.suspects[k],
             value=value,
-            interval=(value - reach, value + reach),
+            interval=(
+                float(max(value - reach, run.low[k])),
+                float(min(value + reach, run.high[k])),
+            ),
             effect_rms=float(np.sqrt(np.mean(seen**2))),
             probability=min(at.follows.listed.get(key_of(names[k]), 0.0), 1.0),
             aliases=tuple(names[j] for j in self.study.design.class_of(k) if j != k),
         )
 
-    def gain(self, start: FittedPoint) -> HeldOutGain:
+    def gain(self, start: FittedPoint, most_calls: int) -> HeldOutGain:
         """Misfit of rows held out, before and after, in the unit of the readings."""
-        before, by = _held_out(self.study, self.at, start, (), self.causes)
-        after, by = _held_out(self.study, self.at, self.final, self.causes, self.causes)
-        rms = [float(np.sqrt(np.mean((left * self.at.weight) ** 2))) for left in (before, after)]
-        return HeldOutGain(rms[0], rms[1], by)
+        study, at = self.study, self.at
+        before, by, part = _held_out(study, at, start, (), self.causes)
+        after, by, part = _held_out(study, at, self.final, self.causes, self.causes)
+        # Each fold needs a step, its check, and the columns at both.
+        folds = len(np.unique(part))
+        fitted = (len(study.nuisance), len(study.nuisance) + len(self.causes))
+        needed = sum(folds * 2 * (2 * k + 1) for k in fitted if k)
+        refitted = study.runner.calls + needed <= most_calls
+        if refitted:
+            before = self._refitted(start, (), part)
+            after = self._refitted(self.final, self.causes, part)
+        rms = [float(np.sqrt(np.mean((left * at.weight) ** 2))) for left in (before, after)]
+        return HeldOutGain(rms[0], rms[1], by, refitted)
+
+    def _refitted(self, point: FittedPoint, fitted: Sequence[int], part: Wholes) -> Array:
+        """Misfit of each reading over its scatter, the simulation fitted to the other folds."""
+        study, weight = self.study, self.at.weight
+        active, left = [*fitted, *study.nuisance], point.rest / weight
+        for k in np.unique(part):
+            test = part == k
+            if test.all() or not active:
+                continue
+            share = np.where(test, 0.0, 1.0 / weight**2)
+            found = study.runner.fit(point.values, active, lambda c, w=share: w[:, None] * c)  # type: ignore[misc]
+            slopes = study.runner.sensitivities(found.values, found.base, active)
+            rest = (study.runner.reading - found.base) / weight
+            own = list(range(len(fitted)))
+            free = list(range(len(fitted), len(active)))
+            left[test] = held_out(slopes / weight[:, None], rest, own, free, part, [k])[test]
+        return left
+
+    def untestable(self, found: Collection[int]) -> dict[str, str]:
+        """Suspects that these rows cannot test, and why."""
+        study, run, why = self.study, self.study.runner, dict[str, str]()
+        for k, s in enumerate(run.suspects[: study.count]):
+            if k in run.silent:
+                why[s.name] = "the simulation gives no number near its nominal value"
+            elif k not in study.design.testable:
+                acts = np.any(study.nominal.columns[:, k] != 0.0)
+                why[s.name] = "absorbed by the nuisance parameters" if acts else "no effect here"
+            elif k not in found and (widest := _stated(s)) < (least := self._detectable(k)):
+                unit = f" {s.unit}".rstrip()
+                why[s.name] = (
+                    f"a change of {least:.3g}{unit} would be detected, {widest:.3g}{unit} is the"
+                    " most that is stated to be possible"
+                )
+        return why
+
+    def _detectable(self, k: int) -> float:
+        """Smallest change of a suspect that is detected with 80 % power. [unit of the suspect]"""
+        error = self.at.linear([k, *(j for j in self.causes if j != k)], 0).errors[0]
+        seen = self.study.beliefs.seen_from(self.study.often, len(self.at.unit))
+        return float(seen * error * abs(self.study.runner.trial[k]))
+
+    def notes(self, in_sequence: bool) -> tuple[str, ...]:
+        """What to know before the numbers are used, as sentences."""
+        run, notes = self.study.runner, list[str]()
+        if in_sequence and self.study.series is None:
+            notes.append(
+                "Residuals of neighbouring rows are correlated: probabilities and intervals are too"
+                " sharp. State with series= (and time=) which rows follow each other."
+            )
+        elif in_sequence:
+            notes.append(
+                "Residuals are correlated further than one correlation from row to row explains:"
+                " probabilities and intervals may be too sharp."
+            )
+        for k in self.causes:
+            if self.final.values[k] in {run.low[k], run.high[k]}:
+                own = {run.names[j] for j in (*self.causes, *self.study.design.class_of(k))}
+                others = (str(name) for _what, name in self.at.follows.listed if name not in own)
+                notes.append(
+                    f"{run.names[k]} stands at its bound {self.final.values[k]:g}; the likeliest"
+                    f" rival is {next(others, 'something that is not listed')}."
+                )
+        if not self.final.arrived:
+            notes.append("The fit did not arrive: values may be off, and intervals too narrow.")
+        if run.failed:
+            notes.append(
+                f"{run.failed} of {run.calls} calls gave no number for some reading, the first"
+                f" with {run.told[0]}."
+            )
+        return tuple(notes)
 
     def in_sequence(self) -> bool:
         """True if what the likeliest explanation leaves of a row resembles what it leaves of the

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,13 +16,25 @@ from mlg_troubleshoot.misfit.simulation_result import Suspect
 
 
 def checked(
-    measured: ArrayLike,
+    measured: Any,
     suspects: Sequence[Suspect],
     nuisance: Sequence[Suspect],
     groups: ArrayLike | None,
     reading_u: ArrayLike | None,
-) -> tuple[Array, Array | None, Wholes | None]:
-    """Readings as (n, m), declared uncertainty likewise, groups as numbers."""
+) -> tuple[Array, tuple[str, ...], Array | None, Wholes | None]:
+    """Readings as (n, m) and names of their outputs, declared uncertainty likewise, groups as
+    numbers.
+    """
+    channels: tuple[str, ...] = ()
+    if isinstance(measured, Mapping) or hasattr(measured, "columns"):
+        channels = tuple(measured)
+        lengths = {name: np.shape(measured[name]) for name in channels}
+        if len(set(lengths.values())) != 1:
+            raise UsageError(
+                f"The channels of measured have shapes {lengths}",
+                "give one reading for each row to every channel, NaN where not read",
+            )
+        measured = np.column_stack([_numbers(measured[name], str(name)) for name in channels])
     data = _numbers(measured, "measured")
     data = data[:, None] if data.ndim == 1 else data
     if data.ndim != 2 or not data.size:
@@ -40,7 +53,7 @@ def checked(
             f"{readings} readings are too few for {len(nuisance)} nuisance parameters",
             f"measure {len(nuisance) + 3 - readings} more at least",
         )
-    return data, _declared(reading_u, data), _groups(groups, len(data))
+    return data, channels, _declared(reading_u, data), _groups(groups, len(data))
 
 
 def followed(
@@ -124,6 +137,17 @@ def _suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect]) -> None:
             raise UsageError(
                 f"{s.name}: nominal {s.nominal:g}, trial {s.trial:g} {s.unit}".rstrip(),
                 "both must be finite, and the trial a change that does something, never 0",
+            )
+        low, high = (-np.inf if s.low is None else s.low), (np.inf if s.high is None else s.high)
+        if not low <= s.nominal <= high or not low < high:
+            raise UsageError(
+                f"{s.name}: nominal {s.nominal:g} is not between low {low:g} and high {high:g}",
+                "give bounds within which the nominal value is",
+            )
+        if s.prior_sd is not None and not s.prior_sd > 0.0:
+            raise UsageError(
+                f"{s.name}: prior_sd {s.prior_sd:g} {s.unit}".rstrip(),
+                "a standard deviation is a positive number",
             )
 
 

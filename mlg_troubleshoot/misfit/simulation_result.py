@@ -33,6 +33,8 @@ class Suspect:
         Standard deviation of how wrong it may be, known beforehand; without it any effect from a
         third of the scatter of a reading to a hundred times as much is taken for equally likely.
         [unit]
+    low, high : float, optional
+        Bounds within which it may be, the nominal value among them. [unit]
     """
 
     name: str
@@ -43,6 +45,8 @@ class Suspect:
     inspect: str = ""
     separates: str = ""
     prior_sd: float | None = None
+    low: float | None = None
+    high: float | None = None
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -98,11 +102,15 @@ class HeldOutGain:
         The same with the causes fitted. [unit of the readings]
     held_out_by : str
         What was held out together: ``group``, ``row``, or ``block``: rows that follow each other.
+    refitted : bool
+        True if the simulation itself was fitted again without each fold; False if it was taken for
+        linear, since that would have needed more calls than it may be called.
     """
 
     rms_before: float
     rms_after: float
     held_out_by: str
+    refitted: bool
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -123,7 +131,10 @@ class SimulationDiagnosis(Result):
         Classes of suspects that these rows cannot distinguish, known before a measured value is
         looked at.
     untestable : tuple of str
-        Suspects that do nothing in these rows which the nuisance parameters do not absorb.
+        Suspects that these rows cannot test.
+    why_untestable : mapping of str to str
+        Why each of them: no effect here, absorbed by the nuisance parameters, no number near the
+        nominal value, or less than these rows detect in all of the range that is stated.
     p_nothing : float
         Probability that nothing is wrong. [1]
     p_unlisted : float
@@ -150,6 +161,12 @@ class SimulationDiagnosis(Result):
         What to know before these numbers are used, one sentence or two each; empty if nothing.
     calls : int
         Times that the simulation was called.
+    failed : int
+        Calls that gave no number for some reading, or failed.
+    arrived : bool
+        True if the last fit ended where a further step changes next to nothing.
+    condition : float
+        Condition number of the last fit's columns, each scaled to unit length. [1]
     """
 
     verdict: Verdict
@@ -157,6 +174,7 @@ class SimulationDiagnosis(Result):
     also_possible: tuple[SuspectFound, ...]
     aliases: tuple[tuple[str, ...], ...]
     untestable: tuple[str, ...]
+    why_untestable: Mapping[str, str]
     p_nothing: float
     p_unlisted: float
     gain: HeldOutGain
@@ -168,6 +186,9 @@ class SimulationDiagnosis(Result):
     in_sequence: bool
     notes: tuple[str, ...]
     calls: int
+    failed: int
+    arrived: bool
+    condition: float
 
     @property
     def named(self) -> tuple[SuspectFound, ...]:

@@ -93,15 +93,15 @@ def test_the_correlation_of_rows_is_estimated(correlation: float) -> None:
 
 
 def test_rows_that_remember_each_other_name_nothing_where_nothing_is_wrong() -> None:
-    named = [diagnosed(seed, 0.7).verdict is Verdict.NAMED for seed in range(40)]
-    assert np.mean(named) <= 0.025
+    named = [diagnosed(seed, 0.7).verdict is Verdict.NAMED for seed in range(15)]
+    assert not any(named)
 
 
 def test_intervals_of_correlated_rows_hold_the_true_value() -> None:
     held = []
-    for seed in range(40):
+    for seed in range(20):
         held += [c.interval[0] <= 2.0 <= c.interval[1] for c in diagnosed(seed, 0.7, 2.0).causes]
-    assert len(held) >= 30
+    assert len(held) >= 15
     assert np.mean(held) >= 0.85
 
 

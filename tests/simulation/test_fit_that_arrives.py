@@ -1,0 +1,210 @@
+"""The fit of a simulation: it arrives, within bounds, also from far away, and says so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.optimize import least_squares
+
+from mlg_troubleshoot.diagnosis import SimulationDiagnosis, Suspect, Verdict, diagnose_simulation
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.misfit.runner import Runner
+
+T = np.linspace(0.0, 10.0, 150)
+Predict = Callable[[Mapping[str, float]], np.ndarray]
+
+
+def swing(p: Mapping[str, float]) -> np.ndarray:
+    """A damped oscillation."""
+    return np.asarray(p["size"] * np.exp(-p["damping"] * T) * np.cos(p["rate"] * T) + p["zero"])
+
+
+SWING = [
+    Suspect("size", 1.0, 0.05, "mm"),
+    Suspect("damping", 0.1, 0.01, "1/s"),
+    Suspect("rate", 2.0, 0.02, "rad/s"),
+]
+ZERO = [Suspect("zero", 0.0, 0.1, "mm")]
+SOUND = {"size": 1.0, "damping": 0.1, "rate": 2.0, "zero": 0.0}
+
+
+def noisy(wrong: Mapping[str, float], seed: int = 1, predict: Predict = swing) -> np.ndarray:
+    scatter = 0.02 * np.random.default_rng([36, seed]).standard_normal(len(T))
+    return np.asarray(predict({**SOUND, **wrong}) + scatter)
+
+
+def test_a_frequency_twenty_trials_off_is_found() -> None:
+    found = diagnose_simulation(swing, noisy({"rate": 2.4}), SWING, ZERO)
+    assert (found.verdict, [c.name for c in found.causes]) == (Verdict.NAMED, ["rate"])
+    assert found.causes[0].value == pytest.approx(2.4, rel=0.01)
+    assert found.arrived
+
+
+def test_the_parameters_are_those_of_least_squares_of_the_same_names() -> None:
+    for seed, wrong in enumerate(({"size": 1.3}, {"damping": 0.2}, {"size": 0.8, "rate": 2.1})):
+        read = noisy(wrong, seed)
+        found = diagnose_simulation(swing, read, SWING, ZERO)
+        names = [*(c.name for c in found.causes), "zero"]
+
+        def left(
+            values: np.ndarray, names: list[str] = names, read: np.ndarray = read
+        ) -> np.ndarray:
+            return np.asarray(swing({**SOUND, **dict(zip(names, values, strict=True))}) - read)
+
+        start = [{**SOUND, **wrong}[name] for name in names]
+        best = least_squares(left, start, x_scale=[0.1] * len(names)).fun
+        here = swing(found.parameters) - read
+        assert set(names) == {*wrong, "zero"}
+        assert np.sqrt(np.mean(here**2)) <= 1.02 * np.sqrt(np.mean(best**2))
+
+
+def test_a_value_stays_within_its_bounds_and_the_result_says_that_it_stands_at_one() -> None:
+    suspects = [Suspect("size", 1.0, 0.05, low=0.9, high=1.1), *SWING[1:]]
+    found = diagnose_simulation(swing, noisy({"size": 1.3}), suspects, ZERO)
+    assert found.parameters["size"] <= 1.1
+    (cause,) = found.causes
+    assert cause.value == 1.1
+    assert cause.interval[1] <= 1.1
+    assert any("size stands at its bound 1.1" in note for note in found.notes)
+
+
+def test_what_would_only_move_beyond_its_bound_is_not_reported() -> None:
+    suspects = [Suspect("size", 1.0, 0.05, low=1.0), *SWING[1:]]
+    found = diagnose_simulation(swing, noisy({"size": 0.7}), suspects, ZERO)
+    assert "size" not in {c.name for c in found.causes}
+    assert found.parameters["size"] >= 1.0
+
+
+def test_a_call_that_fails_is_avoided_counted_and_told_with_its_parameters() -> None:
+    def fragile(p: Mapping[str, float]) -> np.ndarray:
+        if p["damping"] < 0.0995:
+            raise FloatingPointError("unstable")
+        return swing(p)
+
+    found = diagnose_simulation(fragile, noisy({"size": 1.3}), SWING, ZERO)
+    assert [c.name for c in found.causes] == ["size"]
+    assert found.failed >= 1
+    (note,) = found.notes
+    assert "damping=0.099" in note
+    assert "unstable" in note
+
+
+def test_a_fault_in_the_code_of_a_simulation_is_passed_on() -> None:
+    def faulty(_p: Mapping[str, float]) -> np.ndarray:
+        raise TypeError("a fault")
+
+    with pytest.raises(TypeError, match="a fault"):
+        diagnose_simulation(faulty, T, SWING)
+
+
+def test_a_suspect_around_which_the_simulation_fails_cannot_be_tested_and_stops_nothing() -> None:
+    def rigid(p: Mapping[str, float]) -> np.ndarray:
+        return swing(p) if p["damping"] == 0.1 else np.full(len(T), np.nan)
+
+    found = diagnose_simulation(rigid, noisy({"size": 1.3}), SWING, ZERO)
+    assert [c.name for c in found.causes] == ["size"]
+    assert "no number" in found.why_untestable["damping"]
+
+
+@pytest.mark.parametrize("form", [dict, pd.DataFrame])
+def test_channels_with_names_are_matched_by_name(form: Callable[..., object]) -> None:
+    def both(p: Mapping[str, float]) -> object:
+        return form({"speed_mm_s": np.gradient(swing(p), T), "place_mm": swing(p)})
+
+    read = noisy({"size": 1.3})
+    speed = np.gradient(swing({**SOUND, "size": 1.3}), T)
+    scatter = 0.02 * np.random.default_rng(2).standard_normal(len(T))
+    measured = form({"place_mm": np.where(T < 1.0, np.nan, read), "speed_mm_s": speed + scatter})
+    found = diagnose_simulation(both, measured, SWING, ZERO)  # type: ignore[arg-type]
+    assert [c.name for c in found.causes] == ["size"]
+    with pytest.raises(UsageError, match="no channel 'place_mm'"):
+        diagnose_simulation(lambda _p: {"speed_mm_s": T}, measured, SWING, ZERO)  # type: ignore[arg-type]
+
+
+def said(found: SimulationDiagnosis) -> tuple[object, ...]:
+    return found.verdict, dict(found.parameters), found.gain, found.calls
+
+
+def test_calls_at_once_give_the_same_result() -> None:
+    read = noisy({"rate": 2.1})
+    alone = diagnose_simulation(swing, read, SWING, ZERO)
+    threads = diagnose_simulation(swing, read, SWING, ZERO, workers=3)
+    with ThreadPoolExecutor(2) as pool:
+        mapped = diagnose_simulation(swing, read, SWING, ZERO, workers=pool.map)
+    assert said(alone) == said(threads) == said(mapped)
+
+
+def test_the_gain_is_refitted_where_calls_allow_and_else_says_that_it_is_linear() -> None:
+    read = noisy({"rate": 2.1})
+    full = diagnose_simulation(swing, read, SWING, ZERO)
+    linear = diagnose_simulation(swing, read, SWING, ZERO, most_calls=1)
+    assert (full.gain.refitted, linear.gain.refitted) == (True, False)
+    assert full.calls <= 400
+    assert full.gain.rms_after == pytest.approx(0.02, rel=0.2)
+    assert full.gain.rms_after == pytest.approx(linear.gain.rms_after, rel=0.1)
+
+
+def test_progress_is_told_after_each_round_of_calls() -> None:
+    seen: list[tuple[int, int]] = []
+    found = diagnose_simulation(
+        swing, noisy({"rate": 2.1}), SWING, ZERO, progress=lambda *done: seen.append(done)
+    )
+    assert seen == sorted(seen)
+    assert seen[-1] == (found.calls, 400)
+
+
+def test_why_a_suspect_cannot_be_tested_is_said() -> None:
+    def several(p: Mapping[str, float]) -> np.ndarray:
+        return swing(p) + p["shift"] + 0.0 * p["idle"] + 0.001 * p["small"] * T
+
+    suspects = [
+        *SWING,
+        Suspect("shift", 0.0, 0.1),
+        Suspect("idle", 0.0, 0.1),
+        Suspect("small", 0.0, 0.1, prior_sd=0.1),
+    ]
+    read = noisy({"shift": 0.0, "idle": 0.0, "small": 0.0}, predict=several)
+    found = diagnose_simulation(several, read, suspects, ZERO)
+    assert found.untestable == ("shift", "idle", "small")
+    assert found.why_untestable["shift"] == "absorbed by the nuisance parameters"
+    assert found.why_untestable["idle"] == "no effect here"
+    assert "would be detected" in found.why_untestable["small"]
+
+
+def test_what_does_nothing_at_the_nominal_values_is_asked_for_where_it_does() -> None:
+    def play(p: Mapping[str, float]) -> np.ndarray:
+        return np.asarray((p["size"] - 1.0) * (T + p["bend"] * np.sin(3.0 * T)))
+
+    suspects = [Suspect("size", 1.0, 0.05), Suspect("bend", 0.0, 0.1)]
+    scatter = 0.02 * np.random.default_rng(7).standard_normal(len(T))
+    found = diagnose_simulation(play, play({"size": 1.3, "bend": 1.0}) + scatter, suspects)
+    assert {c.name for c in found.causes} == {"size", "bend"}
+    assert found.untestable == ()
+
+
+@pytest.mark.parametrize(
+    ("suspect", "says"),
+    [
+        (Suspect("size", 1.0, 0.1, low=2.0), "not between"),
+        (Suspect("size", 1.0, 0.1, low=1.0, high=1.0), "not between"),
+        (Suspect("size", 1.0, 0.1, prior_sd=0.0), "prior_sd 0"),
+    ],
+)
+def test_bounds_and_scatter_that_cannot_be_are_refused(suspect: Suspect, says: str) -> None:
+    with pytest.raises(UsageError, match=says):
+        diagnose_simulation(swing, T, [suspect, *SWING[1:]], ZERO)
+
+
+def test_a_damped_step_arrives_where_a_whole_one_overshoots() -> None:
+    runner = Runner(
+        lambda p: np.arctan(p["x"] * np.linspace(0.5, 2.0, 20))[:, None],
+        np.zeros((20, 1)),
+        [Suspect("x", 3.0, 0.1)],
+    )
+    found = runner.fit(runner.nominal, [0], lambda columns: 1e4 * columns)
+    assert found.values[0] == pytest.approx(0.0, abs=1e-3)
+    assert found.arrived
