@@ -24,7 +24,14 @@ settings.load_profile("everyday")
 
 # What a user may have set that the program, or what it shows its pages with, reads.
 OF_THE_USER = (
-    *("MLG_STORE", "MLG_DEBUG", "SOURCE_DATE_EPOCH", "XDG_CONFIG_HOME", "XDG_DATA_HOME"),
+    *(
+        "MLG_STORE",
+        "MLG_DEBUG",
+        "SOURCE_DATE_EPOCH",
+        "XDG_CONFIG_HOME",
+        "XDG_DATA_HOME",
+        "XDG_CACHE_HOME",
+    ),
     *(
         "COLUMNS",
         "LINES",

@@ -15,7 +15,7 @@ from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
-from mlg_troubleshoot.decision.columns import SIDE
+from mlg_troubleshoot.decision.columns import RECORD_ID, SIDE
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -96,6 +96,10 @@ class Run:
             )
         if not self._files:
             typed = by_hand.from_flags(self._flags, self._asked)
+            if self._place is not None and RECORD_ID.name not in self._flags.typed:
+                from mlg_troubleshoot.workflows.keep import under_a_free_id
+
+                typed = under_a_free_id(typed, self._place)
             return task.check_inspection(typed, self._asked, self._place)
         with stages(quiet=self._wanted.quiet) as bar:
             files = [Path(name) for name in self._files]

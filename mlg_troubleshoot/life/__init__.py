@@ -10,6 +10,7 @@ __all__ = [
     "forecast",
     "landings_left",
     "looking_back",
+    "remembered",
     "since_repairs",
     "unrecorded_work",
     "wear_paths",

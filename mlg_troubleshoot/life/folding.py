@@ -4,21 +4,42 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order
-from mlg_troubleshoot.store import Record, RecordKind, Store, StoreError, inspection_from
+from mlg_troubleshoot.store import (
+    Judge,
+    Record,
+    RecordKind,
+    Store,
+    StoreError,
+    inspection_from,
+)
 
 GearKey = tuple[str, str]
 # Letters of a hash by which a record may be named. [1]
 LEAST_OF_A_HASH = 6
+# Contents that stay unpacked: those of the gears that are being worked on, not of a fleet. [1]
+_UNPACKED = 4096
 
 
-@dataclass(frozen=True)
+# Who judges is no part of what a record says, and has a say in whether it can be read.
+@lru_cache(_UNPACKED)
+def _inspection_of(record: Record, _judge: Judge | None) -> Inspection:
+    return inspection_from(record)
+
+
+@lru_cache(_UNPACKED)
+def _result_of(assessed: Record, _judge: Judge | None) -> Mapping[str, Any]:
+    result: Mapping[str, Any] = assessed.body["result"]
+    return result
+
+
+@dataclass(frozen=True, slots=True)
 class KeptInspection:
     """An inspection as it stands after corrections, with its last assessment; unpacked when it is
     asked for.
@@ -27,14 +48,14 @@ class KeptInspection:
     record: Record
     assessed: Record | None = None
 
-    @cached_property
+    @property
     def inspection(self) -> Inspection:
-        return inspection_from(self.record)
+        return _inspection_of(self.record, self.record.judge)
 
-    @cached_property
+    @property
     def result(self) -> Mapping[str, Any]:
         """What the check said, in the form of its JSON; empty if it was never judged."""
-        return {} if self.assessed is None else self.assessed.body["result"]
+        return {} if self.assessed is None else _result_of(self.assessed, self.assessed.judge)
 
     @property
     def worst_joint(self) -> int | None:
@@ -182,9 +203,16 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
             others.pop(gone, None)
         elif record.kind is RecordKind.ASSESSMENT:
             assessed = (record.record_id, record.day)
-            same = [k for k, s in kept.items() if (s.record.record_id, s.record.day) == assessed]
-            if same:
-                kept[same[-1]] = replace(kept[same[-1]], assessed=record)
+            same = next(
+                (
+                    k
+                    for k, s in reversed(kept.items())
+                    if (s.record.record_id, s.record.day) == assessed
+                ),
+                None,
+            )
+            if same is not None:
+                kept[same] = KeptInspection(kept[same].record, record)
         else:
             others[record.digest] = record
     repairs = [r for r in others.values() if r.kind in (RecordKind.REPAIR, RecordKind.RERIG)]

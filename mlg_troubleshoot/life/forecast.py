@@ -19,7 +19,7 @@ from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
-from mlg_troubleshoot.life.wear_paths import placed_in_time, stretches, unit_of, wear_paths
+from mlg_troubleshoot.life.wear_paths import newest_readings, placed_in_time, unit_of, wear_paths
 from mlg_troubleshoot.wear import (
     Samples,
     WearModel,
@@ -86,7 +86,11 @@ def teachers_first(keys: Iterable[GearKey]) -> list[GearKey]:
     return sorted(keys, key=lambda key: sha256("\0".join(key).encode()).digest())
 
 
-def fit_fleet(lives: Iterable[GearLife], gear: Gear) -> WearModel | None:
+def fit_fleet(
+    lives: Iterable[GearLife],
+    gear: Gear,
+    fit: Callable[[Sequence[WearPath]], WearModel] = fit_wear,
+) -> WearModel | None:
     """Learn the wear of joints from as many gears as are needed, of which the dates and landings
     agree; None if none states its landings.
     """
@@ -104,7 +108,7 @@ def fit_fleet(lives: Iterable[GearLife], gear: Gear) -> WearModel | None:
         followed = {path.unit for path in paths if len(np.asarray(path.usage)) > 1}
         if len(followed) >= WearModel.learns_from:
             break
-    return fit_wear(paths) if any(len(np.asarray(path.usage)) for path in paths) else None
+    return fit(paths) if any(len(np.asarray(path.usage)) for path in paths) else None
 
 
 def forecast(
@@ -144,8 +148,7 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
     """The forecast of a gear that is outside its margin or has a joint over its limit: nothing
     remains of anything.
     """
-    newest = {n: s[-1].readings[-1:] for n, s in stretches(life, gear.joint_numbers).items()}
-    over = _over_limit({n: read[0][1] for n, read in newest.items() if read}, gear)
+    over = _over_limit(newest_readings(life, gear.joint_numbers), gear)
     reasons = []
     if life.inspections[-1].result.get("verdict") == Verdict.OUTSIDE_MARGIN.value:
         reasons.append("outside the margin at the last inspection")

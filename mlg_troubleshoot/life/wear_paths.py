@@ -44,6 +44,22 @@ def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]
     return found
 
 
+def newest_readings(life: GearLife, joints: Sequence[int]) -> dict[int, float]:
+    """The last reading of each joint that was read since it was last restored. [in]"""
+    found: dict[int, float] = {}
+    asked = set(joints)
+    for event in reversed(life.events):
+        if not asked:
+            break
+        if isinstance(event, KeptInspection):
+            read = event.inspection.clearance_in
+            found |= {joint: read[joint] for joint in asked & read.keys()}
+            asked -= read.keys()
+        elif event.kind is RecordKind.REPAIR:
+            asked -= set(event.body["joints"])
+    return {joint: found[joint] for joint in joints if joint in found}
+
+
 def wear_paths(life: GearLife, joints: Sequence[int]) -> dict[int, tuple[list[WearPath], float]]:
     """Paths of each joint between its restorations, and the landings at which the current one
     began.

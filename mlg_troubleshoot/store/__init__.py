@@ -3,6 +3,7 @@
 from mlg_troubleshoot.store.database import (
     Added,
     Broken,
+    Judge,
     Record,
     RecordKind,
     Store,
@@ -19,6 +20,7 @@ __all__ = [
     "Broken",
     "Draft",
     "Drafts",
+    "Judge",
     "Record",
     "RecordKind",
     "Store",

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
+from sys import intern
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sql
@@ -108,7 +109,7 @@ class RecordKind(StrEnum):
     OUTCOME = "outcome"
 
 
-_KINDS = frozenset(kind.value for kind in RecordKind)
+_KINDS = {kind.value: kind for kind in RecordKind}
 _TEXTS = ("kind", "record_id", "tail_no", "side", "day")
 _BYTES = ("identity", "body", "hash")
 # A body that is too large is not fetched at all.
@@ -427,6 +428,29 @@ class Store:
 
     def _record(self, row: Any) -> Record:
         """A row as a record; a column that cannot be one is named."""
+        seq, kind, record_id, tail_no, side, day, identity, body, digest = row
+        texts = {type(kind), type(record_id), type(tail_no), type(side), type(day)}
+        if (
+            texts != {str}
+            or {type(identity), type(body), type(digest)} != {bytes}
+            or kind not in _KINDS
+        ):
+            self._refuse(row)
+        # The records of a gear, and an inspection and its assessment, share what they repeat.
+        return Record(
+            _KINDS[kind],
+            intern(record_id),
+            intern(tail_no),
+            intern(side),
+            intern(day),
+            bytes(body),
+            seq=seq,
+            digest=bytes(digest).hex(),
+            judge=self.judge,
+        )
+
+    def _refuse(self, row: Any) -> None:
+        """Name a column that cannot be one of a record, if there is one."""
         columns = row._mapping
         odd = next((name for name in _TEXTS if not isinstance(columns[name], str)), None)
         odd = odd or next(
@@ -440,15 +464,6 @@ class Store:
                 f"store {self.place}: record {row.seq}, column {odd!r} cannot be read: {found}",
                 _VERIFY,
             )
-        texts = row.record_id, row.tail_no, row.side, row.day
-        return Record(
-            RecordKind(row.kind),
-            *texts,
-            bytes(row.body),
-            seq=row.seq,
-            digest=bytes(row.hash).hex(),
-            judge=self.judge,
-        )
 
     def _walk(self, connection: sql.Connection, after: int = 0) -> Iterator[Any]:
         """Rows of the chain from one on, each of which fits the one before; `_MisfitError` where

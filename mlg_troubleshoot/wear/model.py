@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import asdict, dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,6 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.wear.filtering import Draws, FilterState, clock, follow
 from mlg_troubleshoot.wear.paths import Scale, WearPath, lay_out, scale_of
-from mlg_troubleshoot.wear.posterior import members, posterior
 
 # Posterior draws that every forecast is averaged over. [1]
 _DRAWS = 128
@@ -97,6 +96,26 @@ class WearModel(Result):
     def of(self, paths: Iterable[WearPath]) -> WearModel:
         """The same population, asked about other units of it."""
         return replace(self, paths=_by_unit(paths))
+
+    def learnt(self) -> dict[str, Any]:
+        """What was learnt of the population as plain values, without the paths."""
+        fields = self.draws.__dataclass_fields__
+        return {
+            "kinds": dict(self.kinds),
+            "scale": asdict(self.scale),
+            "draws": {name: getattr(self.draws, name).ravel().tolist() for name in fields},
+            "seed": self.seed,
+            "simulated": self.simulated,
+        }
+
+    @classmethod
+    def from_learnt(cls, learnt: Mapping[str, Any], paths: Iterable[WearPath]) -> WearModel:
+        """The model that `learnt` described, asked about these paths."""
+        scale = Scale(**learnt["scale"])
+        draws = Draws(**{name: np.array(of)[:, None] for name, of in learnt["draws"].items()})
+        return cls(
+            _by_unit(paths), learnt["kinds"], scale, draws, learnt["seed"], learnt["simulated"]
+        )
 
     def forecast(
         self,
@@ -351,6 +370,9 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
     UsageError
         If nothing was read at all.
     """
+    # Who goes on with a model that was learnt before needs no optimizer.
+    from mlg_troubleshoot.wear.posterior import members, posterior
+
     if not any(len(np.asarray(path.usage)) for path in paths):
         raise UsageError("no path has a reading", "Give at least one reading of one unit.")
     by_unit = _by_unit(paths)

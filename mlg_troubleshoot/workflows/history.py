@@ -22,7 +22,6 @@ from mlg_troubleshoot.life.folding import (
     find,
     is_readable,
     life_of,
-    lives,
     lives_of,
 )
 from mlg_troubleshoot.life.landings_left import Order
@@ -35,9 +34,12 @@ from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
+    from mlg_troubleshoot.life.remembered import Remembered
     from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.wear import WearModel
 
+# Gears that are read and forecast together: their unpacked contents are 5 MB. [1]
+_AT_ONCE = 100
 # An exported chain, which is judged in 5 s, and its longest line. [bytes, characters]
 _MOST_BYTES = 120_000_000
 _LONGEST_LINE = 4_000_000
@@ -114,30 +116,56 @@ def show_fleet(
     problems: tuple[Problem, ...] = (),
 ) -> Lives:
     """Every gear's life, with its forecast unless nobody wants to look ahead."""
-    from mlg_troubleshoot.life.forecast import fit_fleet, forecast, teachers_first
+    from mlg_troubleshoot.life.remembered import Remembered
 
-    progress("Reading the store", 0, None)
-    by_key = lives(store)
-    found = tuple(by_key.values())
+    keys = store.gears()
+    remembered = Remembered(store, gear)
+    model = _taught(store, gear, keys, remembered, progress) if ahead else None
+    doing = "Looking ahead" if ahead else "Reading the store"
+    found: list[GearLife] = []
+    forecasts: dict[GearKey, Forecast] = {}
+    try:
+        # What was unpacked of one part is let go before the next one.
+        for first in range(0, len(keys), _AT_ONCE):
+            progress(doing, first, len(keys))
+            part = tuple(lives_of(store, keys[first : first + _AT_ONCE]).values())
+            found += part
+            forecasts |= remembered.forecast(part, model)
+    finally:
+        # Also what was done until somebody lost patience.
+        remembered.save()
+    progress(doing, len(keys), len(keys))
+    return Lives(gear, tuple(found), forecasts, model, problems)
+
+
+def _taught(
+    store: Store,
+    gear: Gear,
+    keys: Sequence[GearKey],
+    remembered: Remembered,
+    progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
+) -> WearModel | None:
+    """How joints wear, from as many gears as are needed of a large fleet."""
+    from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
+
     progress("Learning how joints wear", 0, None)
-    model = fit_fleet(map(by_key.__getitem__, teachers_first(by_key)), gear) if ahead else None
-    return Lives(gear, found, forecast(found, model, gear, progress), model, problems)
+    order = teachers_first(keys)
+    parts = (order[first : first + TEACHERS] for first in range(0, len(order), TEACHERS))
+    taught = (life for part in parts for life in lives_of(store, part).values())
+    return fit_fleet(taught, gear, remembered.fit)
 
 
 def show_lives(store: Store, gear: Gear, tail: str, side: str | None, *, ahead: bool) -> Lives:
     """The lives of one aircraft's gears, or of one of them."""
-    from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, forecast, teachers_first
+    from mlg_troubleshoot.life.forecast import forecast
+    from mlg_troubleshoot.life.remembered import Remembered
 
     tail, meant = key_of(tail, "LH" if side is None else side)
     keys = store.gears()
     wanted = [key for key in keys if key == (tail, meant if side else key[1])]
     if not wanted:
         life_of(store, tail, meant)
-    # The whole fleet teaches how joints wear: of a large one as many gears as are needed are read.
-    order = teachers_first(keys)
-    parts = (order[first : first + TEACHERS] for first in range(0, len(order), TEACHERS))
-    taught = (life for part in parts for life in lives_of(store, part).values())
-    model = fit_fleet(taught, gear) if ahead else None
+    model = _taught(store, gear, keys, Remembered(store, gear)) if ahead else None
     found = tuple(lives_of(store, wanted).values())
     return Lives(gear, found, forecast(found, model, gear), model)
 

@@ -78,6 +78,22 @@ def keep(
     return Kept(new, len(inspections) - new, tuple(warnings_of(store, gears)))
 
 
+def under_a_free_id(made: Inspection, store: Store) -> Inspection:
+    """An inspection whose id was made from the second of its entry: with a number behind it where
+    the gear has another inspection of that id.
+    """
+    kept = [r for r in store.of_gear(*key_of(made)) if r.kind is RecordKind.INSPECTION]
+    by_id = {record.record_id: record for record in kept}
+    free = made
+    number = 1
+    while (other := by_id.get(free.record_id)) and not same_inspection(
+        other, inspection_record(free)
+    ):
+        number += 1
+        free = replace(made, record_id=f"{made.record_id}-{number}")
+    return free
+
+
 def _repairs_of(row: Inspection, store: Store) -> list[Record]:
     """The repair that a row states, as records; none that the store keeps already."""
     repair = stated_repair(row)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -48,9 +49,13 @@ _PLAIN: dict[Holds, Any] = {Holds.YES_NO: bool, Holds.AREAS: tuple[str, ...]}
 _READ: dict[Holds, tuple[str, Callable[[str], str]]] = {
     Holds.TEXT: ("a text", lambda text: text if read_text(text, "") else ""),
     Holds.AREAS: ("texts", lambda text: text if read_text(text, "") else ""),
-    Holds.DATE: ("a date", lambda text: read_date(text).isoformat()),
+    # A store has few days and many records of each.
+    Holds.DATE: ("a date", lru_cache(1024)(lambda text: read_date(text).isoformat())),
     Holds.MOMENT: ("a date, with its time if known", lambda text: read_moment(text).isoformat()),
 }
+
+# Each column that holds one, whoever fills it.
+_TEXTS = tuple(column for column in COLUMNS if not column.carried and column.holds in _READ)
 
 
 def _table(known: Mapping[str, Any], **others: Any) -> Any:
@@ -162,7 +167,7 @@ class KeptGate:
                     f"column {column.filled!r}: {found.get(column.filled)!r} is not what the record"
                     f" is filed under ({value!r})"
                 )
-        return _unread({c: found.get(c.filled) for c in COLUMNS if not c.carried})
+        return _unread({c: found[c.filled] for c in _TEXTS if c.filled in found})
 
 
 def _number(low: float, high: float, *, above: bool = False) -> Any:

@@ -12,9 +12,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Callable, Mapping
+from datetime import date, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +26,23 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.life import folding
+from mlg_troubleshoot.life.forecast import fit_fleet, landings_of_bands, teachers_first
+from mlg_troubleshoot.life.forecast import forecast as look_ahead
+from mlg_troubleshoot.store import Store, inspection_record
+from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.wear import Samples, WearPath, fit_wear
 from tests.wear import real, worlds
 
 Array = NDArray[np.float64]
 Known = Mapping[str, Array]
 Forecaster = Callable[[Known], Callable[[str, Array], Array]]
+# Clearance and landings of a gear where a simulated part has wear 1 and usage 1. [in; landings]
+WEAR_IN, LANDINGS = 0.003, 4000.0
+# What a row without a gauge uncertainty is taken to have. [in]
+GAUGE_U_IN = 0.0005
 # Samples that stand for a forecast distribution. [1]
 N = 2000
 Z = np.random.default_rng(0).standard_normal(N)
@@ -215,6 +228,84 @@ def simulated(kind: str, fleets: int) -> None:
     )
 
 
+def large_fleet(kind: str, fleets: int, gears: int) -> None:
+    """Hold the forecasts of fleets in a store, which learn from a part of their joints, against the
+    wear that then came.
+    """
+    known_gear, numbers = load_gear(), range(1, 11)
+    ahead = landings_of_bands(known_gear)
+    held: list[bool] = []
+    limit_held: list[bool] = []
+    early: list[bool] = []
+    for seed in range(fleets):
+        rng = np.random.default_rng(37_000 + seed)
+        parts = worlds.fleet(kind, rng, parts=gears * len(numbers), restored=0.0)
+        drawn = [[part[0] for part in parts[g::gears]] for g in range(gears)]
+        kept = []
+        last = {}
+        for g, joints in enumerate(drawn):
+            usage = np.sort(rng.uniform(0.02, 1.5, rng.integers(1, 6)))
+            key = f"N{g}", "LH"
+            last[key] = usage[-1], joints
+            for visit, at in enumerate(usage):
+                true_in = WEAR_IN * np.array([np.interp(at, p.grid, p.true) for p in joints])
+                read = true_in + GAUGE_U_IN * rng.standard_normal(len(true_in))
+                inches = np.maximum(np.round(read, 4), 0.0)
+                clearance_in = dict(zip(numbers, map(float, inches), strict=True))
+                kept.append(
+                    inspection_record(
+                        Inspection(
+                            f"{g}-{visit}",
+                            key[0],
+                            Side.LH,
+                            ClearanceConvention.RADIAL,
+                            clearance_in,
+                            inspection_date=date(2015, 1, 1) + timedelta(days=60 * visit),
+                            gear_landings=float(LANDINGS * at),
+                        )
+                    )
+                )
+        with tempfile.TemporaryDirectory() as folder:
+            store = Store(Path(folder) / "store.sqlite")
+            store.add(kept)
+            found = folding.lives(store)
+        model = fit_fleet(map(found.__getitem__, teachers_first(found)), known_gear)
+        for key, forecast in look_ahead(list(found.values()), model, known_gear).items():
+            now, joints = last[key]
+            # What is over its limit is due at once, without a forecast.
+            if forecast.due_now:
+                continue
+            # Wear is known along the grid only.
+            known = LANDINGS * now + ahead <= LANDINGS * joints[0].grid[-1]
+            for joint, part in zip(numbers, joints, strict=True):
+                low, _middle, high = forecast.bands[joint]
+                at = now + ahead[known] / LANDINGS
+                true = np.maximum(WEAR_IN * np.interp(at, part.grid, part.true), 0.0)
+                held += list((low[known] <= true) & (true <= high[known]))
+                crossing = LANDINGS * (
+                    part.crossing(known_gear.joint(joint).limit.value / WEAR_IN) - now
+                )
+                if crossing > 0.0:
+                    ends = forecast.joints[joint]
+                    low_end = np.inf if ends["p05"] is None else ends["p05"]
+                    high_end = np.inf if ends["p95"] is None else ends["p95"]
+                    early.append(crossing < low_end)
+                    limit_held.append(
+                        low_end <= crossing <= high_end
+                        if np.isfinite(crossing)
+                        else high_end > LANDINGS * (part.grid[-1] - now)
+                    )
+    most = 0.10 if kind == "gamma" else 0.07
+    show(
+        f"fleets of {gears} gears: {kind}",
+        "this project",
+        f"held {np.mean(held):.1%} of {len(held)}, limit {np.mean(limit_held):.1%}, "
+        f"early {np.mean(early):.1%} of {len(early)}",
+        f"88-95 %, early <= {most:.0%}",
+        met=bool(0.88 <= np.mean(held) <= 0.95 and np.mean(early) <= most),
+    )
+
+
 def speed(gears: int) -> None:
     """Fit and forecast ten joints of each gear."""
     rng = np.random.default_rng(0)
@@ -245,7 +336,14 @@ def main() -> None:
         "--fleets", type=int, default=4, help="simulated fleets of 60 parts of each kind"
     )
     arguments.add_argument("--gears", type=int, default=10_000)
+    arguments.add_argument(
+        "--large", type=int, help="only fleets of as many gears in a store, of each kind"
+    )
     given = arguments.parse_args()
+    if given.large:
+        for kind in worlds.KINDS:
+            large_fleet(kind, given.fleets, given.large)
+        return
     data = real.liners()
     known = {unit: h[: max(len(h) - 1, 1)] for unit, h in data.items()}
     forecasts(

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.life import remembered
+from mlg_troubleshoot.life.folding import GearKey, GearLife, lives
 from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
-from mlg_troubleshoot.store import Store, inspection_record
+from mlg_troubleshoot.store import Store, StoreError, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import CheckOptions, check_inspection
-from mlg_troubleshoot.workflows.history import show_fleet, show_lives
+from mlg_troubleshoot.workflows.history import Lives, show_fleet, show_lives, void
 from mlg_troubleshoot.workflows.keep import keep
 
 TAILS = [f"N{n:03d}" for n in range(TEACHERS + 30)]
@@ -106,3 +109,140 @@ def test_the_gears_learnt_from_stay_the_same_when_one_comes_in_behind_them() -> 
     keys = [(tail, "LH") for tail in TAILS]
     order = teachers_first(keys)
     assert [key for key in teachers_first([*keys, ("NEW", "RH")]) if key[0] != "NEW"] == order
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "mlg"
+
+
+def computed(monkeypatch: pytest.MonkeyPatch, store: Store) -> tuple[Lives, set[GearKey]]:
+    """A fleet, and the gears of it whose forecast was not recalled."""
+    asked: set[GearKey] = set()
+    found = remembered.forecast
+
+    def forecast(lives: Sequence[GearLife], *more: Any) -> Any:
+        asked.update(life.key for life in lives)
+        return found(lives, *more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(remembered, "forecast", forecast)
+        return show_fleet(store, load_gear(), ahead=True), asked
+
+
+def one_more(store: Store, tail: str) -> None:
+    """Keep one new inspection of a gear."""
+    last = Inspection(
+        f"{tail}-4",
+        tail,
+        Side.LH,
+        ClearanceConvention.RADIAL,
+        {3: 0.004, 4: 0.003, 5: 0.004},
+        inspection_date=date(2024, 1, 1),
+        gear_landings=2000.0,
+    )
+    store.add([inspection_record(last)])
+
+
+def test_a_second_look_at_a_fleet_computes_nothing_and_says_the_same(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    first, asked = computed(monkeypatch, store)
+    assert len(asked) == len(TAILS)
+    monkeypatch.setattr(remembered, "fit_wear", None)
+    again, asked = computed(monkeypatch, store)
+    assert not asked
+    assert again == first
+
+
+def test_after_one_new_inspection_only_its_gear_is_forecast_again(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    before, _ = computed(monkeypatch, store)
+    key = teachers_first(before.forecasts)[-1]
+    one_more(store, key[0])
+    found, asked = computed(monkeypatch, store)
+    assert asked == {key}
+    shutil.rmtree(cache)
+    fresh, asked = computed(monkeypatch, store)
+    assert len(asked) == len(TAILS)
+    assert found == fresh
+    assert found.forecasts[key] != before.forecasts[key]
+
+
+def test_what_the_fleet_learnt_from_a_gear_is_learnt_again_when_it_is_inspected(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    before, _ = computed(monkeypatch, store)
+    one_more(store, teachers_first(before.forecasts)[0][0])
+    found, asked = computed(monkeypatch, store)
+    assert len(asked) == len(TAILS)
+    assert found.model != before.model
+
+
+def test_a_void_inspection_is_not_remembered(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    before, _ = computed(monkeypatch, store)
+    key = teachers_first(before.forecasts)[-1]
+    void(store, f"{key[0]}-3", "wrong gear")
+    _, asked = computed(monkeypatch, store)
+    assert asked == {key}
+
+
+def test_another_margin_has_another_forecast(tmp_path: Path, cache: Path) -> None:
+    store, gear = fleet_of(tmp_path), load_gear()
+    before = show_fleet(store, gear, ahead=True).forecasts
+    wide = replace(gear, margin=replace(gear.margin, value=2.0 * gear.margin.value))
+    after = show_fleet(store, wide, ahead=True).forecasts
+    key = teachers_first(before)[-1]
+    assert after[key].landings_to_margin != before[key].landings_to_margin
+
+
+def test_a_damaged_file_of_what_is_remembered_is_left_aside(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    first, _ = computed(monkeypatch, store)
+    for file in cache.iterdir():
+        file.write_bytes(file.read_bytes()[:-9])
+    again, asked = computed(monkeypatch, store)
+    assert len(asked) == len(TAILS)
+    assert again == first
+
+
+def test_where_nothing_can_be_remembered_forecasts_are_made_all_the_same(
+    tmp_path: Path, cache: Path
+) -> None:
+    cache.parent.mkdir()
+    cache.write_text("no folder")
+    assert show_fleet(fleet_of(tmp_path), load_gear(), ahead=True).model is not None
+
+
+def test_what_was_forecast_until_it_was_interrupted_is_remembered(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+
+    def impatient(_name: str, done: int, _total: int | None) -> None:
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        show_fleet(store, load_gear(), ahead=True, progress=impatient)
+    _, asked = computed(monkeypatch, store)
+    assert 0 < len(asked) < len(TAILS)
+
+
+def test_unpacked_contents_are_judged_by_the_gate_of_their_own_store(tmp_path: Path) -> None:
+    store = fleet_of(tmp_path)
+    [life] = lives(store, TAILS[0]).values()
+    assert life.inspections[0].inspection.tail_no == TAILS[0]
+    strict = Store(store.place, judge=lambda _record, _body: "it is wrong")
+    with pytest.raises(StoreError, match="it is wrong"):
+        lives(strict, TAILS[0])

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mlg_troubleshoot import records
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.life.folding import life_of
@@ -211,3 +212,22 @@ def test_bodies_and_hashes_of_records_are_those_of_earlier_versions(tmp_path: Pa
     Store(tmp_path / "new.sqlite").add(places.records(1, 4))
     old, new = (list(Store(tmp_path / f"{name}.sqlite").export()) for name in ("old", "new"))
     assert old == new
+
+
+def test_two_entries_of_one_gear_within_a_second_are_both_kept(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = "N1-LH-20260201-101500"
+    monkeypatch.setattr(records, "made_record_id", lambda *_entry: made)
+    for value in ("0.001in", "0.002in", "0.003in", "0.002in"):
+        assert mlg(*BY_HAND, "--side", "LH", "--set", f"4={value}").code in (0, 1)
+    ids = [kept.record.record_id for kept in life_of(Store(place), "N1", "LH").inspections]
+    assert [each for each in ids if each.startswith(made)] == [made, f"{made}-2", f"{made}-3"]
+
+
+def test_an_id_that_was_typed_stays_as_it_is(place: Path) -> None:
+    typed = (*BY_HAND, "--side", "LH", "--record-id", "mine")
+    assert mlg(*typed, "--set", "4=0.001in").code in (0, 1)
+    refused = mlg(*typed, "--set", "4=0.002in")
+    assert refused.code == 5
+    assert "kept already with other content" in refused.err
