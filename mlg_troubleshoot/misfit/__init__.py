@@ -9,6 +9,7 @@ __all__ = [
     "conclusion",
     "covariance",
     "design",
+    "dynamic",
     "explanation",
     "fitting",
     "held_out",

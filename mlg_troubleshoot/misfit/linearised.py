@@ -129,7 +129,7 @@ class Study:
         largest = float(max(np.max(np.abs(runner.reading)), np.max(np.abs(columns))))
         floor, self.rounding = _DIGITS * largest, _ROUNDED * _DIGITS * largest
         least = max(floor, 1e-300)
-        self.readings = Readings(runner.row, self.outputs, group, own, least, series)
+        self.readings = Readings(runner.row, self.outputs, group, own, least, series, base)
         scale = np.ones(len(base)) if own is None else own.copy()
         for index in self.outputs if own is None else ():
             scale[index] = max(float(np.sqrt(np.mean(columns[index] ** 2))), 1e-300)

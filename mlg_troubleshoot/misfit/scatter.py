@@ -23,6 +23,8 @@ _FAR = 3.0
 # what is tried.
 _GROUP_RATIO, _GROUP_SPREAD = 0.15, 1.0
 _GROUP_RATIOS = (0.05, 0.15, 0.45, 1.35, 4.0, 12.0)
+# Share of the variance of a reading that grows with the square of the prediction: what is tried.
+_GROWING = (0.5, 0.9, 0.99)
 # Standard deviation of nuisance parameters, over the scatter of a reading: whatever they are.
 _WIDE = 1e4
 # Rows that stand for all in a smooth shape; lengths in units of the median distance of the rows.
@@ -41,7 +43,7 @@ class Readings:
 
     floor: scatter that each has at least, as a number of limited digits. [unit of the readings]
     series: number of the series in which each row follows others, and when in usual steps; None
-    where rows stand alone.
+    where rows stand alone. predicted, shape (N,): the prediction, with which the scatter may grow.
     """
 
     row: Wholes
@@ -50,6 +52,7 @@ class Readings:
     declared: Array | None
     floor: float = 1e-300
     series: tuple[Wholes, Array] | None = None
+    predicted: Array | None = None
 
     def noise(
         self, scale: Array, free: Array, correlation: float = 0.0
@@ -88,7 +91,7 @@ class Readings:
         """Standard deviation of each reading by itself, from residuals of which a share is spare;
         far ones count less.
         """
-        relative = np.ones(len(left)) if self.declared is None else self.declared
+        relative = self._grown(left) if self.declared is None else self.declared
         size = np.abs(left) / relative
         level = np.empty(len(left))
         for index in self.outputs if self.declared is None else [np.arange(len(left))]:
@@ -99,6 +102,32 @@ class Readings:
                 float(np.sqrt(np.mean(near**2) / spare)), self.floor / float(np.max(relative))
             )
         return np.asarray(relative * level * np.maximum(1.0, size / level / _FAR))
+
+    def _grown(self, left: Array) -> Array:
+        """Relative scatter of each reading, of which a share grows with the prediction where second
+        differences of residuals along it make that clearly likelier (Schwarz 1978).
+        """
+        relative = np.ones(len(left))
+        if self.predicted is None:
+            return relative
+        for index in self.outputs:
+            square = self.predicted[index] ** 2
+            group = np.zeros(len(index)) if self.group is None else self.group[self.row[index]]
+            order = np.lexsort((self.predicted[index], group))
+            inside = group[order][2:] == group[order][:-2]
+            bend = np.abs(np.diff(left[index][order], 2))[inside]
+            if len(bend) == 0 or not (np.any(bend > 0.0) and np.any(square > 0.0)):
+                continue
+            square = square / float(np.mean(square))
+            bend = np.minimum(bend, _FAR * 1.4826 * float(np.median(bend)))
+            along = square[order]
+            weights = ((along[:-2] + 4.0 * along[1:-1] + along[2:]) / 6.0)[inside]
+            least = _log_likelihood(bend, np.ones(len(bend))) + 0.5 * float(np.log(len(index)))
+            for share in _GROWING:
+                likely = _log_likelihood(bend, np.sqrt(1.0 - share + share * weights))
+                if likely > least:
+                    least, relative[index] = likely, np.sqrt(1.0 - share + share * square)
+        return relative
 
     def first_scale(self, columns: Array, free: Array, data: Array) -> Array:
         """The same before anything is explained: from what all columns leave, or the free ones
@@ -115,6 +144,12 @@ class Readings:
             left = data - columns @ values
             scale = self.scale_of(left, spare)
         return scale
+
+
+def _log_likelihood(size: Array, relative: Array) -> float:
+    """Log-likelihood of residuals whose scatter is known up to a common factor."""
+    common = float(np.mean((size / relative) ** 2))
+    return float(-np.sum(np.log(relative)) - 0.5 * len(size) * np.log(common))
 
 
 @dataclass(frozen=True)
