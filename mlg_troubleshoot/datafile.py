@@ -36,8 +36,13 @@ from mlg_troubleshoot.errors import GearFileError
 
 # The shipped files have 25 kB, lines of 400 characters and tables four deep; reading dotted keys
 # takes time with the square of a line's length, and deep nesting ends in a full stack.
-MOST_BYTES, LONGEST_LINE, DEEPEST, MOST_ENTRIES = 2_000_000, 8_000, 24, 200
-LONGEST_NAME, LONGEST_TEXT, LARGEST = 40, 2_000, 10**12
+MOST_BYTES = 2_000_000
+LONGEST_LINE = 8_000
+DEEPEST = 24
+MOST_ENTRIES = 200
+LONGEST_NAME = 40
+LONGEST_TEXT = 2_000
+LARGEST = 10**12
 _SHOWN = 80
 
 Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.notebook import Picture
 
 # A representation has at most so many lines of so many characters, and a value in it so many.
-_LINES, _WIDTH, _VALUE = 18, 100, 60
+_LINES = 18
+_WIDTH = 100
+_VALUE = 60
 
 
 class Result:
@@ -95,7 +97,8 @@ def same(one: Any, other: Any) -> bool:
         return False
     if isinstance(one, np.ndarray | float):
         return np.array_equal(one, other, equal_nan=np.asarray(one).dtype.kind == "f")
-    pieces, others = _pieces(one), _pieces(other)
+    pieces = _pieces(one)
+    others = _pieces(other)
     if pieces is None or others is None:
         return bool(one == other)
     return pieces.keys() == others.keys() and all(same(pieces[key], others[key]) for key in pieces)

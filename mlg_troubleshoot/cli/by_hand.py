@@ -105,7 +105,7 @@ def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
 
 
 def unfinished(store: SessionStore, terminal: RichTerminal, gear: Gear, flags: Flags) -> Session:
-    """The unfinished entry to go on with: the last one, or the one of the gear that flags name."""
+    """The unfinished entry to resume: the last one, or the one of the gear that flags name."""
     from mlg_troubleshoot.cli.prompts.answers import Answers
     from mlg_troubleshoot.cli.prompts.flow import contradictions
     from mlg_troubleshoot.cli.prompts.pages import unfinished_lines
@@ -122,12 +122,13 @@ def unfinished(store: SessionStore, terminal: RichTerminal, gear: Gear, flags: F
     others = tuple(each for each in found if each.answers.joints and each.id != saved.id)
     if others:
         terminal.say(unfinished_lines(others))
-        output.say("Go on with another one: mlg check --resume --tail TAIL --side LH|RH")
+        output.say("Resume another one: mlg check --resume --tail TAIL --side LH|RH")
     return saved
 
 
 def kept_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
-    """The last visit to a gear; what cannot be read is said, and keeps nobody from a new one."""
+    """The last visit to a gear; records that cannot be read are reported and do not prevent a new
+    visit."""
     from mlg_troubleshoot.cli.prompts import last_visit
     from mlg_troubleshoot.store import StoreError
 
@@ -141,16 +142,16 @@ def kept_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
 def continued(
     read: Inspection, continues: str, visit: Visit | None
 ) -> tuple[Inspection, Visit | None]:
-    """An entry that goes on with a kept inspection, and that one; if it was changed meanwhile, the
-    entry is one of its own.
+    """An entry that continues a kept inspection, and that inspection; if it was changed meanwhile,
+    the entry is a new inspection.
     """
     if visit is not None and visit.record.digest == continues:
         return visit.completed(read), visit
     from mlg_troubleshoot.records import made_record_id
 
     output.say(
-        "Note: the inspection that this entry goes on with was changed meanwhile: the entry is kept"
-        " as one of its own."
+        "Note: the inspection that this entry continues was changed meanwhile: the entry is kept"
+        " as a new inspection."
     )
     return replace(read, record_id=made_record_id(read.tail_no, read.side, datetime.now())), None
 

@@ -223,14 +223,14 @@ class Run:
             for f in self._wanted.formats or (options.ReportFormat.HTML, options.ReportFormat.PDF)
         )
         with stages(quiet=self._wanted.quiet) as bar:
-            told = partial(bar, "Writing reports")
+            progress = partial(bar, "Writing reports")
             written = task.write_reports(
                 result,
                 self._asked,
                 directory,
                 formats,
                 str(seen.page),
-                on_written=told,
+                on_written=progress,
                 unit=seen.show,
                 before=before,
             )
@@ -249,8 +249,8 @@ class Run:
             added = Kept(1, 0, tuple(warnings_of(self._place, [(before.tail_no, before.side)])))
         else:
             with stages(quiet=self._wanted.quiet) as bar:
-                told = partial(bar, "Keeping")
-                added = keep(result, self._asked, self._place, self._same_tail(), told)
+                progress = partial(bar, "Keeping")
+                added = keep(result, self._asked, self._place, self._same_tail(), progress)
         if not self._wanted.quiet:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""

@@ -127,7 +127,7 @@ class _Course:
         return Page((BLANK, line((question, Tone.STRONG)), *shown, line(f"as: {example}")), " > ")
 
     def help(self, state: int) -> tuple[Line, ...]:
-        return (note(f"One line, as: {_QUESTIONS[state][2]}. Enter goes on."), _KEYS)
+        return (note(f"One line, as: {_QUESTIONS[state][2]}. Enter continues."), _KEYS)
 
     def back(self, state: int) -> Turn[int]:
         return Turn(max(state - 1, 0))

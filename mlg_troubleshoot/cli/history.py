@@ -180,7 +180,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     from mlg_troubleshoot.reporting.life_json import life_as_json
 
     console = output.console(unit=unit)
-    told = life_as_json(life, ahead, gear)
+    values = life_as_json(life, ahead, gear)
     console.print(output.text(life.name, "bold"))
     events = [
         (
@@ -190,7 +190,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
             event["hash"][:10],
             _what(event, unit),
         )
-        for event in told["events"]
+        for event in values["events"]
     ]
     headings = ("date", "landings", "record", "hash", "what")
     for each in lines_of(console, headings, events, "landings", ("hash", "record")):
@@ -198,7 +198,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     show_warnings(console, [life])
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
-    _show_joints(console, life, told["joints"], ahead, gear)
+    _show_joints(console, life, values["joints"], ahead, gear)
     _show_advice(console, Advice.of([life]))
 
 

@@ -83,7 +83,7 @@ def _asked(answers: Path) -> Path:
         )
     if ask_gear(answers, RichTerminal()):
         return answers
-    output.say(f"Kept: {answers}. Go on: run the command again.")
+    output.say(f"Kept: {answers}. To continue, run the command again.")
     raise typer.Exit
 
 

@@ -252,12 +252,17 @@ class Tables:
     dates: Dates = None
 
     def declared(self, remembered: Mapping[str, str]) -> dict[str, Any]:
-        """What a task is told of them, with the headers that are remembered."""
+        """What a task receives of them, with the headers that are remembered."""
         from mlg_troubleshoot.records.dates import DateOrder
 
-        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        declared = {each.name: getattr(self, each.name) for each in fields(self)}
         dates = None if self.dates is None else DateOrder.parse(self.dates)
-        return {**told, "dates": dates, "column_map": self.columns, "remembered_map": remembered}
+        return {
+            **declared,
+            "dates": dates,
+            "column_map": self.columns,
+            "remembered_map": remembered,
+        }
 
     @property
     def columns(self) -> dict[str, str]:

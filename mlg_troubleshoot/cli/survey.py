@@ -118,8 +118,8 @@ def survey(
 
 
 def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
-    """Ask for the readings on the terminal; the file keeps them, so that a later run goes on where
-    this one stopped.
+    """Ask for the readings on the terminal; the file keeps them, so that a later run continues
+    where this one stopped.
     """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.prompts import RichTerminal
@@ -136,7 +136,7 @@ def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
     claim(gear, (), [OutputFile("the survey", file, CONTINUED)])
     if not file.exists():
         write_survey_template(file, gear, unit)
-    again = f"Kept: {file}. Go on: mlg gear survey ask {file}"
+    again = f"Kept: {file}. Continue with: mlg gear survey ask {file}"
     try:
         if ask_survey(file, load_gear(gear), RichTerminal()):
             return str(file)

@@ -356,7 +356,8 @@ class Assessment(_Planned, Result):
     @property
     def in_brief(self) -> str:
         """The next action in words that stand alone."""
-        step, retracted = self.next_action, self.inspection.outcome is Outcome.RETRACTED
+        step = self.next_action
+        retracted = self.inspection.outcome is Outcome.RETRACTED
         return in_brief(step.action, step.joints, self.end, retracted=retracted)
 
     @property

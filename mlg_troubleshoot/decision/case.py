@@ -59,7 +59,8 @@ class Cases:
         extension: Extension | None = None,
         fleet: Fleet | None = None,
     ) -> Cases:
-        numbers, rows = gear.joint_numbers, tuple(inspections)
+        numbers = gear.joint_numbers
+        rows = tuple(inspections)
         means = [i.measured_displacement_in for i in rows]
         return cls(
             gear=gear,
@@ -163,7 +164,8 @@ class Cases:
 
 def _disagreement(inspection: Inspection, margin_in: float) -> str:
     """Plunger readings with one outside the margin although their mean is not."""
-    mean, one_u = inspection.measured_displacement_in, inspection.plunger_gauge_u_in
+    mean = inspection.measured_displacement_in
+    one_u = inspection.plunger_gauge_u_in
     beyond = margin_in + 2.0 * (DEFAULT_PLUNGER_U_IN if one_u is None else one_u)
     far = [reading for reading in inspection.standing_readings_in if abs(reading) > beyond]
     if mean is None or not far or abs(mean) > margin_in:
@@ -201,7 +203,8 @@ def predict_batch(cases: Cases, exceeds: Array | None = None) -> BatchPrediction
         upper = with_rows(lower, some.predict(some.filled(cases.gear.limits_in)), open_rows)
     if exceeds is None or cases.extension is not None:
         return BatchPrediction(lower, upper, _chance(cases, at_zero))
-    chance, rows = exceeds.copy(), np.flatnonzero(cases.measured.all(axis=1))
+    chance = exceeds.copy()
+    rows = np.flatnonzero(cases.measured.all(axis=1))
     if len(rows):
         chance[rows] = _chance(cases.take(rows), at_zero[rows])
     return BatchPrediction(lower, upper, chance)
@@ -211,7 +214,8 @@ def _chance(cases: Cases, clearance_in: Array) -> Array:
     """Chance of exceeding the margin with random directions: by the expansion where clearances are
     small.
     """
-    gear, chance = cases.gear, np.empty(len(cases))
+    gear = cases.gear
+    chance = np.empty(len(cases))
     small = np.all(clearance_in <= gear.confirm_above.value, axis=1) & (cases.extension is None)
     chance[small] = responses(gear)[0].chance_beyond(
         clearance_in[small], cases.margin_in[small], DIRECTION_SETS
@@ -224,7 +228,8 @@ def _chance(cases: Cases, clearance_in: Array) -> Array:
 
 def exact_chance(cases: Cases, clearance_in: Array, shift_in: float = 0.0) -> Array:
     """Chance of exceeding the margin with random directions, the plunger shifted. [1]"""
-    model, extension = cases.gear.model, cases.extension
+    model = cases.gear.model
+    extension = cases.extension
     found = (
         Adjustment(clearance_in)
         if extension is None

@@ -69,8 +69,10 @@ class _Unread:
 
 @lru_cache(maxsize=4)
 def _unread(gear: Gear) -> tuple[_Unread, _Unread]:
-    response, found = responses(gear)[0], []
-    amplification, diagonal = response.amplification, np.diag(response.curvature)
+    response = responses(gear)[0]
+    found = []
+    amplification = response.amplification
+    diagonal = np.diag(response.curvature)
     bend = 0.25 * (diagonal[0::2] + diagonal[1::2])
     reach = amplification * gear.limits_in
     for pins in (RANDOM, HELD):
@@ -207,9 +209,12 @@ class Causes:
         )
 
     def _second_repair(self, row: int, members: Mask, believed_of: _Believed) -> Array:
-        unread, waves = believed_of.unread, believed_of.waves[row]
-        pins, gear = unread.pins, self.cases.gear
-        margin, x = float(self.cases.margin_in[row]), float(self.cases.mean_in[row])
+        unread = believed_of.unread
+        waves = believed_of.waves[row]
+        pins = unread.pins
+        gear = self.cases.gear
+        margin = float(self.cases.margin_in[row])
+        x = float(self.cases.mean_in[row])
         left = np.prod(np.where(members[:, :, None], 1.0, waves), axis=1) * _LINKAGE
         if not np.isfinite(x):
             new = np.prod(np.where(members[:, :, None], unread.fresh, 1.0), axis=1)
@@ -229,7 +234,8 @@ class Causes:
 
 def believed(cases: Cases) -> Causes:
     """Weigh what may be the matter with n gears, by everything that is known of each."""
-    levels, u = level_chances(cases), np.hypot(cases.mean_u_in, 1e-4)
+    levels = level_chances(cases)
+    u = np.hypot(cases.mean_u_in, 1e-4)
     both = tuple(_believed(cases, unread, levels, u) for unread in _unread(cases.gear))
     chances = np.array([1.0 - cases.fleet.loaded, cases.fleet.loaded])[:, None]
     chances = chances * [each.fits for each in both]
@@ -245,14 +251,16 @@ def believed(cases: Cases) -> Causes:
 
 
 def _believed(cases: Cases, unread: _Unread, levels: Array, u: Array) -> _Believed:
-    pins, read = unread.pins, cases.measured
+    pins = unread.pins
+    read = cases.measured
     known = pins.waves(FREQUENCIES * (unread.amplification * cases.filled(0.0))[:, :, None])
     known = known * blur(pins.cosine * unread.amplification * cases.gauge_u_in)
     flat = unread.unread.reshape(len(LEVELS), -1)
     waves = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
     exceeds = 1.0 - inside(np.prod(waves, axis=1) * _LINKAGE, cases.margin_in)
     worn = np.repeat((levels @ BEYOND.sum(axis=1))[:, None], read.shape[1], axis=1)
-    fits, likely = np.ones(len(cases)), levels.copy()
+    fits = np.ones(len(cases))
+    likely = levels.copy()
     rows = np.flatnonzero(np.isfinite(cases.mean_in))
     if len(rows):
         at = np.exp(-1j * FREQUENCIES * np.abs(cases.mean_in[rows])[:, None])
@@ -271,8 +279,10 @@ def _given_plunger(
     """Density of the plunger's reading, and given it chances of the levels, and of each unread
     joint being worn.
     """
-    count, beyond = read.shape[1], BEYOND.sum(axis=1)
-    fits, worn = np.empty_like(levels), np.zeros((len(at), len(LEVELS), count))
+    count = read.shape[1]
+    beyond = BEYOND.sum(axis=1)
+    fits = np.empty_like(levels)
+    worn = np.zeros((len(at), len(LEVELS), count))
     for k in range(len(LEVELS)):
         waves = np.where(read[:, :, None], known, unread.unread[k])
         ahead, behind = _products(waves)
@@ -280,7 +290,8 @@ def _given_plunger(
         for j in range(count):
             rest = ahead[j] * behind[j + 1] * at
             worn[:, k, j] = 0.5 * beyond[k] + (rest @ unread.worn[k, j]).real
-    fits, worn = np.maximum(fits, 1e-12), np.maximum(worn, 0.0)
+    fits = np.maximum(fits, 1e-12)
+    worn = np.maximum(worn, 0.0)
     likely = levels * fits
     total = likely.sum(axis=1, keepdims=True)
     likely /= total
@@ -297,11 +308,14 @@ def _weighed(
     u: Array,
 ) -> Causes:
     """Divide each gear between its joints, its rigging and everything else."""
-    margin, seen = cases.margin_in[:, None], np.isfinite(cases.mean_in)
+    margin = cases.margin_in[:, None]
+    seen = np.isfinite(cases.mean_in)
     x = np.nan_to_num(cases.mean_in)
-    outside, within = [], []
+    outside = []
+    within = []
     for each in both:
-        pins, waves = each.unread.pins, np.prod(each.waves, axis=1) * _LINKAGE
+        pins = each.unread.pins
+        waves = np.prod(each.waves, axis=1) * _LINKAGE
         shift = np.sum(each.unread.bend * mean_in**2, axis=1)
         reading = x - shift
         if pins is HELD:
@@ -363,7 +377,8 @@ def _weighed(
 def _products(waves: Array) -> tuple[list[Array], list[Array]]:
     """Products of the characteristic functions before each joint, and from each joint on."""
     count = waves.shape[1]
-    ahead, behind = [np.ones_like(waves[:, 0])], [np.ones_like(waves[:, 0])]
+    ahead = [np.ones_like(waves[:, 0])]
+    behind = [np.ones_like(waves[:, 0])]
     for j in range(count):
         ahead.append(ahead[-1] * waves[:, j])
         behind.append(behind[-1] * waves[:, count - 1 - j])

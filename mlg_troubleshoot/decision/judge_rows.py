@@ -138,12 +138,10 @@ def _assessment(
     sets: tuple[RepairSet, ...],
     seed: int | None,
 ) -> Assessment:
-    inspection, found, lower, plunger = (
-        cases.inspections[i],
-        judged.verdicts[i],
-        judged.batch.lower,
-        judged.plunger,
-    )
+    inspection = cases.inspections[i]
+    found = judged.verdicts[i]
+    lower = judged.batch.lower
+    plunger = judged.plunger
     margin = float(cases.margin_in[i])
     closes = bool(np.isfinite(lower.displacement_in[i]))
     # A linkage of the ensemble may not close where the reference does: the uncertainty is then
@@ -236,8 +234,11 @@ def _detail(
     seed: int,
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
-    one, rng = cases.take(np.array([i])), np.random.default_rng(seed)
-    lower, found, causes = one.predict(one.filled(0.0)), judged.verdicts[i], believed(one)
+    one = cases.take(np.array([i]))
+    rng = np.random.default_rng(seed)
+    lower = one.predict(one.filled(0.0))
+    found = judged.verdicts[i]
+    causes = believed(one)
     unread = Unread(one, lower, causes.levels)
     worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
     detail: dict[str, Any] = {
@@ -253,12 +254,12 @@ def _detail(
 
 
 def _headline(cases: Cases, judged: Judged, i: int) -> str:
-    margin, mean, plunger = float(cases.margin_in[i]), float(cases.mean_in[i]), judged.plunger
-    lower, found, chance = (
-        judged.batch.lower,
-        judged.verdicts[i],
-        float(judged.batch.chance_random[i]),
-    )
+    margin = float(cases.margin_in[i])
+    mean = float(cases.mean_in[i])
+    plunger = judged.plunger
+    lower = judged.batch.lower
+    found = judged.verdicts[i]
+    chance = float(judged.batch.chance_random[i])
     # Adding zero turns a minus zero into zero.
     said = sentences.Predicted(
         float(lower.displacement_in[i]) + 0.0,
@@ -380,9 +381,12 @@ def allowances(cases: Cases, lower: Prediction) -> Array:
     second-order expansion, anchored at the exact worst case, gives the wear; one exact worst case
     along its directions corrects it. [in]
     """
-    gear, reference = cases.gear, responses(cases.gear)[0]
-    start, worst = cases.filled(0.0), lower.displacement_in
-    slopes, bend = reference.slopes(start), np.diag(reference.worst_curvature)
+    gear = cases.gear
+    reference = responses(cases.gear)[0]
+    start = cases.filled(0.0)
+    worst = lower.displacement_in
+    slopes = reference.slopes(start)
+    bend = np.diag(reference.worst_curvature)
     sense = np.where(lower.worst.over_in >= -lower.worst.under_in, 1.0, -1.0)[:, None]
     left = (cases.margin_in - worst)[:, None]
     room = np.maximum(gear.limits_in - start, 0.0)

@@ -24,7 +24,8 @@ from mlg_troubleshoot.decision.wear_levels import LEVELS, MEAN, level_chances
 from mlg_troubleshoot.gear.gear import Gear
 
 # Quantiles of the share of gears whose pins are held, and rounds in which shares of levels settle.
-_QUANTILES, _ROUNDS = (np.arange(2000) + 0.5) / 2000, 50
+_QUANTILES = (np.arange(2000) + 0.5) / 2000
+_ROUNDS = 50
 
 
 def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:

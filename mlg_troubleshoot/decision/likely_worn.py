@@ -27,13 +27,15 @@ from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, level_chanc
 
 def explain(one: Cases, causes: Causes | None = None) -> Posterior:
     """Find which joints explain the plunger's reading of one gear."""
-    gear, reading = one.gear, abs(float(one.mean_in[0]))
+    gear = one.gear
+    reading = abs(float(one.mean_in[0]))
     found = causes or believed(one)
     rigging = float(found.rigging[0])
     loaded = float(found.joints[0] * found.loaded[0])
     clearance = _clearances(one)
     turns = FREQUENCIES * (responses(gear)[0].amplification[:, None] * clearance.at_in)[..., None]
-    random, aligned = RANDOM.waves(turns), HELD.waves(turns)
+    random = RANDOM.waves(turns)
+    aligned = HELD.waves(turns)
     u = np.hypot(found.u_in[0], PRIORS.linkage_u_in)
     # As wide as what a wrong rigging adds, which is about even.
     wide = np.hypot(u, PRIORS.offset * one.margin_in[0] / np.sqrt(3.0))
@@ -81,7 +83,8 @@ class _Clearances:
 
 
 def _clearances(one: Cases) -> _Clearances:
-    read, limits = one.measured[0, :, None], one.gear.limits_in[:, None]
+    read = one.measured[0, :, None]
+    limits = one.gear.limits_in[:, None]
     # Clearances that a reading allows: normal, cut off at 0.
     scores = np.linspace(-4, 4, len(SHARES))
     near = one.filled(0.0)[0, :, None] + one.gauge_u_in[0, :, None] * scores

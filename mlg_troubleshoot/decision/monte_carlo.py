@@ -25,12 +25,14 @@ def check_probability(
     one: Cases, worst_in: tuple[float, float], budget: UncertaintyBudget, rng: np.random.Generator
 ) -> Confidence:
     """Recompute the probability of being within the margin by Monte Carlo."""
-    start, margin_in = one.filled(0.0)[0], float(one.margin_in[0])
+    start = one.filled(0.0)[0]
+    margin_in = float(one.margin_in[0])
     gauge_u_in = one.gauge_u_in[0] * one.measured[0]
     response = responses(one.gear)[0].anchored(start, *worst_in)
     half = gauge_u_in * rng.standard_normal((_DRAWS // 2, len(start)))
     errors = np.vstack([half, -half])
-    centre, slopes = float(response.magnitude(start)), response.slopes(start)
+    centre = float(response.magnitude(start))
+    slopes = response.slopes(start)
     u_rest = float(np.sqrt(budget.geometry_in**2 + budget.model_in**2 + budget.margin_in**2))
     u_readings = float(np.sqrt(np.sum((gauge_u_in * slopes) ** 2)))
     curved = normal_cdf((margin_in - response.magnitude(start + errors)) / u_rest)

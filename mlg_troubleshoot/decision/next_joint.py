@@ -55,7 +55,8 @@ def outlook(one: Cases, unread: Unread | None = None) -> Outlook:
     """
     if unread is None:
         unread = Unread(one, one.predict(one.filled(0.0)), level_chances(one))
-    gear, removed = one.gear, unread.variance(0)
+    gear = one.gear
+    removed = unread.variance(0)
     opened = frozenset(
         joint.area for joint, read in zip(gear.joints, one.measured[0], strict=True) if read
     )
@@ -88,7 +89,8 @@ def advise(
     one: Cases, unread: Unread, found: Verdict, p_within: float, plan: Plan
 ) -> MeasuringAdvice:
     """Say of one gear what measuring is worth, in the order and the words of its plan."""
-    ahead, first = outlook(one, unread), plan.steps[0]
+    ahead = outlook(one, unread)
+    first = plan.steps[0]
     reads = first.action in (Action.MEASURE, Action.MEASURE_AGAIN)
     order = {joint: place for place, joint in enumerate(first.joints)}
     worth = sorted(ahead.worth, key=lambda w: order.get(w.joint, len(order)) if reads else 0)

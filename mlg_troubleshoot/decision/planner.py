@@ -100,7 +100,8 @@ def _predict_tried(cases: Cases, courses: Sequence[_PlanBuilder]) -> None:
     rows = [i for i, course in enumerate(courses) if course.tried is not None]
     if not rows:
         return
-    some, numbers = cases.take(np.array(rows)), np.array(cases.gear.joint_numbers)
+    some = cases.take(np.array(rows))
+    numbers = np.array(cases.gear.joint_numbers)
     tried = [course.tried for course in courses if course.tried is not None]
     members = np.array([np.isin(numbers, each.joints) for each in tried])
     now = some.filled(cases.gear.limits_in)
@@ -121,14 +122,17 @@ class _BatchContext:
     def __init__(self, cases: Cases, judged: Judged, causes: Causes) -> None:
         gear = cases.gear
         ahead = Unread(cases, judged.batch.lower, causes.levels)
-        self.cases, self.judged, self.causes = cases, judged, causes
+        self.cases = cases
+        self.judged = judged
+        self.causes = causes
         self.numbers = gear.joint_numbers
         self.restore_min = np.array([joint.restore.value for joint in gear.joints])
         self.access_min = np.array([area.access.value for area in gear.areas])
         self.inside = np.array(
             [[joint.area == area.name for joint in gear.joints] for area in gear.areas]
         )
-        self.questions, self.complained = judged.questions, cases.complained
+        self.questions = judged.questions
+        self.complained = cases.complained
         self.over, self.removable = cases.over_limit & cases.restorable, removable(cases)
         self.open: Mask = np.asarray(~cases.measured & cases.reachable)
         critical = self.open & gear.critical
@@ -155,8 +159,12 @@ class _PlanBuilder:
     """The course of one gear: each branch appends its steps and ends."""
 
     def __init__(self, facts: _BatchContext, row: int, sets: tuple[RepairSet, ...]) -> None:
-        self.facts, self.row, self.sets = facts, row, sets
-        self.cases, self.judged, self.gear = facts.cases, facts.judged, facts.cases.gear
+        self.facts = facts
+        self.row = row
+        self.sets = sets
+        self.cases = facts.cases
+        self.judged = facts.judged
+        self.gear = facts.cases.gear
         self.numbers = facts.numbers
         self.inspection = self.cases.inspections[row]
         self.steps: list[Step] = []
@@ -168,12 +176,14 @@ class _PlanBuilder:
 
     def plan(self) -> Plan:
         """The steps in their order, within what the day allows."""
-        f, i = self.facts, self.row
+        f = self.facts
+        i = self.row
         if not np.isfinite(self.judged.batch.lower.displacement_in[i]):
             return NOT_CLOSING
         if f.questions[i] and not self.judged.plunger.beyond[i]:
             return CONFIRM
-        failed, complained = bool(self.cases.failed[i]), bool(f.complained[i])
+        failed = bool(self.cases.failed[i])
+        complained = bool(f.complained[i])
         found = self._course(failed=failed, complained=complained)
         return self._within_the_day(replace(found, open_question=self._open_question(found)))
 
@@ -208,8 +218,10 @@ class _PlanBuilder:
 
     def _failed(self) -> Plan:
         """A gear that failed: the plunger first, then whatever is likeliest per minute."""
-        causes, i = self.facts.causes, self.row
-        joints, rigging = float(causes.joints[i]), float(causes.rigging[i])
+        causes = self.facts.causes
+        i = self.row
+        joints = float(causes.joints[i])
+        rigging = float(causes.rigging[i])
         if not self.read_plunger or self._again():
             self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
         if not self.read_plunger:
@@ -227,7 +239,8 @@ class _PlanBuilder:
         return self._end(End.NOT_EXPLAINED)
 
     def _to_repair(self, joints: float, rigging: float) -> Plan:
-        f, i = self.facts, self.row
+        f = self.facts
+        i = self.row
         best = self._repair()
         unread = self._joints(f.open[i])
         following = self._worth_reading(best) if unread else ()
@@ -275,7 +288,8 @@ class _PlanBuilder:
 
         Offered are what is over its limit with the fewest more, and what holds in the worst case.
         """
-        f, i = self.facts, self.row
+        f = self.facts
+        i = self.row
         over = np.flatnonzero(f.over[i])
         more = np.flatnonzero(f.removable[i] & ~f.over[i])
         more = more[np.argsort(-f.causes.reach_in[i, more], kind="stable")][:_MOST_TRIED]
@@ -328,7 +342,8 @@ class _PlanBuilder:
 
     def _worth_reading(self, best: RepairSet | None) -> tuple[int, ...]:
         """The joints to read next; none where a repair is quicker than what reading may save."""
-        f, i = self.facts, self.row
+        f = self.facts
+        i = self.row
         # A worn joint that hardly moves the plunger is hardly the cause.
         # Rounded: both ends of one link are worth the same, and noise must not order them.
         worn = np.round(f.causes.worn[i] * f.causes.leverage, 9)
@@ -341,7 +356,8 @@ class _PlanBuilder:
                 if f.open[i, j] and joint.area == area.name
             ]
             inside.sort(key=lambda j: -worn[j] / self.gear.joints[j].access.value)
-            total, taken = sum(worn[j] for j in inside), 0.0
+            total = sum(worn[j] for j in inside)
+            taken = 0.0
             group: list[int] = []
             for j in inside:
                 group.append(j)
@@ -353,7 +369,8 @@ class _PlanBuilder:
                 continue
             rate = taken / minutes_to_measure(self.gear, numbers, self.opened)
             if rate > most:
-                chosen, most = numbers, rate
+                chosen = numbers
+                most = rate
         if best is None or not chosen:
             return chosen
         sound = [n for n in best.joints if n not in self.over]
@@ -367,7 +384,8 @@ class _PlanBuilder:
         """A gear without a complaint: read until there is a verdict, restore what is over its
         limit, end.
         """
-        f, i = self.facts, self.row
+        f = self.facts
+        i = self.row
         found = f.after_limits[i]
         if found is Verdict.INCOMPLETE and f.too_close[i] and not self.over:
             return self._end(End.TOO_CLOSE)
@@ -499,7 +517,8 @@ class _PlanBuilder:
         """What cannot be settled because of the day."""
         if found.end in (End.WITHIN, End.CORRECT):
             return None
-        cases, i = self.cases, self.row
+        cases = self.cases
+        i = self.row
         asked = {n for step in found.steps for n in step.joints}
         unread = self._joints(~cases.measured[i] & ~cases.reachable[i])
         over = self._joints(cases.over_limit[i] & ~cases.restorable[i])
@@ -561,7 +580,8 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
     A new reading differs from the old one by the errors of both.
     """
     n = len(cases)
-    chosen, needed = np.zeros_like(cases.measured), np.full(n, np.nan)
+    chosen = np.zeros_like(cases.measured)
+    needed = np.full(n, np.nan)
     rows = np.flatnonzero([v is Verdict.INCONCLUSIVE for v in judged.verdicts] & ~cases.failed)
     if not len(rows):
         return chosen, needed
@@ -571,7 +591,8 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
     fixed = part.u_geometry_in[rows] ** 2 + part.u_model_in[rows] ** 2 + some.margin_u_in**2
     own = np.where(some.measured, (slopes * some.gauge_u_in) ** 2, 0.0)
     off = part.displacement_in[rows] - cases.margin_in[rows]
-    off, fixed = off[:, None], (fixed + own.sum(axis=1))[:, None]
+    off = off[:, None]
+    fixed = (fixed + own.sum(axis=1))[:, None]
     for better in sorted(BETTER_GAUGES_IN):
         eligible = some.measured & ~some.own_gauge & (some.gauge_u_in > better)
         then = (slopes * better) ** 2
@@ -581,7 +602,8 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
             np.cumsum(np.take_along_axis(each, order, axis=1), axis=1)
             for each in (worth, np.where(eligible, own + then, 0.0))
         )
-        guard, moves = SCORE * np.sqrt(fixed - gained), np.sqrt(np.maximum(moved, 1e-24))
+        guard = SCORE * np.sqrt(fixed - gained)
+        moves = np.sqrt(np.maximum(moved, 1e-24))
         settles = tabled_normal_cdf((off - guard) / moves) + tabled_normal_cdf(
             (-off - guard) / moves
         )

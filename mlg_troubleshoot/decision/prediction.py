@@ -22,7 +22,8 @@ DIRECTION_SETS = 4096
 DEFAULT_PLUNGER_U_IN = 0.0015
 # The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
 # the prediction.
-PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.0005, 0.02
+PROVISIONAL_U_IN = 0.0005
+PROVISIONAL_U_SHARE = 0.02
 
 
 class Extension(Protocol):
@@ -136,9 +137,11 @@ def _members(gear: Gear, adjustment: Adjustment, extension: Extension | None) ->
     Where clearances are small the expansion gives the directions at once; the displacement in them
     is exact.
     """
-    clearance, others = adjustment.clearance_in, gear.ensemble_models[1:]
+    clearance = adjustment.clearance_in
+    others = gear.ensemble_models[1:]
     small = np.all(clearance <= gear.confirm_above.value, axis=1) & (extension is None)
-    members, rows = [], np.flatnonzero(~small)
+    members = []
+    rows = np.flatnonzero(~small)
     for model, response in zip(others, responses(gear)[1:], strict=True):
         member = np.empty(len(clearance))
         part = np.concatenate([clearance[small], clearance[small]])

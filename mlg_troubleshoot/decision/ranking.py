@@ -44,7 +44,8 @@ def rank_joints(
         np.array([linkage.amplification for linkage in responses(gear)]) * assumed[:, None, :]
     )
     places = _places(over[:, None, :], contribution, table.total_order)
-    first, last = places.min(axis=1), places.max(axis=1)
+    first = places.min(axis=1)
+    last = places.max(axis=1)
     if gauge_u_in is not None:
         u = np.where(measured, gauge_u_in, 0.0)
         above = _surely_above(
@@ -52,15 +53,19 @@ def rank_joints(
         )
         first = np.minimum(first, 1 + above.sum(axis=1))
         last = np.maximum(last, above.shape[1] - above.sum(axis=2))
-    best, worst = first.tolist(), last.tolist()
+    best = first.tolist()
+    worst = last.tolist()
     # There are few ranges: a large batch holds each of them once.
     ranges: dict[tuple[int, int], tuple[int, int]] = {}
-    ranks, known, above = places[:, 0].tolist(), clearance_in.tolist(), over.tolist()
+    ranks = places[:, 0].tolist()
+    known = clearance_in.tolist()
+    above = over.tolist()
     room = np.full(clearance_in.shape, np.nan) if allowance_in is None else allowance_in
     allowed = np.where(np.isfinite(room), room, np.nan).tolist()
 
     def finding(i: int, j: int) -> JointFinding:
-        joint, indices = gear.joints[j], table.joints[j]
+        joint = gear.joints[j]
+        indices = table.joints[j]
         clearance = known[i][j] if measured[i, j] else None
         return JointFinding(
             joint=joint.number,

@@ -20,7 +20,8 @@ from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, normal_cd
 from mlg_troubleshoot.gear.gear import Gear
 
 # Repair sets that are shown, and gears searched at once. [1]
-_SHOWN, _ROWS = 5, 256
+_SHOWN = 5
+_ROWS = 256
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
 # may be off. [in]
 _ABOUT_IN = 5e-4
@@ -56,7 +57,8 @@ def subsets_of(gear: Gear) -> Subsets:
     numbers = np.array(gear.joint_numbers)
     minutes = np.array([minutes_to_restore(gear, numbers[row].tolist()) for row in members])
     order = np.lexsort((members.sum(axis=1), np.round(minutes, 6)))
-    members, minutes = members[order], minutes[order]
+    members = members[order]
+    minutes = minutes[order]
     joints = [tuple(numbers[row].tolist()) for row in members]
     first, second = np.triu_indices(n)
     keys = np.column_stack([np.round(minutes, 6), members.sum(axis=1)])
@@ -96,7 +98,8 @@ def _surest(table: Subsets, slack_in: Array, among: Mask) -> Places:
     """The quickest of some subsets; of equally many joints in equal minutes the one with most
     slack; −1 if none.
     """
-    first, rows = np.argmax(among, axis=1), np.arange(len(among))
+    first = np.argmax(among, axis=1)
+    rows = np.arange(len(among))
     alike = among & (table.alike[first][:, None] == table.alike)
     # Rounded: both ends of one link leave the same, and rounding noise must not choose between
     # them.
@@ -117,8 +120,10 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     """Judge all subsets of all gears by the second-order expansion, anchored at the exact worst
     case `worst_in`.
     """
-    table, linkages = subsets_of(cases.gear), responses(cases.gear)
-    worn, now = removable(cases), cases.filled(cases.gear.limits_in)
+    table = subsets_of(cases.gear)
+    linkages = responses(cases.gear)
+    worn = removable(cases)
+    now = cases.filled(cases.gear.limits_in)
     less = np.where(worn, now - cases.gear.new_parts_in, 0.0)
     over = cases.over_limit & cases.restorable
     # A subset must contain every joint over its limit, and no joint that gains nothing.
@@ -130,7 +135,8 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     slack = np.empty(barred.shape)
     for start in range(0, len(cases), _ROWS):
         part = slice(start, start + _ROWS)
-        some, gone = now[part], less[part]
+        some = now[part]
+        gone = less[part]
         members = [_restored_worst(linkage, table, some, gone) for linkage in linkages]
         falls = members[0][:, :1] - members[0]
         after = worst_in[part, None] - falls
@@ -181,7 +187,9 @@ def _variance_drop(
 
 def _variance(members: Sequence[Array]) -> Array:
     """Variance over the ensemble, without a copy of all of it. [in²]"""
-    n, total, square = len(members), np.zeros_like(members[0]), np.zeros_like(members[0])
+    n = len(members)
+    total = np.zeros_like(members[0])
+    square = np.zeros_like(members[0])
     for member in members:
         off = member - members[0]
         total += off
@@ -227,7 +235,8 @@ def repair_sets(cases: Cases, upper: Prediction, wanted: Places) -> list[tuple[R
     result: list[tuple[RepairSet, ...]] = [()] * len(cases)
     if not len(wanted):
         return result
-    some, table = cases.take(wanted), subsets_of(cases.gear)
+    some = cases.take(wanted)
+    table = subsets_of(cases.gear)
     found = search(some, upper.displacement_in[wanted], upper.u_clearances_in[wanted])
     chosen = _quickest_sets(table, calibrated(some, found).slack_in)
     rows = np.repeat(np.arange(len(wanted)), [len(places) for places in chosen])
@@ -236,7 +245,8 @@ def repair_sets(cases: Cases, upper: Prediction, wanted: Places) -> list[tuple[R
     sets = np.concatenate(chosen)
     prediction, p = _restored(some, rows, sets)
     for k in np.flatnonzero(p >= CONFORMANCE):
-        which, row = sets[k], int(wanted[rows[k]])
+        which = sets[k]
+        row = int(wanted[rows[k]])
         minutes = table.to_measure[which], float(table.minutes[which])
         moved = float(prediction.displacement_in[k])
         held = RepairSet(table.joints[which], moved, float(p[k]), *minutes, RepairKind.SURE)
@@ -273,10 +283,12 @@ def rigging_alternative(
     over, under = worst_in
     measured = float(one.mean_in[0])
     if np.isfinite(measured):
-        shift, left = -measured, max(over, -under)
+        shift = -measured
+        left = max(over, -under)
         chance = exact_chance(one, one.filled(0.0))
     else:
-        shift, left = -0.5 * (over + under), 0.5 * (over - under)
+        shift = -0.5 * (over + under)
+        left = 0.5 * (over - under)
         chance = exact_chance(one, one.filled(0.0), shift)
     within = float(normal_cdf((one.margin_in - left) / budget.combined_in)[0])
     return Rigging(shift, left, within, float(chance[0]))

@@ -73,7 +73,8 @@ class Response:
         others lead. [in]
         """
         n, joints = clearance_in.shape
-        links, towards = np.zeros((n, 2 * joints)), np.reshape(sense, (-1, 1, 1))
+        links = np.zeros((n, 2 * joints))
+        towards = np.reshape(sense, (-1, 1, 1))
         for _ in range(5):
             gradient = towards * (self.gradient + links @ self.curvature).reshape(n, joints, 2)
             length = np.maximum(np.hypot(gradient[..., :1], gradient[..., 1:]), 1e-300)
@@ -112,7 +113,8 @@ def expand(model: LinkageModel) -> Response:
     n = 2 * len(model.joint_numbers)
     unit = np.eye(n)
     i, j = np.triu_indices(n)
-    plus, minus = (unit[i] + unit[j]) * _STEP_IN, (unit[i] - unit[j]) * _STEP_IN
+    plus = (unit[i] + unit[j]) * _STEP_IN
+    minus = (unit[i] - unit[j]) * _STEP_IN
     points = np.vstack([central_steps(n), plus, -plus, minus, -minus])
     moved = model.displacement(list(points.T))
     gradient = central_slopes(moved[: 2 * n])

@@ -117,12 +117,14 @@ def check_rigging(stands_in: float | None, as_new: Sequence[int]) -> Sentence:
 
 # Landings and months after which a gear that is too close is looked at again: half of what most
 # operators leave between inspections of this kind; assumed. [landings, months]
-_AGAIN_LANDINGS, _AGAIN_MONTHS = 300, 6
+_AGAIN_LANDINGS = 300
+_AGAIN_MONTHS = 6
 
 
 def look_again(inspection: Inspection) -> str:
     """By when a gear that is too close to its margin is looked at again."""
-    day, landings = inspection.inspection_date, inspection.gear_landings
+    day = inspection.inspection_date
+    landings = inspection.gear_landings
     if landings is not None:
         by = f"at {landings + _AGAIN_LANDINGS:.0f} landings"
     else:
@@ -176,7 +178,8 @@ class Predicted:
             chance += ", unread joints by their usual wear"
         if not self.read:
             return Sentence(f"no joint was read; {chance}")
-        displacement, bound = Length(self.displacement_in), Length(self.bound_in)
+        displacement = Length(self.displacement_in)
+        bound = Length(self.bound_in)
         alone = " from the measured joints alone" if self.unread else ""
         if self.loaded:
             return Sentence.of(
@@ -200,10 +203,8 @@ def measured(measured_in: float, margin_in: float, where: str) -> Sentence:
     """Where the plunger was measured: ``outside`` or ``within`` its margin; outside is said first
     and loudest.
     """
-    sense, word = (
-        "beyond" if measured_in > 0 else "short of",
-        "MEASURED" if where == "outside" else "Measured",
-    )
+    sense = "beyond" if measured_in > 0 else "short of"
+    word = "MEASURED" if where == "outside" else "Measured"
     return Sentence.of(
         "{}: the plunger stands {} {} mid-position, {} its margin of {}.",
         word,

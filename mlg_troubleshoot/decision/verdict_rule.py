@@ -43,7 +43,8 @@ def zone(probability: float) -> Verdict:
 
 def verdict(p_lower: float, p_upper: float, *, critical_missing: bool) -> Verdict:
     """Apply the rule; the first match wins."""
-    lower, upper = zone(p_lower), zone(p_upper)
+    lower = zone(p_lower)
+    upper = zone(p_upper)
     if lower is Verdict.OUTSIDE_MARGIN:
         return Verdict.OUTSIDE_MARGIN
     if critical_missing or lower is not upper:

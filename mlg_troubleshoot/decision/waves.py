@@ -17,11 +17,14 @@ from mlg_troubleshoot.decision.priors import PRIORS
 
 # Half the range of displacements that a sum may have, the frequencies and the places of its
 # density. [in, 1/in, in]
-HALF_IN, _TERMS, _PLACES = 0.18, 104, 145
+HALF_IN = 0.18
+_TERMS = 104
+_PLACES = 145
 FREQUENCIES = np.pi * np.arange(1, _TERMS + 1) / HALF_IN
 AT_IN = np.linspace(-HALF_IN, HALF_IN, _PLACES)
 STEP_IN = AT_IN[1] - AT_IN[0]
-_COSINES, _SINES = np.cos(FREQUENCIES[:, None] * AT_IN), np.sin(FREQUENCIES[:, None] * AT_IN)
+_COSINES = np.cos(FREQUENCIES[:, None] * AT_IN)
+_SINES = np.sin(FREQUENCIES[:, None] * AT_IN)
 
 
 @lru_cache(maxsize=1)

@@ -64,7 +64,8 @@ def surely_worn(cases: Cases, levels: Array) -> Array:
     read = (cases.clearance_in[rows, joints] / limits[joints])[:, None]
     u = (cases.gauge_u_in[rows, joints] / limits[joints])[:, None]
     again = cases.own_gauge[rows, joints][:, None]
-    logs, slip = [], -np.expm1(-PRIORS.wrong_readings / len(limits))
+    logs = []
+    slip = -np.expm1(-PRIORS.wrong_readings / len(limits))
     for factor, share in ((1.0, 1.0 - slip), (2.0, slip)):
         spread = np.hypot(u, np.where(again, 0.0, PRIORS.gauge_scale * factor * SHARES))
         log = -0.5 * ((read - factor * SHARES) / spread) ** 2 - np.log(spread)
@@ -89,7 +90,9 @@ class Unread:
 
     def __init__(self, cases: Cases, lower: Prediction, levels: Array) -> None:
         gear, linkages, self.levels = cases.gear, responses(cases.gear), levels
-        self.gear, self.read, self.margin_in = gear, cases.measured, cases.margin_in
+        self.gear = gear
+        self.read = cases.measured
+        self.margin_in = cases.margin_in
         self.base_in = np.nan_to_num(lower.displacement_in)
         expected = cases.filled((levels @ MEAN)[:, None] * gear.limits_in)
         each = np.array([linkage.magnitude(expected) for linkage in linkages])
@@ -104,7 +107,8 @@ class Unread:
         )
         self.u_in = np.sqrt(sum(part**2 for part in parts))
         guard = SCORE * self.u_in
-        self.within_in, self.outside_in = cases.margin_in - guard, cases.margin_in + guard
+        self.within_in = cases.margin_in - guard
+        self.outside_in = cases.margin_in + guard
 
     def adds(self, joints: Mask) -> tuple[Array, Array]:
         """Mean and variance, at each level, of what some joints add to the worst case. [in, in²]"""
@@ -142,7 +146,8 @@ class Unread:
         # Rounded: both ends of one link are worth the same, and rounding noise must not order them.
         rate = np.round(self.reach_in / self.gear.access_minutes, 9)
         order = np.argsort(np.where(candidates, -rate, np.inf), axis=1, kind="stable")
-        chosen, done = np.zeros_like(candidates), ~candidates.any(axis=1)
+        chosen = np.zeros_like(candidates)
+        done = ~candidates.any(axis=1)
         rows = np.arange(len(candidates))
         for place in range(candidates.shape[1]):
             joint = order[:, place]
@@ -157,7 +162,8 @@ class Unread:
         """Chances of what a joint of one gear may read, and of the gear being within its margin
         then. [1]
         """
-        rest, reach = np.delete(self.reach_in[row], joint), self.reach_in[row, joint]
+        rest = np.delete(self.reach_in[row], joint)
+        reach = self.reach_in[row, joint]
         chances = self.levels[row][:, None] * DENSITIES
         mean = self.base_in[row] + (rest.sum() * MEAN)[:, None] + reach * SHARES
         spread = np.sqrt((rest @ rest) * VARIANCE + self.u_in[row] ** 2)[:, None]

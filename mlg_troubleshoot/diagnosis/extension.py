@@ -174,7 +174,8 @@ def adjustment_of(
     clearance = np.asarray(clearance_in, float)
     changed: dict[str, Array] = {}
     scaled: dict[str, Array] = {}
-    rate, shift = np.ones(len(clearance)), np.zeros(len(clearance))
+    rate = np.ones(len(clearance))
+    shift = np.zeros(len(clearance))
     loaded: Array | None = None
     for term in terms:
         cause = term.candidate.cause
@@ -212,7 +213,8 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
     """
     terms = []
     for term in extension.terms:
-        cause, candidate = term.candidate.cause, term.candidate
+        cause = term.candidate.cause
+        candidate = term.candidate
         setting = {k: v for k, v in candidate.setting.items() if v is not None}
         terms.append(
             {
@@ -262,7 +264,9 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
     """
     terms: list[Term] = []
     hashes: list[str] = []
-    rows, residual, unread = 0, float("nan"), set[int]()
+    rows = 0
+    residual = float("nan")
+    unread = set[int]()
     known = {cause.name: cause for cause in with_own(own)}
     for file in files:
         read = read_toml(file, ExtensionFile, "Give a file that mlg diagnose wrote.")
@@ -273,7 +277,8 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
                 f" ({found.geometry_sha256[:12]} instead of {gear.geometry_sha256[:12]})",
                 "Diagnose again with this gear, or name the gear that it was made on with --gear.",
             )
-        rows, residual = found.rows, found.residual_u_in
+        rows = found.rows
+        residual = found.residual_u_in
         unread |= set(found.unread_joints)
         hashes += found.data_sha256
         terms += [_term(read, index, known, gear) for index in range(len(found.terms))]
@@ -304,7 +309,8 @@ def _tried_out(term: Term, gear: Gear) -> float:
 def _term(
     file: DataFile[ExtensionFile], index: int, known: Mapping[str, Cause], gear: Gear
 ) -> Term:
-    read, place = file.content.terms[index], ("terms", index)
+    read = file.content.terms[index]
+    place = ("terms", index)
     if read.cause not in known:
         raise file.fail(
             (*place, "cause"),

@@ -199,7 +199,8 @@ def table_from_inspections(
         [*[np.nan] * len(at_mid), *(i.actuator_extension_in for i in positions)], float
     )
     inspections = [*at_mid, *positions]
-    n, numbers = len(inspections), gear.joint_numbers
+    n = len(inspections)
+    numbers = gear.joint_numbers
     clearance = np.full((n, len(numbers)), np.nan)
     floats = np.full((n, len(numbers)), np.nan)
     below = np.zeros((n, len(numbers)), bool)

@@ -62,10 +62,12 @@ class Conclusion:
         """Names that these rows cannot tell from each other, one of which is sure: what is believed
         of them beforehand must not decide.
         """
-        found, effects = self.posterior, self.posterior.effects
+        found = self.posterior
+        effects = self.posterior.effects
         places = np.flatnonzero(effects.listed).tolist()
         names = [effects.names[k] for k in places]
-        columns, prior = effects.columns[:, places], (effects.log_prior - effects.rarity)[places]
+        columns = effects.columns[:, places]
+        prior = (effects.log_prior - effects.rarity)[places]
         unit = columns / np.linalg.norm(columns, axis=0)
         evidence = np.log(np.maximum(found.of_effect[places], 1e-300)) - prior
         alike: set[Key] = set()
@@ -94,7 +96,8 @@ class Conclusion:
         """Names of which something more acts than what is said; look-alikes with them."""
         counted = {*said, *(self.aliases if said else ())}
         rest = [n for n in self.listed if n not in counted]
-        further, names = self.any_of(rest), list[Key]()
+        further = self.any_of(rest)
+        names = list[Key]()
         if self.verdict is Verdict.AMBIGUOUS or (self.verdict is Verdict.NAMED and further >= 0.5):
             # At least one of the set acts, as sure as anything that is said.
             for name in rest:

@@ -44,7 +44,8 @@ def shrunk(
 
 def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
     """Fit columns to one data set, scale and tail scatter included."""
-    n, k = len(data) - noise.absorbed, columns.shape[1]
+    n = len(data) - noise.absorbed
+    k = columns.shape[1]
     best: Fit | None = None
     for ratio, chance in noise.tail_levels:
         product, log_determinant = noise.precision_times(np.column_stack([columns, data]), ratio)

@@ -47,7 +47,8 @@ def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bo
 
     Far readings decide no more than others: where noise is estimated they scatter more.
     """
-    left, ratio = np.column_stack([before, after]), noise.tail_ratios[-1]
+    left = np.column_stack([before, after])
+    ratio = noise.tail_ratios[-1]
     square = np.sum(
         [noise.take(fold == k).square(left[fold == k], ratio) for k in np.unique(fold)], axis=0
     )
@@ -68,9 +69,11 @@ def held_out_part(
     """
     explained = np.zeros(len(data))
     for k in np.unique(fold):
-        train, test = fold != k, fold == k
+        train = fold != k
+        test = fold == k
         used = np.any(columns[train] != 0.0, axis=0)
-        held, part = columns[:, used], noise.take(train)
+        held = columns[:, used]
+        part = noise.take(train)
         if not train.any():
             continue
         if known is not None:

@@ -131,13 +131,13 @@ class ReadOptions(TableOptions):
 
     @classmethod
     def of(cls, gear: Gear, tables: TableOptions | None = None, **declared: Any) -> ReadOptions:
-        told = (
+        given = (
             {}
             if tables is None
             else {each.name: getattr(tables, each.name) for each in fields(TableOptions)}
         )
         return cls(
-            **told,
+            **given,
             **declared,
             joints=Joints.of(gear),
             new_part_in={joint.number: joint.new_part.value for joint in gear.joints},

@@ -272,11 +272,13 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     rows = sheet.rows()
     peeked = list(islice(rows, _PEEKED_ROWS))
     first = next((cell for _, cells in peeked[:1] for cell in cells if cell is not None), None)
-    told = isinstance(first, str) and first.strip().lower().startswith(_INSTRUCTIONS)
-    header = None if told else find_header(peeked, options, sheet.merged)
-    form = None if told or header is not None else find_form(peeked, options)
+    is_instructions = isinstance(first, str) and first.strip().lower().startswith(_INSTRUCTIONS)
+    header = None if is_instructions else find_header(peeked, options, sheet.merged)
+    form = None if is_instructions or header is not None else find_form(peeked, options)
     has_rows = header is not None and any(number > header.row for number, _ in peeked)
-    return _Candidate(sheet, chain(peeked, rows), header, form, has_rows, bool(peeked) and not told)
+    return _Candidate(
+        sheet, chain(peeked, rows), header, form, has_rows, bool(peeked) and not is_instructions
+    )
 
 
 def _read_book(

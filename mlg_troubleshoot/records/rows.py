@@ -240,11 +240,11 @@ class RowReader:
         if SIDE not in self._at:
             side = self._table.side
         identity = {"record_id": record_id, "tail_no": tail_no, "side": side}
-        told: dict[str, Any] = {**identity, "convention": convention, "source": source}
-        if self._bad or None in told.values():
+        given: dict[str, Any] = {**identity, "convention": convention, "source": source}
+        if self._bad or None in given.values():
             said = tuple(warnings)
             named = [self._place(index).cell for index in sorted(self._bad) if index >= 0]
-            understood = self._inspection(found, **told)
+            understood = self._inspection(found, **given)
             return InvalidRow(
                 **identity,
                 correct=self._correct(),
@@ -254,12 +254,12 @@ class RowReader:
                 cells=tuple(cell for cell in named if cell is not None),
             )
         self._warn(found, warnings)
-        return self._inspection(found, **told, unit_question=question, warnings=tuple(warnings))
+        return self._inspection(found, **given, unit_question=question, warnings=tuple(warnings))
 
     @staticmethod
-    def _inspection(found: _Found, **told: Any) -> Inspection:
+    def _inspection(found: _Found, **given: Any) -> Inspection:
         """What was read of a row; of one that cannot be judged, as far as it could be read."""
-        scale: ClearanceConvention = told["convention"] or ClearanceConvention.TOTAL_PLAY
+        scale: ClearanceConvention = given["convention"] or ClearanceConvention.TOTAL_PLAY
         lengths = found.lengths
         clearance = lengths.pop(CLEARANCE, {})
         gauge_u = {
@@ -283,7 +283,7 @@ class RowReader:
             other_columns=other,
             carried=found.carried,
             **said,
-            **told,
+            **given,
         )
 
     def _read_cells(
@@ -331,8 +331,8 @@ class RowReader:
                 continue
             number = field.number or 0
             if entered.bound:
-                told, end = self._at_an_end(number, length, entered)
-                warnings.append(told)
+                warning, end = self._at_an_end(number, length, entered)
+                warnings.append(warning)
                 if end is None:
                     continue
                 length = end
@@ -420,8 +420,10 @@ class RowReader:
         self, row: int, cells: Cells, why: FileRefusedError, record_id: str | None = None
     ) -> InvalidRow:
         shown = quote(",".join(map(show, cells)), 80)
-        told = why.problem
-        self._table.tell(told.code, f"{why}: {shown}", told.expected, told.remedy, CellPlace(row))
+        problem = why.problem
+        self._table.tell(
+            problem.code, f"{why}: {shown}", problem.expected, problem.remedy, CellPlace(row)
+        )
         return InvalidRow(record_id, None, None, ("row",), (), self._table.source(row))
 
     def _begin(self, row: int, cells: Cells, places: Sequence[tuple[int, str]] | None) -> None:

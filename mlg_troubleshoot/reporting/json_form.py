@@ -99,8 +99,8 @@ def kept_as_json(assessment: Assessment) -> dict[str, Any]:
     joints = [_joint(finding) for finding in assessment.joints]
     kept = [{n: each for n, each in j.items() if n not in _OF_GEOMETRY} for j in joints]
     # What the gear did is kept with the inspection; words follow from what is kept.
-    told = assessment_as_json(assessment, kept)
-    return {n: each for n, each in told.items() if n not in ("outcome", "in_brief")}
+    whole = assessment_as_json(assessment, kept)
+    return {n: each for n, each in whole.items() if n not in ("outcome", "in_brief")}
 
 
 def check_json_pieces(

@@ -62,12 +62,12 @@ def fleet_sheets(
 ) -> dict[str, tuple[list[str], list[list[Any]]]]:
     """The sheets of a fleet's workbook: gears, readings, landings left of each joint, records."""
     lines = fleet_lines(lives, forecasts, order)
-    told = [life_as_json(line.life, forecasts[line.life.key], gear) for line in lines]
+    whole = [life_as_json(line.life, forecasts[line.life.key], gear) for line in lines]
     readings: list[list[Any]] = []
     left: list[list[Any]] = []
     events: list[list[Any]] = []
     kept = ("date", "gear_landings", "kind", "record_id", "verdict", "predicted_displacement_in")
-    for life in told:
+    for life in whole:
         whose = [life["tail_no"], life["side"]]
         for joint in life["joints"]:
             named = [*whose, joint["joint"], joint["limit_in"]]

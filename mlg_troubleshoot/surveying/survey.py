@@ -720,13 +720,13 @@ def fit(
     gear: Gear,
     readings: Readings,
     rng: Generator,
-    told: Callable[[int, int], None] = lambda *_: None,
+    progress: Callable[[int, int], None] = lambda *_: None,
 ) -> Survey:
     """Find the linkages that fit the readings, what does not fit, and draws from the posterior.
 
-    told: called with the stages that are done and how many there are.
+    progress: called with the stages that are done and how many there are.
     """
-    told(0, tuned.STAGES)
+    progress(0, tuned.STAGES)
     linkage = SurveyedLinkage(gear)
     prior = Prior(linkage)
     if linkage.travel is not None:
@@ -741,7 +741,7 @@ def fit(
     fitting = Fitting(linkage, prior, readings)
     starts = np.concatenate([prior.members, prior.closing(tuned.STARTS, rng, readings)])
     fits = fitting.reheated(fitting.begun(fitting.robust(starts)), rng)
-    told(1, tuned.STAGES)
+    progress(1, tuned.STAGES)
     kept = np.abs(fitting.residuals(fits.points[:1])[0]) < tuned.TRUSTED
     if not kept.all() and fitting.still:
         # What does not fit is a slip or another valley.
@@ -753,7 +753,7 @@ def fit(
     # What is that much less likely, each slip counted, is not a mode: without what was exchanged it
     # might seem one.
     points = fits.points[fits.loss <= fits.loss[0] - 2.0 * np.log(tuned.LEAST_WEIGHT)]
-    told(2, tuned.STAGES)
+    progress(2, tuned.STAGES)
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
     if not modes:
         raise InconclusiveDataError(
@@ -761,12 +761,12 @@ def fit(
             " them",
             "Check the units and the points of the readings.",
         )
-    told(tuned.STAGES - 2, tuned.STAGES)
+    progress(tuned.STAGES - 2, tuned.STAGES)
     misfits, kept = fitting.misfits(modes[0], kept)
     vectors, means = (np.array([getattr(m, part) for m in modes]) for part in ("vector", "mean"))
     modes = fitting.modes(vectors, means, kept) or modes
     modes = fitting.with_mirrored(modes, kept)
-    told(tuned.STAGES - 1, tuned.STAGES)
+    progress(tuned.STAGES - 1, tuned.STAGES)
     draws = fitting.draws(modes, kept, rng)
-    told(tuned.STAGES, tuned.STAGES)
+    progress(tuned.STAGES, tuned.STAGES)
     return Survey(linkage, readings, misfits, modes, draws)

@@ -141,13 +141,13 @@ def check_files(
     options = options or CheckOptions()
     gear = load_gear(options.gear)
     read = read_many(sources, ReadOptions.of(gear, options), progress=on_read)
-    told = {
+    details = {
         "problems": read.problems,
         "notes": read.notes,
         "inputs_sha256": read.inputs_sha256,
         "read": read,
     }
-    return _judge(gear, read.rows, options, on_judged, store=store, **told)
+    return _judge(gear, read.rows, options, on_judged, store=store, **details)
 
 
 def check_inspection(
@@ -355,7 +355,7 @@ def _judge(
     options: CheckOptions,
     on_judged: Callable[[int, int], None] | None = None,
     store: Store | None = None,
-    **told: Any,
+    **details: Any,
 ) -> CheckResult:
     advice = len(rows) == 1 if options.advice is None else options.advice
     fleet = None
@@ -370,7 +370,7 @@ def _judge(
         "fleet": fleet,
     }
     if fleet is not None:
-        told["notes"] = (*told.get("notes", ()), fleet.text)
+        details["notes"] = (*details.get("notes", ()), fleet.text)
     as_they_count = since_repairs(rows, gear, store)
     judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
     if as_they_count is not rows:
@@ -381,7 +381,7 @@ def _judge(
             else judged
             for judged, row in zip(judgements, rows, strict=True)
         )
-    return CheckResult(gear=gear, judgements=judgements, seed=options.seed, **told)
+    return CheckResult(gear=gear, judgements=judgements, seed=options.seed, **details)
 
 
 def write_reports(

@@ -271,9 +271,9 @@ def write_diagnosis_report(
     from mlg_troubleshoot.reporting.publish import publish
 
     made = provenance_of(result.gear, result.inputs_sha256, remembered=options.remembered)
-    told = (result.extension, unit, result.problems, result.notes)
+    findings = (result.extension, unit, result.problems, result.notes)
     return publish(
-        diagnosis_document(result.diagnosis, result.gear, made, *told), directory, page=page
+        diagnosis_document(result.diagnosis, result.gear, made, *findings), directory, page=page
     )
 
 

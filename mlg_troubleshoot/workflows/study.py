@@ -76,28 +76,28 @@ def run_study(
 
     known = load_gear(gear)
     wanted = options or study.StudyOptions()
-    told = progress or (lambda _stage, _done, _total: None)
+    report = progress or (lambda _stage, _done, _total: None)
     if statements and not targets_file(known).exists():
         raise UsageError(
             f"{known.name} has no printed statements",
             f"Write {targets_file(known).name} next to it.",
         )
-    findings = study.StudyFindings(known, wanted, study.run_study(known, wanted, told))
+    findings = study.StudyFindings(known, wanted, study.run_study(known, wanted, report))
     if not findings.result.finished:
         return findings
     if designs:
-        findings = replace(findings, designs=study.compare_designs(known, wanted, told))
+        findings = replace(findings, designs=study.compare_designs(known, wanted, report))
     if statements:
         found = check_statements(
-            known, progress=lambda done, total: told("statements", done, total)
+            known, progress=lambda done, total: report("statements", done, total)
         )
         findings = replace(findings, statements=found)
     if bound:
-        findings = replace(findings, searches=_searches(known, wanted, told))
+        findings = replace(findings, searches=_searches(known, wanted, report))
     return findings
 
 
-def _searches(gear: Gear, options: StudyOptions, told: Progress) -> tuple[WorstSearch, ...]:
+def _searches(gear: Gear, options: StudyOptions, report: Progress) -> tuple[WorstSearch, ...]:
     from mlg_troubleshoot.paper.worst_search import search_worst
 
     found = []
@@ -105,7 +105,7 @@ def _searches(gear: Gear, options: StudyOptions, told: Progress) -> tuple[WorstS
         rng = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(1000 + k,)))
         limits = gear.limits_in if options.limits_in is None else options.limits_in
         found.append(search_worst(gear.model, limits, sense, rng, options.seed))
-        told("proof", k + 1, 2)
+        report("proof", k + 1, 2)
     return tuple(found)
 
 

@@ -169,7 +169,7 @@ def test_ctrl_c_and_ctrl_d_say_how_to_resume(
     gear: Gear, store: SessionStore, end: type[BaseException]
 ) -> None:
     terminal, _ = interrupted(gear, store, [*HEADING, ".004"], end=end)
-    assert terminal.screen.rstrip().endswith("Saved. Go on later with:  mlg check --resume")
+    assert terminal.screen.rstrip().endswith("Saved. Resume it with:  mlg check --resume")
 
 
 def test_q_is_the_same_as_ctrl_c(gear: Gear, store: SessionStore) -> None:
@@ -443,7 +443,7 @@ def test_what_a_newer_version_saved_is_kept_and_said_to_be_readable_there(
     before = drafts(store)
     with pytest.raises(SessionFileError, match=r"was saved by mlg 9\.1\.0") as caught:
         store.latest()
-    assert "It is kept: go on with it in mlg 9.1.0 or later" in caught.value.remedy
+    assert "It is kept: resume it in mlg 9.1.0 or later" in caught.value.remedy
     assert "amaged" not in caught.value.message
     assert drafts(store) == before
 

@@ -77,7 +77,7 @@ class Answers:
     optional, by column.
 
     `todo` is asked next, joints before the others; `continues` is the hash of the kept inspection
-    that these answers go on with.
+    that these answers continue.
     """
 
     tail_no: str | None = None
@@ -296,7 +296,7 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
     """Read the optional answers; each is kept as it was typed, with the unit that it was typed
     in.
     """
-    told: list[Line] = []
+    remarks: list[Line] = []
     at = 0
     while at < len(typed):
         item = _ITEM.match(typed, at)
@@ -307,8 +307,8 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
             )
         at = item.end()
         answers, said = _taken(item, answers, gear)
-        told.append(line((said, Tone.GOOD)))
-    return answers, tuple(told)
+        remarks.append(line((said, Tone.GOOD)))
+    return answers, tuple(remarks)
 
 
 def _taken(item: re.Match[str], answers: Answers, gear: Gear) -> tuple[Answers, str]:

@@ -68,14 +68,14 @@ class _Saver:
             self.session = self._store.save(self.session)
         except OutputError as error:
             self.saved = False
-            self._say_once(f"{error.message}. {error.remedy} You can go on.")
+            self._say_once(f"{error.message}. {error.remedy} You can continue.")
             return
         if self._store.away:
             self._say_once(self._store.away)
         self.saved = True
 
     def resume(self, session: Session) -> None:
-        """Go on with another session instead of the one just begun."""
+        """Resume another session instead of the one just begun."""
         if self.saved:
             self._store.discard(self.session.id)
         self.session = session
@@ -192,7 +192,7 @@ def _converse(flow: Flow, turn: Turn[State], terminal: RichTerminal, saver: _Sav
 
 def _stopped(terminal: RichTerminal, saver: _Saver, *, is_kept: bool) -> EntryInterruptedError:
     if saver.saved:
-        said = line(("Saved. ", Tone.GOOD), "Go on later with:  ", ("mlg check --resume", Tone.KEY))
+        said = line(("Saved. ", Tone.GOOD), "Resume it with:  ", ("mlg check --resume", Tone.KEY))
         terminal.say((BLANK, said))
         return EntryInterruptedError(saver.session.id)
     if is_kept:

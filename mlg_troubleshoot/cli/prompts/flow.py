@@ -143,7 +143,7 @@ class Flow:
                 "Resume without that flag, or begin a new inspection.",
             )
         answers = answers.beside(given)
-        return self._read_anew(answers, told=self._resumed(answers))
+        return self._read_anew(answers, remarks=self._resumed(answers))
 
     def page(self, state: State, width: int) -> Page:
         return _QUESTIONS[state.ask].page(self, state, width)
@@ -213,20 +213,18 @@ class Flow:
             return again(state, _not_taken(typed, "Type r, d or t; ? explains them."))
         if convention is answers.convention:
             return self._go_on(answers, state.from_review)
-        told: tuple[Line, ...] = ()
+        remarks: tuple[Line, ...] = ()
         if answers.convention is not None and answers.radial_in:
             name = pages.CONVENTION_NAMES[convention]
-            told = (warning(f"The readings stay as typed and are now read as {name}."),)
+            remarks = (warning(f"The readings stay as typed and are now read as {name}."),)
         changed = replace(answers, convention=convention).with_each(_unconfirmed)
-        return self._read_anew(changed, state.from_review, told)
+        return self._read_anew(changed, state.from_review, remarks)
 
     def _offer(self, state: State, typed: str) -> Turn[State]:
         saved = _known(state.saved)
         yes = _YES_NO.get(typed.lower())
         if yes is None:
-            return again(
-                state, _not_taken(typed, "Type y to go on with it or n to begin a new one.")
-            )
+            return again(state, _not_taken(typed, "Type y to resume it or n to begin a new one."))
         if yes:
             return self._on_with(saved, state.answers)
         turn = self._offer_visit(state.answers)
@@ -234,7 +232,7 @@ class Flow:
 
     def _on_with(self, saved: Session, given: Answers) -> Turn[State]:
         answers = saved.answers.beside(given)
-        turn = self._read_anew(answers, told=self._resumed(saved.answers))
+        turn = self._read_anew(answers, remarks=self._resumed(saved.answers))
         return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.RESUME)
 
     def _next(self, state: State, typed: str) -> Turn[State]:
@@ -250,20 +248,20 @@ class Flow:
         if word == "c":
             return Turn(State(Ask.REVIEW, visit.answers))
         if word == "u" and visit.before is not None:
-            told = (line(("The last change is taken back.", Tone.GOOD)),)
-            return Turn(State(Ask.REVIEW, visit.before), told, Effect.COMPUTE)
+            remarks = (line(("The last change is undone.", Tone.GOOD)),)
+            return Turn(State(Ask.REVIEW, visit.before), remarks, Effect.COMPUTE)
         return self._added(state, visit.answers, typed)
 
     def _added(self, state: State, kept: Answers, typed: str) -> Turn[State]:
         """Take an optional answer that is added to a kept inspection."""
         try:
-            answers, told = read_more(kept, typed, self.gear)
+            answers, remarks = read_more(kept, typed, self.gear)
         except UsageError as error:
             return again(state, f"{error.message}. Type one of the letters above, or Enter.")
         if answers.more == kept.more:
             return again(state, "That is known already.")
         turn = self._go_on(self._reread_restored(kept, answers))
-        return replace(turn, lines=(*told, *turn.lines))
+        return replace(turn, lines=(*remarks, *turn.lines))
 
     def _reread_restored(self, before: Answers, answers: Answers) -> Answers:
         """Ask for the clearances of the joints that were restored with the last answer."""
@@ -283,17 +281,17 @@ class Flow:
             return again(state, _not_taken(typed, "Type what you found, or s to leave it out."))
         letter = pages.STEP_LETTERS[column]
         try:
-            answers, told = read_more(state.answers, f"{letter} {given}".strip(), self.gear)
+            answers, remarks = read_more(state.answers, f"{letter} {given}".strip(), self.gear)
         except UsageError:
             try:
-                answers, told = read_more(state.answers, given, self.gear)
+                answers, remarks = read_more(state.answers, given, self.gear)
             except UsageError as error:
                 return again(state, f"{error.message}. {error.remedy}")
         if self._is_far(answers, state.answers):
-            return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), told)
+            return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), remarks)
         answers = self._reread_restored(state.answers, answers).without(column)
         turn = self._go_on(answers)
-        return replace(turn, lines=(*told, *turn.lines))
+        return replace(turn, lines=(*remarks, *turn.lines))
 
     def _advised(self, answers: Answers) -> str:
         """The joints that NEXT says are to be restored."""
@@ -354,16 +352,16 @@ class Flow:
 
     def _answered(self, state: State, number: int, answer: JointAnswer) -> Turn[State]:
         answers = state.answers.with_joint(number, answer)
-        told = list(pages.echo_lines(self.gear, answers, number))
+        remarks = list(pages.echo_lines(self.gear, answers, number))
         still_open = self.open_joints(answers)
         turn = self._go_on(answers, state.from_review)
         advised = None
         if self.advice is not None and still_open and self.gear.joint(number).critical:
             advised = self.advice(answers.radial_in, still_open)
         if advised is not None:
-            told.append(line(("→ ", Tone.STRONG), advised[0]))
+            remarks.append(line(("→ ", Tone.STRONG), advised[0]))
             turn = replace(turn, state=replace(turn.state, suggested=advised[1]))
-        return replace(turn, lines=(*told, *turn.lines))
+        return replace(turn, lines=(*remarks, *turn.lines))
 
     def _done(self, state: State) -> Turn[State]:
         answers = state.answers
@@ -371,8 +369,8 @@ class Flow:
         for number in rest:
             answers = answers.with_joint(number, answers.joints.get(number, NOT_MEASURED))
         names = ", ".join(f"#{n}" for n in rest if answers.reading(n) is None)
-        told = (warning(f"– {names}  not measured"),) if names else ()
-        return self._go_on(answers, state.from_review, told)
+        remarks = (warning(f"– {names}  not measured"),) if names else ()
+        return self._go_on(answers, state.from_review, remarks)
 
     def _jump(self, state: State, number: int) -> Turn[State]:
         if number not in self.gear.joint_numbers:
@@ -385,12 +383,12 @@ class Flow:
         if typed.lower() in ("", "s"):
             return self._go_on(state.answers.without(OPTIONAL))
         try:
-            answers, told = read_more(state.answers, typed, self.gear)
+            answers, remarks = read_more(state.answers, typed, self.gear)
         except UsageError as error:
             return again(state, f"{error.message}. {error.remedy}")
         if self._is_far(answers, state.answers):
-            return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), told)
-        return Turn(replace(state, ask=Ask.MORE, answers=answers, pending=None), told)
+            return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), remarks)
+        return Turn(replace(state, ask=Ask.MORE, answers=answers, pending=None), remarks)
 
     def _confirm_more(self, state: State, typed: str) -> Turn[State]:
         yes = _YES_NO.get(typed.lower())
@@ -488,8 +486,8 @@ class Flow:
             return self._offer_visit(answers)
         if not contradictions(saved.answers, answers):
             return Turn(State(Ask.OFFER, answers, saved=saved))
-        told = ("An unfinished inspection is not offered: ", Tone.WARN)
-        return self._go_on(answers, told=(line(told, self._heading(saved.answers)),))
+        remarks = ("An unfinished inspection is not offered: ", Tone.WARN)
+        return self._go_on(answers, remarks=(line(remarks, self._heading(saved.answers)),))
 
     def _offer_visit(self, answers: Answers) -> Turn[State]:
         """Show the last inspection of the gear, if there is one."""
@@ -504,15 +502,15 @@ class Flow:
         return (line((f"Resumed: {pages.identity(answers)}, ", Tone.GOOD), self._heading(answers)),)
 
     def _go_on(
-        self, answers: Answers, from_review: bool = False, told: tuple[Line, ...] = ()
+        self, answers: Answers, from_review: bool = False, remarks: tuple[Line, ...] = ()
     ) -> Turn[State]:
         """Go to the first open question."""
         # What was confirmed of the readings holds for these readings only.
         answers = answers.with_more(small_readings_true=None)
         state = self._open_question(answers, from_review)
         if state.ask is Ask.REVIEW and answers.continues and not from_review:
-            return replace(self._compute(state), lines=told)
-        return Turn(state, told)
+            return replace(self._compute(state), lines=remarks)
+        return Turn(state, remarks)
 
     def _open_question(self, answers: Answers, from_review: bool) -> State:
         """The heading, then what NEXT asks for, the joints, and what may be left out."""
@@ -530,23 +528,23 @@ class Flow:
         return State(Ask.MORE, answers) if rest == OPTIONAL else State(Ask.DETAIL, answers, rest)
 
     def _read_anew(
-        self, answers: Answers, from_review: bool = False, told: tuple[Line, ...] = ()
+        self, answers: Answers, from_review: bool = False, remarks: tuple[Line, ...] = ()
     ) -> Turn[State]:
         """Judge every answer again, in another unit or convention or on another day, and go on;
         readings that have become impossible are open again.
         """
         answers, settled = self._settled(answers)
-        return self._go_on(answers, from_review, (*told, *settled))
+        return self._go_on(answers, from_review, (*remarks, *settled))
 
     def _settled(self, answers: Answers) -> tuple[Answers, tuple[Line, ...]]:
         kept: dict[int, JointAnswer] = {}
-        told: list[Line] = []
+        remarks: list[Line] = []
         for column, text in answers.more.items():
             try:
                 judge_more(column, text, answers.unit, self.gear)
             except UsageError as error:
                 answers = answers.with_more(**{column: None})
-                told.append(warning(f"{column.replace('_', ' ')}: {error.message}: left out."))
+                remarks.append(warning(f"{column.replace('_', ' ')}: {error.message}: left out."))
         for number, answer in answers.joints.items():
             reading = answers.reading(number)
             if reading is None:
@@ -558,10 +556,10 @@ class Flow:
                 kept[number] = answer
                 continue
             if judged.refused:
-                told.extend(pages.refusal_lines(typed, number, judged.said))
+                remarks.extend(pages.refusal_lines(typed, number, judged.said))
             said = f"#{number}  {typed} is {reading.radial_in:.4g} in radial: asked again."
-            told.append(warning(said))
-        return replace(answers, joints=MappingProxyType(kept)), tuple(told)
+            remarks.append(warning(said))
+        return replace(answers, joints=MappingProxyType(kept)), tuple(remarks)
 
     def back(self, state: State) -> Turn[State]:
         if state.ask in _CONFIRMS:

@@ -49,7 +49,7 @@ UNIT_HELP = (
     note("The unit of a number typed alone; 1 thou is 0.001 in."),
     note("One reading may carry another unit: 13 thou, 0.33 mm."),
 )
-OFFER_HELP = (note("y goes on where you stopped. n begins with empty joints."),)
+OFFER_HELP = (note("y resumes where you stopped. n begins with empty joints."),)
 REREAD_HELP = (note("Readings with their own unit, such as 13 thou, stay as they are either way."),)
 
 
@@ -100,8 +100,8 @@ def _heading_page(asked: str, kept: str | None, *shown: Line) -> Page:
 
 def tail_page(answers: Answers, unfinished: tuple[Session, ...] = ()) -> Page:
     if unfinished and answers.tail_no is None:
-        goes_on = f"Tail number (Enter goes on with {identity(unfinished[0].answers)})"
-        return _heading_page(goes_on, None)
+        resumes = f"Tail number (Enter resumes {identity(unfinished[0].answers)})"
+        return _heading_page(resumes, None)
     return _heading_page("Tail number", answers.tail_no)
 
 
@@ -147,10 +147,10 @@ def offer_page(saved: Session, gear: Gear) -> Page:
             f"begun {saved.started:%Y-%m-%d %H:%M}, {len(saved.answers.radial_in)} of"
             f" {len(gear.joints)} joints measured.",
         ),
-        choice("y", "go on with it"),
+        choice("y", "resume it"),
         choice("n", "begin a new one and put the old one away"),
     )
-    return Page(shown, " Go on with it? y or n > ")
+    return Page(shown, " Resume it? y or n > ")
 
 
 STEP_LETTERS = {

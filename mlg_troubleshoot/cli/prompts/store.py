@@ -197,8 +197,7 @@ def read_session(draft: Draft) -> Session:
         raise SessionFileError(
             f"{draft.id}: this inspection was saved by mlg {program}, which this version "
             f"({version('mlg-troubleshoot')}) cannot read.",
-            f"It is kept: go on with it in mlg {program} or later, or begin a new one with mlg"
-            " check.",
+            f"It is kept: resume it in mlg {program} or later, or begin a new one with mlg check.",
         )
     try:
         session = replace(_from_json(raw), writer=draft.writer, complete=draft.complete)

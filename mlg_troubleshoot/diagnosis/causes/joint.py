@@ -84,10 +84,8 @@ class JointContact(Cause):
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield candidates of both forms for each pair of neighbours that the gear names."""
         for first, second in scene.where.contact:
-            a, b = (
-                scene.clearance_in[:, scene.place(first)],
-                scene.clearance_in[:, scene.place(second)],
-            )
+            a = scene.clearance_in[:, scene.place(first)]
+            b = scene.clearance_in[:, scene.place(second)]
             if not (
                 scene.is_read(first) and scene.is_read(second) and np.any(np.minimum(a, b) > 0.0)
             ):

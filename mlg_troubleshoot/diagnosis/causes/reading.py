@@ -233,7 +233,8 @@ class RiggingOffset(Cause):
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Shift the rows of that aircraft or gear from that day on."""
-        table, setting = scene.table, candidate.setting
+        table = scene.table
+        setting = candidate.setting
         where = table.factors["tail_no"] == setting["tail"]
         if "side" in setting:
             where = where & (table.factors["side"] == setting["side"])
