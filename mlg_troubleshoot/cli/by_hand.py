@@ -62,7 +62,8 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
         column = CLEARANCE.header(int(number))
         if column in values:
             raise UsageError(f"--set gives joint {int(number)} twice", "Give each joint once.")
-        values[column], labels[column] = written, f"--set {text!r}"
+        values[column] = written
+        labels[column] = f"--set {text!r}"
     read = _judged(values, labels, flags, declared)
     made = made_record_id(read.tail_no, read.side, datetime.now())
     return replace(read, record_id=flags.typed.get(RECORD_ID.name) or made)

@@ -133,7 +133,8 @@ class _BatchContext:
         )
         self.questions = judged.questions
         self.complained = cases.complained
-        self.over, self.removable = cases.over_limit & cases.restorable, removable(cases)
+        self.over = cases.over_limit & cases.restorable
+        self.removable = removable(cases)
         self.open: Mask = np.asarray(~cases.measured & cases.reachable)
         critical = self.open & gear.critical
         missing = np.asarray(critical.any(axis=1))
@@ -610,7 +611,8 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
         enough = (settles > 0.5) & np.take_along_axis(eligible, order, axis=1)
         upto = np.argsort(order, axis=1) <= np.argmax(enough, axis=1)[:, None]
         now = enough.any(axis=1)
-        chosen[rows[now]], needed[rows[now]] = (eligible & upto)[now], better
+        chosen[rows[now]] = (eligible & upto)[now]
+        needed[rows[now]] = better
     return chosen, needed
 
 

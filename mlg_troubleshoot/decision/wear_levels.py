@@ -89,7 +89,9 @@ class Unread:
     """
 
     def __init__(self, cases: Cases, lower: Prediction, levels: Array) -> None:
-        gear, linkages, self.levels = cases.gear, responses(cases.gear), levels
+        gear = cases.gear
+        linkages = responses(cases.gear)
+        self.levels = levels
         self.gear = gear
         self.read = cases.measured
         self.margin_in = cases.margin_in

@@ -114,13 +114,12 @@ def _sequential(
     for j in reversed(range(joints)):
         length = np.ascontiguousarray(clearance[:, j])
         probe = np.where(length > 0.0, length, _PROBE_IN)
-        links[2 * j], links[2 * j + 1] = (
-            np.cos(_ANGLES)[:, None] * probe,
-            np.sin(_ANGLES)[:, None] * probe,
-        )
+        links[2 * j] = np.cos(_ANGLES)[:, None] * probe
+        links[2 * j + 1] = np.sin(_ANGLES)[:, None] * probe
         angle = _argmax_on_circle(sense * model.displacement(links, changed))
         chosen[j] = angle
-        links[2 * j], links[2 * j + 1] = length * np.cos(angle), length * np.sin(angle)
+        links[2 * j] = length * np.cos(angle)
+        links[2 * j + 1] = length * np.sin(angle)
     return np.broadcast_to(model.displacement(links, changed), (n,)), chosen.T
 
 

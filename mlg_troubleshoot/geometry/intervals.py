@@ -346,8 +346,9 @@ def cosine_range(angle: Interval) -> Interval:
     low = angle.low - slack
     high = angle.high + slack
     ends = np.cos(low), np.cos(high)
-    top = np.floor(high / (2 * np.pi)) > np.floor(low / (2 * np.pi))
-    bottom = np.floor((high - np.pi) / (2 * np.pi)) > np.floor((low - np.pi) / (2 * np.pi))
+    turn = 2 * np.pi
+    top = np.floor(high / turn) > np.floor(low / turn)
+    bottom = np.floor((high - np.pi) / turn) > np.floor((low - np.pi) / turn)
     least = np.where(bottom, -1.0, np.minimum(*ends) - 1e-15)
     most = np.where(top, 1.0, np.maximum(*ends) + 1e-15)
     return Interval(np.maximum(least, -1.0), np.minimum(most, 1.0))

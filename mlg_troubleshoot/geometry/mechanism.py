@@ -309,7 +309,8 @@ class Mechanism:
         """Vector from one reference position to another, along the two axes of a plane. [in]"""
         _, axes = self.frame(plane)
         across = self.reference_in_space(end) - self.reference_in_space(start)
-        return (across * axes[..., 0, :]).sum(axis=-1), (across * axes[..., 1, :]).sum(axis=-1)
+        first = (across * axes[..., 0, :]).sum(axis=-1)
+        return first, (across * axes[..., 1, :]).sum(axis=-1)
 
     def side(self, step: Dyad | Slider) -> Any:
         """How far the coordinates put a joint to the side that its branch sign names: the sign is

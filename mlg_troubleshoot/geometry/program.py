@@ -320,7 +320,8 @@ def _slider(w: _Writer, step: Slider) -> None:
     c = w.let(f"cos({axis})")
     s = w.let(f"sin({axis})")
     square = w.let(f"{length} * {length}" + (f" - {height} * {height}" if height else ""))
-    _slide(w, step.joint, (ox, oy, c, s), _reach((ox, oy, c, s), (ux, uy), square, sign, w))
+    line = ox, oy, c, s
+    _slide(w, step.joint, line, _reach(line, (ux, uy), square, sign, w))
 
 
 # A point of a line and its direction: the names of x, y, cosine and sine.

@@ -79,7 +79,8 @@ class FleetLine:
 
 def _in_brief(kept: KeptInspection) -> str | None:
     """Say the next action as the check of today says it; None if the inspection was not judged."""
-    step, end = kept.result.get("next_action"), kept.result.get("end")
+    step = kept.result.get("next_action")
+    end = kept.result.get("end")
     if step is None or end is None:
         return None if step is None else str(step["text"])
     retracted = kept.inspection.outcome is Outcome.RETRACTED

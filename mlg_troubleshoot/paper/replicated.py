@@ -68,7 +68,8 @@ def central_composite(n: int) -> Array:
     signs = np.array(list(product((-1, 1), repeat=base)))
     columns = [signs, *(np.prod(signs[:, list(word)], axis=1)[:, None] for word in words)]
     corners = (np.concatenate(columns, axis=1) + 1) / 2.0
-    return np.concatenate([corners, np.where(np.eye(n, dtype=bool), np.arange(1, n + 1) % 2, 0.5)])
+    axial = np.where(np.eye(n, dtype=bool), np.arange(1, n + 1) % 2, 0.5)
+    return np.concatenate([corners, axial])
 
 
 def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> Wholes:

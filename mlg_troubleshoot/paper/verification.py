@@ -105,7 +105,9 @@ def _worst_displacement(facts: Facts, target: Target) -> float:
 def _travel(facts: Facts, _: Target) -> float:
     stroke, position = facts.curve
     least = int(np.argmin(position))
-    near = np.linspace(stroke[max(least - 1, 0)], stroke[min(least + 1, len(stroke) - 1)], _CURVE)
+    before = stroke[max(least - 1, 0)]
+    after = stroke[min(least + 1, len(stroke) - 1)]
+    near = np.linspace(before, after, _CURVE)
     return float(position[-1] - facts.model.plunger(near).min())
 
 
@@ -119,7 +121,8 @@ def _end_rate(facts: Facts, _: Target) -> float:
     step = stroke[1] - stroke[0]
     at, least = _least(stroke, position)
     mean = (position[-1] - least) / (stroke[-1] - at)
-    return float((3.0 * position[-1] - 4.0 * position[-2] + position[-3]) / (2.0 * step) / mean)
+    rise = 3.0 * position[-1] - 4.0 * position[-2] + position[-3]
+    return float(rise / (2.0 * step) / mean)
 
 
 def _least(stroke: Array, position: Array) -> tuple[float, float]:

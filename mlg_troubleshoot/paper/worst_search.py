@@ -111,7 +111,8 @@ class _Search:
         self.stroke = model.stroke[1]
         # The sequential rule is a good start: what it reaches drops most boxes at once.
         moved, directions = worst_of_sense(model, clearance[None], sense)
-        self.directions, self.best = directions[0], float(sense * moved[0])
+        self.directions = directions[0]
+        self.best = float(sense * moved[0])
         if not np.isfinite(self.best):
             self.best = -np.inf
 
@@ -155,7 +156,8 @@ class _Search:
         for k, length in enumerate(self.reach):
             rows = slice(2 * k, 2 * k + 2)
             arc = boxes[rows] & _arc(slope[rows], float(length))
-            low[rows], high[rows] = arc.low, arc.high
+            low[rows] = arc.low
+            high[rows] = arc.high
         grows = slope.low[-1] > 0.0
         falls = slope.high[-1] < 0.0
         low[-1] = np.where(grows, high[-1], low[-1])
@@ -216,7 +218,8 @@ def _arc(slope: Interval, length: float) -> Interval:
     quarter = np.array([[0.0], [np.pi / 2]])
     unit = cosine_range(Interval(centre - half - quarter, centre + half - quarter))
     arc = Interval(unit.low * length, unit.high * length).rounded()
-    return Interval(np.where(usable, arc.low, -np.inf), np.where(usable, arc.high, np.inf))
+    low = np.where(usable, arc.low, -np.inf)
+    return Interval(low, np.where(usable, arc.high, np.inf))
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,21 +69,22 @@ class _Design:
         ]
         points = np.array([*members, *between])
         points = points[linkage.closes(points)]
-        self.linkage, self.pool = linkage, (*linkage.candidates(), *taken)
+        self.linkage = linkage
+        self.pool = (*linkage.candidates(), *taken)
         u = np.array([r.u for r in self.pool])
         with np.errstate(all="ignore"):
             slopes = linkage.slopes(self.pool, points)[1] / u[:, None] @ prior.root
             wanted = linkage.log_slopes(points, quantity) @ prior.root
-        sound = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=(1, 2))
+        sound = np.isfinite(slopes).all(axis=(1, 2))
+        sound &= np.isfinite(wanted).all(axis=(1, 2))
         self.slopes = slopes[sound]
         self.wanted = wanted[sound]
         self.given = [i for i, r in enumerate(self.pool) if r.kind is not ReadingKind.DISTANCE]
         self.free = [i for i, r in enumerate(self.pool) if r.kind is ReadingKind.DISTANCE]
         self.known = np.eye(slopes.shape[2])
         if linkage.travel is not None:
-            self.known = self.known + np.outer(
-                *2 * [prior.root[-1] / DEFAULT_U[ReadingKind.TRAVEL]]
-            )
+            travel = prior.root[-1] / DEFAULT_U[ReadingKind.TRAVEL]
+            self.known = self.known + np.outer(travel, travel)
 
     def covariance(self, rows: list[int]) -> Array:
         """Covariance of each linkage's variables after these readings."""
@@ -108,9 +109,8 @@ class _Design:
         g = self.slopes[:, others]
         moved = np.swapaxes(g @ covariance, 1, 2)
         size = 1.0 + (np.swapaxes(g, 1, 2) * moved).sum(axis=1)[:, None, :]
-        wanted = (self.wanted @ covariance * self.wanted).sum(axis=2)[:, :, None] - (
-            self.wanted @ moved
-        ) ** 2 / size
+        before = (self.wanted @ covariance * self.wanted).sum(axis=2)[:, :, None]
+        wanted = before - (self.wanted @ moved) ** 2 / size
         return wanted, covariance, moved, size
 
     def best(self, taken: list[int]) -> int:
@@ -119,16 +119,12 @@ class _Design:
         others = [j for j in self.free if j not in taken]
         wanted, covariance, moved, size = self.after(rows, others)
         known = self.slopes[:, rows]
-        held = (
-            1.0 - (known @ covariance * known).sum(axis=2)[:, :, None] + (known @ moved) ** 2 / size
-        )
-        checks = np.log(
-            np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + tuned.LOOSE
-        ).sum(axis=1)
-        cost = (
-            np.log(np.maximum(wanted, 0.0) + tuned.WELL_KNOWN**2).sum(axis=1)
-            - tuned.BRACING * checks
-        )
+        before = (known @ covariance * known).sum(axis=2)[:, :, None]
+        held = 1.0 - before + (known @ moved) ** 2 / size
+        held = np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0)
+        checks = np.log(held + tuned.LOOSE).sum(axis=1)
+        unknown = np.log(np.maximum(wanted, 0.0) + tuned.WELL_KNOWN**2).sum(axis=1)
+        cost = unknown - tuned.BRACING * checks
         return others[int(np.argmin(cost.mean(axis=0)))]
 
     def exchanged(self, taken: list[int], count: int) -> list[int]:
@@ -202,7 +198,8 @@ def suggested(
     if total <= 0.0 or len(y) < 3 or not candidates:
         return None
     u = np.array([c.u for c in candidates])
-    explained = ((q.T @ y) ** 2).sum(axis=0) / ((y * y).sum(axis=0) + len(y) * u * u) / total
+    shared = ((q.T @ y) ** 2).sum(axis=0)
+    explained = shared / ((y * y).sum(axis=0) + len(y) * u * u) / total
     # What chance alone would explain with so many draws.
     narrowing = 1.0 - np.sqrt(1.0 - np.clip(explained - 1.0 / len(y), 0.0, 1.0))
     return _worth_most(candidates, narrowing)

@@ -186,8 +186,9 @@ class SurveyedLinkage:
         raw = self.kernel.output(at, self.kernel.no_clearance(), numbers)
         direction = np.sign(raw[:, -1:] - raw[:, :1])
         along = direction * raw
-        i = np.clip(np.argmin(along, axis=1), 1, _POSITIONS - 2)[:, None] + np.arange(-1, 2)
-        before, least, after = np.take_along_axis(along, i, 1).T
+        middle = np.clip(np.argmin(along, axis=1), 1, _POSITIONS - 2)
+        around = middle[:, None] + np.arange(-1, 2)
+        before, least, after = np.take_along_axis(along, around, 1).T
         slope = (after - before) / 2.0
         bend = after - 2.0 * least + before
         step = np.clip(-slope / np.maximum(bend, 1e-12), -1.0, 1.0)
@@ -299,9 +300,8 @@ class SurveyedLinkage:
         n_cases): displacement; NaN where the linkage does not close. [in]
         """
         gradient, reference, numbers, rate = self._gradient(vectors)
-        length = np.repeat(
-            np.maximum(np.hypot(gradient[:, 0::2], gradient[:, 1::2]), 1e-12), 2, axis=1
-        )
+        length = np.maximum(np.hypot(gradient[:, 0::2], gradient[:, 1::2]), 1e-12)
+        length = np.repeat(length, 2, axis=1)
         link = np.repeat(clearance_in, 2, axis=1)[None] * (gradient / length)[:, None]
         at = reference + self._beyond
         none = self.kernel.no_clearance()

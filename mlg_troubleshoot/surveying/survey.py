@@ -131,12 +131,12 @@ class Prior:
         members = np.array([linkage.vector(each) for each in gear.ensemble])
         angles = linkage.angles
         # The same direction, one turn further, is not a distance.
-        members[:, angles] -= (
-            2 * np.pi * np.round((members[:, angles] - members[0, angles]) / (2 * np.pi))
-        )
+        turned = members[:, angles] - members[0, angles]
+        members[:, angles] -= 2 * np.pi * np.round(turned / (2 * np.pi))
         self.members = members
         self.linkage = linkage
-        size = float(np.std([c for p in gear.reference.mechanism.points for c in (p.x, p.y)]))
+        points = gear.reference.mechanism.points
+        size = float(np.std([c for p in points for c in (p.x, p.y)]))
         alone = np.where(angles, np.radians(tuned.ALONE_ANGLE), tuned.ALONE_SIZE * size)
         least = tuned.LEAST_SPREAD * alone
         if linkage.travel is not None:
@@ -146,9 +146,8 @@ class Prior:
         covariance = np.diag(alone**2)
         if len(members) > 2:
             around = np.cov(members.T)
-            covariance = tuned.COVARIANCE_SHARE * around + (1.0 - tuned.COVARIANCE_SHARE) * np.diag(
-                np.diag(around)
-            )
+            share = tuned.COVARIANCE_SHARE
+            covariance = share * around + (1.0 - share) * np.diag(np.diag(around))
         self.mean = members.mean(axis=0)
         order = float(np.log(linkage.amplification(members)).mean())
         self.order = SurveyReading(ReadingKind.ORDER, value=order, u=DEFAULT_U[ReadingKind.ORDER])
@@ -171,14 +170,12 @@ class Prior:
         )
         if own:
             slopes = self.linkage.slopes(own, self.mean[None])[1][0] @ self.root
-            gain = (
-                np.linalg.solve(slopes @ slopes.T + np.diag([r.u**2 for r in own]), slopes)
-                @ self.root.T
-            )
-            found = found + ([r.value for r in own] - self.linkage.predicted(own, found)) @ gain
-        apart = (
-            self.linkage.predicted((self.order,), found)[:, 0] - self.order.value
-        ) / self.order.u
+            spread = slopes @ slopes.T + np.diag([r.u**2 for r in own])
+            gain = np.linalg.solve(spread, slopes) @ self.root.T
+            misfit = [r.value for r in own] - self.linkage.predicted(own, found)
+            found = found + misfit @ gain
+        order = self.linkage.predicted((self.order,), found)[:, 0]
+        apart = (order - self.order.value) / self.order.u
         likely = np.exp(-0.5 * apart * apart) > rng.random(len(found))
         return found[likely & self.linkage.closes(found)][:n]
 
@@ -296,7 +293,8 @@ class Fitting:
                 trial = replace(trial, points=trial.points - step)
                 new = self.loss(trial, widened, robust)
                 better = new < loss[at]
-                points[at[better]], loss[at[better]] = trial.points[better], new[better]
+                points[at[better]] = trial.points[better]
+                loss[at[better]] = new[better]
                 damping[at] = np.where(better, damping[at] / 5.0, damping[at] * 8.0).clip(
                     1e-9, 1e12
                 )
@@ -351,13 +349,13 @@ class Fitting:
         part = self._standing()
         lengths = [i for i, r in enumerate(part.readings) if r.kind is ReadingKind.DISTANCE]
         pairs = list(combinations(lengths, 2))
-        kept = np.concatenate(
-            [~np.eye(len(still), dtype=bool), np.ones((len(pairs), len(still)), dtype=bool)]
-        )
+        all_but_one = ~np.eye(len(still), dtype=bool)
+        kept = np.concatenate([all_but_one, np.ones((len(pairs), len(still)), dtype=bool)])
         noise = np.zeros(kept.shape)
         starts = starts[: max(1, tuned.MOST_RESIDUALS // kept.size)]
         for row, (i, j) in zip(noise[len(still) :], pairs, strict=True):
-            row[[i, j]] = np.array([1.0, -1.0]) * (part.value[j] - part.value[i]) / part.u[[i, j]]
+            difference = part.value[j] - part.value[i]
+            row[[i, j]] = np.array([difference, -difference]) / part.u[[i, j]]
         points = np.tile(starts, (len(kept), 1))
         which = np.repeat(np.arange(len(kept)), len(starts))
         fits = part.begun(points, points, kept[which], noise[which], which)
@@ -369,7 +367,8 @@ class Fitting:
         fits = fits[np.isin(fits.origin, likely)]
         held = np.ones((len(fits.points), len(self.readings)), dtype=bool)
         off = np.zeros(held.shape)
-        held[:, still], off[:, still] = fits.kept, fits.noise
+        held[:, still] = fits.kept
+        off[:, still] = fits.noise
         fits = self.begun(fits.points, fits.means, held, off, fits.origin)
         for widened in tuned.WIDENED[1:]:
             fits = self.descend(fits, widened, tuned.STEPS_LEFT_OUT, False)
@@ -689,14 +688,16 @@ class Fitting:
         late = np.arange(len(points))
         for _ in range(tuned.DRAW_ROUNDS):
             found = self.descend(fits[late], 1.0, tuned.DRAW_STEPS, False)
-            points[late], loss[late] = found.points, found.loss
+            points[late] = found.points
+            loss[late] = found.loss
             late = np.flatnonzero(loss > enough)
             if not len(late):
                 break
             # One that is held up in another valley begins again at the nearest that is in the right
             # one.
             sound = np.concatenate([[mode.vector for mode in modes], points[loss <= enough]])
-            apart = (((fits.means[late][:, None] - sound) @ prior.whiten.T) ** 2).sum(axis=2)
+            away = (fits.means[late][:, None] - sound) @ prior.whiten.T
+            apart = (away**2).sum(axis=2)
             points[late] = sound[np.argmin(apart, axis=1)]
         arrived = points[(loss <= enough) & self.linkage.closes(points)]
         if len(arrived) < 2:

@@ -67,6 +67,11 @@ def test_unread_joints_are_worn_as_the_fleet_is(
     assert bool(expected[1] > expected[0]) is more
 
 
+def test_a_small_fleet_excludes_no_level_of_wear(gear: Gear) -> None:
+    new_parts = learned(gear, [inspected(every_joint(0.0002))] * 2)
+    assert min(new_parts.levels) > 0.05
+
+
 def test_a_failure_near_the_bound_is_repaired_again_less_often_in_a_fleet_that_is_known(
     gear: Gear,
 ) -> None:

@@ -61,6 +61,12 @@ def test_what_is_due_first_stands_first(store: Path) -> None:
     assert len(known) > 1
 
 
+def test_the_gear_with_the_most_work_stands_first_when_sorted_by_minutes(store: Path) -> None:
+    minutes = [gear["minutes"] for gear in gears(store, "--sort", "minutes", "--no-forecast")]
+    assert minutes == sorted(minutes, reverse=True)
+    assert minutes[0] != minutes[-1]
+
+
 def test_history_and_fleet_agree_on_the_next_inspection(store: Path) -> None:
     for gear in gears(store):
         shown = mlg("history", gear["tail_no"], gear["side"], "--store", store, "--json", "-q")
@@ -103,6 +109,14 @@ def test_minutes_and_parts_are_summed_over_the_fleet(store: Path) -> None:
     assert f"{minutes:.0f} min" in told["work"]
     assert [gear["restore"] for gear in told["gears"] if gear["restore"]] == [[3]]
     assert "#3 on 1" in told["work"]
+
+
+def test_gears_without_work_are_not_counted_as_having_some(store: Path) -> None:
+    shown = mlg("fleet", "--store", store, "--json", "-q", "--no-forecast")
+    listed = json.loads(shown.out)
+    waiting = sum(gear["minutes"] > 0 for gear in listed["gears"])
+    assert waiting < len(listed["gears"])
+    assert f"on {waiting} of {len(listed['gears'])} gears" in listed["work"]
 
 
 def test_the_action_has_the_same_words_on_screen_in_json_and_on_paper(

@@ -86,7 +86,9 @@ def _show_problem_tables(console: Console, groups: Sequence[ProblemGroup]) -> No
             if part is not None
         )
         table = output.plain_table(console)
-        table.title, table.title_justify, table.title_style = output.text(place), "left", ""
+        table.title = output.text(place)
+        table.title_justify = "left"
+        table.title_style = ""
         for heading in ("cell", "column", "found"):
             table.add_column(heading, overflow="fold", max_width=_PROBLEM_COLUMN)
         table.add_column("expected, and what to do", ratio=1)
