@@ -85,7 +85,7 @@ def columns_table() -> str:
     """The columns of an inspection table, one line per column, from the table of the package."""
     from mlg_troubleshoot import load_gear
     from mlg_troubleshoot.decision.columns import COLUMNS, Need
-    from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
+    from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 
     gear = load_gear()
     low, high = gear.down_lock_range

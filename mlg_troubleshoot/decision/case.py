@@ -14,7 +14,6 @@ from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.prediction import (
-    DEFAULT_PLUNGER_U_IN,
     DIRECTION_SETS,
     BatchPrediction,
     Extension,
@@ -25,6 +24,7 @@ from mlg_troubleshoot.decision.prediction import (
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import chance_beyond
+from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import Length, Sentence
 

@@ -12,11 +12,9 @@ from enum import StrEnum
 from typing import Any
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-
-# Standard uncertainty of a clearance reading that states none. [in]
-DEFAULT_GAUGE_U_IN = 0.0005
 
 
 class Side(StrEnum):

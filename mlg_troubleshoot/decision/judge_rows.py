@@ -29,7 +29,6 @@ from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.plan import Basis, Plan
 from mlg_troubleshoot.decision.planner import Judged, correct, plans
 from mlg_troubleshoot.decision.prediction import (
-    DEFAULT_PLUNGER_U_IN,
     PROVISIONAL_U_IN,
     PROVISIONAL_U_SHARE,
     BatchPrediction,
@@ -41,6 +40,7 @@ from mlg_troubleshoot.decision.repair import repair_sets, rigging_alternative
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.decision.wear_levels import Unread
+from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import Length, Sentence

@@ -34,9 +34,8 @@ from mlg_troubleshoot.decision.repair import removable
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, tabled_normal_cdf, verdict
 from mlg_troubleshoot.decision.wear_levels import TOO_CLOSE, Unread
+from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
 
-# Standard uncertainties that a better gauge can reach: those of bore gauges and micrometers. [in]
-BETTER_GAUGES_IN = (0.0004, 0.0003)
 # Readings of one round are read together until the verdict is settled with this chance. [1]
 _SETTLED = 0.2
 # A cause counts as excluded below this chance. [1]

@@ -18,8 +18,6 @@ from mlg_troubleshoot.gear.gear import Gear
 
 # Sets of random directions behind the chance of exceeding the margin. [1]
 DIRECTION_SETS = 4096
-# What a hand-held gauge reads the plunger to. [in]
-DEFAULT_PLUNGER_U_IN = 0.0015
 # The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
 # the prediction.
 PROVISIONAL_U_IN = 0.0005

@@ -14,10 +14,10 @@ from scipy.stats import mannwhitneyu, poisson, spearmanr
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
-from mlg_troubleshoot.decision.prediction import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import visits
 from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import MM_PER_IN
 

@@ -6,6 +6,7 @@ __all__ = [
     "design",
     "directions",
     "from_pylinkage",
+    "gauges",
     "gear",
     "gear_file",
     "model",

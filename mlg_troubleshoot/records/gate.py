@@ -21,13 +21,13 @@ from mlg_troubleshoot.decision.columns import (
     TAIL_NO,
 )
 from mlg_troubleshoot.decision.inspection import (
-    DEFAULT_GAUGE_U_IN,
     Inspection,
     InvalidRow,
     RowSource,
     Side,
 )
 from mlg_troubleshoot.errors import Problem, UsageError
+from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.records.cells import typed
 from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.records.layout import ColumnReader

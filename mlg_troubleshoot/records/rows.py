@@ -31,12 +31,12 @@ from mlg_troubleshoot.decision.columns import (
     Holds,
 )
 from mlg_troubleshoot.decision.inspection import (
-    DEFAULT_GAUGE_U_IN,
     EnteredClearance,
     Inspection,
     InvalidRow,
     RowSource,
 )
+from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.gear import ROUNDING_IN
 from mlg_troubleshoot.records.cells import (
     Cell,

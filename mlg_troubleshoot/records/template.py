@@ -27,7 +27,7 @@ from mlg_troubleshoot.decision.columns import (
     Holds,
     Need,
 )
-from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
+from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.gear import Gear, JointSpec
 from mlg_troubleshoot.outputs import OutputKind, write_bytes
 from mlg_troubleshoot.records.cells import column_letters
