@@ -77,6 +77,13 @@ INSTEAD = {
     r"\bleaves? nothing\b": "nothing remains",
     r"\bthe one right inspection\b": "the corrected …",
     r"\bwhat becomes of\b": "the outcome of",
+    r"\b[Gg]o(?:es)? on with (?!fault)": "resume …, continue …",
+    r"\bnobody from\b": "does not prevent …",
+    r"\bspeaks? of\b": "describes, names",
+    r"\bbeside its stated\b": "in addition to …",
+    r"\b(?:who|gear|that) is told\b": "receives, reads",
+    r"\blast change is taken back\b": "undone",
+    r"\bone of its own\b": "a new …",
     r"\bkept before is untouched\b": "existing records are unchanged",
 }
 

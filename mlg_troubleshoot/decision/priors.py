@@ -28,7 +28,8 @@ class Priors:
     levels: least and largest level of wear of one gear, in units of the limit. [1]
     worn_out: chance that a joint is worn out for a reason of its own, at any level: between its
     limit and twice its limit. [1]
-    gauge_scale: standard deviation of the scale of a gauge, beside its stated uncertainty. [1]
+    gauge_scale: standard deviation of the scale of a gauge, in addition to its stated
+    uncertainty. [1]
     wrong_readings: readings of one gear that are the total play where the radial clearance is
     stated, on average: as many as things that are wrong in any set of data.
     """

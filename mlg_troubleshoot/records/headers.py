@@ -351,7 +351,7 @@ def _split_number(words: list[str]) -> tuple[list[str], int | None, list[str]]:
 def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
     words: list[str], joints: Joints
 ) -> Recognition | None:
-    """Read the words of a joint's column; None if they do not speak of a joint by number."""
+    """Read the words of a joint's column; None if they do not number a joint."""
     before, number, after = _split_number(words)
     said = set(before)
     if number is None:

@@ -166,7 +166,7 @@ NOWHERE = CellPlace()
 
 @dataclass(frozen=True, slots=True)
 class TableInHand:
-    """The table or form that is being read: how, where it stands, and who is told of its
+    """The table or form that is being read: how, where it stands, and who receives its
     problems.
 
     side: of every row of a table that has no column of sides.

@@ -159,9 +159,7 @@ class Prior:
         return np.asarray(self.mean + rng.standard_normal((n, len(self.mean))) @ self.root.T)
 
     def closing(self, n: int, rng: Generator, readings: Readings = ()) -> Array:
-        """Draws of it that close, about so many, as the readings have it that speak of one variable
-        each.
-        """
+        """About n draws of it that close, given the readings of one variable each."""
         found = self.drawn(tuned.DRAWN_FOR_ONE * n, rng)
         own = tuple(
             r

@@ -61,7 +61,7 @@ def survey(
     seed: int = 0,
     on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> SurveyResult:
-    """Find the linkage that a survey speaks of, and write it as a gear file with ensemble and index
+    """Find the linkage that a survey describes, and write it as a gear file with ensemble and index
     table.
 
     Nothing is written if readings contradict each other.

@@ -46,6 +46,12 @@ def test_no_displacement_does_not_call_any_joint_worn(gear: Gear) -> None:
     assert explained(gear, {}, 0.0).called_worn == ()
 
 
+def test_only_joints_more_likely_worn_than_not_are_called_worn(gear: Gear) -> None:
+    found = explained(gear, {}, 0.05)
+    assert {0.3 < group.probability < 0.5 for group in found.groups} == {True, False}
+    assert found.called_worn == ((3, 5),)
+
+
 def test_a_displacement_raises_the_chance_of_wear(gear: Gear) -> None:
     sound = {j: 0.0005 for j in range(1, 11) if j not in (2, 4)}
     assert chance(explained(gear, sound, 0.025), 2) > 3.0 * chance(explained(gear, sound, 0.0), 2)
