@@ -106,7 +106,8 @@ def fmu_simulation(
     Returns
     -------
     callable
-        Takes the parameters as start values by name, returns each output, shape (n,).
+        Takes the parameters as start values by name, returns each output, shape (n,). Raises a
+        RuntimeError where a call of the unit fails.
 
     Raises
     ------
@@ -115,6 +116,7 @@ def fmu_simulation(
     """
     try:
         import fmpy
+        from fmpy.fmi1 import FMICallException
     except ModuleNotFoundError as error:
         raise UsageError(
             "FMPy, which runs functional mock-up units, is not installed", "pip install fmpy"
@@ -122,14 +124,17 @@ def fmu_simulation(
     when = np.asarray(times, float)
 
     def predict(parameters: Parameters) -> dict[str, Array]:
-        run = fmpy.simulate_fmu(
-            str(file),
-            start_time=float(when.min()),
-            stop_time=float(when.max()),
-            start_values={**(constants or {}), **parameters},
-            output=list(outputs),
-            **options,
-        )
+        try:
+            run = fmpy.simulate_fmu(
+                str(file),
+                start_time=float(when.min()),
+                stop_time=float(when.max()),
+                start_values={**(constants or {}), **parameters},
+                output=list(outputs),
+                **options,
+            )
+        except FMICallException as error:
+            raise RuntimeError(str(error)) from error
         return {name: np.interp(when, run["time"], run[name]) for name in outputs}
 
     return predict

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -62,6 +62,30 @@ def test_times_that_fall_are_refused() -> None:
         ode_simulation(lambda _t, x, _p: x, [1.0], [0.0, 2.0, 1.0])
 
 
+class RefusedCallError(Exception):
+    """What FMPy raises where a call of a unit fails; it is derived from nothing else."""
+
+
+def given_fmpy(monkeypatch: pytest.MonkeyPatch, simulate_fmu: Callable[..., np.ndarray]) -> None:
+    """Put a unit in the place of FMPy."""
+    unit, calls = ModuleType("fmpy"), ModuleType("fmpy.fmi1")
+    unit.simulate_fmu = simulate_fmu  # type: ignore[attr-defined]
+    calls.FMICallException = RefusedCallError  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "fmpy", unit)
+    monkeypatch.setitem(sys.modules, "fmpy.fmi1", calls)
+
+
+def test_a_call_of_a_mock_up_unit_that_fails_is_a_call_without_an_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def simulate_fmu(_file: str, **_given: Any) -> np.ndarray:
+        raise RefusedCallError("fmi2DoStep failed")
+
+    given_fmpy(monkeypatch, simulate_fmu)
+    with pytest.raises(RuntimeError, match="fmi2DoStep failed"):
+        fmu_simulation("tank.fmu", TIMES, ["level"])({"gain": 3.0})
+
+
 def test_a_mock_up_unit_is_given_the_parameters_and_read_at_the_times(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -73,9 +97,7 @@ def test_a_mock_up_unit_is_given_the_parameters_and_read_at_the_times(
         rows = list(zip(steps, given["start_values"]["gain"] * steps, strict=True))
         return np.array(rows, [("time", float), ("level", float)])
 
-    unit = ModuleType("fmpy")
-    unit.simulate_fmu = simulate_fmu  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "fmpy", unit)
+    given_fmpy(monkeypatch, simulate_fmu)
     predict = fmu_simulation("tank.fmu", [0.0, 0.7, 3.0], ["level"], {"area": 2.0})
     np.testing.assert_allclose(predict({"gain": 3.0})["level"], [0.0, 2.1, 9.0])
     assert asked["start_values"] == {"area": 2.0, "gain": 3.0}
