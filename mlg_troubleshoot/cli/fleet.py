@@ -82,11 +82,12 @@ def fleet(
     settings = shown.begin(records.gear, (), outputs, store=records.store)
     with stages(quiet=shown.quiet) as bar:
         everything = show_fleet(records.kept, known, ahead=not no_forecast, progress=bar)
-    order = Order(sort)
-    found = everything.chosen(tail, only or (), order)
-    if not shown.quiet:
-        for line in suggestions(found.lives, found.model, known):
-            output.say(f"Note: {line}")
+        order = Order(sort)
+        found = everything.chosen(tail, only or (), order)
+        bar("Comparing the last inspections", 0, None)
+        noted = [] if shown.quiet else suggestions(found.lives, found.model, known)
+    for line in noted:
+        output.say(f"Note: {line}")
     if shown.as_json:
         output.write_json(fleet_as_json(found.lives, found.forecasts, order))
     else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -67,9 +68,9 @@ def show(
     """Show the records: the gears and their latest state, or one gear's life with the forecast of
     each joint.
     """
+    from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.prompts.visit import unit_entered
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.life.folding import lives
     from mlg_troubleshoot.reporting import life_json
     from mlg_troubleshoot.workflows import history
 
@@ -82,7 +83,8 @@ def show(
                 "--report needs a gear",
                 "Give TAIL, or write the page of all gears: mlg fleet --report DIR",
             )
-        everything = list(lives(place).values())
+        with stages(quiet=shown.quiet) as bar:
+            everything = history.show_fleet(place, known, ahead=False, progress=bar).lives
         if shown.as_json:
             output.write_json(life_json.fleet_as_json(everything, {}))
         else:
@@ -412,6 +414,7 @@ def verify(
     The last hash is printed. Note it elsewhere and pass it to --expect later: this shows whether
     records were removed.
     """
+    from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.workflows import history
 
     noted = None if expect is None else expect.strip().lower()
@@ -420,7 +423,8 @@ def verify(
             f"--expect {expect!r} is not a hash",
             "Give the 64 letters and digits that verify printed.",
         )
-    found = history.verify(records.kept, noted)
+    with stages(quiet=False) as bar:
+        found = history.verify(records.kept, noted, partial(bar, "Verifying"))
     if found.broken is None:
         output.write(f"{found.count} records fit the chain.")
     else:

@@ -321,7 +321,11 @@ class Verified:
     wrong: tuple[str, ...]
 
 
-def verify(store: Store, expect: str | None = None) -> Verified:
+def verify(
+    store: Store,
+    expect: str | None = None,
+    progress: Callable[[int, int | None], None] = lambda _done, _total: None,
+) -> Verified:
     """Walk the chain, read every content that is not void, and look whether a hash noted before
     still stands there.
     """
@@ -332,6 +336,8 @@ def verify(store: Store, expect: str | None = None) -> Verified:
     def visit(record: Record) -> None:
         nonlocal last, expected
         last = record.digest
+        if record.seq % _AT_ONCE == 0:
+            progress(record.seq, None)
         expected = record.seq if last == expect else expected
         try:
             if record.body and record.kind is RecordKind.VOID:

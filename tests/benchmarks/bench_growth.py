@@ -11,6 +11,7 @@ import argparse
 import math
 import os
 import sys
+import tempfile
 from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
@@ -63,7 +64,10 @@ def measured(folder: Path) -> Costs:
     costs: Costs = {}
 
     def measure(name: str, size: int, *command: str) -> None:
-        taken = run(ROOT, ["-m", "mlg_troubleshoot", *command, "--quiet"], environment)
+        # Nothing is remembered from the command before.
+        with tempfile.TemporaryDirectory() as cache:
+            own = {**environment, "XDG_CACHE_HOME": cache}
+            taken = run(ROOT, ["-m", "mlg_troubleshoot", *command, "--quiet"], own)
         costs.setdefault(name, {})[size] = taken
         print(f"| {name} | {size:,} | {taken[0]:.1f} s | {taken[1]:.0f} MiB |", flush=True)
 
