@@ -82,8 +82,9 @@ class CheckedInspection(TypedDict):
     by the joints' worst case; null without a reading. basis: MEASURED only with OUTSIDE_MARGIN,
     when the mean reading is beyond the margin. next_action: the first step of the plan, of which
     only that binds. in_brief: the same in words that stand alone, as on screen, in CSV and on
-    paper. open_question: what the day does not allow to settle. repair_sets: null where
-    the linkage does not close. measuring, confidence: null in a batch. posterior: null in a batch
+    paper. open_question: what the day does not allow to settle, and at the end of the plan which
+    joints nobody read, with the chance that one is over its limit. repair_sets: null where the
+    linkage does not close. measuring, confidence: null in a batch. posterior: null in a batch
     or where nothing was measured.
     """
 

@@ -96,7 +96,7 @@ class Plan:
     """The expected course from what is known now to an end; never empty, and only its first step
     binds.
 
-    open_question: what the day does not allow to settle.
+    open_question: what the day does not allow to settle, and joints that nobody read at the end.
     """
 
     steps: tuple[Step, ...]

@@ -33,7 +33,7 @@ from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.repair import removable
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, tabled_normal_cdf, verdict
-from mlg_troubleshoot.decision.wear_levels import TOO_CLOSE, Unread
+from mlg_troubleshoot.decision.wear_levels import BEYOND, TOO_CLOSE, Unread
 from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
 
 # Readings of one round are read together until the verdict is settled with this chance. [1]
@@ -427,10 +427,9 @@ class _PlanBuilder:
         return self._done()
 
     def _done(self) -> Plan:
-        repaired = self.inspection.is_repaired or any(
-            step.action is Action.RESTORE for step in self.steps
-        )
-        self._step(Action.DONE, 0.0, sentences.done(repaired=repaired))
+        restored = any(step.action is Action.RESTORE for step in self.steps)
+        recorded = self.inspection.is_repaired and not restored
+        self._step(Action.DONE, 0.0, sentences.done(repaired=restored, recorded=recorded))
         return Plan(tuple(self.steps), End.DONE)
 
     def _check_rigging(self) -> _PlanBuilder:
@@ -514,15 +513,25 @@ class _PlanBuilder:
         return tuple(self.numbers[j] for j in order if places[j]) if places.any() else ()
 
     def _open_question(self, found: Plan) -> str | None:
-        """What cannot be settled because of the day."""
-        if found.end in (End.WITHIN, End.CORRECT):
+        """What cannot be settled because of the day, and what nobody read where the plan ends."""
+        if found.end is End.CORRECT:
             return None
         cases = self.cases
         i = self.row
+        left = self._joints(self.facts.open[i])
+        never = None
+        if left and found.steps[0].action in (Action.CONTINUE, Action.DONE):
+            sound = (1.0 - BEYOND.sum(axis=1)) ** len(left)
+            worn = 1.0 - float(self.facts.causes.levels[i] @ sound)
+            minutes = minutes_to_measure(self.gear, left, self.opened)
+            never = sentences.never_read(left, worn, minutes)
+        if found.end is End.WITHIN:
+            return never
         asked = {n for step in found.steps for n in step.joints}
         unread = self._joints(~cases.measured[i] & ~cases.reachable[i])
         over = self._joints(cases.over_limit[i] & ~cases.restorable[i])
-        return sentences.open_question([n for n in unread if n not in asked], over)
+        shut = sentences.open_question([n for n in unread if n not in asked], over)
+        return " ".join(said for said in (shut, never) if said) or None
 
     def _within_the_day(self, found: Plan) -> Plan:
         """The plan as far as the minutes of the day reach; its first step is one that fits."""

@@ -65,6 +65,10 @@ _BEYOND_AND_LOOKED = (
     " to engineering."
 )
 _REPAIRED_DONE = "Joints are within limits; record the repair. This is not a release to service."
+_RECORDED_DONE = (
+    "Joints are within limits, and the repair is entered here: sign it off in the aircraft's"
+    " records. This is not a release to service."
+)
 STOP_FOR_TODAY = (
     "Stop for today: what would decide takes longer than the minutes that are left. Hand over what"
     " stays open."
@@ -91,8 +95,10 @@ def go_on(end: End, *, failed: bool, beyond: bool, looked: bool, look_again: str
     return f"{GO_ON[end]} {look_again}".rstrip()
 
 
-def done(*, repaired: bool) -> str:
-    """Step DONE."""
+def done(*, repaired: bool, recorded: bool) -> str:
+    """Step DONE; `recorded`: the inspection names the repair already."""
+    if recorded:
+        return _RECORDED_DONE
     return _REPAIRED_DONE if repaired else JOINTS_DONE
 
 
@@ -146,6 +152,15 @@ def open_question(unread: Sequence[int], over: Sequence[int]) -> str | None:
         are = "is" if len(over) == 1 else "are"
         said.append(f"{joint_list(over)} {are} over the limit and cannot be restored today.")
     return " ".join(said) or None
+
+
+def never_read(unread: Sequence[int], worn: float, minutes: float) -> str:
+    """What a plan that ends leaves unread; `worn`: the chance that one is over its limit."""
+    if len(unread) == 1:
+        what, them = f"{joint_list(unread)} was not read and is over its limit", "it"
+    else:
+        what, them = f"{joint_list(unread)} were not read; one or more is over its limit", "them"
+    return f"{what} with chance {percent(worn)}: to know, measure {them} ({minutes:.0f} min)."
 
 
 def does_not_fit(step: Step, left: float, before: str | None) -> str:

@@ -44,7 +44,12 @@ def test_a_gear_that_retracts_after_the_repair_is_done(judge: Judge) -> None:
     tried = {"outcome": Outcome.RETRACTED, "outcome_date": NOON}
     found = judge(RESTORED, **REPAIRED | tried)
     assert (found.next_action.action, found.end) == (Action.DONE, End.DONE)
-    assert "Joints are within limits; record the repair" in found.next_action.text
+
+
+def test_a_repair_that_is_entered_is_signed_off_and_not_recorded_once_more(judge: Judge) -> None:
+    tried = {"outcome": Outcome.RETRACTED, "outcome_date": NOON}
+    text = judge(RESTORED, **REPAIRED | tried).next_action.text
+    assert "the repair is entered here: sign it off" in text
 
 
 def test_a_gear_that_fails_again_after_the_repair_with_its_plunger_within_has_another_cause(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Outcome
@@ -73,3 +75,17 @@ def test_a_plan_that_the_minutes_cut_off_does_not_say_that_no_repair_holds(judge
     found = judge(every_joint(0.003), **FAILED, minutes_available=20.0)
     assert any(each.kind == "sure" for each in found.repair_sets or ())
     assert found.next_action.text.startswith("Stop for today")
+
+
+def test_a_plan_that_ends_says_how_likely_unread_joints_are_over_their_limit(judge: Judge) -> None:
+    ended = judge({}, outcome=Outcome.FAILED, readings_in=(0.002,))
+    assert ended.next_action.action is Action.CONTINUE
+    assert re.search(
+        r"were not read; one or more is over its limit with chance \d+ %: to know, measure them"
+        r" \(\d+ min\)",
+        ended.plan.open_question or "",
+    )
+
+
+def test_unread_joints_are_not_mentioned_before_the_plan_ends(judge: Judge) -> None:
+    assert judge({3: 0.002}).plan.open_question is None
