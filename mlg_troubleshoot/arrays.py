@@ -23,6 +23,14 @@ def frozen(values: ArrayLike) -> Array:
     return fixed
 
 
+def log_sum(terms: Array) -> Array:
+    """Logarithm of the sum of exponentials, over the first axis; a fraction of the time that scipy
+    takes to check what it is given. One term of each sum at least is finite.
+    """
+    most = np.max(terms, axis=0)
+    return np.asarray(most + np.log(np.sum(np.exp(terms - most), axis=0)))
+
+
 def central_steps(n: int, step: float = STEP) -> Array:
     """Changes of n variables, each one up and then each one down, shape (2 n, n)."""
     return np.vstack([np.eye(n), -np.eye(n)]) * step

@@ -1,4 +1,4 @@
-"""Lengths as people write them. The only place where 25.4 stands.
+"""Lengths as people write them, and the year. The only place where 25.4 stands.
 
 Inside the program a length is in inches and a clearance is radial: the offset of the pin centre
 from the hole centre (section 3.2 of the paper).
@@ -18,6 +18,7 @@ from mlg_troubleshoot.errors import UsageError
 MINUS = "-\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
 MM_PER_IN = 25.4
 THOU_PER_IN = 1000.0
+DAYS_PER_YEAR = 365.25
 
 
 class LengthUnit(StrEnum):

@@ -19,7 +19,7 @@ from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
 # Standard deviation of the plunger at Down Lock where 0.01 to 0.05 in are allowed, each as likely.
 # [in]
-RIGGED_IN = 0.04 / np.sqrt(12.0)
+RIGGED_IN = 0.04 / np.sqrt(12)
 # Gears from which their own readings say how far rods were rigged apart.
 _MANY_GEARS = 6
 

@@ -11,12 +11,13 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
+from mlg_troubleshoot.units import DAYS_PER_YEAR
 
 # What the rows of one aircraft may move with alone.
 WITHIN = ("hydraulic_pressure_psi", "temperature_c", "gear_landings", "predicted")
 _LEAST_OF_TAIL = 6
 # Periods of seasons: one to three a year, evenly spaced in frequency.
-_PERIODS_DAYS = 365.25 / np.linspace(1, 3, 6)
+_PERIODS_DAYS = DAYS_PER_YEAR / np.linspace(1, 3, 6)
 
 
 @dataclass(frozen=True)

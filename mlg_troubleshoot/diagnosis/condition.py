@@ -23,7 +23,7 @@ from mlg_troubleshoot.units import MM_PER_IN
 
 # Steps to which people round, inches and millimetres. [in]
 _STEPS_IN = tuple(
-    sorted((*(1e-3 * n for n in (1, 2, 2.5, 5, 10)), *(n / MM_PER_IN for n in (0.05, 0.1, 0.2))))
+    sorted((*(n / 2000 for n in (2, 4, 5, 10, 20)), *(n / 20 / MM_PER_IN for n in (1, 2, 4))))
 )
 # Share of values on a step, or of rows that show a habit, that may be exceptions. [1]
 _EXCEPTIONS = 0.05
@@ -32,7 +32,7 @@ _LEAST_VALUES, _LEAST_ROWS, _LEAST_JOINTS, _ON_STEP = 20, 5, 5, 0.02
 # Share of clearances that are known to be cut off, from which their effects are. [1]
 _MANY_CUT = 0.1
 # Chance of a false statement about the data of a table. [1]
-_BY_CHANCE = 0.001
+BY_CHANCE = 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +190,7 @@ def _copies(table: DiagnosisTable) -> Mask:
     others = both & ~full[:, None]
     usual = (same & others).sum(axis=0) / np.maximum(others.sum(axis=0), 1)
     expected = float(np.sum(np.prod(np.where(both, usual, 1.0), axis=1)[later & (count > 0)]))
-    return np.asarray(full & (poisson.sf(full.sum() - 1, expected) < _BY_CHANCE))
+    return np.asarray(full & (poisson.sf(full.sum() - 1, expected) < BY_CHANCE))
 
 
 def _identical(table: DiagnosisTable) -> Mask:
@@ -204,7 +204,7 @@ def _identical(table: DiagnosisTable) -> Mask:
     same &= (count >= _LEAST_JOINTS) & _at_mid(table)
     _found, often = np.unique(values[known & ~same[:, None]], return_counts=True)
     alike = float(np.sum((often / max(often.sum(), 1)) ** 2))
-    return np.asarray(same & (len(values) * alike ** np.maximum(count - 1.0, 0.0) < _BY_CHANCE))
+    return np.asarray(same & (len(values) * alike ** np.maximum(count - 1.0, 0.0) < BY_CHANCE))
 
 
 def _at_limits(table: DiagnosisTable, gear: Gear) -> Mask:
@@ -331,7 +331,7 @@ def _only_worn(table: DiagnosisTable, use: Mask) -> bool:
         return False
     use = use & np.isfinite(landings)
     blanks = np.isnan(table.clearance_in[use]).sum(axis=1)
-    return bool(spearmanr(landings[use], blanks, alternative="less").pvalue < _BY_CHANCE)
+    return bool(spearmanr(landings[use], blanks, alternative="less").pvalue < BY_CHANCE)
 
 
 def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
@@ -343,7 +343,7 @@ def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
     over = worst_case(gear.model, np.nan_to_num(table.clearance_in[use])).over_in
     known = np.isfinite(over)
     one, other = over[known & read], over[known & ~read]
-    if mannwhitneyu(one, other).pvalue < _BY_CHANCE:
+    if mannwhitneyu(one, other).pvalue < BY_CHANCE:
         more = "more" if np.median(one) > np.median(other) else "less"
         yield DataCondition(
             "selected",

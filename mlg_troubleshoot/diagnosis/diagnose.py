@@ -20,7 +20,7 @@ from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
-from mlg_troubleshoot.diagnosis.condition import DataCondition
+from mlg_troubleshoot.diagnosis.condition import BY_CHANCE, DataCondition
 from mlg_troubleshoot.diagnosis.explain import Finding, MisfitProblem, explain, p_value_of
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
@@ -37,6 +37,7 @@ from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.covariance import FAR
 from mlg_troubleshoot.misfit.explanation import Key
 from mlg_troubleshoot.misfit.fitting import shrunk
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
@@ -49,17 +50,15 @@ _MANY_FAULTS = 0.15
 # Measured over predicted displacement: further from 1 than this, or negative, is not a misfit. [1]
 _MOST_RATIO = 4.0
 # Mean square left by all-joint effects, over that left by one scale or by a constant, from which
-# they explain; rows further off than so many standard deviations are slips and do not count. Ten
-# factors take 5 % off by chance. [1]
-_CLEARLY_LESS, _SLIP = 0.7, 4.0
+# they explain. Ten factors take 5 % off by chance. [1]
+_CLEARLY_LESS = 0.7
 # Above this ratio readings against the prediction are not an error of the sign, which gives -0.9 to
 # -1.1 (20 simulated tables with one cause or none), nor of a unit: that the clearances tell of them
 # beyond chance is enough. [1]
-_SIGN_SLIP, _BY_CHANCE = -0.75, 0.05
+_SIGN_SLIP = -0.75
 # And where one scale leaves more than this of the variance, which a slip of the unit does not (of
-# 60 tables with one cause, S = 10 and 25, seeds 8,700,000 and on, at most 0.25 in 57): that they
-# tell beyond this chance. [1]
-_NO_SCALE, _SURELY = 0.3, 0.001
+# 60 tables with one cause, S = 10 and 25, seeds 8,700,000 and on, at most 0.25 in 57). [1]
+_NO_SCALE = 0.3
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -510,7 +509,8 @@ def _explained_by_clearances(
     for _ in range(4):
         factors = lsq_linear(contribution_in[near], measured_in[near], (-1.0, 1.0)).x
         left = measured_in - contribution_in @ factors
-        near = np.abs(left) <= _SLIP * max(robust_scale(left), 1e-9)
+        about_zero = robust_scale(np.hstack([left, -left]))
+        near = np.abs(left) <= FAR * max(about_zero, 1e-9)
     in_mm = predicted_in[:, None] - (1.0 - 1.0 / MM_PER_IN) * contribution_in
     simple, measured = np.column_stack([predicted_in, in_mm])[near], measured_in[near]
     one = measured[:, None] - simple * (measured @ simple / np.sum(simple**2, axis=0))
@@ -518,11 +518,11 @@ def _explained_by_clearances(
     if no_sign_slip:
         return bool(
             len(measured) * np.log(constant / unexplained)
-            > chi2.isf(_BY_CHANCE, contribution_in.shape[1])
+            > chi2.isf(BY_CHANCE, contribution_in.shape[1])
         )
     alone = min(np.mean(one**2, axis=0).min(), constant)
     surely = len(measured) * np.log(alone / unexplained) > chi2.isf(
-        _SURELY, contribution_in.shape[1]
+        BY_CHANCE, contribution_in.shape[1]
     )
     return bool(unexplained < _CLEARLY_LESS * alone or (surely and alone > _NO_SCALE * constant))
 

@@ -32,6 +32,8 @@ from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 # The noise is estimated again from what is left as long as that changes the likeliest explanation,
 # so often at most.
 _ROUNDS = 3
+# Computing only: rows that may be a slip each, those that lie furthest off.
+_MOST_SLIPS = 500
 _BY = " × "
 
 
@@ -111,8 +113,14 @@ class MisfitProblem:
         alike = Counter(named)
         share = np.log([shares[UNLISTED] / (len(alike) * alike[name]) for name in named])
         free = Effects.free(shapes, named, share, beliefs.shape_size * scale)
+        far = np.sort(np.argsort(-np.abs(self.expected - np.median(self.expected)))[:_MOST_SLIPS])
         slip = float(np.log(beliefs.slips / n))
-        slips = Effects.free(np.eye(n), [None] * n, slip, beliefs.slip_size * scale)
+        slips = Effects.free(
+            (np.arange(n)[:, None] == far).astype(float),
+            [None] * len(far),
+            slip,
+            beliefs.slip_size * scale,
+        )
         return Effects.joined([listed, free, slips])
 
     def contexts(self) -> list[Context]:

@@ -22,14 +22,15 @@ from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import fleet_history, one_inspection
 from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.units import SLIPS
 
 # Degree of the curve along the stroke, rounds to fit it, median distances from it within which rows
 # count, and rows from which there is one.
 _BEND, _BEND_ROUNDS, _BEND_FAR = 6, 4, 6
 LEAST_ALONG = 8
-# Share of rows with an entry error, each kind as often; probability from which one is said. [1]
-_WRONG, _SURE = 0.005, 0.9
+# Share of rows with an entry error, each kind as often. [1]
+_WRONG = 0.005
 # Wear and misfit have heavier tails than a normal distribution: degrees of freedom of Student's t.
 _FREEDOM = 8.0
 # No clearance, reading or misfit is expected more sharply than this. [in]
@@ -249,7 +250,7 @@ class _Screen:
             return None
         meant, found, read = [meant[k] for k in kept], found[kept], read[kept]
         found += np.where(read, self.near(place, self.misfit_of(place, meant)), 0.0)
-        if logsumexp(found) - written < np.log(_SURE / (1.0 - _SURE)):
+        if logsumexp(found) - written < Beliefs().odds:
             return None
         return meant[int(np.argmax(found))]
 

@@ -17,7 +17,7 @@ from scipy.stats import norm
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 
 # What is not a cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy
 # tails, scatter between tails, confounded, growing noise) so that at most 2 % alarm; more of it
@@ -29,30 +29,27 @@ EXPECTED_SLOPE = -0.0045
 # Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the
 # slope [1]; twice that where clearances are read no better than the plunger.
 BIAS_IN, SLOPE = 0.0001, 0.003
-# Doubt about how well clearances were really read: share of the drawing that may be too much or too
-# little. [1]
-DRAWN = 0.3
+# Doubt whether clearances were read as well as declared: standard deviation of the share of the
+# declared error, and so of the drawing. [1]
+SHARE_DOUBT = 0.35
 # Scatter of a row is at least this share of the predictions' size: nothing is known better than
 # that. [1]
 LEAST_SCATTER = 0.01
-# Scatter between the gears of one tail, in units of the scatter of a row, and what the errors of
-# reading leave in the level of wear of each.
-GEAR_RATIO, READ_GEAR_RATIO = 0.08, 0.28
+# What the errors of reading leave in the level of wear of each gear, in units of the scatter of a
+# row.
+READ_GEAR_RATIO = 0.28
 # Trends over a quantity, and habits of a side or an approach, that are not a cause yet, in the same
 # units; twice that likewise.
-TREND, HABIT = 0.03, 0.04
-# Scatter between gauges, and between technicians, over that of a row, before the data are looked
-# at: median, and spread of its logarithm; the spread for gears; and the ratios that are tried.
-HABIT_OF_ONE, HABIT_SPREAD = 0.1, 0.7
-GEAR_SPREAD = 0.5
-_RATIOS = np.geomspace(0.02, 1.0, 24)
-# Common error of a gear's rows, over the scatter of a row, from which it is distinguished from that
-# of single rows. [1]
-_SHARED = 0.2
+HABIT = 0.035
+# Scatter between the gears of a tail, between gauges, and between technicians, over that of a row,
+# before the data are looked at: median, and spread of its logarithm; and the ratios that are tried,
+# from three spreads below it to four above.
+USUAL_RATIO, RATIO_SPREAD = 0.1, 0.6
+_RATIOS = USUAL_RATIO * np.exp(RATIO_SPREAD * np.linspace(-3, 4, 24))
 # With fewer levels nothing can be told.
 _LEAST_LEVELS = 4
-# Ratios of the scatter between tails to the scatter of a row that are tried.
-TAIL_RATIOS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0)
+# Ratios of the scatter between tails to the scatter of a row that are tried: nodes of a sum.
+TAIL_RATIOS = (0.0, *np.geomspace(0.15, 2.0, 8).tolist())
 # The first estimate of the scatter has all in it that effects of unknown size explain.
 _ROUNDS = 2
 # With fewer tails none of them can be left out.
@@ -201,7 +198,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     relative = np.sqrt(relative**2 + (rows.u_filled_in / scale) ** 2 + own**2)
     # Rows far out in the tails of the distribution count less, but never as nothing.
     standard = np.minimum(np.abs(centred), _companion(alone, numbers)) / (scale * relative)
-    relative = relative * np.maximum(1.0, standard / 3.0)
+    relative = relative * np.maximum(1.0, standard / FAR)
     # Clearances cannot scatter more than the misfit does beyond the plunger gauge.
     room = np.sqrt(max(scale**2 - rows.u_measured_in**2, 0.0))
     read = min(rows.u_read_in, room) / scale
@@ -209,26 +206,26 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     bias = [
         np.full(len(rest), small * BIAS_IN / scale),
         small * SLOPE * predicted / scale,
-        DRAWN * rows.drawn_in / scale,
+        SHARE_DOUBT * rows.drawn_in / scale,
     ]
-    trends, habits = small * TREND * rows.trends, small * HABIT * rows.habits
-    gear_ratio = float(np.hypot(GEAR_RATIO, read * READ_GEAR_RATIO))
+    trends, habits = small * HABIT * rows.trends, small * HABIT * rows.habits
+    gear_ratio = float(np.hypot(USUAL_RATIO, read * READ_GEAR_RATIO))
     ratios = _tail_ratios(rest / (scale * relative), numbers, gear_ratio)
     loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, trends, habits, shared])
     noise = NoiseModel(relative, numbers, gears, loadings, 0.5 * least, gear_ratio, ratios, scale)
     standard = rest / scale
-    each_own = [HABIT_OF_ONE] * len(rows.readers)
+    each_own = [USUAL_RATIO] * len(rows.readers)
     for place, levels in enumerate(rows.readers):
-        others = [HABIT_OF_ONE * other for k, other in enumerate(rows.readers) if k != place]
+        others = [USUAL_RATIO * other for k, other in enumerate(rows.readers) if k != place]
         beside = replace(noise, loadings=np.hstack([loadings, *others]))
-        each_own[place] = _ratio(beside, levels, standard, HABIT_OF_ONE, HABIT_SPREAD)
+        each_own[place] = _ratio(beside, levels, standard, USUAL_RATIO, RATIO_SPREAD)
     loadings = np.hstack(
         [loadings, *(ratio * levels for ratio, levels in zip(each_own, rows.readers, strict=True))]
     )
     alike = replace(noise, loadings=loadings, gear_ratio=0.0)
     each = (gears[:, None] == np.arange(gears.max() + 1)).astype(float)
     return replace(
-        noise, loadings=loadings, gear_ratio=_ratio(alike, each, standard, gear_ratio, GEAR_SPREAD)
+        noise, loadings=loadings, gear_ratio=_ratio(alike, each, standard, gear_ratio, RATIO_SPREAD)
     )
 
 
@@ -238,9 +235,9 @@ def _shared(relative: Array, gears: Wholes) -> tuple[Array, Array]:
     """
     largest = np.zeros(gears.max() + 1)
     np.maximum.at(largest, gears, relative)
-    large = np.flatnonzero(largest > _SHARED)
+    large = np.flatnonzero(largest > USUAL_RATIO)
     loadings = np.where(gears[:, None] == large, relative[:, None], 0.0)
-    return loadings, np.where(largest[gears] > _SHARED, 0.0, relative)
+    return loadings, np.where(largest[gears] > USUAL_RATIO, 0.0, relative)
 
 
 def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, spread: float) -> float:

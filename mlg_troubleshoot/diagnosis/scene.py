@@ -9,10 +9,15 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unknown_along
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
-from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, measured_uncertainty, small_trends
+from mlg_troubleshoot.diagnosis.noise import (
+    SHARE_DOUBT,
+    Rows,
+    build_noise,
+    measured_uncertainty,
+    small_trends,
+)
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import (
-    HEAVY_LEAD,
     UNREAD_IN,
     LikelyClearances,
     likely_clearances,
@@ -21,11 +26,8 @@ from mlg_troubleshoot.diagnosis.wear import (
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.fitting import fit
-
-# Doubt whether clearances were read as well as declared: standard deviation of the share of the
-# declared error. [1]
-_SHARE_DOUBT = 0.35
 
 
 def build_scene(
@@ -45,7 +47,7 @@ def build_scene(
         _scene(model, table, where, likely_clearances(table, unread_in)) for unread_in in UNREAD_IN
     ]
     moderate, heavy = (_likelihood(*found) for found in supposed)
-    return supposed[heavy > moderate + HEAVY_LEAD]
+    return supposed[heavy > moderate + Beliefs().odds]
 
 
 def _likelihood(scene: Scene, rows: Rows) -> float:
@@ -149,7 +151,7 @@ def _share_of_declared(misfit: Array, drawn: Array) -> float:
         level = float(weight @ (y - share * d) / weight.sum())
         told = float(weight @ (d - middle) ** 2) / scale**2
         slope = float(weight @ ((d - middle) * y)) / scale**2
-        share = (slope + 1.0 / _SHARE_DOUBT**2) / (told + 1.0 / _SHARE_DOUBT**2)
+        share = (slope + 1.0 / SHARE_DOUBT**2) / (told + 1.0 / SHARE_DOUBT**2)
     return float(np.clip(share, 0.0, 1.0))
 
 

@@ -19,12 +19,10 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 # Spread of the logarithm of a clearance about its gear's median. [1]
 _LOG_SPREAD = 0.55
 # Set in 2026 on sides exchanged in fleets of the study's tuning seeds: nearer ones are found more
-# often, and falsely. By how much a row must be nearer to the other side, and nearer than its twin,
-# where few days tell of pairs.
-_SIDE_ALONE = 4.0
-_SIDE_APART = 8.0
-# Two rows no further apart than this are the same inspection twice.
-_SIDE_DIFFER = 2.0
+# often, and falsely. By how much a row must be nearer to the other side. Where few days tell of
+# pairs it must be nearer than its twin by twice that, as both count; two rows no further apart than
+# half of it are the same inspection twice.
+_NEARER = 4.0
 
 
 def swapped_sides(table: DiagnosisTable) -> list[tuple[int, str, str]]:
@@ -100,8 +98,8 @@ def _pairs(table: DiagnosisTable, rows: Places, rate: float) -> tuple[int, int |
     # A gear may be inspected twice a day: then neither row lies with the other side, or both do
     # alike.
     apart, likely = abs(near[0] - near[1]), max(near)
-    clear = apart >= _SIDE_APART and likely >= (_SIDE_ALONE if pairs == 1 else -_SIDE_ALONE)
-    if not (clear or (pairs > 1 and likely > 0.0 and apart >= _SIDE_DIFFER)):
+    clear = apart >= 2 * _NEARER and likely >= (_NEARER if pairs == 1 else -_NEARER)
+    if not (clear or (pairs > 1 and likely > 0.0 and apart >= _NEARER / 2)):
         return pairs, None
     return pairs, int(two[0] if near[0] > near[1] else two[1])
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.misfit.covariance import FAR
 
 # Set in 2026 on simulated wear (tests/diagnosis/test_wear.py and the study's tuning seeds); not
 # re-tuned.
@@ -24,18 +25,13 @@ _ROUNDS = 25
 _SETTLED = 3
 # A gear's joint scatters as if it were worn at least this share of the fleet's mean. [1]
 _LEAST_LEVEL = 0.25
-# No joint is tighter than this for the purpose. [in]
+# No joint is tighter, and no reading surer, than this for the purpose. [in]
 _TIGHT_IN = 1e-5
 # Scatter of wear about its line at the start, as a share of the level. [1]
 _SCATTER = 0.15
 # Rows of gears with three readings or more that are needed to distinguish errors of reading from
 # scatter of wear.
 _LEAST_ROWS = 20
-# No reading is exact. [in²]
-_LEAST_READING_IN2 = 1e-12
-# A row further out than this many standard deviations counts less.
-_FAR = 3.0
-
 # A reading is overruled by at most this many standard deviations of its error.
 _MOST_SIGMAS = 2.0
 # Single gears wear further off the fleet than a normal distribution has it: of ten fleets with 30
@@ -46,10 +42,9 @@ _HEAVY_TAILS = 1.5
 # of the fleet, between gears, and between inspections of one gear. Supposed, from the read joints
 # of simulated fleets. [1]
 JOINTS_APART, GEARS_APART, ROWS_APART = 0.35, 0.5, 0.4
-# Mean radial wear of joints where none was read, moderate and heavy [in]; log-likelihood by which
-# the heavy one must be ahead to be supposed: another linkage makes it no more than half a unit
-# likelier, fleets twice as worn by ten.
-UNREAD_IN, HEAVY_LEAD = (0.003, 0.006), 3.0
+# Mean radial wear of joints where none was read, moderate; heavy wear is twice that. [in]
+_MODERATE_IN = 0.003
+UNREAD_IN = (_MODERATE_IN, 2 * _MODERATE_IN)
 # How far all joints of such a fleet, and of one of its gears, may be worn more or less together,
 # over that. Of 100 sound simulated fleets (seeds 20,000 and on) two alarmed, seven where wear was
 # half as much again. [1]
@@ -57,11 +52,9 @@ FLEET_TOGETHER, GEARS_TOGETHER = 0.5, 0.25
 # Where landings fall in a larger share of visits they do not follow the dates: half of them would
 # fall by chance. [1]
 _MOST_FALLS = 1.0 / 3.0
-# Share of the largest variance below which one is but rounding. [1]
-_NEGLIGIBLE = 1e-9
 # How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the
-# others, supposed. [1]
-OWN_GEAR = 0.5
+# others: the share of its variance that is the gear's. [1]
+OWN_GEAR = GEARS_APART**2 / (JOINTS_APART**2 + GEARS_APART**2 + ROWS_APART**2)
 # Standard deviations, supposed: how much further that may follow one read joint, and of exponents
 # of wear. [1]
 FOLLOWS, BENT = 0.2, 0.1
@@ -185,9 +178,10 @@ def gears_of(table: DiagnosisTable) -> Places:
 def visits(table: DiagnosisTable) -> dict[str, Places]:
     """Rows of each gear in the order of their dates, else as they stand."""
     day = np.nan_to_num(table.quantities.get("day", np.zeros(len(table))), nan=-np.inf)
-    order = np.lexsort((np.arange(len(table)), day, table.gears))
-    starts = np.flatnonzero(np.r_[True, table.gears[order][1:] != table.gears[order][:-1]])
-    return {str(table.gears[rows[0]]): rows for rows in np.split(order, starts[1:])}
+    gears = table.gears
+    order = np.lexsort((np.arange(len(table)), day, gears))
+    starts = np.flatnonzero(np.r_[True, gears[order][1:] != gears[order][:-1]])
+    return {str(gears[rows[0]]): rows for rows in np.split(order, starts[1:])}
 
 
 def _overhauls(landings: Array) -> Places:
@@ -242,7 +236,7 @@ def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
     covariance = (1.0 + grown) * (FLEET_TOGETHER**2 * together + JOINTS_APART**2 * each)
     covariance += own * grown * (GEARS_TOGETHER**2 * together + GEARS_APART**2 * each)
     values, vectors = np.linalg.eigh(covariance + visit * grown * ROWS_APART**2 * each)
-    kept = values > _NEGLIGIBLE * values[-1]
+    kept = values > np.sqrt(np.finfo(float).eps) * values[-1]
     return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
 
 
@@ -295,7 +289,7 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     y = reading_in.reshape(len(gears), -1)
     known, x = np.isfinite(y), kilo[:, None]
     y, here = np.where(known, y, 0.0), known.astype(float)
-    declared = np.maximum(reading_in2.reshape(y.shape), _LEAST_READING_IN2)
+    declared = np.maximum(reading_in2.reshape(y.shape), _TIGHT_IN**2)
     by_gear = (np.arange(count)[:, None] == gears).astype(float)
     # Gears of which a joint was never read say nothing about the fleet.
     read = by_gear @ here
@@ -316,7 +310,7 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
         spread = np.sum(seen * (unsure + np.array([a * a, a * b, b * b])), axis=1) + least_spread
         fitted = lines[0][gears] + lines[1][gears] * x
         square = (y - fitted) ** 2 + _variance(unsure, gears, x)
-        far = np.minimum(1.0, _FAR * np.sqrt(variance / np.maximum(square, 1e-30)))
+        far = np.minimum(1.0, FAR * np.sqrt(variance / np.maximum(square, 1e-30)))
         square = square * far**2
         worn, error = scatter * level**2, share * declared
         part, size = worn / (worn + error), np.maximum(many.sum(axis=0), 1)

@@ -10,6 +10,9 @@ from scipy.linalg import solve_triangular
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 
+# Rows further out than this many standard deviations count less, and may be entry errors.
+FAR = 3.0
+
 
 @dataclass(frozen=True)
 class NoiseModel:

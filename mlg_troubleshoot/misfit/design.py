@@ -11,8 +11,8 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask
 
 # Share of its effect that a suspect keeps given the nuisance parameters, below which it cannot be
-# tested; and of the square of an effect by which two must differ not to be one.
-TESTABLE, ALIKE = 0.03, 1e-3
+# tested; given another suspect, below which the two are one.
+TESTABLE = 0.03
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def design_of(columns: Array, nuisance: Array) -> Design:
     own = np.linalg.norm(left, axis=0)
     testable = [int(k) for k in np.flatnonzero(seen)]
     unit = left / np.where(own > 0.0, own, 1.0)
-    alike = 1.0 - (unit.T @ unit) ** 2 < ALIKE
+    alike = 1.0 - (unit.T @ unit) ** 2 < TESTABLE**2
     classes: list[tuple[int, ...]] = []
     for k in testable:
         if not any(k in members for members in classes):

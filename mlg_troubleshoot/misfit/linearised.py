@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.conclusion import Conclusion
-from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 from mlg_troubleshoot.misfit.design import Design, beside, design_of
 from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
 from mlg_troubleshoot.misfit.fitting import Fit, fit
@@ -23,9 +23,7 @@ from mlg_troubleshoot.misfit.scatter import Readings, smooth_shapes
 
 # Sizes of a suspect that does not state its own, over the usual one: equally likely, as nobody
 # knows them.
-_SIZES = (1.0 / 3.0, 1.0, 3.0, 10.0, 30.0, 100.0)
-# Residual over the scatter of a reading from which it may be an entry error.
-_SLIP = 3.0
+_SIZES = tuple((3.0 ** np.arange(-1, 5)).tolist())
 # Share of the largest reading or effect that a number of it does not hold.
 _DIGITS = 1e-9
 # Residual over such a number's digits below which it is rounding, and says nothing.
@@ -254,7 +252,7 @@ class Study:
         for index in self.outputs:
             middle = 1.4826 * float(np.median(np.abs(rest[index])))
             usual[index] = np.maximum(usual[index], middle)
-        return np.asarray(np.abs(rest) > _SLIP * usual)
+        return np.asarray(np.abs(rest) > FAR * usual)
 
     def judged(self, start: FittedPoint) -> JudgedPoint:
         """Search from nothing; where that ends with a discrepancy, also from what explains most

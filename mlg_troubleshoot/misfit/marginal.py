@@ -13,13 +13,12 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, log_sum
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation
 
 Members = tuple[int, ...]
-_ALL, _NONE = slice(None), slice(0)
 
 
 class Products:
@@ -108,24 +107,27 @@ class Marginal:
         self.spread = np.maximum(factor * effects.size, effects.least) / noise.scale_in
         self.signed = np.flatnonzero(effects.sign)
 
-    def _given(self, members: Members, others: slice = _ALL) -> _Given:
-        """What members leave of the data, and of other effects."""
-        effects, places = self.effects, list(members)
-        square, along = self.square[:, :-1][:, others], self.along[:, :-1][:, others]
+    def _given(self, members: Members, alone: bool = False) -> _Given:
+        """What members leave of the data, and of other effects, none of these if alone."""
+        effects, places, others = self.effects, list(members), slice(0 if alone else -1)
+        square, along = self.square[:, others], self.along[:, others]
         m, rest, log = len(self.spread), self.along[:, -1], self.log
         if not places:
             none = np.empty((m * len(log), 0))
             square, along, rest, log = (np.concatenate([x] * m) for x in (square, along, rest, log))
             return _Given(square, along, rest, log, none)
-        whole = self.products.cross(members)
-        cross = np.array([whole - low.T @ low[:, places] for low in self.low])
+        # Rows of the products that are needed, and where the members stand among them.
+        kept, at = (places, list(range(len(places)))) if alone else (slice(None), places)
+        whole = self.products.cross(members)[kept]
+        cross = np.array([whole - low[:, kept].T @ low[:, places] for low in self.low])
+        inner = cross[:, at]
         mean, spread = effects.mean[places], self.spread[:, places][:, None, :]
-        onto = self.along - cross @ mean
-        rest = rest - 2.0 * self.along[:, places] @ mean + (cross[:, places] @ mean) @ mean
-        wide = spread * onto[None, :, places]
-        own = spread[..., None] * cross[None, :, places] * spread[:, :, None, :]
+        onto = self.along[:, kept] - cross @ mean
+        rest = rest - 2.0 * self.along[:, places] @ mean + (inner @ mean) @ mean
+        wide = spread * onto[None, :, at]
+        own = spread[..., None] * inner[None] * spread[:, :, None, :]
         lower = np.linalg.cholesky(np.eye(len(places)) + own)
-        scaled = spread[..., None] * cross[None, :, :-1][:, :, others].transpose(0, 1, 3, 2)
+        scaled = spread[..., None] * cross[None, :, others].transpose(0, 1, 3, 2)
         left = np.linalg.solve(lower, np.concatenate([scaled, wide[..., None]], axis=-1))
         left, told = left[..., :-1], left[..., -1]
         rest = rest - np.sum(told**2, axis=-1)
@@ -136,7 +138,7 @@ class Marginal:
         error *= np.sqrt((np.maximum(rest, 0.0) + self.floor)[..., None] / self.products.n)
         log = log - 2.0 * np.sum(_of_sign(effects.sign[places], values, error), axis=-1)
         square = square - np.sum(left**2, axis=2)
-        along = onto[:, :-1][:, others] - np.einsum("mrkp,mrk->mrp", left, told)
+        along = onto[:, others] - np.einsum("mrkp,mrk->mrp", left, told)
         levels = m * len(self.low)
         return _Given(
             square.reshape(levels, square.shape[-1]),
@@ -156,7 +158,7 @@ class Marginal:
 
     def explanation(self, number: int, members: Members) -> Explanation:
         """How likely a set is, and how large its members are expected to be."""
-        given = self._given(members, _NONE)
+        given = self._given(members, alone=True)
         level = self._likelihood(given.rest, given.log)
         whole = float(log_sum(level))
         values = np.exp(level - whole) @ given.values
@@ -176,8 +178,10 @@ class Marginal:
         one = self.signed
         error = spread[:, one] * np.sqrt(rest[:, one] / (n * wider[:, one]))
         level[:, one] += _of_sign(effects.sign[one], value[:, one], error)
-        whole = log_sum(level)
-        values = np.sum(np.exp(level - whole) * value, axis=0)
+        most = np.max(level, axis=0)
+        chance = np.exp(level - most)
+        total = np.sum(chance, axis=0)
+        whole, values = most + np.log(total), np.sum(chance * value, axis=0) / total
         prior = self._prior(members) + effects.log_prior - np.log(len(level))
         return whole + prior + self.corrected(members), values
 
@@ -203,12 +207,6 @@ class Marginal:
     @cached_property
     def _corrections(self) -> dict[Members, float]:
         return {}
-
-
-def log_sum(terms: Array) -> Array:
-    """Logarithm of the sum of exponentials, over the first axis."""
-    most = np.max(terms, axis=0)
-    return np.asarray(most + np.log(np.sum(np.exp(terms - most), axis=0)))
 
 
 def _of_sign(sign: Array, value: Array, error: Array) -> Array:

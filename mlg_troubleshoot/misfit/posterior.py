@@ -7,18 +7,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, log_sum
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation, Key
-from mlg_troubleshoot.misfit.marginal import Marginal, Products, log_sum
+from mlg_troubleshoot.misfit.marginal import Marginal, Products
 
 # Computing only: more of each must not change what is said. Effects that act together at most; sets
-# that are extended with a context and without; log-likelihood behind the likeliest one from which a
-# set is not extended, and from which a context's own effects are not asked for.
-MOST, BEAM = 4, 16
-REACH, OWN = 9.0, 4.6
-_LEADING, _TRACE = 6, 1e-7
+# that are extended with a context and without; sets that every step is taken from.
+MOST, BEAM, _LEADING = 4, 16, 6
+# Log-likelihood behind the likeliest set from which one is not extended; half of it is that from
+# which the own effects of a context are not asked for. Of what lies twice as far behind the sets
+# are not kept.
+REACH = 9.2
+OWN, _TRACE = REACH / 2, float(np.exp(-2 * REACH))
 
 
 @dataclass(frozen=True)

@@ -13,23 +13,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 from mlg_troubleshoot.misfit.design import basis_of
 from mlg_troubleshoot.misfit.runner import least_squares
 
-# Readings further out than this many standard deviations count less.
-_FAR = 3.0
 # Scatter between groups over that of a reading: median and spread of its logarithm beforehand, and
 # what is tried.
 _GROUP_RATIO, _GROUP_SPREAD = 0.15, 1.0
-_GROUP_RATIOS = (0.05, 0.15, 0.45, 1.35, 4.0, 12.0)
+_GROUP_RATIOS = tuple((_GROUP_RATIO * 3.0 ** np.arange(-1, 5)).tolist())
 # Share of the variance of a reading that grows with the square of the prediction: what is tried.
 _GROWING = (0.5, 0.9, 0.99)
 # Standard deviation of nuisance parameters, over the scatter of a reading: whatever they are.
 _WIDE = 1e4
 # Rows that stand for all in a smooth shape; lengths in units of the median distance of the rows.
 _LANDMARKS = 60
-_LENGTHS = (0.25, 0.5, 1.0)
+_LENGTHS = 1 / 2 ** np.arange(2, -1, -1)
 # Rows with fewer of which no shape is seen.
 _LEAST_ROWS = 8
 _ORDER = "order of the rows"
@@ -97,11 +95,11 @@ class Readings:
         for index in self.outputs if self.declared is None else [np.arange(len(left))]:
             own = size[index]
             spread = 1.4826 * float(np.median(own)) / np.sqrt(spare)
-            near = np.minimum(own, _FAR * spread) if spread > 0.0 else own
+            near = np.minimum(own, FAR * spread) if spread > 0.0 else own
             level[index] = max(
                 float(np.sqrt(np.mean(near**2) / spare)), self.floor / float(np.max(relative))
             )
-        return np.asarray(relative * level * np.maximum(1.0, size / level / _FAR))
+        return np.asarray(relative * level * np.maximum(1.0, size / level / FAR))
 
     def _grown(self, left: Array) -> Array:
         """Relative scatter of each reading, of which a share grows with the prediction where second
@@ -119,7 +117,7 @@ class Readings:
             if len(bend) == 0 or not (np.any(bend > 0.0) and np.any(square > 0.0)):
                 continue
             square = square / float(np.mean(square))
-            bend = np.minimum(bend, _FAR * 1.4826 * float(np.median(bend)))
+            bend = np.minimum(bend, FAR * 1.4826 * float(np.median(bend)))
             along = square[order]
             weights = ((along[:-2] + 4.0 * along[1:-1] + along[2:]) / 6.0)[inside]
             least = _log_likelihood(bend, np.ones(len(bend))) + 0.5 * float(np.log(len(index)))

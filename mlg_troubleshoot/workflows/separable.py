@@ -39,7 +39,7 @@ from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.design import ALIKE, beside
+from mlg_troubleshoot.misfit.design import TESTABLE, beside
 from mlg_troubleshoot.records.headers import Joints, parse_canonical
 from mlg_troubleshoot.units import LengthUnit
 
@@ -231,7 +231,7 @@ class _Plan:
                     name = " ".join(part for part in other if part)
         apart = 1.0 - best
         return name, (
-            float("inf") if apart < ALIKE else _APART * self._row(key) / float(np.sqrt(apart))
+            float("inf") if apart < TESTABLE**2 else _APART * self._row(key) / float(np.sqrt(apart))
         )
 
     def found_from(self, key: Key) -> float:

@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 import numpy as np
-from scipy.special import logsumexp
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array, Mask, log_sum
 from mlg_troubleshoot.diagnosis.causes.base import (
     MOST_UNREAD,
     Candidate,
@@ -22,14 +21,16 @@ from mlg_troubleshoot.diagnosis.causes.base import (
 )
 from mlg_troubleshoot.diagnosis.causes.reading import change_date, days_since
 from mlg_troubleshoot.gear.adjustment import Adjustment
+from mlg_troubleshoot.units import DAYS_PER_YEAR
 
 # A gauge is calibrated once a year; in which month is not known.
-_YEAR_DAYS, _MONTHS = 365.25, 12
+_MONTHS = 12
 # Aircraft from which on a step is one of several; turns in which steps and their size settle. [1]
 _LEAST_AIRCRAFT, _TURNS = 3, 20
 _TAILS = "tails "
-# Times in which a beginner comes down to a third of what he was off, a season to a year. [d]
-_LEARNING_DAYS = (60.0, 120.0, 240.0, 480.0)
+# Times in which a beginner comes down to a third of what he was off, from two months on, each
+# twice the last. [d]
+_LEARNING_DAYS = DAYS_PER_YEAR / 6 * 2 ** np.arange(4)
 
 
 class GaugeDrift(Cause):
@@ -47,18 +48,18 @@ class GaugeDrift(Cause):
         """Yield each gauge, and all together, with each month of calibration."""
         days = scene.table.quantities["day"]
         known = days[np.isfinite(days)]
-        if len(known) == 0 or np.ptp(known) <= 0.5 * _YEAR_DAYS:
+        if len(known) == 0 or np.ptp(known) <= 0.5 * DAYS_PER_YEAR:
             return
         first = float(known.min())
         for gauge in (None, *levels(scene.table.factors["gauge_id"])):
             for month in range(_MONTHS):
-                day = round(first - month * _YEAR_DAYS / _MONTHS)
+                day = round(first - month * DAYS_PER_YEAR / _MONTHS)
                 setting = {"value": gauge, "day": day, "since": change_date(scene, day)}
                 yield Candidate(self, None if gauge is None else f"gauge {gauge}", setting)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Shift the rows of that gauge by the time since it was calibrated."""
-        since = np.nan_to_num(days_since(scene, candidate.setting)) % _YEAR_DAYS / _YEAR_DAYS
+        since = np.nan_to_num(days_since(scene, candidate.setting)) % DAYS_PER_YEAR / DAYS_PER_YEAR
         return offset(scene, since * _of_value(scene, self.needs[0], candidate), value)
 
     def words(self, target: str | None) -> str:
@@ -187,6 +188,10 @@ def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], flo
     rows = {t: np.flatnonzero((tails == t) & np.isfinite(days + misfit)) for t in levels(tails)}
     # One visit after it is enough: that other aircraft have the same step holds it.
     offered = {t: np.unique(days[own])[1:].tolist() for t, own in rows.items()}
+    after = {
+        t: np.array([days[own] >= day for day in offered[t]]).reshape(-1, len(own))
+        for t, own in rows.items()
+    }
     known = np.isfinite(misfit)
     if not known.any():
         return {}, 0.0
@@ -204,12 +209,12 @@ def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], flo
         gain = size * (misfit - level - 0.5 * size) / scatter**2
         steps, rarity, chance = {}, 0.0, np.zeros(len(tails))
         for tail, own in rows.items():
-            after = np.array([days[own] >= day for day in offered[tail]]).reshape(-1, len(own))
-            gains = np.r_[0.0, after @ gain[own]]
-            each = np.log(0.5) + gains - np.r_[0.0, np.full(len(after), np.log(max(len(after), 1)))]
-            total = float(logsumexp(each))
-            chance[own] = np.exp(each[1:] - total) @ after
-            modified = len(after) > 0 and each[0] - total < np.log(0.5)
+            count = len(after[tail])
+            gains = np.r_[0.0, after[tail] @ gain[own]]
+            each = np.log(0.5) + gains - np.r_[0.0, np.full(count, np.log(max(count, 1)))]
+            total = float(log_sum(each))
+            chance[own] = np.exp(each[1:] - total) @ after[tail]
+            modified = count > 0 and each[0] - total < np.log(0.5)
             best = 1 + int(np.argmax(each[1:])) if modified else 0
             rarity += float(each[best] - gains[best])
             if modified:

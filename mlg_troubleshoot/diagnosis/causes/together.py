@@ -17,10 +17,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.linalg import block_diag
-from scipy.special import logsumexp
 from scipy.stats import norm
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, log_sum
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
@@ -30,17 +29,19 @@ from mlg_troubleshoot.gear.model import LinkageModel
 # tried; the last one stands for evenly all around. Fleets with 40°, 90° and all around lie within a
 # factor 1.6 of one of them. [deg]
 SPREADS_DEG = (25.0, 45.0, 70.0, 180.0)
+# A linkage halfway to another member of the ensemble, which moves the plunger up to 1.8 times as
+# far. [1]
+_HALFWAY = 0.5
 # Spread of the true linkage about the drawn one over that of the ensemble, and of what it changes
 # in all joints alike: another member, one half as far, and one that nobody has calibrated on the
-# published failure, as the ensemble is: halfway to another member, linkages move the plunger up to
-# 1.8 times as far. [1]
-LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
+# published failure, as the ensemble is. [1]
+LINKAGES = ((1, 0), (_HALFWAY, 0), (1, _HALFWAY))
 # Difference of a true linkage in addition to the ensemble's spread, each joint alone: an eighth of
 # the largest. [1]
 ALONE = 0.03
 # And in addition to the way from the drawn one to a member of the ensemble, supposed: a third of
 # that. [1]
-NEAR = 0.01
+NEAR = ALONE / 3
 # Changes of one joint that stand for all; rounds that settle the evidence to 0.02, but of a spread
 # far behind another.
 _LIKELY, _ROUNDS = 250, 8
@@ -302,7 +303,7 @@ def _evidence(along: Array, square: Array, changes: Array) -> float:
         mean, own = spread @ (along + pull), np.diag(spread)
         others, push = np.maximum(1.0 / own - precise, 0.0), mean / own - pull
         weight = push[:, None] * changes - 0.5 * others[:, None] * changes**2
-        size = logsumexp(weight, axis=1, keepdims=True)
+        size = log_sum(weight.T)[:, None]
         chance = np.exp(weight - size)
         at = chance @ changes
         variance = np.maximum(chance @ changes**2 - at**2, 1e-8)
