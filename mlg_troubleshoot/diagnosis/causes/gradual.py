@@ -188,10 +188,7 @@ def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], flo
     rows = {t: np.flatnonzero((tails == t) & np.isfinite(days + misfit)) for t in levels(tails)}
     # One visit after it is enough: that other aircraft have the same step holds it.
     offered = {t: np.unique(days[own])[1:].tolist() for t, own in rows.items()}
-    after = {
-        t: np.array([days[own] >= day for day in offered[t]]).reshape(-1, len(own))
-        for t, own in rows.items()
-    }
+    after = {t: days[own] >= np.array(offered[t])[:, None] for t, own in rows.items()}
     known = np.isfinite(misfit)
     if not known.any():
         return {}, 0.0
