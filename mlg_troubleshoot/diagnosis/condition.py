@@ -52,6 +52,8 @@ class DataCondition:
         What it does to the answer.
     record_next : str
         What to record next time.
+    doubtful : bool
+        True if nothing that depends on the clearances can be named because of it.
     """
 
     kind: str
@@ -59,6 +61,7 @@ class DataCondition:
     share: float
     effect: str
     record_next: str
+    doubtful: bool = False
 
 
 def data_condition(table: DiagnosisTable, gear: Gear) -> tuple[tuple[DataCondition, ...], Mask]:
@@ -109,11 +112,7 @@ def doubt_of(found: tuple[DataCondition, ...]) -> str:
     str
         The reason, empty if there is none.
     """
-    cut = [
-        c.where
-        for c in found
-        if c.kind == "blank_not_at_random" or (c.kind == "censored" and c.share > _MANY_CUT)
-    ]
+    cut = [c.where for c in found if c.doubtful]
     if not cut:
         return ""
     return f"Causes of joints, of scale, of wear and of rigging are not named: {'; '.join(cut)}."
@@ -227,6 +226,14 @@ def _step(values: Array, least: float) -> float:
     return max(on, default=0.0)
 
 
+def _too_coarse(values: Array, step: float) -> bool:
+    """Tell whether what rounding takes away depends on the values: it does where the step is larger
+    than twice their standard deviation (Sheppard's corrections), that of the rounding taken out.
+    """
+    spread = float(np.nanvar(values)) - step**2 / 12.0
+    return bool(step**2 > 4.0 * spread)
+
+
 def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     """Values on a step of twice their standard uncertainty or more: half a step is as large."""
     use = rows & _at_mid(table)
@@ -238,12 +245,15 @@ def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
         where = f"clearances, to {step:.4g} in"
         if len(own) < len(steps):
             where += f", technician {', '.join(own)}"
+        rounded = np.isin(people, own) & use
+        share = float(np.mean(rounded[use]))
         yield DataCondition(
             "rounded",
             where,
-            float(np.mean(np.isin(people[use], own))),
+            share,
             f"each is known to ± {0.5 * step:.4g} in only; small effects of joints are not told",
             "the value as the gauge shows it, to 0.0005 in",
+            share > _MANY_CUT and _too_coarse(table.clearance_in[rounded], step),
         )
     plunger = table.readings_in[use]
     known = table.plunger_gauge_u_in
@@ -264,9 +274,10 @@ def _piled(table: DiagnosisTable) -> Iterator[DataCondition]:
         yield DataCondition(
             "censored",
             "clearances below an end of the gauge",
-            float(table.below.sum() / np.isfinite(table.clearance_in).sum()),
+            share := float(table.below.sum() / np.isfinite(table.clearance_in).sum()),
             "half of the end stands for each, and anything up to it is as likely",
             "the value, with a gauge that reaches further",
+            share > _MANY_CUT,
         )
     values = table.clearance_in[_at_mid(table) & ~_identical(table)]
     if table.below is not None:
@@ -283,9 +294,10 @@ def _piled(table: DiagnosisTable) -> Iterator[DataCondition]:
             yield DataCondition(
                 "censored",
                 f"clearances of {found[end]:.4g} in",
-                float(counts[end] / counts.sum()),
+                share := float(counts[end] / counts.sum()),
                 f"some of them are {side} than this: it is where the gauge or the sheet ends",
                 f"{sign}{found[end]:.4g} where no value was read",
+                share > _MANY_CUT,
             )
 
 
@@ -311,6 +323,7 @@ def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
             share,
             "worn joints are over-represented; what the blanks add is not known",
             "every joint, also after a worn one",
+            doubtful=True,
         )
     elif _only_worn(table, use):
         yield DataCondition(
@@ -320,6 +333,7 @@ def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
             "the blanks are smaller than what was written: names of joints and of scale may be"
             " wrong",
             "every joint that was read, also the sound ones",
+            doubtful=True,
         )
 
 

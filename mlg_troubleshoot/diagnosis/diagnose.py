@@ -92,6 +92,17 @@ class NamedCause(Term):
         return float(np.sqrt(np.mean(self.effect_in**2)))
 
     @property
+    def rows_acting(self) -> int:
+        """Number of rows in which it acts. [1]"""
+        return int(np.count_nonzero(self.effect_in))
+
+    @property
+    def acting_rms_in(self) -> float:
+        """Root mean square of its effect over the rows in which it acts. [in]"""
+        share = max(self.rows_acting, 1) / len(self.effect_in)
+        return self.effect_rms_in / float(np.sqrt(share))
+
+    @property
     def predicts(self) -> bool:
         """True if the model can be extended by it: it is about the gear, and some joint's share of
         it is known.
@@ -590,6 +601,8 @@ def _report(
     gain = _gain(case) if finding.verdict is Verdict.NAMED else None
     left = misfit - np.sum([cause.effect_in for cause in causes], axis=0)
     repeatability, source = estimate_repeatability(table)
+    residual = float(np.std(left))
+    expected = _expected_scatter(model, table, repeatability)
     chances = finding.posterior
     return Diagnosis(
         verdict=finding.verdict,
@@ -628,9 +641,10 @@ def _report(
             if gain is not None and gain.better
             else ()
         ),
-        residual_u_in=float(np.std(left)),
-        expected_scatter_in=_expected_scatter(model, table, repeatability),
-        remainder_is_noise=finding.left < 0.5,
+        residual_u_in=residual,
+        expected_scatter_in=expected,
+        # What the gauges alone leave is noise, however it lies.
+        remainder_is_noise=finding.left < 0.5 or (expected is not None and residual <= expected),
         used=table,
         predicted_in=case.scene.over_in,
         misfit_in=misfit,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.diagnosis import diagnose
 from mlg_troubleshoot.diagnosis.causes import RiggingOffset
-from mlg_troubleshoot.diagnosis.condition import data_condition
+from mlg_troubleshoot.diagnosis.condition import data_condition, doubt_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.diagnosis.wear import gears_of
 from mlg_troubleshoot.gear.directions import worst_case
@@ -167,6 +167,18 @@ def test_steps_are_said_of_the_technician_who_rounds(gear: Gear) -> None:
     (found,) = data_condition(changed(gear, one_rounds), gear)[0]
     assert found.where == "clearances, to 0.001 in, technician T-1"
     assert found.share == pytest.approx(1 / 3)
+
+
+@pytest.mark.parametrize(("step_in", "doubtful"), [(0.001, False), (0.005, True)])
+def test_rounding_is_in_doubt_where_its_step_exceeds_the_spread_of_the_values(
+    gear: Gear, step_in: float, doubtful: bool
+) -> None:
+    def rounded(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+        clearance[:] = np.round(clearance / step_in) * step_in
+
+    found = data_condition(changed(gear, rounded), gear)[0]
+    assert [f.doubtful for f in found if f.kind == "rounded"] == [doubtful]
+    assert ("clearances, to 0.005 in" in doubt_of(found)) == doubtful
 
 
 def test_landings_that_fall_are_said_with_their_gear(gear: Gear) -> None:

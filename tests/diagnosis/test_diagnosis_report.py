@@ -274,7 +274,8 @@ def test_no_gain_is_shown_where_the_model_was_not_extended(nothing: Made) -> Non
 def test_nothing_found_says_what_would_have_been_found(nothing: Made) -> None:
     shown = nothing.text.replace("\u00a0", " ")
     assert (
-        f"The test had 80 % power for an effect of {nothing.diagnosis.smallest_rms_in:.5f} in rms"
+        f"The test had 80 % power for an effect of {nothing.diagnosis.smallest_rms_in:.5f} in rms,"
+        " of a listed form"
         in shown
     )
 
@@ -355,6 +356,22 @@ def test_the_command_s_report_is_written_as_html_and_pdf(tmp_path: Path) -> None
 def test_where_nothing_is_found_what_is_left_is_noise(nothing: Made) -> None:
     assert nothing.diagnosis.remainder_is_noise
     assert "looks like noise" in seven_lines(nothing.diagnosis)[5].text
+
+
+def test_a_shift_of_some_rows_is_given_as_large_as_it_is_where_it_acts(named: Made) -> None:
+    (cause,) = named.diagnosis.causes
+    assert cause.acting_rms_in == pytest.approx(abs(cause.value))
+    lines = seven_lines(named.diagnosis)
+    assert f"in the {cause.rows_acting} rows where it acts" in lines[2].text
+
+
+def test_what_the_gauges_alone_leave_is_not_called_more_than_noise(gear: Gear, make: Make) -> None:
+    table = fleet(gear.model, cold_under_load, rows=160)
+    coarse = replace(table, gauge_u_in=np.full(len(table), 0.01))
+    found = make(coarse).diagnosis
+    assert found.verdict == "UNLISTED"
+    assert found.residual_u_in < (found.expected_scatter_in or 0.0)
+    assert "not noise" not in seven_lines(found)[5].text
 
 
 def bar_of(made: Made, name: str) -> float:
