@@ -275,8 +275,7 @@ def test_nothing_found_says_what_would_have_been_found(nothing: Made) -> None:
     shown = nothing.text.replace("\u00a0", " ")
     assert (
         f"The test had 80 % power for an effect of {nothing.diagnosis.smallest_rms_in:.5f} in rms,"
-        " of a listed form"
-        in shown
+        " of a listed form" in shown
     )
 
 
