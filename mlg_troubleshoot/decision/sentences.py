@@ -160,7 +160,8 @@ def never_read(unread: Sequence[int], worn: float, minutes: float) -> str:
         what, them = f"{joint_list(unread)} was not read and is over its limit", "it"
     else:
         what, them = f"{joint_list(unread)} were not read; one or more is over its limit", "them"
-    return f"{what} with chance {percent(worn)}: to know, measure {them} ({minutes:.0f} min)."
+    chance = f"chance {percent(worn)} by the wear that is expected"
+    return f"{what} ({chance}): to know, measure {them} ({minutes:.0f} min)."
 
 
 def does_not_fit(step: Step, left: float, before: str | None) -> str:
