@@ -81,7 +81,7 @@ def test_a_plan_that_ends_says_how_likely_unread_joints_are_over_their_limit(jud
     ended = judge({}, outcome=Outcome.FAILED, readings_in=(0.002,))
     assert ended.next_action.action is Action.CONTINUE
     assert re.search(
-        r"one or more is over its limit \(chance \d+ % by the wear that is expected\): to know,"
+        r"one or more may be over its limit \(chance \d+ % by the wear that is expected\): to know,"
         r" measure them \(\d+ min\)",
         ended.plan.open_question or "",
     )
