@@ -66,7 +66,8 @@ def measure_gain(
     expected = misfit - EXPECTED_SLOPE * predicted
     known = None if block is None else (block.columns, block.covariance)
     correction = held_out_part(noise, columns, expected, fold, known)
-    before, after = misfit, misfit - correction
+    before = misfit
+    after = misfit - correction
     drawn = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else np.arange(len(misfit))
     measured = predicted + misfit
     outside = np.abs(measured) > table.margin_in

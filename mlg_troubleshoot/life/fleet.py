@@ -7,7 +7,8 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_from
 
 # Newest inspections that are looked at: they tell a share to some percent. Fewer gears are none.
-_MOST, _FEWEST = 500, 10
+_MOST = 500
+_FEWEST = 10
 
 
 def expected_of(store: Store, gear: Gear) -> Fleet | None:

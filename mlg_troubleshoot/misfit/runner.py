@@ -67,7 +67,9 @@ class Runner:
         channels: Sequence[str] = (),
         call: Callable[..., Iterable[Any]] = map,
     ) -> None:
-        self.predict, self.channels, self.call = predict, channels, call
+        self.predict = predict
+        self.channels = channels
+        self.call = call
         self.shape = measured.shape
         self.row, self.output = (
             places.astype(np.int64) for places in np.nonzero(np.isfinite(measured))
@@ -168,7 +170,8 @@ class Runner:
         found = False
         for step in (_STEP, 1.0, 0.01):
             up, down = (self._change(values, base, k, way * step) for way in (1.0, -1.0))
-            forward, backward = bool(np.isfinite(up).all()), bool(np.isfinite(down).all())
+            forward = bool(np.isfinite(up).all())
+            backward = bool(np.isfinite(down).all())
             if not (forward or backward):
                 continue
             found = True
@@ -215,7 +218,9 @@ class Runner:
 
         weigh: multiplies columns by the inverse covariance of the readings.
         """
-        base, arrived, condition = self.at(values), not active, 1.0
+        base = self.at(values)
+        arrived = not active
+        condition = 1.0
         for _ in range(_ITERATIONS if active else 0):
             rest = self.reading - base
             cost = float(rest @ weigh(rest[:, None])[:, 0])
@@ -275,7 +280,8 @@ class _Normal:
         self.size = np.where(size > 0.0, size, 1.0)
         unit = slopes / self.size
         held = weigh(unit)
-        self.inner, self.along = unit.T @ held, held.T @ rest
+        self.inner = unit.T @ held
+        self.along = held.T @ rest
         self.fall = float(self.step(0.0) * self.size @ self.along)
 
     def step(self, damping: float) -> Array:
@@ -316,18 +322,21 @@ def held_out(
     is fitted there.
     """
     left = rest.copy()
-    chosen, free = columns[:, list(causes)], columns[:, list(nuisance)]
+    chosen = columns[:, list(causes)]
+    free = columns[:, list(nuisance)]
     size = np.linalg.norm(free, axis=0)
     free = free / np.where(size > 0.0, size, 1.0)
     for k in np.unique(part) if folds is None else folds:
-        test, train = part == k, part != k
+        test = part == k
+        train = part != k
         if not train.any():
             continue
         known = unknown = free
         if free.shape[1]:
             values, across = np.linalg.eigh(free[train].T @ free[train])
             told = values > _KNOWN**2 * max(float(values[-1]), 1e-300)
-            known, unknown = free @ across[:, told], free @ across[:, ~told]
+            known = free @ across[:, told]
+            unknown = free @ across[:, ~told]
         both = np.hstack([chosen, known])
         if both.shape[1]:
             left[test] -= both[test] @ least_squares(both[train], rest[train])

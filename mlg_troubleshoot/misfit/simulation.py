@@ -128,7 +128,8 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
 
 def _diagnosed(study: Study, most_calls: int) -> SimulationDiagnosis:
     """Say what is wrong, what may be, what that gains, and the residual."""
-    runner, names = study.runner, study.runner.names
+    runner = study.runner
+    names = study.runner.names
     start = study.start()
     at = study.judged(start)
     causes = _causes(study, at)
@@ -136,18 +137,23 @@ def _diagnosed(study: Study, most_calls: int) -> SimulationDiagnosis:
     moved = [k for k in causes if final.values[k] != runner.nominal[k]]
     if moved != causes:
         # What would only move beyond its bound is no cause.
-        causes, final = moved, study.fitted(at, moved, 0)
+        causes = moved
+        final = study.fitted(at, moved, 0)
     report = _Report(study, at, final, tuple(causes))
     open_ = study.chosen(at.follows.open_beside([key_of(names[k]) for k in causes]))
-    verdict, found = at.follows.verdict, at.follows.posterior
+    verdict = at.follows.verdict
+    found = at.follows.posterior
     if verdict is Verdict.NAMED and not causes:
         # Held-out rows veto what these rows name.
-        verdict, open_ = Verdict.AMBIGUOUS, study.chosen(at.follows.sure)
-    often, n = study.often, len(at.unit)
+        verdict = Verdict.AMBIGUOUS
+        open_ = study.chosen(at.follows.sure)
+    often = study.often
+    n = len(at.unit)
     in_sequence = report.in_sequence()
     smallest = study.beliefs.seen_from(often, n) * float(np.sqrt(np.mean(at.unit**2) / n))
     described = [report.describe(k) for k in causes]
-    gain, untestable = report.gain(start, most_calls), report.untestable({*causes, *open_})
+    gain = report.gain(start, most_calls)
+    untestable = report.untestable({*causes, *open_})
     return SimulationDiagnosis(
         verdict=verdict,
         causes=tuple(sorted(described, key=lambda c: -c.effect_rms)),
@@ -215,7 +221,8 @@ def _share(at: JudgedPoint, others: Sequence[int], k: int) -> float:
     """Share of the squared misfit where a suspect acts that it takes away from what others leave.
     [1]
     """
-    noise, acts = at.settled([*others, k], 0), at.point.columns[:, k] != 0.0
+    noise = at.settled([*others, k], 0)
+    acts = at.point.columns[:, k] != 0.0
     square = []
     for chosen in ([*others], [*others, k]):
         left = at.point.whole / at.unit - at.columns[:, chosen] @ at.linear(chosen, 0).values
@@ -235,12 +242,15 @@ def _held_out(
     """Misfit of rows held out over their scatter, some causes fitted to the others, or what of it
     is new in each row; rows are held out by group as long as the others teach what acts.
     """
-    row, both = study.runner.row, np.column_stack([point.columns, point.whole]) / at.unit[:, None]
+    row = study.runner.row
+    both = np.column_stack([point.columns, point.whole]) / at.unit[:, None]
     both = both / at.noise.relative[:, None] if whole else at.noise.own(both)
-    columns, rest = both[:, :-1], both[:, -1]
+    columns = both[:, :-1]
+    rest = both[:, -1]
     part, by = folds_of(row, study.group, columns[:, list(acting)], study.fold)
     if by == "row" and study.series is not None:
-        part, by = blocks_of(*study.series)[row], "block"
+        part = blocks_of(*study.series)[row]
+        by = "block"
     return held_out(columns, rest, fitted, study.nuisance, part), by, part
 
 
@@ -266,10 +276,13 @@ class _Report:
 
     def describe(self, k: int) -> SuspectFound:
         """Describe a cause, or what may be one in addition to the causes."""
-        at, run, names = self.at, self.study.runner, self.study.runner.names
+        at = self.at
+        run = self.study.runner
+        names = self.study.runner.names
         others = [j for j in self.causes if j != k]
         told = float(at.linear([k, *others], at.likeliest.context).values[0])
-        change, whole = told * run.trial[k], at.point.columns[:, k] * told
+        change = told * run.trial[k]
+        whole = at.point.columns[:, k] * told
         if k in self.causes:
             change = self.final.values[k] - run.nominal[k]
             without = np.where(np.arange(len(names)) == k, run.nominal, self.final.values)
@@ -293,7 +306,8 @@ class _Report:
 
     def gain(self, start: FittedPoint, most_calls: int) -> HeldOutGain:
         """Misfit of rows held out, before and after, in the unit of the readings."""
-        study, at = self.study, self.at
+        study = self.study
+        at = self.at
         before, by, part = _held_out(study, at, start, (), self.causes)
         after, by, part = _held_out(study, at, self.final, self.causes, self.causes)
         # Each fold needs a step, its check, and the columns at both.
@@ -309,8 +323,10 @@ class _Report:
 
     def _refitted(self, point: FittedPoint, fitted: Sequence[int], part: Wholes) -> Array:
         """Misfit of each reading over its scatter, the simulation fitted to the other folds."""
-        study, weight = self.study, self.at.weight
-        active, left = [*fitted, *study.nuisance], point.rest / weight
+        study = self.study
+        weight = self.at.weight
+        active = [*fitted, *study.nuisance]
+        left = point.rest / weight
         for k in np.unique(part):
             test = part == k
             if test.all() or not active:
@@ -326,7 +342,9 @@ class _Report:
 
     def untestable(self, found: Collection[int]) -> dict[str, str]:
         """Suspects that these rows cannot test, and why."""
-        study, run, why = self.study, self.study.runner, dict[str, str]()
+        study = self.study
+        run = self.study.runner
+        why = dict[str, str]()
         for k, s in enumerate(run.suspects[: study.count]):
             if k in run.silent:
                 why[s.name] = "the simulation gives no number near its nominal value"
@@ -349,7 +367,8 @@ class _Report:
 
     def notes(self, in_sequence: bool) -> tuple[str, ...]:
         """What to know before the numbers are used, as sentences."""
-        run, notes = self.study.runner, list[str]()
+        run = self.study.runner
+        notes = list[str]()
         if in_sequence and self.study.series is None:
             notes.append(
                 "Residuals of neighbouring rows are correlated: probabilities and intervals are too"
@@ -385,7 +404,9 @@ class _Report:
         chosen = self.study.chosen(at.follows.posterior.names_of(at.likeliest))
         noise = at.settled(chosen, 0 if self.study.series is None else at.likeliest.context)
         own, _spare = noise.own_part(at.point.rest / at.unit)
-        own, along, square = own / at.noise.relative, 0.0, 0.0
+        own = own / at.noise.relative
+        along = 0.0
+        square = 0.0
         for index in self.study.outputs:
             along += float(own[index][1:] @ own[index][:-1])
             square += float(own[index] @ own[index])
@@ -396,16 +417,19 @@ class _Report:
         (Bonferroni); each sum of squares as a multiple of chi-squared (Satterthwaite 1946).
         """
         noise = self.at.settled(self.causes, 0)
-        ratio, left = noise.tail_ratios[-1], self.final.rest / self.at.unit
+        ratio = noise.tail_ratios[-1]
+        left = self.final.rest / self.at.unit
         weighed = noise.precision_times(left[:, None], ratio)[0][:, 0]
         variance = float(left @ weighed) / max(len(left) - noise.absorbed - len(self.causes), 1)
         if variance == 0.0:
             return 1.0
-        patterns, chances = self.study.contexts[1 :: len(self.study.beliefs.sizes)], [1.0]
+        patterns = self.study.contexts[1 :: len(self.study.beliefs.sizes)]
+        chances = [1.0]
         for pattern in patterns:
             shape = pattern.shared_in
             spread = shape.T @ noise.precision_times(shape, ratio)[0]
-            mean, square = float(np.trace(spread)), float(np.sum(spread**2))
+            mean = float(np.trace(spread))
+            square = float(np.sum(spread**2))
             size = float(np.sum((shape.T @ weighed) ** 2)) / variance
             chances.append(len(patterns) * float(chi2.sf(size * mean / square, mean**2 / square)))
         return min(chances)

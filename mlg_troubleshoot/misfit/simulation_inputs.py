@@ -66,7 +66,8 @@ def followed(
                 "time was given without series", "say with series= which rows follow each other"
             )
         return None
-    chain, when = _labels(series, n, "series"), _times(time, n)
+    chain = _labels(series, n, "series")
+    when = _times(time, n)
     order = np.lexsort((when, chain))
     step = np.diff(when[order])[np.diff(chain[order]) == 0]
     if np.any(step <= 0.0):
@@ -138,7 +139,8 @@ def _suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect]) -> None:
                 f"{s.name}: nominal {s.nominal:g}, trial {s.trial:g} {s.unit}".rstrip(),
                 "both must be finite, and the trial a change that does something, never 0",
             )
-        low, high = (-np.inf if s.low is None else s.low), (np.inf if s.high is None else s.high)
+        low = -np.inf if s.low is None else s.low
+        high = np.inf if s.high is None else s.high
         if not low <= s.nominal <= high or not low < high:
             raise UsageError(
                 f"{s.name}: nominal {s.nominal:g} is not between low {low:g} and high {high:g}",

@@ -478,7 +478,8 @@ class Store:
                 raise _MisfitError(row, f"record {count + 1} is missing before it")
             if before and _chained(before, values) != values["hash"]:
                 raise _MisfitError(row, "its content, its hash or the record before it was changed")
-            before, count = values["hash"], count + 1
+            before = values["hash"]
+            count = count + 1
             yield row
 
     def _head(self, connection: sql.Connection) -> tuple[int, bytes]:
@@ -741,14 +742,16 @@ class _MisfitError(Exception):
 
     def __init__(self, row: Any, why: str) -> None:
         super().__init__(why)
-        self.row, self.why = row, why
+        self.row = row
+        self.why = why
 
 
 _VERIFY = "Run: mlg history verify"
 _FOREIGN = "Give --store the name of a new file, or of one that mlg wrote."
 _EXTRA = "Install the extra: pip install 'mlg-troubleshoot[server]'"
 # Records of one import, and wrong ones among them that wait for a later one to void them. [1]
-_MOST_IMPORTED, _MOST_WRONG = 100_000, 1_000
+_MOST_IMPORTED = 100_000
+_MOST_WRONG = 1_000
 
 
 def _as_bytes_are(raw: Any, _record: Any) -> None:

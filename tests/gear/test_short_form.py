@@ -155,6 +155,14 @@ def test_what_is_not_stated_is_assumed_and_named() -> None:
     assert any("10 min" in text for text in short_form(FOUR_BAR).assumed)
 
 
+@pytest.mark.parametrize(("key", "times"), [("confirm_above", 2), ("hard_limit", 5)])
+def test_readings_are_asked_again_and_refused_at_multiples_of_the_largest_limit(
+    key: str, times: int
+) -> None:
+    form = changed(joints={**FOUR_BAR["joints"], next(iter(FOUR_BAR["joints"])): 0.02})
+    assert short_form(form).values["entry"][key] == times * 0.02
+
+
 def test_an_assumed_number_is_not_counted_as_a_given_one(tmp_path: Path) -> None:
     given = changed(source={"kind": "measured", "text": "bench"})
     kinds = [str(n.kind) for n in gear_of(given, tmp_path).numbers]
