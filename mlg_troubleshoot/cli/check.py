@@ -88,7 +88,10 @@ class Wanted(options.OutputOptions):
         **options.OutputOptions.panels,
         **dict.fromkeys(("formats", "annotate", "csv", "detail", "every"), "Output"),
         **dict.fromkeys(
-            ("extension", "causes", "resume", "keep", "store", "tails", "remember", "seed"),
+            (
+                *("extension", "causes", "resume", "keep", "store", "tails", "remember", "seed"),
+                *("workers", "scheduler"),
+            ),
             "This run",
         ),
     }
@@ -150,6 +153,14 @@ class Wanted(options.OutputOptions):
         int,
         typer.Option(min=0, help="Seed of the Monte Carlo check of a single gear."),
     ] = 1
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Cores that judge more than 1,024 rows; all if not given."),
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Dask cluster that judges them."),
+    ] = None
 
 
 @options.flat

@@ -4,6 +4,7 @@ found.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -66,6 +67,8 @@ class Run:
             remembered=self._shown.note or None,
             seed=wanted.seed,
             extension=load_model_extension(extensions, tables.gear, causes),
+            workers=wanted.workers or os.cpu_count() or 1,
+            scheduler=wanted.scheduler and options.dask_client(wanted.scheduler),
         )
         self._records = options.Records(wanted.store, tables.gear)
         # A store that nothing is kept in is not opened: SQLAlchemy is a third of a check.

@@ -7,6 +7,7 @@ from copy import copy
 from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import wraps
+from importlib import import_module
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_type_hints
@@ -332,3 +333,19 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
     run.__annotations__ = {each.name: each.annotation for each in shown}
     run.__dict__["__signature__"] = Signature(shown)
     return run
+
+
+def dask_client(address: str) -> Any:
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise UsageError(
+            "--scheduler needs dask.distributed",
+            "Install the extra: pip install 'mlg-troubleshoot[cluster]'",
+        ) from None
+    try:
+        return distributed.Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise UsageError(
+            f"no Dask scheduler at {address}: {error}", "Start one, or leave out --scheduler."
+        ) from error

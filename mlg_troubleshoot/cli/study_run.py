@@ -6,14 +6,13 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, replace
-from importlib import import_module
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import typer
 from rich.table import Table
 
-from mlg_troubleshoot.cli import output
+from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.cli.study import StudyFlags
@@ -64,7 +63,9 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
         "fixed_rad": fixed,
         "limits_in": None if flags.limit is None else np.full(len(known.joints), flags.limit),
     }
-    with nullcontext() if flags.scheduler is None else _client(flags.scheduler) as client:
+    with (
+        nullcontext() if flags.scheduler is None else options.dask_client(flags.scheduler) as client
+    ):
         yield known, StudyOptions(**{**plain, **read, "scheduler": client})
 
 
@@ -119,22 +120,6 @@ def _choice(kind: type[_Choice], text: str, what: str) -> _Choice:
         raise UsageError(
             f"{what} {text!r} is not known", f"Give one of {', '.join(kind)}."
         ) from None
-
-
-def _client(address: str) -> Any:
-    try:
-        distributed: Any = import_module("distributed")
-    except ImportError:
-        raise UsageError(
-            "--scheduler needs dask.distributed",
-            "Install the extra: pip install 'mlg-troubleshoot[cluster]'",
-        ) from None
-    try:
-        return distributed.Client(address, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise UsageError(
-            f"no Dask scheduler at {address}: {error}", "Start one, or leave out --scheduler."
-        ) from error
 
 
 def _show(findings: StudyFindings, unit: LengthUnit) -> None:

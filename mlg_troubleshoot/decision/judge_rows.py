@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -43,9 +45,10 @@ from mlg_troubleshoot.decision.wear_levels import Unread
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.parallel import spread
 from mlg_troubleshoot.units import Length, Sentence
 
-# Rows judged at once: bounds the memory. [1]
+# Rows judged at once, by one process: bounds the memory. [1]
 _CHUNK = 1024
 
 
@@ -58,31 +61,39 @@ def assess(
     seed: int = 1,
     extension: Extension | None = None,
     fleet: Fleet | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    over: Callable[..., Iterator[tuple[int, tuple[Judgement, ...]]]] = spread,
 ) -> tuple[Judgement, ...]:
     """Judge rows: verdict, plan, repair sets and allowances; with `advice` what is worth it for one
-    gear alone. `fleet` is what other gears teach.
+    gear alone. `fleet` is what other gears teach; `over` has the parts judged, here or elsewhere,
+    as `spread` does.
     """
-    judged: list[Judgement] = []
-    for start in range(0, len(rows), _CHUNK):
-        part = rows[start : start + _CHUNK]
-        valid = [row for row in part if isinstance(row, Inspection)]
-        drawn = seed if advice else None
-        # Products of this size take twice as long where they wait for other threads.
-        with threadpool_limits(1, "blas"):
-            cases = Cases.of(gear, valid, extension, fleet)
-            assessed = iter(_assess_valid(cases, table, drawn) if valid else ())
-        judged += [
-            (
-                next(assessed)
-                if isinstance(row, Inspection)
-                else Rejected(row, correct(row), row.warnings)
-            )
-            for row in part
-        ]
-        if progress is not None:
-            progress(len(judged), len(rows))
-    return tuple(judged)
+    parts = [rows[start : start + _CHUNK] for start in range(0, len(rows), _CHUNK)]
+    task = partial(_judge_part, gear, table, seed if advice else None, extension, fleet)
+    judged = dict(over(task, parts))
+    return tuple(chain.from_iterable(judged[place] for place in range(len(parts))))
+
+
+def _judge_part(
+    gear: Gear,
+    table: IndexTable,
+    drawn: int | None,
+    extension: Extension | None,
+    fleet: Fleet | None,
+    part: Sequence[Inspection | InvalidRow],
+) -> tuple[Judgement, ...]:
+    valid = [row for row in part if isinstance(row, Inspection)]
+    # Products of this size take twice as long where they wait for other threads.
+    with threadpool_limits(1, "blas"):
+        cases = Cases.of(gear, valid, extension, fleet)
+        assessed = iter(_assess_valid(cases, table, drawn) if valid else ())
+    return tuple(
+        (
+            next(assessed)
+            if isinstance(row, Inspection)
+            else Rejected(row, correct(row), row.warnings)
+        )
+        for row in part
+    )
 
 
 def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Assessment]:

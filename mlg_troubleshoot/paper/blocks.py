@@ -10,12 +10,9 @@ and in any order add up to the same bits.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from importlib import import_module
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,6 +24,7 @@ from mlg_troubleshoot.geometry.kernel import numba_is_installed
 from mlg_troubleshoot.indices.estimators import failed_note
 from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs
 from mlg_troubleshoot.paper.replicated import middle_of_level, replicated_levels
+from mlg_troubleshoot.parallel import spread
 
 # Levels of one block: the work that is lost at an interruption. [1]
 LEVELS_PER_BLOCK = 50
@@ -181,21 +179,12 @@ def total_order_study(
     blocks = study.blocks
     done = {} if state is None else _resumed(study, state)
     missing = [block for block in blocks if block not in done]
-    runner: Iterator[tuple[StudyBlock, BlockSums]]
-    if scheduler is not None:
-        waiting = {
-            scheduler.submit(compute_block, study, block, pure=False): block for block in missing
-        }
-        distributed: Any = import_module("distributed")
-        runner = (
-            (waiting[future], future.result()) for future in distributed.as_completed(list(waiting))
-        )
-    elif workers > 1 and len(missing) > 1:
-        runner = _on_this_machine(study, missing, workers)
-    else:
-        runner = ((block, compute_block(study, block)) for block in missing)
+    # The compiled loop runs without the interpreter's lock.
+    task = partial(compute_block, study)
+    runner = spread(task, missing, workers, scheduler, threads=numba_is_installed())
     try:
-        for block, sums in runner:
+        for place, sums in runner:
+            block = missing[place]
             done[block] = sums
             if state is not None:
                 _append(state, [block, sums])
@@ -204,20 +193,6 @@ def total_order_study(
     except KeyboardInterrupt:
         pass
     return _summed(study, done)
-
-
-def _on_this_machine(
-    study: BlockStudy, blocks: list[StudyBlock], workers: int
-) -> Iterator[tuple[StudyBlock, BlockSums]]:
-    # The compiled loop runs without the interpreter's lock: threads share its memory. Forking a
-    # process that has threads of its own can hang; a fresh interpreter cannot.
-    fresh = partial(ProcessPoolExecutor, mp_context=get_context("spawn"))
-    pool: Executor = (ThreadPoolExecutor if numba_is_installed() else fresh)(workers)
-    try:
-        waiting = {pool.submit(compute_block, study, block): block for block in blocks}
-        yield from ((waiting[future], future.result()) for future in as_completed(waiting))
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def _summed(study: BlockStudy, done: dict[StudyBlock, BlockSums]) -> TotalOrder:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -22,6 +22,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
+from mlg_troubleshoot.parallel import spread
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from mlg_troubleshoot.workflows.index_tables import load_index_table
 
@@ -55,6 +56,11 @@ class CheckOptions(TableOptions):
         Seed of the Monte Carlo draws.
     extension : Extension or None
         An extension of the model.
+    workers : int
+        Cores that judge more than 1,024 rows; what is found does not depend on it. A script that
+        asks for more than one needs ``if __name__ == "__main__":``, as `multiprocessing` does.
+    scheduler : distributed.Client or None
+        Dask client to judge them with.
     """
 
     gear: Gear | str | Path = DEFAULT_GEAR
@@ -62,6 +68,8 @@ class CheckOptions(TableOptions):
     advice: bool | None = None
     seed: int = 1
     extension: Extension | None = None
+    workers: int = 1
+    scheduler: Any = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -372,7 +380,16 @@ def _judge(
     if fleet is not None:
         details["notes"] = (*details.get("notes", ()), fleet.text)
     as_they_count = since_repairs(rows, gear, store)
-    judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
+
+    def over(task: Callable[[Any], tuple[Judgement, ...]], parts: Sequence[Any]) -> Iterator[Any]:
+        done = 0
+        for place, found in spread(task, parts, options.workers, options.scheduler):
+            done += len(found)
+            if on_judged is not None:
+                on_judged(done, len(rows))
+            yield place, found
+
+    judgements = assess(as_they_count, gear, load_index_table(gear), **asked, over=over)
     if as_they_count is not rows:
         # What is shown and kept of an inspection is what was found, whatever counts no more.
         judgements = tuple(
