@@ -21,8 +21,8 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
-from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.parallel import spread
+from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from mlg_troubleshoot.workflows.index_tables import load_index_table
 
