@@ -63,7 +63,7 @@ def _on_this_machine(
         ThreadPoolExecutor,
         as_completed,
     )
-    from multiprocessing import get_context
+    from multiprocessing import active_children, get_context
 
     pool: Executor
     if threads:
@@ -74,13 +74,16 @@ def _on_this_machine(
             workers, mp_context=get_context("spawn"), initializer=_hold, initargs=(task,)
         )
     asked: Callable[[Any], Any] = task if threads else _of_held
+    waiting: dict[Future[Any], int] = {}
     try:
-        waiting: dict[Future[Any], int] = {
-            pool.submit(asked, part): k for k, part in enumerate(parts)
-        }
+        waiting.update((pool.submit(asked, part), k) for k, part in enumerate(parts))
         for future in as_completed(list(waiting)):
-            yield waiting.pop(future), future.result()
+            found = future.result()
+            yield waiting.pop(future), found
     finally:
+        for child in active_children() if waiting and not threads else ():
+            # Interrupted: nobody waits for the parts that are being computed.
+            child.terminate()
         pool.shutdown(cancel_futures=True)
 
 

@@ -168,14 +168,10 @@ class UncertaintyBudget:
     model_source: str
 
     @property
-    def clearances_in(self) -> float:
-        """Of all readings together. [in]"""
-        return math.hypot(*self.readings_in.values())
-
-    @property
     def combined_in(self) -> float:
         """Of the prediction against the margin. [in]"""
-        return math.hypot(self.clearances_in, self.geometry_in, self.model_in, self.margin_in)
+        others = (self.geometry_in, self.model_in, self.margin_in)
+        return math.hypot(*self.readings_in.values(), *others)
 
     @property
     def lines(self) -> tuple[tuple[str, float, float], ...]:

@@ -45,7 +45,6 @@ from mlg_troubleshoot.decision.wear_levels import Unread
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
-from mlg_troubleshoot.parallel import spread
 from mlg_troubleshoot.units import Length, Sentence
 
 # Rows judged at once, by one process: bounds the memory. [1]
@@ -61,14 +60,16 @@ def assess(
     seed: int = 1,
     extension: Extension | None = None,
     fleet: Fleet | None = None,
-    over: Callable[..., Iterator[tuple[int, tuple[Judgement, ...]]]] = spread,
+    over: Callable[..., Iterator[tuple[int, tuple[Judgement, ...]]]] | None = None,
 ) -> tuple[Judgement, ...]:
     """Judge rows: verdict, plan, repair sets and allowances; with `advice` what is worth it for one
     gear alone. `fleet` is what other gears teach; `over` has the parts judged, here or elsewhere,
-    as `spread` does.
+    as `spread` does, where there are several.
     """
     parts = [rows[start : start + _CHUNK] for start in range(0, len(rows), _CHUNK)]
     task = partial(_judge_part, gear, table, seed if advice else None, extension, fleet)
+    if over is None or len(parts) < 2:
+        return tuple(chain.from_iterable(map(task, parts)))
     judged = dict(over(task, parts))
     return tuple(chain.from_iterable(judged[place] for place in range(len(parts))))
 

@@ -33,7 +33,7 @@ from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.repair import removable
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, tabled_normal_cdf, verdict
-from mlg_troubleshoot.decision.wear_levels import BEYOND, TOO_CLOSE, Unread
+from mlg_troubleshoot.decision.wear_levels import TOO_CLOSE, Unread
 from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
 
 # Readings of one round are read together until the verdict is settled with this chance. [1]
@@ -521,10 +521,8 @@ class _PlanBuilder:
         left = self._joints(self.facts.open[i])
         never = None
         if left and found.steps[0].action in (Action.CONTINUE, Action.DONE):
-            sound = (1.0 - BEYOND.sum(axis=1)) ** len(left)
-            worn = 1.0 - float(self.facts.causes.levels[i] @ sound)
             minutes = minutes_to_measure(self.gear, left, self.opened)
-            never = sentences.never_read(left, worn, minutes)
+            never = sentences.never_read(left, minutes)
         if found.end is End.WITHIN:
             return never
         asked = {n for step in found.steps for n in step.joints}

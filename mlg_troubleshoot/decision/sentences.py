@@ -154,17 +154,14 @@ def open_question(unread: Sequence[int], over: Sequence[int]) -> str | None:
     return " ".join(said) or None
 
 
-def never_read(unread: Sequence[int], worn: float, minutes: float) -> str:
-    """What a plan that ends leaves unread; `worn`: the chance that one is over its limit."""
+def never_read(unread: Sequence[int], minutes: float) -> str:
+    """What a plan that ends leaves unread."""
     if len(unread) == 1:
         what, them = f"{joint_list(unread)} was not read and may be over its limit", "it"
     else:
-        what, them = (
-            f"{joint_list(unread)} were not read; one or more may be over its limit",
-            "them",
-        )
-    chance = f"chance {percent(worn)} by the wear that is expected"
-    return f"{what} ({chance}): to know, measure {them} ({minutes:.0f} min)."
+        what = f"{joint_list(unread)} were not read; one or more may be over its limit"
+        them = "them"
+    return f"{what}: to know, measure {them} ({minutes:.0f} min)."
 
 
 def does_not_fit(step: Step, left: float, before: str | None) -> str:

@@ -187,17 +187,6 @@ def test_a_batch_judges_each_gear_as_if_it_were_alone(
         )
 
 
-def test_progress_is_told_once_for_every_row(gear: Gear, table: IndexTable) -> None:
-    told: list[int] = []
-    assess(
-        [InvalidRow(None, None, None, ())] * 1030,
-        gear,
-        table,
-        progress=lambda done, _all: told.append(done),
-    )
-    assert told == [1024, 1030]
-
-
 def test_a_gear_that_does_not_close_is_outside_with_its_numbers_absent_and_a_warning(
     judge: Judge,
 ) -> None:

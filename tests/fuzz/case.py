@@ -119,7 +119,8 @@ def _asked(name: str, case: Case, before: Mapping[str, object], *, refused: bool
     if any(wanted.startswith(f"{name}/") for wanted in (*case.writes, *case.keeps, *case.fills)):
         # A missing folder on the way to an output.
         return True
-    if name in case.writes:
+    if name in case.writes or f"{name}/".startswith("home/.cache/"):
+        # What forecasts remember may be made anywhere, and is safe to delete.
         return True
     for store in case.keeps:
         if name in {f"{store}{end}" for end in _SQLITE_LEAVES}:

@@ -655,6 +655,11 @@ def test_nothing_is_computed_without_a_single_clearance(flow: Flow) -> None:
     assert "nothing to compute" in said(turn)
 
 
+def test_a_plunger_reading_alone_is_computed(flow: Flow) -> None:
+    turn = play(flow, ["done", "plunger .041", *ENTERS, ""])
+    assert turn.effect is Effect.COMPUTE
+
+
 @pytest.mark.parametrize("typed", ["11", "0", "3 .004", "compute"])
 def test_anything_else_at_the_review_computes_nothing(flow: Flow, typed: str) -> None:
     turn = play(flow, [*TEN, *ENTERS, typed])

@@ -31,7 +31,7 @@ from mlg_troubleshoot.cli.prompts.conversation import Effect, Page, Turn, again
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line, warning
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.cli.prompts.visit import Visit
-from mlg_troubleshoot.decision.columns import DATE
+from mlg_troubleshoot.decision.columns import DATE, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
@@ -453,10 +453,11 @@ class Flow:
         )
 
     def _compute(self, state: State) -> Turn[State]:
-        if not state.answers.radial_in:
+        if not (state.answers.radial_in or PLUNGER_DISPLACEMENT.name in state.answers.more):
             return again(
                 state,
-                "No joint has a clearance, so there is nothing to compute. Type a joint number.",
+                "No joint has a clearance and the plunger was not read, so there is nothing to"
+                " compute. Type a joint number, or b to go back to the plunger.",
             )
         if state.answers.unit_question(self.gear):
             return Turn(replace(state, ask=Ask.CONFIRM_UNIT))
