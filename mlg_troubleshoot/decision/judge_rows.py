@@ -64,11 +64,11 @@ def assess(
 ) -> tuple[Judgement, ...]:
     """Judge rows: verdict, plan, repair sets and allowances; with `advice` what is worth it for one
     gear alone. `fleet` is what other gears teach; `over` has the parts judged, here or elsewhere,
-    as `spread` does, where there are several.
+    as `spread` does.
     """
     parts = [rows[start : start + _CHUNK] for start in range(0, len(rows), _CHUNK)]
     task = partial(_judge_part, gear, table, seed if advice else None, extension, fleet)
-    if over is None or len(parts) < 2:
+    if over is None:
         return tuple(chain.from_iterable(map(task, parts)))
     judged = dict(over(task, parts))
     return tuple(chain.from_iterable(judged[place] for place in range(len(parts))))

@@ -389,7 +389,8 @@ def _judge(
                 on_judged(done, len(rows))
             yield place, found
 
-    judgements = assess(as_they_count, gear, load_index_table(gear), **asked, over=over)
+    asked["over"] = over if len(rows) > 1 else None
+    judgements = assess(as_they_count, gear, load_index_table(gear), **asked)
     if as_they_count is not rows:
         # What is shown and kept of an inspection is what was found, whatever counts no more.
         judgements = tuple(
