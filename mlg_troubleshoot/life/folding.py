@@ -27,7 +27,7 @@ LEAST_OF_A_HASH = 6
 _UNPACKED = 4096
 
 
-# Who judges is no part of what a record says, and has a say in whether it can be read.
+# Who judges is not part of what a record says, but decides whether it can be read.
 @lru_cache(_UNPACKED)
 def _inspection_of(record: Record, _judge: Judge | None) -> Inspection:
     return inspection_from(record)

@@ -136,7 +136,7 @@ def _diagnosed(study: Study, most_calls: int) -> SimulationDiagnosis:
     final = study.fitted(at, causes, 0)
     moved = [k for k in causes if final.values[k] != runner.nominal[k]]
     if moved != causes:
-        # What would only move beyond its bound is no cause.
+        # What would only move beyond its bound is not a cause.
         causes = moved
         final = study.fitted(at, moved, 0)
     report = _Report(study, at, final, tuple(causes))
