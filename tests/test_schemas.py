@@ -64,13 +64,12 @@ def test_the_contract_names_eleven_outputs_and_the_verification() -> None:
     [
         (("check", FAILURE), b""),
         (("check", FLEET), b""),
-        (("check", "-", "--repairs"), BAD_ROWS),
         (("check", "-"), BAD_ROWS),
         (("check", "-"), b""),
         ((*HAND, "--convention", "RADIAL", "--set", "3=0.013in", "--measured", "0.04in"), b""),
         ((*HAND, "--convention", "RADIAL", *(f"--set={n}=0.05in" for n in range(1, 11))), b""),
     ],
-    ids=["failure", "fleet", "repairs", "bad rows", "nothing", "by hand", "does not close"],
+    ids=["failure", "fleet", "bad rows", "nothing", "by hand", "does not close"],
 )
 def test_every_check_fits_its_schema(arguments: tuple[object, ...], stdin: bytes) -> None:
     assert complain("check", mlg(*arguments, "--json", stdin=stdin).json) == []

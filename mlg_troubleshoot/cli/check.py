@@ -176,9 +176,6 @@ def check(
     flags: Flags,
     tables: options.Tables,
     wanted: Wanted,
-    _repairs: Annotated[
-        bool, typer.Option("--repairs", hidden=True, help="No effect: repairs are always searched.")
-    ] = False,
     _version: options.Version = False,
 ) -> None:
     """Check gears: clearances in, verdict and ranked joints out.

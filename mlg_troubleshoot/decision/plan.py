@@ -52,7 +52,7 @@ _ENDS = {
     End.CANNOT_CLEAR: "Engineering decides: no set of repairs brings it within",
 }
 _RETRACTED = "Engineering decides: outside its bound, retracted normally"
-_DONE = "Done: joints within their limits"
+_DONE = "Done: no further action on the joints"
 
 
 def in_brief(action: Action, joints: Sequence[int], end: End, *, retracted: bool) -> str:

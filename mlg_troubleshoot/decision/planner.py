@@ -427,9 +427,17 @@ class _PlanBuilder:
         return self._done()
 
     def _done(self) -> Plan:
+        cases = self.cases
+        i = self.row
         restored = any(step.action is Action.RESTORE for step in self.steps)
-        recorded = self.inspection.is_repaired and not restored
-        self._step(Action.DONE, 0.0, sentences.done(repaired=restored, recorded=recorded))
+        text = sentences.done(
+            repaired=restored,
+            recorded=self.inspection.is_repaired and not restored,
+            # What the steps before this one read is not known yet.
+            unread=not self.steps and not cases.measured[i].all(),
+            over=bool((cases.over_limit[i] & ~cases.restorable[i]).any()),
+        )
+        self._step(Action.DONE, 0.0, text)
         return Plan(tuple(self.steps), End.DONE)
 
     def _check_rigging(self) -> _PlanBuilder:

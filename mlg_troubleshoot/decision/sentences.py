@@ -46,9 +46,6 @@ GO_ON = {
 
 
 ALL_WITHIN_LIMITS = "Every joint was measured and is within its limit."
-JOINTS_DONE = (
-    "Joints are within limits. No further action on the joints; this is not a release to service."
-)
 FAILED_BUT_WITHIN = (
     "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
 )
@@ -63,11 +60,6 @@ _BEYOND_NOT_EXPLAINED = (
 _BEYOND_AND_LOOKED = (
     "Joint clearances do not explain where the plunger stands, and the rigging was looked at: go on"
     " to engineering."
-)
-_REPAIRED_DONE = "Joints are within limits; record the repair. This is not a release to service."
-_RECORDED_DONE = (
-    "Joints are within limits, and the repair is entered here: sign it off in the aircraft's"
-    " records. This is not a release to service."
 )
 STOP_FOR_TODAY = (
     "Stop for today: what would decide takes longer than the minutes that are left. Hand over what"
@@ -95,11 +87,19 @@ def go_on(end: End, *, failed: bool, beyond: bool, looked: bool, look_again: str
     return f"{GO_ON[end]} {look_again}".rstrip()
 
 
-def done(*, repaired: bool, recorded: bool) -> str:
-    """Step DONE; `recorded`: the inspection names the repair already."""
+def done(*, repaired: bool, recorded: bool, unread: bool, over: bool) -> str:
+    """Step DONE; `recorded`: the inspection names the repair already; `unread`, `over`: joints are
+    left that nobody read, or that are over their limit.
+    """
+    others = f"{'The other joints' if over else 'The joints'}{' that were read' * unread}"
+    stands = f"{others if unread or over else 'Joints'} are within limits"
     if recorded:
-        return _RECORDED_DONE
-    return _REPAIRED_DONE if repaired else JOINTS_DONE
+        then = ", and the repair is entered here: sign it off in the aircraft's records. This"
+    elif repaired:
+        then = "; record the repair. This"
+    else:
+        then = ". No further action on the joints; this"
+    return f"{stands}{then} is not a release to service."
 
 
 def check_rigging(stands_in: float | None, as_new: Sequence[int]) -> Sentence:

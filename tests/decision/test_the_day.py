@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import date, datetime
 
 import pytest
 
@@ -88,3 +89,16 @@ def test_a_plan_that_ends_says_that_unread_joints_may_be_over_their_limit(judge:
 
 def test_unread_joints_are_not_mentioned_before_the_plan_ends(judge: Judge) -> None:
     assert judge({3: 0.002}).plan.open_question is None
+
+
+def test_done_does_not_say_that_joints_that_nobody_read_are_within_limits(judge: Judge) -> None:
+    repaired = {"restored_joints": (3,), "repair_date": datetime(2026, 3, 2, 9)}
+    done = judge({3: 0.0005}, **repaired, inspection_date=date(2026, 3, 2))
+    assert done.next_action.action is Action.DONE
+    assert done.next_action.text.startswith("The joints that were read are within limits, and")
+
+
+def test_done_does_not_say_that_a_joint_without_a_spare_is_within_limits(judge: Judge) -> None:
+    repaired = {"restored_joints": (5,), "repair_date": datetime(2026, 3, 2, 9)}
+    found = judge(every_joint(0.0005, j3=0.009), **repaired, no_spare=(3,))
+    assert found.next_action.text.startswith("The other joints are within limits, and")

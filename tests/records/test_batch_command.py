@@ -510,10 +510,10 @@ def test_a_row_is_judged_alike_alone_and_in_a_batch(tmp_path):
     ]
     path = tmp_path / "all.csv"
     path.write_text(as_csv(HEADER, *rows))
-    batch = mlg("check", path, "--repairs", "--json").json["inspections"]
+    batch = mlg("check", path, "--json").json["inspections"]
     for n in (0, 5, 11):
         (tmp_path / "one.csv").write_text(as_csv(HEADER, rows[n]))
-        (alone,) = mlg("check", tmp_path / "one.csv", "--repairs", "--json").json["inspections"]
+        (alone,) = mlg("check", tmp_path / "one.csv", "--json").json["inspections"]
         # What is worked out for a single inspection only is null in a batch.
         in_both = [key for key in alone if key != "joints" and batch[n][key] is not None]
         assert twelve_digits([alone[k] for k in in_both]) == twelve_digits(

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Rejected
-from mlg_troubleshoot.decision.inspection import Side
+from mlg_troubleshoot.decision.inspection import Outcome, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.sentences import rigging_sentence
 from mlg_troubleshoot.errors import Problem
@@ -176,6 +176,30 @@ def test_there_is_a_line_to_sign_for(role: str, failure: Made) -> None:
 
 def test_there_is_a_handover_line(failure: Made) -> None:
     assert "Handover, open for the next shift" in failure.text
+
+
+def test_what_stays_open_stands_on_the_first_page_and_in_the_handover(
+    judge: Judge, make: Make
+) -> None:
+    ended = judge({3: 0.0005}, readings_in=(0.002,))
+    open_question = ended.plan.open_question or ""
+    text = make(ended, formats=("html",)).text.replace("\u00a0", " ")
+    assert "were not read; one or more may be over its limit" in open_question
+    assert -1 < text.find(f"Open: {open_question}") < text.find("Joints, by contribution")
+    assert f"Handover, open for the next shift: {open_question}" in text
+
+
+def test_a_gear_too_close_to_its_margin_says_on_paper_when_to_look_again(
+    judge: Judge, make: Make
+) -> None:
+    close = judge(
+        dict.fromkeys(range(1, 11), 0.0022),
+        outcome=Outcome.RETRACTED,
+        gear_landings=4100.0,
+        gauge_u_in=0.0003,
+    )
+    text = make(close, formats=("html",)).text.replace("\u00a0", " ")
+    assert "Look again at 4400 landings or by 2024-11-17, whichever comes first." in text
 
 
 @pytest.mark.parametrize(
