@@ -4,7 +4,7 @@ explanation is there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -180,13 +180,29 @@ class Study:
     def _fit(
         self, values: Array, chosen: Sequence[int], noise: NoiseModel, unit: Array
     ) -> FittedPoint:
+        weigh = self._weigh(noise, unit)
+        return self.at(self.runner.fit(values, [*chosen, *self.nuisance], weigh))
+
+    def _weigh(self, noise: NoiseModel, unit: Array) -> Callable[[Array], Array]:
+        """Multiply columns by the inverse covariance of the readings, nothing absorbed."""
         noise = replace(noise, loadings=noise.loadings[:, noise.absorbed :], absorbed=0)
 
         def weigh(columns: Array) -> Array:
             weighed, _log = noise.precision_times(columns / unit[:, None], noise.tail_ratios[-1])
             return weighed / unit[:, None]
 
-        return self.at(self.runner.fit(values, [*chosen, *self.nuisance], weigh))
+        return weigh
+
+    def expected(self, at: JudgedPoint) -> Array:
+        """Every parameter as expected over all explanations, nuisance parameters fitted to that."""
+        run = self.runner
+        found = at.follows.posterior
+        values = np.where(np.arange(len(run.names)) < self.count, run.nominal, at.point.values)
+        for name, size in zip(found.effects.names, found.expected_size, strict=True):
+            for k in self.chosen([name] if name else []):
+                values[k] += size * run.trial[k]
+        weigh = self._weigh(at.settled((), 0), at.unit)
+        return run.fit(run.within(values), self.nuisance, weigh).values
 
     def start(self) -> FittedPoint:
         """The nuisance parameters fitted; what they absorb shows only there."""

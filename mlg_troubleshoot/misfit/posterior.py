@@ -31,7 +31,8 @@ class MisfitPosterior:
     logarithmic probability. names: probability that something of each name acts. nothing: that
     nothing of any name does. unlisted: that something acts that is on no list. together:
     probability of each set of names. of_effect, shape (p,): of each effect. over_nothing, shape
-    (p,): logarithm of the odds of each alone against nothing at all. expected_in, shape (n,):
+    (p,): logarithm of the odds of each alone against nothing at all. expected_size, shape (p,):
+    expected size of each effect, whether it acts or not. expected_in, shape (n,):
     expected effect on each row of all that acts but slips. log_evidence: logarithm of the
     likelihood of the data under all that was looked at, up to a constant of the rows.
     """
@@ -45,6 +46,7 @@ class MisfitPosterior:
     over_nothing: Array
     nothing: float
     unlisted: float
+    expected_size: Array
     expected_in: Array
     log_evidence: float = 0.0
 
@@ -280,6 +282,7 @@ class _Search:
             over_nothing,
             nothing,
             unlisted,
+            size,
             expected,
             whole,
         )

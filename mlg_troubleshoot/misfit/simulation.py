@@ -150,6 +150,9 @@ def _diagnosed(study: Study, most_calls: int) -> SimulationDiagnosis:
     often = study.often
     n = len(at.unit)
     in_sequence = report.in_sequence()
+    # With rivals no single set predicts best: each counts by how likely it is.
+    rivals = verdict is at.follows.verdict is Verdict.AMBIGUOUS
+    values = study.expected(at) if rivals else final.values
     smallest = study.beliefs.seen_from(often, n) * float(np.sqrt(np.mean(at.unit**2) / n))
     described = [report.describe(k) for k in causes]
     gain = report.gain(start, most_calls)
@@ -166,7 +169,7 @@ def _diagnosed(study: Study, most_calls: int) -> SimulationDiagnosis:
         p_nothing=found.nothing,
         p_unlisted=min(found.unlisted, 1.0),
         gain=gain,
-        parameters=dict(zip(names, report.final.values.tolist(), strict=True)),
+        parameters=dict(zip(names, values.tolist(), strict=True)),
         remainder_p=report.remainder_p(),
         smallest_detectable_rms=smallest,
         noise=tuple(

@@ -142,7 +142,9 @@ class SimulationDiagnosis(Result):
     gain : HeldOutGain
         Gain on held-out rows.
     parameters : mapping of str to float
-        Value of every suspect and nuisance parameter, to predict with.
+        Value of every suspect and nuisance parameter, to predict with: the causes as fitted, all
+        else nominal; where the posterior leaves rivals (AMBIGUOUS), each suspect as expected over
+        all that may be wrong, by how likely it is.
     remainder_p : float
         p-value of the pattern in the residual. [1]
     smallest_detectable_rms : float

@@ -146,7 +146,7 @@ def ours(draw: Draw, kept: NDArray[np.bool_]) -> Answer:
         series=draw.series[kept],
         time=np.flatnonzero(kept).astype(float),
     )
-    names = {name for cause in found.causes for name in (cause.name, *cause.aliases)}
+    names = {name for cause in found.named for name in (cause.name, *cause.aliases)}
     return Answer(names, draw.rig.predict(found.parameters)[:, 0])
 
 

@@ -56,6 +56,7 @@ def concluded(
         of_effect,
         together.get(frozenset(), 0.0),
         names[SHAPE],
+        of_effect,
         np.zeros(N),
     )
     return Conclusion(found, Beliefs(), either, never)

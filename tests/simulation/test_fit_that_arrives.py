@@ -223,3 +223,19 @@ def test_a_damped_step_arrives_where_a_whole_one_overshoots() -> None:
     found = runner.fit(runner.nominal, [0], lambda columns: 1e4 * columns)
     assert found.values[0] == pytest.approx(0.0, abs=1e-3)
     assert found.arrived
+
+
+def test_among_rivals_the_parameters_predict_better_than_the_nominal_values() -> None:
+    def two(x: np.ndarray) -> Predict:
+        return lambda p: np.asarray(p["straight"] * x + p["bent"] * x**1.1)
+
+    read_at, beyond = np.linspace(0.0, 1.0, 60), np.linspace(1.0, 1.5, 30)
+    sound, true = {"straight": 1.0, "bent": 1.0}, {"straight": 1.2, "bent": 1.0}
+    scatter = 0.05 * np.random.default_rng(3).standard_normal(60)
+    suspects = [Suspect(name, 1.0, 0.05) for name in sound]
+    found = diagnose_simulation(two(read_at), two(read_at)(true) + scatter, suspects)
+    assert found.verdict is Verdict.AMBIGUOUS
+    off, nominally_off = (
+        np.abs(two(beyond)(p) - two(beyond)(true)).max() for p in (found.parameters, sound)
+    )
+    assert off < 0.2 * nominally_off
