@@ -14,6 +14,9 @@ from mlg_troubleshoot.errors import UsageError
 
 Parameters = Mapping[str, float]
 
+# Share of the time by which the last step of a mock-up unit may end early: rounding of its clock.
+_ENDS = 1e-6
+
 
 def ode_simulation(
     derivative: Callable[[float, Array, Parameters], ArrayLike],
@@ -107,7 +110,7 @@ def fmu_simulation(
     -------
     callable
         Takes the parameters as start values by name, returns each output, shape (n,). Raises a
-        RuntimeError where a call of the unit fails.
+        RuntimeError where a call of the unit fails, or it stops before the last time.
 
     Raises
     ------
@@ -135,6 +138,8 @@ def fmu_simulation(
             )
         except FMICallException as error:
             raise RuntimeError(str(error)) from error
+        if run["time"][-1] < when.max() - _ENDS * np.ptp(when):
+            raise RuntimeError(f"the unit stopped at {run['time'][-1]:g} of {when.max():g}")
         return {name: np.interp(when, run["time"], run[name]) for name in outputs}
 
     return predict

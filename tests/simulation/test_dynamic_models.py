@@ -5,18 +5,22 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping
-from types import ModuleType
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pytest
+from pythonfmu.builder import FmuBuilder
 
 from mlg_troubleshoot.diagnosis import (
+    Suspect,
+    diagnose_simulation,
     fmu_simulation,
     ode_simulation,
 )
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.misfit.scatter import Readings
+
+Simulation = Callable[[Mapping[str, float]], dict[str, np.ndarray]]
 
 TIMES = np.linspace(0.0, 6.0, 60)
 NOISE = 0.02 * np.random.default_rng(5).standard_normal((2, 60))
@@ -62,46 +66,37 @@ def test_times_that_fall_are_refused() -> None:
         ode_simulation(lambda _t, x, _p: x, [1.0], [0.0, 2.0, 1.0])
 
 
-class RefusedCallError(Exception):
-    """What FMPy raises where a call of a unit fails; it is derived from nothing else."""
+@pytest.fixture(scope="session")
+def unit(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
+    """A mock-up unit of the oscillator, run by FMPy."""
+    folder = tmp_path_factory.mktemp("unit")
+    file = FmuBuilder.build_FMU(Path(__file__).with_name("oscillator_unit.py"), dest=folder)
+    return fmu_simulation(file, TIMES, ["position", "speed"], output_interval=0.02)
 
 
-def given_fmpy(monkeypatch: pytest.MonkeyPatch, simulate_fmu: Callable[..., np.ndarray]) -> None:
-    """Put a unit in the place of FMPy."""
-    unit, calls = ModuleType("fmpy"), ModuleType("fmpy.fmi1")
-    unit.simulate_fmu = simulate_fmu  # type: ignore[attr-defined]
-    calls.FMICallException = RefusedCallError  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "fmpy", unit)
-    monkeypatch.setitem(sys.modules, "fmpy.fmi1", calls)
+def test_a_mock_up_unit_is_given_the_parameters_and_read_at_the_times(unit: Simulation) -> None:
+    here = {"stiffness": 3.0, "damping": 0.2}
+    read, closed = unit(here), oscillator(here)
+    for name in closed:
+        np.testing.assert_allclose(read[name], closed[name], atol=2e-3)
 
 
-def test_a_call_of_a_mock_up_unit_that_fails_is_a_call_without_an_answer(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("wrong", [{"stiffness": -1.0}, {"damping": -0.1}])
+def test_a_mock_up_unit_that_fails_is_a_call_without_an_answer(
+    unit: Simulation, wrong: dict[str, float]
 ) -> None:
-    def simulate_fmu(_file: str, **_given: Any) -> np.ndarray:
-        raise RefusedCallError("fmi2DoStep failed")
-
-    given_fmpy(monkeypatch, simulate_fmu)
-    with pytest.raises(RuntimeError, match="fmi2DoStep failed"):
-        fmu_simulation("tank.fmu", TIMES, ["level"])({"gain": 3.0})
+    with pytest.raises(RuntimeError):
+        unit({"stiffness": 3.0, "damping": 0.2, **wrong})
 
 
-def test_a_mock_up_unit_is_given_the_parameters_and_read_at_the_times(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    asked: dict[str, Any] = {}
-
-    def simulate_fmu(file: str, **given: Any) -> np.ndarray:
-        asked.update(given, file=file)
-        steps = np.linspace(given["start_time"], given["stop_time"], 7)
-        rows = list(zip(steps, given["start_values"]["gain"] * steps, strict=True))
-        return np.array(rows, [("time", float), ("level", float)])
-
-    given_fmpy(monkeypatch, simulate_fmu)
-    predict = fmu_simulation("tank.fmu", [0.0, 0.7, 3.0], ["level"], {"area": 2.0})
-    np.testing.assert_allclose(predict({"gain": 3.0})["level"], [0.0, 2.1, 9.0])
-    assert asked["start_values"] == {"area": 2.0, "gain": 3.0}
-    assert asked["file"] == "tank.fmu"
+def test_a_mock_up_unit_is_diagnosed(unit: Simulation) -> None:
+    exact = oscillator({"stiffness": 4.4, "damping": 0.3})
+    read = {name: exact[name] + NOISE[k] for k, name in enumerate(exact)}
+    suspects = [Suspect("stiffness", 4.0, 0.1, low=0.1), Suspect("damping", 0.3, 0.05, low=0.0)]
+    found = diagnose_simulation(unit, read, suspects)
+    assert [cause.name for cause in found.named] == ["stiffness"]
+    low, high = found.named[0].interval
+    assert low < 4.4 < high
 
 
 def test_without_fmpy_a_mock_up_unit_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
