@@ -170,6 +170,7 @@ class _PlanBuilder:
         self.steps: list[Step] = []
         self.tried: RepairSet | None = None
         self.opened: frozenset[str] = frozenset(self.inspection.open_areas)
+        self.over_limit = self._joints(self.cases.over_limit[row])
         self.over = self._joints(facts.over[row])
         self.read_plunger = bool(np.isfinite(self.cases.mean_in[row]))
         self.looked = self.inspection.rigging_checked not in (None, RiggingCheck.NO)
@@ -205,6 +206,9 @@ class _PlanBuilder:
         beyond = self.judged.plunger.beyond[self.row]
         if self.over:
             return self._try(self.over)
+        if self.over_limit:
+            # The plunger is read after these are restored, whatever it reads before.
+            return self._stop_for_today()
         if self.read_plunger and beyond and not self._again():
             return self._failed()
         if not self.read_plunger or beyond:
@@ -234,9 +238,9 @@ class _PlanBuilder:
 
     def _elsewhere(self) -> Plan:
         """The joints are not the cause; what is over its limit is restored nevertheless."""
-        if self.over:
+        if self.over and self.over == self.over_limit:
             return self._try(self.over)
-        return self._end(End.NOT_EXPLAINED)
+        return self._restore_over_limit()._end(End.NOT_EXPLAINED)
 
     def _to_repair(self, joints: float, rigging: float) -> Plan:
         f = self.facts
@@ -247,14 +251,14 @@ class _PlanBuilder:
         if following:
             minutes = minutes_to_measure(self.gear, unread, self.opened)
         elif best is not None:
-            sound = [n for n in best.joints if n not in self.over]
+            sound = [n for n in best.joints if n not in self.over_limit]
             minutes = minutes_to_restore(self.gear, sound, self.opened) if sound else 0.0
         else:
             minutes = np.inf
         if not self.looked and self.read_plunger:
             check = self.gear.rigging_check.value
             # No sound joint is restored before the rigging was looked at, unless it is excluded.
-            tears = not following and best is not None and set(best.joints) > set(self.over)
+            tears = not following and best is not None and set(best.joints) > set(self.over_limit)
             if rigging > _EXCLUDED and (tears or rigging * minutes > joints * check):
                 self._check_rigging()
                 if rigging > 0.5:
@@ -262,7 +266,9 @@ class _PlanBuilder:
                 joints /= 1.0 - (1.0 - PRIORS.overlooked) * rigging
         if following:
             return self._read_and_restore(following)
-        if best is not None and (joints >= PRIORS.usual or set(best.joints) <= set(self.over)):
+        if best is not None and (
+            joints >= PRIORS.usual or set(best.joints) <= set(self.over_limit)
+        ):
             return self._try(best.joints, best)
         if best is not None:
             return self._elsewhere()
@@ -287,11 +293,14 @@ class _PlanBuilder:
         None without one.
 
         Offered are what is over its limit with the fewest more, and what holds in the worst case.
+        What is over its limit is restored in any case, if not today: until then no reading is worth
+        more than it is with every spare at hand.
         """
         f = self.facts
         i = self.row
-        over = np.flatnonzero(f.over[i])
-        more = np.flatnonzero(f.removable[i] & ~f.over[i])
+        over_limit = self.cases.over_limit[i]
+        over = np.flatnonzero(over_limit)
+        more = np.flatnonzero(f.removable[i] & ~over_limit)
         more = more[np.argsort(-f.causes.reach_in[i, more], kind="stable")][:_MOST_TRIED]
         chosen = [
             (*over, *extra)
@@ -309,7 +318,12 @@ class _PlanBuilder:
         opened = (members[:, None, :] & f.inside[shut]).any(axis=2)
         minutes = members @ f.restore_min + opened @ f.access_min[shut]
         accepted = _FOR_ONE_REPAIR * self.gear.second_repair_chance.value
-        sure = [s for s in self.sets if (s.second_repair_probability or 0.0) <= accepted]
+        sure = [
+            each
+            for each in self.sets
+            if (each.second_repair_probability or 0.0) <= accepted
+            and set(self.over_limit) <= set(each.joints)
+        ]
         enough = np.flatnonzero(second <= accepted)
         if len(enough):
             best = enough[np.lexsort((second[enough], np.round(minutes[enough], 6)))[0]]
@@ -324,7 +338,8 @@ class _PlanBuilder:
             return None
         tried = self._try_set(members[best], float(second[best]))
         quicker = [s for s in sure if s.minutes < tried.minutes]
-        if all(set(s.joints) != set(tried.joints) for s in self.sets):
+        today = self.over == self.over_limit
+        if today and all(set(each.joints) != set(tried.joints) for each in self.sets):
             self.tried = tried
         return quicker[0] if quicker else tried
 
@@ -373,7 +388,7 @@ class _PlanBuilder:
                 most = rate
         if best is None or not chosen:
             return chosen
-        sound = [n for n in best.joints if n not in self.over]
+        sound = [n for n in best.joints if n not in self.over_limit]
         places = [self.numbers.index(n) for n in chosen]
         worn = f.causes.worn[i]
         saved = minutes_to_restore(self.gear, sound, self.opened) if sound else 0.0
@@ -416,7 +431,11 @@ class _PlanBuilder:
     def _try(
         self, joints: Sequence[int], best: RepairSet | None = None, *, expected: bool = False
     ) -> Plan:
-        """Restore, read the plunger, retract the gear: done."""
+        """Restore, read the plunger, retract the gear: done. Where something over its limit must
+        wait for its spare, that comes after it.
+        """
+        if not expected and self.over != self.over_limit:
+            return self._restore_over_limit()._stop_for_today()
         ranked = self._joints(np.array([n in joints for n in self.numbers]))
         self._restore(ranked, best, expected=expected)
         self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
@@ -425,6 +444,12 @@ class _PlanBuilder:
     def _retract(self) -> Plan:
         self._step(Action.RETRACT, self.gear.retraction.value, sentences.RETRACT)
         return self._done()
+
+    def _stop_for_today(self) -> Plan:
+        """What is over its limit cannot be restored today."""
+        left = [n for n in self.over_limit if n not in self.over]
+        self._step(Action.CONTINUE, 0.0, sentences.stop_without_spares(left))
+        return Plan(tuple(self.steps), End.CANNOT_CLEAR)
 
     def _done(self) -> Plan:
         cases = self.cases

@@ -164,6 +164,15 @@ def never_read(unread: Sequence[int], minutes: float) -> str:
     return f"{what}: to know, measure {them} ({minutes:.0f} min)."
 
 
+def stop_without_spares(joints: Sequence[int]) -> str:
+    """Step CONTINUE where joints over their limit cannot be restored today."""
+    are = "is" if len(joints) == 1 else "are"
+    return (
+        f"Stop for today: {joint_list(joints)} {are} to be restored and cannot be. Hand over what"
+        " stays open."
+    )
+
+
 def does_not_fit(step: Step, left: float, before: str | None) -> str:
     """What stays open because the minutes of the day do not reach."""
     said = f"To {step.words} takes {step.minutes:.0f} min; {left:.0f} min are left today."

@@ -102,3 +102,32 @@ def test_done_does_not_say_that_a_joint_without_a_spare_is_within_limits(judge: 
     repaired = {"restored_joints": (5,), "repair_date": datetime(2026, 3, 2, 9)}
     found = judge(every_joint(0.0005, j3=0.009), **repaired, no_spare=(3,))
     assert found.next_action.text.startswith("The other joints are within limits, and")
+
+
+def test_no_joint_is_read_where_the_one_that_explains_it_waits_for_its_spare(judge: Judge) -> None:
+    read = dict.fromkeys(SIDESTAY, 0.0003) | {3: 0.0148}
+    assert judge(read, **FAILED).next_action.action is Action.RESTORE
+    waits = judge(read, **FAILED, no_spare=(3,))
+    assert [step.action for step in waits.plan.steps] == [Action.CONTINUE]
+    assert waits.next_action.text.startswith("Stop for today: #3 is to be restored and cannot be.")
+    assert "#3 is over the limit and cannot be restored today" in (waits.plan.open_question or "")
+
+
+def test_joints_are_read_where_the_one_without_a_spare_does_not_explain_it(judge: Judge) -> None:
+    read = {8: 0.0085} | dict.fromkeys((6, 7, 9, 10), 0.001)
+    waits = judge(read, **FAILED, no_spare=(8,))
+    assert waits.next_action.action is Action.MEASURE
+    assert waits.next_action.joints == judge(read, **FAILED).next_action.joints
+
+
+def test_what_has_a_spare_is_restored_today(judge: Judge) -> None:
+    found = judge(every_joint(0.0005, j3=0.0145, j9=0.009), **FAILED, no_spare=(9,))
+    steps = [(step.action, step.joints) for step in found.plan.steps]
+    assert steps == [(Action.RESTORE, (3,)), (Action.CONTINUE, ())]
+
+
+def test_no_plunger_is_read_while_a_joint_over_its_limit_waits_for_its_spare(judge: Judge) -> None:
+    repaired = {"restored_joints": (5,), "repair_date": datetime(2026, 3, 2, 9)}
+    gear = every_joint(0.0005, j3=0.009)
+    found = judge(gear, outcome=Outcome.FAILED, **repaired, no_spare=(3,))
+    assert found.next_action.text.startswith("Stop for today: #3")
