@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import mannwhitneyu, poisson, spearmanr
+from scipy.stats import mannwhitneyu, norm, poisson, spearmanr
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import visits
+from mlg_troubleshoot.diagnosis.wear import gears_of, visits
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
@@ -31,6 +31,9 @@ _EXCEPTIONS = 0.05
 _LEAST_VALUES, _LEAST_ROWS, _LEAST_JOINTS, _ON_STEP = 20, 5, 5, 0.02
 # Share of clearances that are known to be cut off, from which their effects are. [1]
 _MANY_CUT = 0.1
+# Values before the last one that lead to it, and the chance that it is more frequent by so much;
+# it is twenty times there at all in few sound tables. [1]
+_LED_BY, _PILED_BY_CHANCE = 3, 0.01
 # Chance of a false statement about the data of a table. [1]
 BY_CHANCE = 0.001
 
@@ -269,7 +272,7 @@ def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
 
 
 def _piled(table: DiagnosisTable) -> Iterator[DataCondition]:
-    """The least or the largest value stands for what lies beyond it: none is as frequent."""
+    """The least or the largest value stands for what lies beyond it."""
     if table.below is not None:
         yield DataCondition(
             "censored",
@@ -285,12 +288,9 @@ def _piled(table: DiagnosisTable) -> Iterator[DataCondition]:
     found, counts = np.unique(np.round(values[np.isfinite(values)], 7), return_counts=True)
     if len(found) < _LEAST_JOINTS:
         return
-    ends = (
-        (0, "<", "less", found[0] >= 2.0 * float(np.median(table.gauge_u_in)), counts.max()),
-        (-1, ">", "more", True, counts[-2] / 2),
-    )
-    for end, sign, side, large, least in ends:
-        if large and counts[end] >= max(least, _LEAST_VALUES):
+    small = found[0] < 2.0 * float(np.median(table.gauge_u_in))
+    for end, sign, side, way in ((0, "<", "less", -1), (-1, ">", "more", 1)):
+        if not (end == 0 and small) and _more_than_led_to(counts[::way].astype(float)):
             yield DataCondition(
                 "censored",
                 f"clearances of {found[end]:.4g} in",
@@ -299,6 +299,26 @@ def _piled(table: DiagnosisTable) -> Iterator[DataCondition]:
                 f"{sign}{found[end]:.4g} where no value was read",
                 share > _MANY_CUT,
             )
+
+
+def _more_than_led_to(counts: Array) -> bool:
+    """Tell whether the last of successive values is more frequent than those before it lead to.
+
+    The logarithm of the counts of a unimodal distribution bends downwards, so the line through the
+    three before lies above the last one. Where people prefer some values (heaping), others lie
+    above their line as far, and nothing is said.
+    """
+    if counts[-1] < _LEAST_VALUES:
+        return False
+    surely = np.zeros(len(counts))
+    for place in range(_LED_BY, len(counts)):
+        before = counts[place - _LED_BY : place]
+        line, covariance = np.polyfit(
+            np.arange(-_LED_BY, 0), np.log(before), 1, w=np.sqrt(before), cov="unscaled"
+        )
+        error = np.sqrt(1.0 / counts[place] + covariance[1, 1])
+        surely[place] = np.log(counts[place]) - line[1] - norm.isf(_PILED_BY_CHANCE) * error
+    return bool(surely[-1] > max(0.0, float(surely[:-1].max())))
 
 
 def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
@@ -369,23 +389,29 @@ def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
 
 
 def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
-    """Landings of a gear that fall over time."""
+    """Landings of a gear that fall over time where its wear does not begin anew."""
     landings = table.quantities.get("gear_landings")
     if landings is None or "day" not in table.quantities:
         return
-    order = visits(table)
-    fell = [
-        name
-        for name, rows in order.items()
-        if np.any(np.diff(landings[rows][np.isfinite(landings[rows])]) < 0.0)
-    ]
+    order, numbers = visits(table), gears_of(table)
+    fell: list[str] = []
+    pooled = overhauls = 0
+    for name, rows in order.items():
+        known = rows[np.isfinite(landings[rows])]
+        falls = np.diff(landings[known]) < 0.0
+        anew = falls & (np.diff(numbers[known]) != 0)
+        overhauls += int(anew.sum())
+        pooled += (count := int(falls.sum() - anew.sum()))
+        fell += [name] * (count > 0)
     if fell:
         more = f" and {len(fell) - 8} more" if len(fell) > 8 else ""
+        times = f"{pooled} time{'s' if pooled > 1 else ''}"
+        beside = f", and at {overhauls} overhaul{'s' if overhauls > 1 else ''}" * (overhauls > 0)
         yield DataCondition(
             "landings_fall",
-            f"gears {', '.join(fell[:8])}{more}",
+            f"gears {', '.join(fell[:8])}{more}: {times}{beside}",
             len(fell) / len(order),
-            "new bushings, or a slip (mlg check names the cells): where they stay lower the wear"
-            " of the gear begins anew",
+            "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"
+            " before and after is taken as one",
             "landings since overhaul, and the date of the overhaul",
         )

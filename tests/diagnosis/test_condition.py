@@ -62,13 +62,13 @@ def test_of_clean_data_nothing_is_said(gear: Gear) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_of_a_simulated_sound_fleet_nothing_is_said_but_of_overhauls(
+def test_of_a_simulated_sound_fleet_with_overhauls_nothing_is_said(
     seed: int, tmp_path: Path
 ) -> None:
     rows, _truth = blemished_fleet("sound", "mild", 61_000 + seed, rows=100)
     write_rows(rows, tmp_path / "sound.csv")
     said = mlg("diagnose", tmp_path / "sound.csv", "--convention", "RADIAL", "--json").json
-    assert {found["kind"] for found in said["data_condition"]} <= {"landings_fall"}
+    assert said["data_condition"] == []
 
 
 def changed(gear: Gear, change: Change) -> DiagnosisTable:
@@ -91,6 +91,12 @@ def no_smaller_than_two_thousandths(
     clearance: NDArray[np.float64], _readings: NDArray[np.float64]
 ) -> None:
     clearance[:] = np.maximum(clearance, 0.002)
+
+
+def no_larger_than_three_thousandths(
+    clearance: NDArray[np.float64], _readings: NDArray[np.float64]
+) -> None:
+    clearance[:] = np.minimum(np.round(clearance / 0.0005) * 0.0005, 0.003)
 
 
 def only_worn(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
@@ -127,6 +133,7 @@ def plunger_of_worn_gears(clearance: NDArray[np.float64], readings: NDArray[np.f
         (to_a_thousandth, "rounded"),
         (plunger_to_five_thousandths, "rounded"),
         (no_smaller_than_two_thousandths, "censored"),
+        (no_larger_than_three_thousandths, "censored"),
         (only_worn, "blank_not_at_random"),
         (until_the_first_worn, "blank_not_at_random"),
         (copied, "copied"),
@@ -144,6 +151,16 @@ def test_blanks_at_random_are_not_remarked_on(gear: Gear) -> None:
         clearance[np.random.default_rng(3).random(clearance.shape) < 0.3] = np.nan
 
     assert kinds(changed(gear, blanks), gear) == set()
+
+
+@pytest.mark.parametrize("largest_in", [0.003, 0.004, 0.005])
+def test_a_value_to_which_many_are_rounded_is_not_an_end(gear: Gear, largest_in: float) -> None:
+    def rounded(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
+        # Half to even of values to 0.0005 in: every other value has three of them, or one.
+        clearance[:] = np.round(np.round(clearance / 0.0005) / 2.0) * 0.001
+        clearance[clearance > largest_in] = np.nan
+
+    assert kinds(changed(gear, rounded), gear) == {"rounded"}
 
 
 def test_rows_that_stand_twice_count_once(gear: Gear) -> None:
@@ -181,13 +198,36 @@ def test_rounding_is_in_doubt_where_its_step_exceeds_the_spread_of_the_values(
     assert ("clearances, to 0.005 in" in doubt_of(found)) == doubtful
 
 
-def test_landings_that_fall_are_said_with_their_gear(gear: Gear) -> None:
-    landings = histories(gear).quantities["gear_landings"].copy()
-    landings[4:6] -= 1200.0
+def with_landings(gear: Gear, change: Callable[[NDArray[np.float64]], None]) -> DiagnosisTable:
     table = histories(gear)
-    fallen = replace(table, quantities={**table.quantities, "gear_landings": landings})
-    (found,) = data_condition(fallen, gear)[0]
-    assert (found.kind, found.where) == ("landings_fall", "gears N100")
+    landings = table.quantities["gear_landings"].copy()
+    change(landings)
+    return replace(table, quantities={**table.quantities, "gear_landings": landings})
+
+
+def test_landings_that_fall_are_said_with_their_gear(gear: Gear) -> None:
+    def one_is_mistyped(landings: NDArray[np.float64]) -> None:
+        landings[3] = 12.0
+
+    (found,) = data_condition(with_landings(gear, one_is_mistyped), gear)[0]
+    assert (found.kind, found.where) == ("landings_fall", "gears N100: 1 time")
+
+
+def test_an_overhaul_is_not_a_condition_of_the_data(gear: Gear) -> None:
+    def overhauled(landings: NDArray[np.float64]) -> None:
+        landings[4:6] -= 1200.0
+
+    assert kinds(with_landings(gear, overhauled), gear) == set()
+
+
+def test_overhauls_are_counted_apart_from_landings_that_fall_otherwise(gear: Gear) -> None:
+    def both(landings: NDArray[np.float64]) -> None:
+        landings[4:6] -= 1200.0
+        landings[9] = 12.0
+
+    (found,) = data_condition(with_landings(gear, both), gear)[0]
+    assert found.where == "gears N101: 1 time, and at 1 overhaul"
+    assert found.share == pytest.approx(1 / 20)
 
 
 def test_the_wear_of_a_gear_begins_anew_at_an_overhaul(gear: Gear) -> None:
