@@ -389,13 +389,13 @@ def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
 
 
 def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
-    """Landings of a gear that fall over time where its wear does not begin anew."""
+    """Landings of a gear that fall over time: at overhauls, where its wear begins anew, or not."""
     landings = table.quantities.get("gear_landings")
     if landings is None or "day" not in table.quantities:
         return
     order, numbers = visits(table), gears_of(table)
     fell: list[str] = []
-    pooled = overhauls = 0
+    pooled = overhauls = gears = 0
     for name, rows in order.items():
         known = rows[np.isfinite(landings[rows])]
         falls = np.diff(landings[known]) < 0.0
@@ -403,15 +403,21 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
         overhauls += int(anew.sum())
         pooled += (count := int(falls.sum() - anew.sum()))
         fell += [name] * (count > 0)
-    if fell:
-        more = f" and {len(fell) - 8} more" if len(fell) > 8 else ""
-        times = f"{pooled} time{'s' if pooled > 1 else ''}"
-        beside = f", and at {overhauls} overhaul{'s' if overhauls > 1 else ''}" * (overhauls > 0)
-        yield DataCondition(
-            "landings_fall",
-            f"gears {', '.join(fell[:8])}{more}: {times}{beside}",
-            len(fell) / len(order),
-            "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"
-            " before and after is taken as one",
-            "landings since overhaul, and the date of the overhaul",
-        )
+        gears += int(falls.any())
+    if not gears:
+        return
+    more = f" and {len(fell) - 8} more" if len(fell) > 8 else ""
+    times = f"{pooled} time{'s' if pooled > 1 else ''}"
+    named = f"gears {', '.join(fell[:8])}{more}: {times}" if fell else ""
+    at = f"at {overhauls} overhaul{'s' if overhauls > 1 else ''}" if overhauls else ""
+    slip = (
+        "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"
+        " before and after is taken as one"
+    )
+    yield DataCondition(
+        "landings_fall",
+        ", and ".join(text for text in (named, at) if text),
+        gears / len(order),
+        slip if fell else "the wear of a gear begins anew there",
+        "landings since overhaul, and the date of the overhaul",
+    )
