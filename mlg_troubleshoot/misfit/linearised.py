@@ -29,11 +29,14 @@ _DIGITS = 1e-9
 # Residual over such a number's digits below which it is rounding, and says nothing.
 _ROUNDED = 0.01
 # Computing only: suspects that act together at most, and rounds until the same is likeliest again.
-_MOST, _ROUNDS = 12, 8
+_MOST = 12
+_ROUNDS = 8
 # Computing only: where a nominal value may be far off, in trials, and how many of these are tried.
-_FAR_TRIALS, _STARTS = (-30.0, -10.0, -3.0, 3.0, 10.0, 30.0), 3
+_FAR_TRIALS = (-30.0, -10.0, -3.0, 3.0, 10.0, 30.0)
+_STARTS = 3
 # Correlation of rows that follow each other at most, and how near the likeliest one is sought.
-_CORRELATED, _NEAR = 0.99, 0.02
+_CORRELATED = 0.99
+_NEAR = 0.02
 _SUSPECT = "suspect"
 
 
@@ -110,7 +113,9 @@ class Study:
         beliefs: Beliefs,
         series: tuple[Wholes, Array] | None = None,
     ) -> None:
-        self.runner, self.count, self.group = runner, count, group
+        self.runner = runner
+        self.count = count
+        self.group = group
         self.beliefs = beliefs
         self.nuisance = list(range(count, len(runner.names)))
         self.outputs = [np.flatnonzero(runner.output == k) for k in np.unique(runner.output)]
@@ -125,7 +130,8 @@ class Study:
         for k in self.nuisance:
             runner.refuse_silent([k])
         largest = float(max(np.max(np.abs(runner.reading)), np.max(np.abs(columns))))
-        floor, self.rounding = _DIGITS * largest, _ROUNDED * _DIGITS * largest
+        floor = _DIGITS * largest
+        self.rounding = _ROUNDED * _DIGITS * largest
         least = max(floor, 1e-300)
         self.readings = Readings(runner.row, self.outputs, group, own, least, series, base)
         scale = np.ones(len(base)) if own is None else own.copy()
@@ -147,7 +153,8 @@ class Study:
     def _contexts(self, predicted: Array, sensitivities: Array) -> list[Context]:
         """Nothing, or a smooth discrepancy of some size, each output by itself."""
         shapes = smooth_shapes(predicted, sensitivities, self.group)
-        beliefs, row = self.beliefs, self.runner.row
+        beliefs = self.beliefs
+        row = self.runner.row
         sizes = [beliefs.shape_size * size for size in beliefs.sizes]
         contexts = [Context.none(len(row))]
         for shape in shapes:
@@ -156,13 +163,15 @@ class Study:
             for place, index in enumerate(self.outputs):
                 placed[index, place * width : (place + 1) * width] = shape.factor[row[index]]
             share = beliefs.expected * beliefs.unlisted / (len(shapes) * len(sizes))
-            name, log = (UNLISTED, shape.moves_with), float(np.log(share))
+            name = (UNLISTED, shape.moves_with)
+            log = float(np.log(share))
             contexts += [Context(name, log, size * placed, listed=False) for size in sizes]
         return contexts
 
     def at(self, found: Fitted) -> FittedPoint:
         """Linearise the simulation where a fit ended; what does nothing there as at nominal."""
-        run, values = self.runner, found.values
+        run = self.runner
+        values = found.values
         columns = run.sensitivities(values, found.base, range(len(values)))
         columns = np.where(np.any(columns != 0.0, axis=0), columns, self.nominal.columns)
         change = (values - run.nominal)[: self.count] / run.trial[: self.count]
@@ -233,7 +242,8 @@ class Study:
 
     def effects(self, point: FittedPoint, noise: NoiseModel, unit: Array) -> Effects:
         """One effect of each class of suspects, and entry errors of readings far out."""
-        run, beliefs = self.runner, self.beliefs
+        run = self.runner
+        beliefs = self.beliefs
         first = [members[0] for members in self.design.classes]
         columns = point.columns[:, first] / unit[:, None]
         acting = np.sqrt(np.sum(columns**2, axis=0) / np.sum(columns != 0.0, axis=0))
@@ -299,7 +309,8 @@ class Study:
         ]
         run.ask(values for _k, values in tried)
         rests = np.column_stack([start.rest, *(run.reading - run.at(v) for _k, v in tried)])
-        rests, free = rests / at.unit[:, None], at.columns[:, self.nuisance]
+        rests = rests / at.unit[:, None]
+        free = at.columns[:, self.nuisance]
         rests[:, ~np.isfinite(rests).all(axis=0)] = np.inf
         usable = np.isfinite(rests[0])
         rests[:, usable] -= free @ least_squares(free, rests[:, usable])
@@ -313,14 +324,16 @@ class Study:
 
     def _searched(self, start: FittedPoint) -> JudgedPoint:
         """Search, fit what is likeliest and linearise there, until the same is likeliest again."""
-        point, tried = start, set[tuple[int, ...]]()
+        point = start
+        tried = set[tuple[int, ...]]()
         free = start.columns[:, self.nuisance]
         scale = self.readings.first_scale(start.columns, free, start.rest)
         beliefs = replace(self.beliefs, sizes=_SIZES)
         while True:
             at = self._likeliest(point, scale, beliefs)
             found = at.follows.posterior
-            chosen, context = self.chosen(found.names_of(at.likeliest)), at.likeliest.context
+            chosen = self.chosen(found.names_of(at.likeliest))
+            context = at.likeliest.context
             state = (context, *sorted(chosen))
             if state in tried or len(tried) == _ROUNDS:
                 return at
@@ -339,7 +352,8 @@ class Study:
         def judged(correlation: float) -> JudgedPoint:
             free = point.columns[:, self.nuisance]
             noise, unit = self.readings.noise(scale, free, correlation)
-            effects, data = self.effects(point, noise, unit), point.whole / unit
+            effects = self.effects(point, noise, unit)
+            data = point.whole / unit
             found = posterior(noise, data, effects, self.contexts, beliefs, (), _MOST)
             return JudgedPoint(point, noise, unit, Conclusion(found, beliefs), self.contexts)
 

@@ -19,7 +19,8 @@ from mlg_troubleshoot.misfit.runner import least_squares
 
 # Scatter between groups over that of a reading: median and spread of its logarithm beforehand, and
 # what is tried.
-_GROUP_RATIO, _GROUP_SPREAD = 0.15, 1.0
+_GROUP_RATIO = 0.15
+_GROUP_SPREAD = 1.0
 _GROUP_RATIOS = tuple((_GROUP_RATIO * 3.0 ** np.arange(-1, 5)).tolist())
 # Share of the variance of a reading that grows with the square of the prediction: what is tried.
 _GROWING = (0.5, 0.9, 0.99)
@@ -56,7 +57,8 @@ class Readings:
         self, scale: Array, free: Array, correlation: float = 0.0
     ) -> tuple[NoiseModel, Array]:
         """Noise in the unit of each output's scatter, free columns absorbed, and these units."""
-        unit, tails = np.empty(len(scale)), np.zeros(len(scale), np.int64)
+        unit = np.empty(len(scale))
+        tails = np.zeros(len(scale), np.int64)
         chain = None if self.series is None else self.series[0][self.row] * len(self.outputs)
         for place, index in enumerate(self.outputs):
             unit[index] = np.median(scale[index])
@@ -64,7 +66,8 @@ class Readings:
                 chain[index] += place
             if self.group is not None:
                 tails[index] = self.group[self.row[index]] * len(self.outputs) + place
-        relative, grouped = scale / unit, self.group is not None
+        relative = scale / unit
+        grouped = self.group is not None
         away = np.log(np.array(_GROUP_RATIOS) / _GROUP_RATIO) / _GROUP_SPREAD
         chances = np.exp(-0.5 * away**2) / np.sum(np.exp(-0.5 * away**2))
         basis = basis_of(free / scale[:, None])
