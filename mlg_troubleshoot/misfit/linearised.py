@@ -102,7 +102,11 @@ class JudgedPoint:
 
 
 class Study:
-    """What does not change while suspects are judged: suspects come first, then nuisance."""
+    """What does not change while suspects are judged: suspects come first, then nuisance.
+
+    drawn: by how much a second call with the same values differs, over the smallest effect of a
+    trial. [1]
+    """
 
     def __init__(
         self,
@@ -127,6 +131,8 @@ class Study:
         base = predicted[runner.row, runner.output]
         columns = runner.sensitivities(runner.nominal, base, range(len(runner.names)))
         runner.refuse_silent(range(count))
+        acts = np.sqrt(np.mean(columns[:, np.any(columns != 0.0, axis=0)] ** 2, axis=0))
+        self.drawn = runner.drawn() / max(float(np.min(acts, initial=np.inf)), 1e-300)
         for k in self.nuisance:
             runner.refuse_silent([k])
         largest = float(max(np.max(np.abs(runner.reading)), np.max(np.abs(columns))))

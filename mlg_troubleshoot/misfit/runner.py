@@ -157,6 +157,12 @@ class Runner:
             )
         return predicted
 
+    def drawn(self) -> float:
+        """Root mean square by which a second call at the nominal values differs from the first."""
+        first = self.at(self.nominal)
+        del self._asked[self.nominal.tobytes()]
+        return float(np.sqrt(np.mean((self.at(self.nominal) - first) ** 2)))
+
     def sensitivities(self, values: Array, base: Array, which: Sequence[int]) -> Array:
         """Change of the readings for a change of some parameters by their trials, shape (N,
         len(which)).

@@ -29,6 +29,8 @@ from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 # Share of the squared misfit that a cause takes away beside a discrepancy: most of it.
 _MOST_OF_IT = 0.5
+# Difference of two equal calls, over the smallest effect, from which derivatives are off.
+_DRAWN = 0.01
 # Standard errors by which a row resembles the one before it, that chance exceeds once in 1,000.
 _ALIKE = 3.1
 
@@ -372,6 +374,12 @@ class _Report:
         """What to know before the numbers are used, as sentences."""
         run = self.study.runner
         notes = list[str]()
+        if self.study.drawn > _DRAWN:
+            notes.append(
+                "Two calls with the same values gave different numbers, by"
+                f" {self.study.drawn:.1%} of the smallest effect of a trial: let the simulation"
+                " draw the same random numbers in each call (one seed)."
+            )
         if in_sequence and self.study.series is None:
             notes.append(
                 "Residuals of neighbouring rows are correlated: probabilities and intervals are too"

@@ -239,3 +239,17 @@ def test_among_rivals_the_parameters_predict_better_than_the_nominal_values() ->
         np.abs(two(beyond)(p) - two(beyond)(true)).max() for p in (found.parameters, sound)
     )
     assert off < 0.2 * nominally_off
+
+
+@pytest.mark.parametrize(("one_seed", "said"), [(False, True), (True, False)])
+def test_a_simulation_that_draws_other_numbers_in_each_call_is_told(
+    one_seed: bool, said: bool
+) -> None:
+    any_draw = np.random.default_rng(5)
+
+    def drawing(p: Mapping[str, float]) -> np.ndarray:
+        rng = np.random.default_rng(5) if one_seed else any_draw
+        return swing(p) + 1e-3 * rng.standard_normal(len(T))
+
+    found = diagnose_simulation(drawing, noisy({}), SWING, ZERO)
+    assert any("same random numbers" in note for note in found.notes) == said
