@@ -14,6 +14,7 @@ from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.held_out import blocks_of, folds_of
 from mlg_troubleshoot.misfit.linearised import FittedPoint, JudgedPoint, Study, key_of
@@ -122,6 +123,8 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
 
     if callable(workers):
         return diagnosed(workers)
+    if workers < 1:
+        raise UsageError(f"workers is {workers}", "give at least one thread")
     if workers == 1:
         return diagnosed(map)
     with ThreadPoolExecutor(workers) as pool:

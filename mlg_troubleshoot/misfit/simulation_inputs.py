@@ -44,13 +44,13 @@ def checked(
         )
     if np.isinf(data).any():
         raise UsageError(
-            f"measured holds {int(np.isinf(data).sum())} infinite readings", "set them to NaN"
+            f"infinite readings in measured: {int(np.isinf(data).sum())}", "set them to NaN"
         )
     _suspects(suspects, nuisance)
     readings = int(np.isfinite(data).sum())
     if readings < len(nuisance) + 3:
         raise UsageError(
-            f"{readings} readings are too few for {len(nuisance)} nuisance parameters",
+            f"too few readings: {readings}, with nuisance parameters: {len(nuisance)}",
             f"measure {len(nuisance) + 3 - readings} more at least",
         )
     return data, channels, _declared(reading_u, data), _groups(groups, len(data))

@@ -253,3 +253,8 @@ def test_a_simulation_that_draws_other_numbers_in_each_call_is_told(
 
     found = diagnose_simulation(drawing, noisy({}), SWING, ZERO)
     assert any("same random numbers" in note for note in found.notes) == said
+
+
+def test_no_thread_at_all_is_refused() -> None:
+    with pytest.raises(UsageError, match="workers is 0"):
+        diagnose_simulation(swing, noisy({}), SWING, ZERO, workers=0)
