@@ -151,7 +151,14 @@ class SuspectCell(TypedDict):
     row: JointNumber
     record_id: str
     column: str
-    kind: Literal["mm_as_in", "factor_10", "swapped_joints", "swapped_side", "implausible"]
+    kind: Literal[
+        "mm_as_in",
+        "factor_10",
+        "swapped_joints",
+        "swapped_side",
+        "implausible",
+        "restored_joint",
+    ]
     value: str
     suggested: str | None
 

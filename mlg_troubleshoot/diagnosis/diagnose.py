@@ -23,7 +23,12 @@ from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
 from mlg_troubleshoot.diagnosis.condition import BY_CHANCE, DataCondition
 from mlg_troubleshoot.diagnosis.explain import Finding, MisfitProblem, explain, p_value_of
 from mlg_troubleshoot.diagnosis.extension import Term
-from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
+from mlg_troubleshoot.diagnosis.faults import (
+    LEAST_ALONG,
+    DataFault,
+    restored_joints,
+    screen_faults,
+)
 from mlg_troubleshoot.diagnosis.gain import LEAST_TAILS, Gain, measure_gain
 from mlg_troubleshoot.diagnosis.noise import (
     Rows,
@@ -314,6 +319,15 @@ def diagnose(
             if more:
                 faults = (*faults, *more)
                 case = _explained(*again, told_by, ensemble, beliefs)
+        if not table.doubt:
+            # Rows that are taken for a cause hide others: look again.
+            for _ in range(2):
+                repaired, more = restored_joints(case.scene, case.accounts, beliefs)
+                if not more:
+                    break
+                faults = (*faults, *more)
+                again = build_scene(model, repaired, where)
+                case = _explained(*again, told_by, ensemble, beliefs)
         report_progress(1.0)
         return _report(model, case.scene.table, read, faults, not_testable, case)
 
@@ -345,6 +359,20 @@ class _Case:
     def explained(self) -> Array:
         """What is likely to act does to each row. [in]"""
         return np.asarray(self.columns @ self.values)
+
+    @property
+    def accounts(self) -> list[tuple[Array, float]]:
+        """What is left of the misfit with nothing taken out, and with what is likely to act; the
+        logarithmic prior of each, every value that is fitted counted (Schwarz's criterion).
+        """
+        whole = (self.problem.misfit, 0.0)
+        if not self.acts:
+            return [whole]
+        found = self.finding.posterior
+        prior = found.effects.log_prior[list(self.chosen)].sum()
+        prior += found.contexts[self.finding.best.context].log_prior
+        fitted = self.columns.shape[1] * np.log(len(self.problem.misfit))
+        return [whole, (self.problem.misfit - self.explained, float(prior - 0.5 * fitted))]
 
     def effect(self, place: int) -> Array:
         """What one of the chosen does to each row. [in]"""

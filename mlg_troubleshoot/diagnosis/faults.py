@@ -1,4 +1,5 @@
-"""Data faults: a cell in the wrong unit, a slipped decimal point, two joints or two sides swapped.
+"""Data faults: a cell in the wrong unit, a slipped decimal point, two joints or two sides swapped;
+clearances of before a repair beside a displacement of after it.
 
 Each row has one posterior over what was meant: as written, or one entry error. It weighs how often
 entry errors are with how well the clearances lie on the wear of their gear, how well the readings
@@ -9,7 +10,7 @@ fleet: rows that stand out together are an effect and stay.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from scipy.special import gammaln, logsumexp
 
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.along import predicted
+from mlg_troubleshoot.diagnosis.causes.base import Scene
 from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
@@ -50,6 +52,12 @@ _FACTORS = tuple(
 )
 _TOO_LARGE = tuple((kind, factor) for kind, factor in _FACTORS if factor < 1)
 _KINDS = 4
+# A new joint is as tight as this share of its readings; shares of rows in which the worst joint was
+# restored between its reading and that of the plunger, each as likely (of a scale: evenly in its
+# logarithm); rounds to fit level and scatter. [1]
+_NEW = 0.05
+_RESTORED = np.geomspace(0.01, 0.5, 12)
+_MIXTURE_ROUNDS = 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +68,7 @@ class DataFault:
     row: row of the source, counted from 1.
     record_id: identity of the row.
     column: column.
-    kind: mm_as_in, factor_10, swapped_joints, swapped_side or implausible.
+    kind: mm_as_in, factor_10, swapped_joints, swapped_side, implausible or restored_joint.
     value: what was written.
     suggested: what was most likely meant; used in the analysis only.
     """
@@ -368,6 +376,72 @@ def screen_faults(
         side[[row for row, _own, _other in swapped]] = [other for _row, _own, other in swapped]
         repaired = replace(repaired, factors={**repaired.factors, "side": side})
     return repaired, tuple(faults), usable
+
+
+def restored_joints(
+    scene: Scene, accounts: Sequence[tuple[Array, float]], beliefs: Beliefs
+) -> tuple[DiagnosisTable, tuple[DataFault, ...]]:
+    """Find rows whose worst joint was restored after its clearance was read and before the plunger
+    was, and give it the clearance of a new one in the analysis.
+
+    In each account of the misfit the rows are as written, or a mixture: of a share of them the
+    largest clearance acts as a new one. What a skewed scatter may do as well, the same the other
+    way round, is as likely beforehand. Where rows are found, every row counts by its probability.
+
+    accounts: what an account leaves of the misfit, shape (n,) [in], and its logarithmic prior.
+    """
+    table, written = scene.table, scene.table.clearance_in
+    known, rows = np.isfinite(written), np.arange(len(table))
+    joints = known.any(axis=0)
+    worst = np.where(known, written, -1.0).argmax(axis=1)
+    new = np.zeros(written.shape[1])
+    new[joints] = np.nanquantile(written[:, joints], _NEW, axis=0)
+    changed = scene.clearance_in.copy()
+    changed[rows, worst] = np.minimum(new[worst], changed[rows, worst])
+    effect = predicted(scene.model, table, changed)[0] - scene.over_in
+    effect = np.where(known.any(axis=1) & ~table.along, effect, 0.0)
+    habit = np.log(beliefs.expected * beliefs.unlisted / len(_RESTORED))
+    likely, chances = [], []
+    for left, prior in accounts:
+        for side, share in ((1.0, 0.0), *((side, s) for side in (1.0, -1.0) for s in _RESTORED)):
+            evidence, chance = _mixture(left, side * effect, share)
+            likely.append(evidence + prior + (habit if share else 0.0))
+            chances.append(chance if side > 0.0 else np.zeros(len(table)))
+    chance = np.exp(np.array(likely) - logsumexp(likely)) @ np.array(chances)
+    found = np.flatnonzero(chance >= beliefs.sure)
+    clearance = written.copy()
+    if len(found):
+        clearance[rows, worst] += chance * (changed - written)[rows, worst]
+    return replace(table, clearance_in=clearance), tuple(
+        DataFault.at(
+            table,
+            int(row),
+            f"clearance_{scene.joints[worst[row]]}_in",
+            "restored_joint",
+            f"{written[row, worst[row]]:g}",
+            f"{clearance[row, worst[row]]:.4g}",
+        )
+        for row in found
+    )
+
+
+def _mixture(left: Array, effect: Array, share: float) -> tuple[float, Array]:
+    """Log-likelihood of residuals of which a share has an effect, and how likely each row has it;
+    level and scatter by expectation and maximisation.
+    """
+    off = np.column_stack([left, left - effect])
+    level, scatter = float(np.median(left)), _scale(left)
+    prior = np.log([1.0 - share, share]) if share else np.array([0.0, -np.inf])
+    for _ in range(_MIXTURE_ROUNDS):
+        each = prior + _density(off - level, scatter)
+        total = logsumexp(each, axis=1)
+        chance = np.exp(each - total[:, None])
+        # Rows far out in the tails of Student's t count less.
+        far = chance * (_FREEDOM + 1.0) / (_FREEDOM + ((off - level) / scatter) ** 2)
+        level = float(np.sum(far * off) / far.sum())
+        scatter = float(np.sqrt(np.sum(far * (off - level) ** 2) / len(left)))
+        scatter = max(scatter, _LEAST_SPREAD_IN)
+    return float(total.sum()), chance[:, 1]
 
 
 def _suspects(

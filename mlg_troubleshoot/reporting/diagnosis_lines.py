@@ -19,6 +19,7 @@ _KINDS = {
     "swapped_joints": "two joints swapped",
     "swapped_side": "left and right swapped",
     "implausible": "implausible",
+    "restored_joint": "joint restored between its reading and the plunger's",
     "other_convention": "the other convention",
 }
 _CONDITIONS = {

@@ -9,9 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis import DiagnosisTable, diagnose
 from mlg_troubleshoot.diagnosis.faults import screen_faults
+from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 
 from .conftest import fleet
@@ -275,3 +277,70 @@ def test_a_worn_joint_that_moves_the_plunger_is_no_slip(gear: Gear) -> None:
     values = fleet(gear.model).clearance_in.copy()
     values[29, 6] = 0.024
     assert faults(gear, fleet(gear.model, noise_in=0.003, clearance_in=values)) == []
+
+
+def restored_between_the_readings(
+    gear: Gear, noise_in: float = 0.0015
+) -> tuple[DiagnosisTable, set[int], NDArray[np.float64]]:
+    """A fleet of whose rows every eighth has its worst joint replaced after its reading; these
+    rows, and what the plunger moves by. [in]
+    """
+    rows = np.arange(3, 120, 8)
+    written = fleet(gear.model).clearance_in
+    written[rows, 3] = 0.009
+    true = written.copy()
+    true[rows, 3] = 0.001
+    moved = worst_case(gear.model, true).over_in - worst_case(gear.model, written).over_in
+    table = fleet(gear.model, lambda *_: moved, clearance_in=written, noise_in=noise_in)
+    return table, set(rows.tolist()), moved
+
+
+def restored(gear: Gear, table: DiagnosisTable) -> set[int]:
+    found = diagnose(gear.model, table, gear.discrepancies).faults
+    return {fault.row - 2 for fault in found if fault.kind == "restored_joint"}
+
+
+def test_rows_whose_worst_joint_was_restored_between_the_readings_are_named(gear: Gear) -> None:
+    table, rows, _moved = restored_between_the_readings(gear)
+    found = diagnose(gear.model, table, gear.discrepancies)
+    assert {fault.row - 2 for fault in found.faults} == rows
+    assert {(f.column, f.kind) for f in found.faults} == {("clearance_4_in", "restored_joint")}
+    assert all(float(fault.suggested or "nan") < 0.002 for fault in found.faults)
+
+
+def test_the_fleet_of_such_rows_is_not_named(gear: Gear) -> None:
+    table, _rows, _moved = restored_between_the_readings(gear)
+    assert diagnose(gear.model, table, gear.discrepancies).verdict == "NONE"
+
+
+def test_such_rows_are_found_beside_a_cause(gear: Gear) -> None:
+    table, rows, _moved = restored_between_the_readings(gear)
+    shifted = 0.004 * (table.factors["gauge_id"] == "G-1")
+    table = replace(table, readings_in=table.readings_in + shifted[:, None])
+    found = diagnose(gear.model, table, gear.discrepancies)
+    assert [cause.candidate.key for cause in found.causes] == [("gauge_bias", "gauge G-1")]
+    assert {fault.row - 2 for fault in found.faults} == rows
+
+
+def test_a_row_that_may_be_restored_counts_by_its_probability(gear: Gear) -> None:
+    table, rows, _moved = restored_between_the_readings(gear, noise_in=0.006)
+    found = diagnose(gear.model, table, gear.discrepancies)
+    undecided = sorted(rows - {fault.row - 2 for fault in found.faults})
+    assert 0 < len(undecided) < len(rows)
+    assert np.all(found.used.clearance_in[undecided, 3] < 0.009)
+    assert np.all(found.used.clearance_in[undecided, 3] > 0.0015)
+
+
+def test_rows_that_scatter_as_far_the_other_way_were_not_restored(gear: Gear) -> None:
+    table, _rows, moved = restored_between_the_readings(gear)
+    clearance = table.clearance_in.copy()
+    clearance[5::8] = clearance[3::8]
+    other = fleet(gear.model, lambda *_: moved - np.roll(moved, 2), clearance_in=clearance)
+    assert restored(gear, other) == set()
+
+
+def test_rows_that_a_named_cause_lowers_were_not_restored(gear: Gear) -> None:
+    def re_rigged(table: DiagnosisTable, _over: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(table.factors["tail_no"] == "N103", -0.01, 0.0)
+
+    assert restored(gear, fleet(gear.model, re_rigged, noise_in=0.0008)) == set()

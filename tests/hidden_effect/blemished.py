@@ -109,8 +109,18 @@ def run(numbered: tuple[int, Task]) -> Record:
         "unseen": left,
         "named": [(c["cause"], c["target"]) for c in found.get("causes", [])],
         "condition": sorted({c["kind"] for c in found.get("data_condition", [])}),
+        "repaired": repaired(found.get("data_faults", []), truth),
         **judged(found.get("verdict"), found.get("causes", []), also, truth, beside),
     }
+
+
+def repaired(faults: list[Record], truth: Truth) -> tuple[int, int, int]:
+    """How many rows with a joint restored between the readings there are, how many of them are
+    named so, and how many other rows.
+    """
+    named = {fault["record_id"] for fault in faults if fault["kind"] == "restored_joint"}
+    true = set(truth.repaired)
+    return len(true), len(named & true), len(named - true)
 
 
 def judged(
@@ -189,6 +199,17 @@ def show(records: list[Record]) -> None:
     for line, rate in summarise(records).items():
         if rate["n"]:
             print(f"{line:55s} {100 * rate['rate']:5.1f} %  of {rate['n']}")
+    for case in ("repair", "worn_repair"):
+        due, hits, false = np.sum(
+            [r["repaired"] for r in records if r["case"] == case] or [[0] * 3], 0
+        )
+        if due:
+            print(f"{case}: {hits} of {due} rows named, {false} others")
+    others = [r["repaired"][2] for r in records if not r["case"].endswith("repair")]
+    print(
+        f"rows named as repaired in other fleets: {sum(others)}, in {np.count_nonzero(others)} of"
+        f" {len(others)}"
+    )
     groups: dict[tuple[str, str], list[Record]] = defaultdict(list)
     for record in records:
         case = record["case"] + (" + cause" if record["beside"] else "")

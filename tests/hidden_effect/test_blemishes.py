@@ -207,6 +207,16 @@ def test_a_repair_between_the_readings_lowers_the_plunger_and_leaves_the_sheet()
     assert np.mean([b[PLUNGER] < a[PLUNGER] for a, b in rows]) > 0.9
 
 
+def test_a_joint_over_its_limit_is_read_and_restored_before_the_plunger_is_read() -> None:
+    rows, truth = drawn("worn_repair")
+    sound = drawn("sound")[0]
+    pairs = [(a, b) for a, b in zip(sound, rows, strict=True) if b["record_id"] in truth.repaired]
+    assert len(pairs) > 10
+    assert all(max(cells([b])) >= 0.0070 for _a, b in pairs)
+    assert all(b[PLUNGER] <= a[PLUNGER] for a, b in pairs)
+    assert len(pairs) == len(changed("worn_repair"))
+
+
 def test_two_joints_of_a_row_are_swapped() -> None:
     assert all(sorted(cells([a])) == sorted(cells([b])) for a, b in changed("swap"))
 

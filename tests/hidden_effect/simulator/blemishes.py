@@ -72,6 +72,8 @@ class Scene:
         Standard deviation of measured minus predicted in a sound fleet [in].
     columns : dict
         Further columns of the table, (n,) each [-].
+    repaired : NDArray
+        Rows whose worst joint was restored between the two readings, (n,) [-].
     """
 
     rng: np.random.Generator
@@ -83,6 +85,7 @@ class Scene:
     noise: Array
     row_noise: float = PLUNGER_NOISE_IN
     columns: dict[str, list[str]] = field(default_factory=dict)
+    repaired: Mask = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     def size(self, mild: float, strong: float) -> float:
         """The one of two sizes that the form asks for."""
@@ -150,6 +153,8 @@ class Truth:
         Further rows of the same tails: clearances properly read, the plunger without noise.
     seed : int
         Seed of the fleet.
+    repaired : tuple of str
+        Records whose worst joint was restored after its reading and before that of the plunger.
     """
 
     case: str
@@ -159,6 +164,7 @@ class Truth:
     near: tuple[str, ...]
     unseen: Rows
     seed: int
+    repaired: tuple[str, ...] = ()
 
 
 def draw_history(
@@ -344,8 +350,21 @@ def _walk(scene: Scene, state: State) -> Hidden:
 
 
 def _repair(scene: Scene, state: State) -> Hidden:
-    rows = np.flatnonzero(scene.seen & (scene.rng.random(scene.seen.size) < scene.size(0.04, 0.16)))
+    scene.repaired = scene.seen & (scene.rng.random(scene.seen.size) < scene.size(0.04, 0.16))
+    rows = np.flatnonzero(scene.repaired)
     state.clearance[rows, scene.design.clearance[rows].argmax(axis=1)] = 0.0008
+    return ()
+
+
+def _worn_repair(scene: Scene, state: State) -> Hidden:
+    """Gears come in with a joint over its limit: it is read, restored, and only then is the plunger
+    read.
+    """
+    scene.repaired = scene.seen & (scene.rng.random(scene.seen.size) < scene.size(0.04, 0.16))
+    rows = np.flatnonzero(scene.repaired)
+    joint = scene.design.clearance[rows].argmax(axis=1)
+    scene.design.clearance[rows, joint] = scene.rng.uniform(0.0075, 0.012, len(rows))
+    state.clearance[rows, joint] = 0.0008
     return ()
 
 
@@ -605,7 +624,9 @@ FURTHER = (
     Blemish("shared_id", act=_shared_id, near=("technician_bias",)),
     Blemish("renumbered", write=_renumbered),
 )
-BLEMISHES = {blemish.name: blemish for blemish in (*LISTED, *FURTHER)}
+#: One that acts more strongly than its like in the review.
+ADDED = (Blemish("worn_repair", act=_worn_repair),)
+BLEMISHES = {blemish.name: blemish for blemish in (*LISTED, *FURTHER, *ADDED)}
 
 
 def blemished_fleet(
@@ -664,6 +685,7 @@ def blemished_fleet(
         float(np.sqrt(np.mean(misfit**2))),
     )
     state = gears.sound()
+    scene.repaired = np.zeros(total, dtype=bool)
     hidden: Hidden = blemish.act(scene, state) if blemish.act is not None else ()
     if beside is not None:
         hidden += (_hide(beside, scene, state, scatter, geometry),)
@@ -674,7 +696,8 @@ def blemished_fleet(
     unseen = _sheet(scene, proper, clean, ~seen)
     if blemish.write is not None:
         table = blemish.write(scene, table)
-    return table, Truth(case, form, blemish.kinds, hidden, blemish.near, unseen, seed)
+    repaired = tuple(f"R{k + 1:04d}" for k in np.flatnonzero(scene.repaired[seen]).tolist())
+    return table, Truth(case, form, blemish.kinds, hidden, blemish.near, unseen, seed, repaired)
 
 
 def _hide(
