@@ -362,7 +362,7 @@ class _Case:
 
     @property
     def accounts(self) -> list[tuple[Array, float]]:
-        """What is left of the misfit with nothing taken out, and with what is likely to act; the
+        """The misfit with nothing taken out, and without what is likely to act; the
         logarithmic prior of each, every value that is fitted counted (Schwarz's criterion).
         """
         whole = (self.problem.misfit, 0.0)
