@@ -4,19 +4,22 @@ and which?
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
+from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.units import DAYS_PER_YEAR
 
 # What the rows of one aircraft may move with alone.
 WITHIN = ("hydraulic_pressure_psi", "temperature_c", "gear_landings", "predicted")
 _LEAST_OF_TAIL = 6
 # Periods of seasons: one to three a year, evenly spaced in frequency.
+# Computing only: shapes that are compared together.
+_AT_ONCE = 256
 _PERIODS_DAYS = DAYS_PER_YEAR / np.linspace(1, 3, 6)
 
 
@@ -24,42 +27,46 @@ _PERIODS_DAYS = DAYS_PER_YEAR / np.linspace(1, 3, 6)
 class Bank:
     """Shapes and the variables that each moves with.
 
-    columns, shape (n, k): shapes, each of unit root mean square. [1]
+    columns: shapes, each of unit root mean square. [1]
     variables: names of the columns of the table behind each shape.
     smooth, shape (n,): the quantities, each of mean 0 and standard deviation 1. [1]
     """
 
-    columns: Array
+    columns: EffectColumns
     variables: tuple[tuple[str, ...], ...]
     smooth: Mapping[str, Array]
 
 
-def build_bank(scene: Scene, catalogue: Array) -> Bank:
+def build_bank(scene: Scene, catalogue: EffectColumns) -> Bank:
     """Build the shapes that the table allows and that no candidate of the catalogue already has."""
     smooth = _quantities(scene)
+    return _distinct(_shapes(scene, smooth), catalogue, smooth)
+
+
+def _shapes(scene: Scene, smooth: Mapping[str, Array]) -> Iterator[tuple[Array, tuple[str, ...]]]:
+    """Shapes of the quantities, of groups, and of both together, with what each moves with."""
     classes = {
         (name, value): (texts == value).astype(float)
         for name, texts in scene.table.factors.items()
         if name != "tail_no"
         for value in levels(texts)
     }
-    shapes: list[tuple[Array, tuple[str, ...]]] = []
     main = {
         name: z for name, z in smooth.items() if not name.startswith(("clearance_", "axial_float_"))
     }
     for name, z in smooth.items():
-        shapes += [(z, (name,)), (z**2, (name,)), (z**3, (name,))]
+        yield from ((z**power, (name,)) for power in (1, 2, 3))
         bends = np.linspace(0.1, 0.9, 9) if name in main else (0.5,)
         for kink in np.quantile(z, bends):
-            shapes += [(np.maximum(z - kink, 0.0), (name,)), (np.abs(z - kink), (name,))]
+            yield from ((np.maximum(z - kink, 0.0), (name,)), (np.abs(z - kink), (name,)))
     if "day" in scene.table.quantities:
         day = np.nan_to_num(scene.table.quantities["day"])
         for period in _PERIODS_DAYS:
             phase = 2.0 * np.pi * day / period
-            shapes += [
+            yield from (
                 (np.cos(phase - turn), ("day",))
                 for turn in (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4)
-            ]
+            )
     # What one of two directions or sides does, the other may undo.
     either = {
         name: np.sign((texts == known[0]).astype(float) - (texts == known[1]))
@@ -72,18 +79,18 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
     main = either | main
     names = list(main)
     for i, a in enumerate(names):
-        shapes += [(main[a] * main[b], (a, b)) for b in names[i + 1 :]]
+        yield from ((main[a] * main[b], (a, b)) for b in names[i + 1 :])
     joint = [name for name in smooth if name.startswith("clearance_")]
     for i, a in enumerate(joint):
-        shapes += [(smooth[a] * smooth[b], (a, b)) for b in joint[i + 1 :]]
+        yield from ((smooth[a] * smooth[b], (a, b)) for b in joint[i + 1 :])
     keys = list(classes)
     for i, key in enumerate(keys):
-        shapes += [(classes[key] * z, (key[0], b)) for z, b in begins if b != key[0]]
-        shapes += [
+        yield from ((classes[key] * z, (key[0], b)) for z, b in begins if b != key[0])
+        yield from (
             (classes[key] * classes[other], (key[0], other[0]))
             for other in keys[i + 1 :]
             if other[0] != key[0]
-        ]
+        )
     for tail in levels(scene.table.tails, _LEAST_OF_TAIL):
         one = scene.table.tails == tail
         # About its mean, or from either end on: then its rows are shifted as well.
@@ -93,8 +100,7 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
             if n in smooth
             for about in (np.mean, np.min, np.max)
         ]
-        shapes += [(shape, v) for shape, v in alone if np.any(shape)]
-    return _distinct(shapes, catalogue, smooth)
+        yield from ((shape, v) for shape, v in alone if np.any(shape))
 
 
 def _quantities(scene: Scene) -> dict[str, Array]:
@@ -119,17 +125,33 @@ def _quantities(scene: Scene) -> dict[str, Array]:
 
 
 def _distinct(
-    shapes: list[tuple[Array, tuple[str, ...]]], catalogue: Array, smooth: Mapping[str, Array]
+    shapes: Iterable[tuple[Array, tuple[str, ...]]],
+    catalogue: EffectColumns,
+    smooth: Mapping[str, Array],
 ) -> Bank:
     """Drop shapes that are constant, or that a candidate of the catalogue has already."""
-    kept = [(s / np.sqrt(np.mean(s**2)), v) for s, v in shapes if np.std(s) > 1e-9]
-    n = len(catalogue)
-    columns = np.column_stack([s for s, _ in kept]) if kept else np.empty((n, 0))
-    size = np.std(catalogue, axis=0)
-    varying = catalogue[:, size > 0]
-    centred = (varying - varying.mean(axis=0)) / size[size > 0]
-    own = (columns - columns.mean(axis=0)) / np.std(columns, axis=0)
-    alike = np.max(np.abs(own.T @ centred) / n, axis=1) if centred.shape[1] else np.zeros(len(kept))
+    n = catalogue.n
+    variables, spreads = list[tuple[str, ...]](), list[float]()
+
+    def varied() -> Iterator[Array]:
+        for shape, names in shapes:
+            size = float(np.sqrt(np.mean(shape**2)))
+            if size > 0.0 and np.std(shape) > 1e-9 * size:
+                variables.append(names)
+                spreads.append(float(np.std(shape)) / size)
+                yield shape / size
+
+    columns = EffectColumns.made(n, varied())
+    one = np.full((1, n), 1.0 / n)
+    mean, about, spread = catalogue.onto(one)[0], columns.onto(one)[0], np.array(spreads)
+    size = np.sqrt(np.maximum(catalogue.squares / n - mean**2, 0.0))
+    varying = np.flatnonzero(size)
+    alike = np.zeros(columns.p)
+    for places in np.array_split(np.arange(columns.p), 1 + columns.p // _AT_ONCE):
+        product = catalogue.onto(columns.take(places).T)[:, varying] / n
+        product -= np.outer(about[places], mean[varying])
+        product /= np.outer(spread[places], size[varying])
+        alike[places] = np.max(np.abs(product), axis=1, initial=0.0)
     # With few rows all may look like a candidate: then the least alike one is asked.
-    use = alike < max(0.97, 1.000001 * float(np.min(alike, initial=1.0)))
-    return Bank(columns[:, use], tuple(v for (_, v), u in zip(kept, use, strict=True) if u), smooth)
+    use = np.flatnonzero(alike < max(0.97, 1.000001 * float(np.min(alike, initial=1.0))))
+    return Bank(columns.some(use), tuple(variables[k] for k in use.tolist()), smooth)

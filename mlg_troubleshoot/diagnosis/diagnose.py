@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -36,12 +36,13 @@ from mlg_troubleshoot.diagnosis.noise import (
     measured_uncertainty,
     robust_scale,
 )
-from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns, scene_at
+from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of, scene_at
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.covariance import FAR
 from mlg_troubleshoot.misfit.explanation import Key
 from mlg_troubleshoot.misfit.fitting import shrunk
@@ -352,7 +353,7 @@ class _Case:
     @property
     def columns(self) -> Array:
         """Effects of what is reported to act, the all-joint ones last. [in / unit]"""
-        held = self.problem.columns[:, list(self.chosen)]
+        held = self.problem.columns.take(self.chosen)
         return held if self.block is None else np.hstack([held, self.block.columns])
 
     @property
@@ -413,10 +414,15 @@ def _explained(
     candidates += [candidate for cause in blind for candidate in cause.stand_ins(scene)]
     if table.doubt:
         candidates = [replace(c, stands_in=not c.cause.is_distinct()) for c in candidates]
-    columns = effect_columns(scene, candidates)
-    moving = np.isfinite(columns).all(axis=0) & (np.abs(columns).max(axis=0) > 0.0)
-    candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]
-    columns = columns[:, moving]
+    moving: list[Candidate] = []
+
+    def moved() -> Iterator[Array]:
+        for candidate, column in zip(candidates, effects_of(scene, candidates), strict=True):
+            if np.isfinite(column).all() and column.any():
+                moving.append(candidate)
+                yield column
+
+    columns = EffectColumns.made(len(table), moved())
     blocks = [
         b
         for cause in testable
@@ -426,14 +432,14 @@ def _explained(
     _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
 
     @cache
-    def columns_in(other: LinkageModel) -> Array:
+    def columns_in(other: LinkageModel) -> EffectColumns:
         changed = scene_at(other, table, scene.where, scene.clearance_in, scene.drawn_share)
-        return np.nan_to_num(effect_columns(changed, candidates))
+        return EffectColumns.made(len(table), map(np.nan_to_num, effects_of(changed, moving)))
 
     problem = MisfitProblem(
         table.measured_in - scene.over_in,
         rows,
-        candidates,
+        moving,
         columns,
         build_bank(scene, columns),
         blocks,
@@ -444,15 +450,15 @@ def _explained(
     )
     finding = explain(problem)
     best, effects = finding.best, finding.posterior.effects
-    chosen = tuple(k for k in best.members if k < len(candidates))
-    others = [k for k in best.members if k >= len(candidates)]
+    chosen = tuple(k for k in best.members if k < len(moving))
+    others = [k for k in best.members if k >= len(moving)]
     block = blocks[best.context - 1] if best.context else None
-    known, spread = effects.columns[:, others], np.diag(effects.size[others] ** 2)
+    known, spread = effects.kept.take(others), np.diag(effects.size[others] ** 2)
     if block is not None:
         known = np.hstack([block.columns, known])
         spread = block_diag(block.covariance, spread)
     values, covariance = shrunk(
-        finding.noise, columns[:, list(chosen)], known, spread, problem.expected
+        finding.noise, columns.take(chosen), known, spread, problem.expected
     )
     count = len(chosen) + (0 if block is None else block.columns.shape[1])
     return _Case(problem, finding, scene, chosen, block, values[:count], covariance[:count, :count])

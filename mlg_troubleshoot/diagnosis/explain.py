@@ -22,6 +22,7 @@ from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.conclusion import Conclusion
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
@@ -42,7 +43,7 @@ class MisfitProblem:
     """The data of one table with all that may explain them.
 
     misfit, shape (n,): measured less predicted. [in]
-    columns, shape (n, n_candidates): effects of the candidates. [in / unit]
+    columns: effects of the candidates. [in / unit]
     blocks: all-joint effects.
     causes: all causes, those that the table cannot test included.
     columns_in: effects of the candidates in another linkage. [in / unit]
@@ -52,11 +53,11 @@ class MisfitProblem:
     misfit: Array
     rows: Rows
     candidates: Sequence[Candidate]
-    columns: Array
+    columns: EffectColumns
     bank: Bank
     blocks: Sequence[Block]
     causes: Sequence[Cause]
-    columns_in: Callable[[LinkageModel], Array]
+    columns_in: Callable[[LinkageModel], EffectColumns]
     beliefs: Beliefs
     doubtful: bool = False
 
@@ -84,9 +85,7 @@ class MisfitProblem:
             for c in self.candidates
         ]
         rarity = np.array([c.rarity for c in self.candidates])
-        acting = np.sqrt(
-            np.sum(self.columns**2, axis=0) / np.maximum(np.sum(self.columns != 0.0, axis=0), 1)
-        )
+        acting = self.columns.acting
         exact = np.array([c.cause.exact or 0.0 for c in self.candidates])
         usual = beliefs.shape_size * scale / acting
         stated = [c.cause.plausible for c in self.candidates]
@@ -105,10 +104,8 @@ class MisfitProblem:
             exact,
             rarity,
         )
-        shapes = np.column_stack([self.bank.columns, np.ones(n)])
-        shapes = shapes / np.sqrt(
-            np.sum(shapes**2, axis=0) / np.maximum(np.sum(shapes != 0.0, axis=0), 1)
-        )
+        shapes = EffectColumns.joined([self.bank.columns, EffectColumns.of(np.ones((n, 1)))])
+        shapes = shapes.scaled(1.0 / shapes.acting)
         named = [(UNLISTED, _BY.join(names)) for names in (*self.bank.variables, ("all rows",))]
         alike = Counter(named)
         share = np.log([shares[UNLISTED] / (len(alike) * alike[name]) for name in named])
@@ -116,7 +113,7 @@ class MisfitProblem:
         far = np.sort(np.argsort(-np.abs(self.expected - np.median(self.expected)))[:_MOST_SLIPS])
         slip = float(np.log(beliefs.slips / n))
         slips = Effects.free(
-            (np.arange(n)[:, None] == far).astype(float),
+            EffectColumns.made(n, (np.eye(1, n, place)[0] for place in far.tolist())),
             [None] * len(far),
             slip,
             beliefs.slip_size * scale,
@@ -132,10 +129,10 @@ class MisfitProblem:
                 Context(
                     (b.cause.name, None),
                     float(np.log(shares[b.cause.name] * b.share)),
-                    b.effects_in,
+                    b.columns,
                     None if b.model is None else partial(self.columns_in, b.model),
                     None if b.changes is None else b.skew,
-                    None if b.changes is None else b.columns,
+                    b.root,
                 )
                 for b in self.blocks
             ),
@@ -274,18 +271,17 @@ def _classes(
 ) -> dict[Key, frozenset[Key]]:
     """Names whose likeliest effects have the direction of a name's own, by that name."""
     keys = [c.key for c in problem.candidates]
-    unit = problem.columns / np.linalg.norm(problem.columns, axis=0)
     best = {
         key: max((k for k, own in enumerate(keys) if own == key), key=found.of_effect.item)
         for key in dict.fromkeys(keys)
     }
-    near = problem.beliefs.alike
+    places = list(best.values())
+    columns = problem.columns.take([best[name] for name in names if name in best])
+    unit = problem.columns.onto(columns.T)[:, places] / np.linalg.norm(columns, axis=0)[:, None]
+    near = np.abs(unit) > problem.beliefs.alike * np.sqrt(problem.columns.squares)[places]
     return {
-        name: frozenset(
-            other for other, k in best.items() if abs(unit[:, k] @ unit[:, best[name]]) > near
-        )
-        for name in names
-        if name in best
+        name: frozenset(other for other, alike in zip(best, row, strict=True) if alike)
+        for name, row in zip((name for name in names if name in best), near, strict=True)
     }
 
 
@@ -293,12 +289,14 @@ def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
     """p-value of the shape of the bank that stands out most in a residual, as one of all of them
     (Bonferroni).
     """
-    shapes = np.column_stack([problem.bank.columns, np.ones(len(left))])
-    fitted = fit(noise, shapes[:, -1:], left)
-    product, _log = noise.precision_times(shapes, fitted.tail_ratio)
-    spread = fitted.scale * np.sqrt(np.sum(shapes * product, axis=0))
-    largest = float(np.max(np.abs(left @ product) / spread))
-    return float(min(1.0, shapes.shape[1] * erfc(largest / sqrt(2.0))))
+    constant = np.ones((len(left), 1))
+    shapes = EffectColumns.joined([problem.bank.columns, EffectColumns.of(constant)])
+    fitted = fit(noise, constant, left)
+    settled = noise.with_tails(fitted.tail_ratio)
+    product, _log = settled.precision_times(left[:, None], fitted.tail_ratio)
+    spread = fitted.scale * np.sqrt(settled.squares(shapes)[0])
+    largest = float(np.max(np.abs(shapes.onto(product.T)[0]) / spread))
+    return float(min(1.0, shapes.p * erfc(largest / sqrt(2.0))))
 
 
 def _unlisted(found: MisfitPosterior, verdict: Verdict) -> tuple[tuple[str, ...], float]:
@@ -311,7 +309,7 @@ def _unlisted(found: MisfitPosterior, verdict: Verdict) -> tuple[tuple[str, ...]
     for explanation in found.likeliest:
         for k, value in zip(explanation.members, explanation.values, strict=True):
             if found.effects.names[k] == name:
-                column = found.effects.columns[:, k]
+                column = found.effects.kept.take([k])
                 return variables, float(abs(value) * np.sqrt(np.mean(column**2)))
     return variables, 0.0
 

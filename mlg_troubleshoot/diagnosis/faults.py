@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import gammaln, logsumexp
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.causes.base import Scene
 from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import fleet_history, one_inspection
+from mlg_troubleshoot.diagnosis.wear import fleet_history, inspection_of
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.units import SLIPS
@@ -164,7 +164,7 @@ class _Screen:
     rest, shape (n,): misfit beyond what is explained. [in]
     explained, shape (n,): what is. [in]
     scale_in, repeat_in: scatter of the misfits, and between the readings of a row. [in]
-    again, shape (n, n): other rows of one inspection.
+    inspection, shape (n,): number of the inspection that a row is of.
     """
 
     model: LinkageModel
@@ -174,7 +174,7 @@ class _Screen:
     explained: Array
     scale_in: float
     repeat_in: float
-    again: Mask
+    inspection: Places
 
     def as_written(self, place: int) -> _Meant:
         """A row as it is written."""
@@ -223,7 +223,8 @@ class _Screen:
         spread, known = self.usual.spread[place], np.isfinite(clearance)
         clearance = np.where(known, clearance, self.usual.expected[place])
         wear = _normal(self.usual.off(clearance, place), spread)
-        again = self.table.clearance_in[self.again[place]]
+        others = self.inspection == self.inspection[place]
+        again = self.table.clearance_in[others & (self.table.row != self.table.row[place])]
         if len(again):
             # Two rows do not hold the same slip: what both read of a joint that still moves is so.
             off = clearance[:, None] - np.where(again < _WORN_OUT_IN, again, np.inf)
@@ -458,9 +459,8 @@ def _suspects(
     rest = misfit - named
     scale = _scale(rest)
     apart = np.diff(np.sort(table.readings_in)).ravel()
-    again = one_inspection(table) & (table.row[:, None] != table.row)
     repeat = _scale(np.append(apart, -apart))
-    screen = _Screen(model, table, usual, rest, named, scale, repeat, again)
+    screen = _Screen(model, table, usual, rest, named, scale, repeat, inspection_of(table))
     # An entry error is in one cell or in two, or in so many that any two of them show it.
     lost = np.sort(_surprise(usual.off(table.clearance_in) / usual.spread))[:, -2:].sum(axis=1)
     lost += _surprise((rest - np.nanmedian(rest)) / scale)

@@ -46,8 +46,8 @@ HABIT = 0.035
 # from three spreads below it to four above.
 USUAL_RATIO, RATIO_SPREAD = 0.1, 0.6
 _RATIOS = USUAL_RATIO * np.exp(RATIO_SPREAD * np.linspace(-3, 4, 24))
-# With fewer levels nothing can be told.
-_LEAST_LEVELS = 4
+# With fewer levels nothing can be told; with more the first tell enough.
+_LEAST_LEVELS, _MOST_LEVELS = 4, 400
 # Ratios of the scatter between tails to the scatter of a row that are tried: nodes of a sum.
 TAIL_RATIOS = (0.0, *np.geomspace(0.15, 2.0, 8).tolist())
 # The first estimate of the scatter has all in it that effects of unknown size explain.
@@ -163,18 +163,15 @@ def build_noise(
     """
     rest = misfit if explained is None else misfit - explained
     wide = rows.along_in if effects_in is None else np.hstack([rows.along_in, effects_in])
-    noise, unread = _scatter(rest, rest, rows), np.empty((len(rest), 0))
-    if rows.unread_in.any():
-        unread = np.hstack(
-            [
-                rows.unread_in,
-                rows.u_shared_in[:, None] * (rows.gears[:, None] == np.unique(rows.gears)),
-            ]
-        )
+    noise, gears = _scatter(rest, rest, rows), tail_numbers(rows.gears)
+    unread = rows.unread_in if rows.unread_in.any() else np.empty((len(rest), 0))
     for _ in range(_ROUNDS if wide.size + unread.size else 0):
         known = noise.beside(wide)
         left = rest - known.share_of(wide, rest)
-        noise = _scatter(left, left - known.share_of(unread, rest), rows)
+        alone = left - known.share_of(unread, rest)
+        if unread.size:
+            alone = alone - known.share_of_groups(rows.u_shared_in, gears, rest)
+        noise = _scatter(left, alone, rows)
     return noise.beside(wide) if wide.size else noise
 
 
@@ -211,8 +208,18 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     trends, habits = small * HABIT * rows.trends, small * HABIT * rows.habits
     gear_ratio = float(np.hypot(USUAL_RATIO, read * READ_GEAR_RATIO))
     ratios = _tail_ratios(rest / (scale * relative), numbers, gear_ratio)
-    loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, trends, habits, shared])
-    noise = NoiseModel(relative, numbers, gears, loadings, 0.5 * least, gear_ratio, ratios, scale)
+    loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, trends, habits])
+    noise = NoiseModel(
+        relative,
+        numbers,
+        gears,
+        loadings,
+        0.5 * least,
+        gear_ratio,
+        ratios,
+        scale,
+        of_gear=shared if shared.any() else None,
+    )
     standard = rest / scale
     each_own = [USUAL_RATIO] * len(rows.readers)
     for place, levels in enumerate(rows.readers):
@@ -223,21 +230,20 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
         [loadings, *(ratio * levels for ratio, levels in zip(each_own, rows.readers, strict=True))]
     )
     alike = replace(noise, loadings=loadings, gear_ratio=0.0)
-    each = (gears[:, None] == np.arange(gears.max() + 1)).astype(float)
-    return replace(
-        noise, loadings=loadings, gear_ratio=_ratio(alike, each, standard, gear_ratio, RATIO_SPREAD)
-    )
+    some = gears < _MOST_LEVELS
+    each = (gears[some][:, None] == np.arange(min(gears.max() + 1, _MOST_LEVELS))).astype(float)
+    ratio = _ratio(alike.take(some), each, standard[some], gear_ratio, RATIO_SPREAD)
+    return replace(noise, loadings=loadings, gear_ratio=ratio)
 
 
 def _shared(relative: Array, gears: Wholes) -> tuple[Array, Array]:
-    """Loadings of gears whose unread joints make all their rows wrong alike, and the residual of
-    single rows. [1]
+    """Scatter that the rows of a gear have in common because its unread joints make all of them
+    wrong alike, and, where that is small, each row's own. [1]
     """
     largest = np.zeros(gears.max() + 1)
     np.maximum.at(largest, gears, relative)
-    large = np.flatnonzero(largest > USUAL_RATIO)
-    loadings = np.where(gears[:, None] == large, relative[:, None], 0.0)
-    return loadings, np.where(largest[gears] > USUAL_RATIO, 0.0, relative)
+    alike = largest[gears] > USUAL_RATIO
+    return np.where(alike, relative, 0.0), np.where(alike, 0.0, relative)
 
 
 def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, spread: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -172,10 +172,13 @@ def effect(scene: Scene, adjustment: Adjustment) -> Array:
     return np.asarray(moved - scene.over_in)
 
 
-def effect_columns(scene: Scene, candidates: Sequence[Candidate]) -> Array:
-    """Effect of each candidate per unit of its parameter."""
-    columns = np.empty((len(scene.table), len(candidates)))
-    for k, candidate in enumerate(candidates):
+def effects_of(scene: Scene, candidates: Iterable[Candidate]) -> Iterator[Array]:
+    """Effect of each candidate per unit of its parameter, one after the other, shape (n,)."""
+    for candidate in candidates:
         trial = candidate.cause.trial
-        columns[:, k] = effect(scene, candidate.cause.adjust(scene, candidate, trial)) / trial
-    return columns
+        yield effect(scene, candidate.cause.adjust(scene, candidate, trial)) / trial
+
+
+def effect_columns(scene: Scene, candidates: Sequence[Candidate]) -> Array:
+    """The same written out, shape (n, n_candidates)."""
+    return np.column_stack([np.empty((len(scene.table), 0)), *effects_of(scene, candidates)])

@@ -8,7 +8,7 @@ side.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -47,10 +47,8 @@ def swapped_sides(table: DiagnosisTable) -> list[tuple[int, str, str]]:
         if min(len(r) for r in rows.values()) < 4:
             continue
         off = [
-            int(row)
-            for own, other in (("LH", "RH"), ("RH", "LH"))
-            for row in rows[own]
-            if _on_the_other_line(day, landings, int(row), rows[own], rows[other])
+            *_on_the_other_line(day, landings, rows["LH"], rows["RH"]),
+            *_on_the_other_line(day, landings, rows["RH"], rows["LH"]),
         ]
         # Two lines that fit this badly are not evidence; one row off its line and on the other one
         # is.
@@ -113,7 +111,8 @@ def _nearness_to_other_side(table: DiagnosisTable, others: Places, row: int, rat
         group = others[(side[others] == side[row]) == wanted]
         timed = group[np.isfinite(landings[group]) & np.isfinite(day[group])]
         if len(timed) and np.isfinite(landings[row]):
-            at, scatter = _line(day[timed], landings[timed], float(day[row]), rate)
+            slope, level, scatter = _line(day[timed], landings[timed], rate)
+            at = level + slope * float(day[row])
             total += sign * min(abs(float(landings[row]) - at) / (3.0 * scatter + 20.0), 50.0)
         known = np.isfinite(table.clearance_in[row]) & np.isfinite(table.clearance_in[group]).any(
             axis=0
@@ -124,21 +123,30 @@ def _nearness_to_other_side(table: DiagnosisTable, others: Places, row: int, rat
     return total
 
 
-def _on_the_other_line(day: Array, landings: Array, row: int, own: Places, other: Places) -> bool:
-    mine = own[own != row]
-    at_own, u_own = _line(day[mine], landings[mine], float(day[row]))
-    at_other, u_other = _line(day[other], landings[other], float(day[row]))
-    apart = abs(at_own - at_other)
-    return (
-        abs(landings[row] - at_own) > max(6.0 * u_own, 0.6 * apart)
-        and abs(landings[row] - at_other) < min(4.0 * u_other, 0.25 * apart)
-        and apart > 8.0 * (u_own + u_other)
-    )
+def _on_the_other_line(day: Array, landings: Array, own: Places, other: Places) -> list[int]:
+    """Rows of one gear that lie off the line of its other rows, and on that of the other gear."""
+    slope, level, u_other = _line(day[other], landings[other])
+    at_other = level + slope * day[own]
+    off_other = np.abs(landings[own] - at_other)
+    slopes = _slopes_without(day[own], landings[own])
+    found = []
+    for k in np.flatnonzero(off_other < 4.0 * u_other):
+        mine = np.delete(own, k)
+        level, u_own = _level(day[mine], landings[mine], slopes(int(k)))
+        at_own = level + slopes(int(k)) * day[own[k]]
+        apart = abs(at_own - at_other[k])
+        if (
+            abs(landings[own[k]] - at_own) > max(6.0 * u_own, 0.6 * apart)
+            and off_other[k] < 0.25 * apart
+            and apart > 8.0 * (u_own + u_other)
+        ):
+            found.append(int(own[k]))
+    return found
 
 
-def _line(x: Array, y: Array, at: float, usual_slope: float = 0.0) -> tuple[float, float]:
-    """Median line through points, read at one place, with a robust scatter; one point alone has the
-    usual slope.
+def _line(x: Array, y: Array, usual_slope: float = 0.0) -> tuple[float, float, float]:
+    """Median line through points (Theil 1950): slope, level and a robust scatter; one point alone
+    has the usual slope.
     """
     i, j = np.triu_indices(len(x), 1)
     apart = np.abs(x[j] - x[i]) > 1e-9
@@ -147,9 +155,40 @@ def _line(x: Array, y: Array, at: float, usual_slope: float = 0.0) -> tuple[floa
         if apart.any()
         else usual_slope
     )
+    return (slope, *_level(x, y, slope))
+
+
+def _level(x: Array, y: Array, slope: float) -> tuple[float, float]:
+    """Median level of points about a line, with a robust scatter."""
     level = float(np.median(y - slope * x))
-    scatter = max(robust_scale(y - level - slope * x), 8.0)
-    return level + slope * at, scatter
+    return level, max(robust_scale(y - level - slope * x), 8.0)
+
+
+def _slopes_without(x: Array, y: Array) -> Callable[[int], float]:
+    """Slope of the median line through all points but one, 0 where it is not told.
+
+    All pairs are sorted once: those of one point move the median by a few places only.
+    """
+    i, j = np.triu_indices(len(x), 1)
+    apart = np.abs(x[j] - x[i]) > 1e-9
+    i, j = i[apart], j[apart]
+    slope = (y[j] - y[i]) / (x[j] - x[i])
+    order = np.argsort(slope)
+    ordered = slope[order]
+    rank = np.full((len(x), len(x)), len(order))
+    rank[i[order], j[order]] = rank[j[order], i[order]] = np.arange(len(order))
+
+    def without(k: int) -> float:
+        own = np.sort(rank[k][rank[k] < len(order)])
+        left = len(order) - len(own)
+        if not left:
+            return 0.0
+        middle = np.array([(left - 1) // 2, left // 2])
+        # As many of its own pairs as stand before a place are passed over on the way to it.
+        passed = np.searchsorted(own - np.arange(len(own)), middle, side="right")
+        return float(np.mean(ordered[middle + passed]))
+
+    return without
 
 
 def _surprise(values: Sequence[float], typical: Sequence[float]) -> float:

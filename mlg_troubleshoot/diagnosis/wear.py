@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -211,14 +212,15 @@ def landed_share(table: DiagnosisTable) -> Array:
     return landings / np.mean(landings) if landings.any() else np.ones(len(table))
 
 
-def one_inspection(table: DiagnosisTable) -> Mask:
-    """Rows of one gear at one number of landings and on one day, so far as told, shape (n, n)."""
-    gears = gears_of(table)
-    same = gears[:, None] == gears
-    for name in {"gear_landings", "day"} & set(table.quantities):
-        values = np.nan_to_num(table.quantities[name], nan=-1.0)
-        same &= values[:, None] == values
-    return np.asarray(same)
+def inspection_of(table: DiagnosisTable) -> Places:
+    """Number of the inspection of each row: of one gear at one number of landings and on one day,
+    so far as told, shape (n,).
+    """
+    told = {"gear_landings", "day"} & set(table.quantities)
+    parts = [np.nan_to_num(table.quantities[name], nan=-1.0) for name in told]
+    whole = np.column_stack([gears_of(table), *parts])
+    found: Places = np.unique(whole, axis=0, return_inverse=True)[1].ravel()
+    return found
 
 
 def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
@@ -230,7 +232,8 @@ def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
     share their wear.
     """
     gears, worn = gears_of(table), landed_share(table)
-    own, visit = gears[:, None] == gears, one_inspection(table)
+    own, inspection = gears[:, None] == gears, inspection_of(table)
+    visit = inspection[:, None] == inspection
     each, all_in = unread_in @ unread_in.T, unread_in.sum(axis=1)
     together, grown = np.outer(all_in, all_in), np.outer(worn, worn)
     covariance = (1.0 + grown) * (FLEET_TOGETHER**2 * together + JOINTS_APART**2 * each)
@@ -284,13 +287,13 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     gears, kilo, shape (n,): gear of each row, and its landings in thousands.
     reading_in2: variance of each reading as declared, of the same shape. [in²]
     """
-    shape, count = reading_in.shape, int(gears.max()) + 1
+    shape = reading_in.shape
     # Joints run along the last axis; a row that lacks a joint has no weight in it.
     y = reading_in.reshape(len(gears), -1)
     known, x = np.isfinite(y), kilo[:, None]
     y, here = np.where(known, y, 0.0), known.astype(float)
     declared = np.maximum(reading_in2.reshape(y.shape), _TIGHT_IN**2)
-    by_gear = (np.arange(count)[:, None] == gears).astype(float)
+    by_gear = csr_array((np.ones(len(gears)), (gears, np.arange(len(gears)))))
     # Gears of which a joint was never read say nothing about the fleet.
     read = by_gear @ here
     many = known & (read[gears] >= 3)
@@ -350,7 +353,7 @@ def _fleet(x: Array, y: Array, here: Array) -> tuple[Array, Array]:
 
 
 def _lines(
-    by_gear: Array, x: Array, y: Array, weight: Array, fleet: Array, spread: Array
+    by_gear: csr_array, x: Array, y: Array, weight: Array, fleet: Array, spread: Array
 ) -> tuple[Array, Array]:
     """Level and rate of each gear drawn to the fleet's, (2, n_gears, n_joints), and their
     covariances (aa, ab, bb).
@@ -358,7 +361,7 @@ def _lines(
     p = np.array([spread[2], -spread[1], spread[0]]) / (spread[0] * spread[2] - spread[1] ** 2)
     j = weight.shape[1]
     sums = by_gear @ np.hstack([weight, weight * x, weight * x * x, weight * y, weight * x * y])
-    w, wx, wxx, wy, wxy = sums.reshape(len(by_gear), 5, j).swapaxes(0, 1)
+    w, wx, wxx, wy, wxy = sums.reshape(len(sums), 5, j).swapaxes(0, 1)
     aa, ab, bb = w + p[0], wx + p[1], wxx + p[2]
     right = wy + p[0] * fleet[0] + p[1] * fleet[1], wxy + p[1] * fleet[0] + p[2] * fleet[1]
     # Rounding must not make level and rate of a gear exactly one.

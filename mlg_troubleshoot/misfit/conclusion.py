@@ -66,9 +66,10 @@ class Conclusion:
         effects = self.posterior.effects
         places = np.flatnonzero(effects.listed).tolist()
         names = [effects.names[k] for k in places]
-        columns = effects.columns[:, places]
+        if not self._standing_out:
+            return set()
         prior = (effects.log_prior - effects.rarity)[places]
-        unit = columns / np.linalg.norm(columns, axis=0)
+        size = np.sqrt(effects.kept.squares)[places]
         evidence = np.log(np.maximum(found.of_effect[places], 1e-300)) - prior
         alike: set[Key] = set()
         for name in self._standing_out:
@@ -76,7 +77,8 @@ class Conclusion:
             if not own:
                 continue
             best = max(own, key=lambda k: found.of_effect[places[k]])
-            near = np.abs(unit.T @ unit[:, best]) > self.beliefs.alike
+            along = effects.kept.onto(effects.kept.take([places[best]]).T)[0, places]
+            near = np.abs(along) > self.beliefs.alike * size * size[best]
             near &= evidence > evidence[best] - self.beliefs.odds
             others = {key for k in np.flatnonzero(near) if (key := names[k]) and key != name}
             alike |= others | ({name} if others else set())

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.sparse import csr_array
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
+from mlg_troubleshoot.misfit.columns import ColumnBlock, EffectColumns
+
+# Sums over the rows of each group of one kind, and over all rows: R with V⁻¹ = P − Rᵀ R, P the
+# inverse of what each row scatters by itself; the logarithm of V's determinant.
+_Root = tuple[tuple[csr_array, ...], Array, float]
 
 # Rows further out than this many standard deviations count less, and may be entry errors.
 FAR = 3.0
@@ -22,12 +30,13 @@ class NoiseModel:
     shape (n,): number of the tail of each row. gears, shape (n,): number of the single gear of each
     row. loadings, shape (n, k): bias, slope and small trends, each at one standard deviation in
     units of the common one. [1] floor_in: scatter that every row has at least. [in] gear_ratio:
-    scatter between the gears of one tail over the scatter of a row. [1] tail_ratios: ratios of the
-    scatter between tails to the scatter of a row that are tried. [1] scale_in: the common standard
-    deviation as it was estimated. [in] chain, shape (n,): number of the series in which a
-    row follows others, if rows do. time, shape (n,): when, in usual steps of a series. correlation:
-    of the own scatter of two rows of a series one usual step apart; rows further apart are less
-    alike by a power of it (a process that forgets, Jones 1980). [1]
+    scatter between the gears of one tail over the scatter of a row. [1] of_gear, shape (n,):
+    further scatter that the rows of a gear have in common, each in its own measure. [1]
+    tail_ratios: ratios of the scatter between tails to the scatter of a row that are tried. [1]
+    scale_in: the common standard deviation as it was estimated. [in] chain, shape (n,): number of
+    the series in which a row follows others, if rows do. time, shape (n,): when, in usual steps of
+    a series. correlation: of the own scatter of two rows of a series one usual step apart; rows
+    further apart are less alike by a power of it (a process that forgets, Jones 1980). [1]
     """
 
     relative: Array
@@ -43,9 +52,8 @@ class NoiseModel:
     chain: Wholes | None = None
     time: Array | None = None
     correlation: float = 0.0
-    _roots: dict[float, tuple[Array, float]] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
+    of_gear: Array | None = None
+    _roots: dict[float, _Root] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
     def white(cls, n: int) -> NoiseModel:
@@ -75,6 +83,7 @@ class NoiseModel:
             tails=self.tails[rows],
             gears=self.gears[rows],
             loadings=self.loadings[rows],
+            of_gear=None if self.of_gear is None else self.of_gear[rows],
             chain=None if self.chain is None else self.chain[rows],
             time=None if self.time is None else self.time[rows],
         )
@@ -127,6 +136,12 @@ class NoiseModel:
         product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
         return np.asarray(effects_in @ (effects_in.T @ product[:, 0]) / self.scale_in**2)
 
+    def share_of_groups(self, scatter_in: Array, group: Wholes, data: Array) -> Array:
+        """The same of what the rows of each group scatter alike, each in its own measure. [in]"""
+        product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
+        pull = np.bincount(group, scatter_in * product[:, 0])
+        return np.asarray(scatter_in * pull[group] / self.scale_in**2)
+
     def own_part(self, data: Array) -> tuple[Array, float]:
         """What each row scatters by itself, all that rows have in common taken out, and the share
         of the rows that is left to tell it. [in, 1]
@@ -136,54 +151,112 @@ class NoiseModel:
             free = replace(NoiseModel.white(len(data)), loadings=held)
             own, share = free.own_part(self.own(data[:, None])[:, 0])
             return self.relative * own, share
-        root, _log = self._root(self.tail_ratios[-1])
-        own = data - self.relative**2 * (root.T @ (root @ data))
-        return own, float(1.0 - np.mean(self.relative**2 * np.sum(root**2, axis=0)))
+        groups, low, _log = self._root(self.tail_ratios[-1])
+        taken = sum(root.power(2).sum(axis=0) for root in groups) + np.sum(low**2, axis=0)
+        own = data - self.relative**2 * self._in_common(data, self.tail_ratios[-1])
+        return own, float(1.0 - np.mean(self.relative**2 * taken))
 
     def factors(self, tail_ratio: float) -> Array:
         """Low-rank part of the covariance, shape (n, k). [1]"""
-        each = self.gear_ratio * (self.gears[:, None] == np.arange(self.gears.max() + 1))
-        if tail_ratio == 0.0:
-            return np.hstack([each, self.loadings])
-        indicator = (self.tails[:, None] == np.arange(self.tails.max() + 1)).astype(float)
-        return np.hstack([tail_ratio * indicator, each, self.loadings])
+        each = [
+            scatter[:, None] * (group[:, None] == np.arange(group.max() + 1))
+            for group, scatter in self._groups(tail_ratio)
+        ]
+        return np.hstack([*each, self.loadings])
+
+    def _groups(self, tail_ratio: float) -> list[tuple[Wholes, Array]]:
+        """Group of each row and what rows of one have in common, gears first. [1]"""
+        one = np.ones(len(self.relative))
+        found = [(self.gears, self.gear_ratio * one), (self.tails, tail_ratio * one)]
+        if self.of_gear is not None:
+            found.insert(1, (self.gears, self.of_gear))
+        return [(group, scatter) for group, scatter in found if scatter.any()]
 
     def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
         """Multiply columns by the inverse covariance (Woodbury)."""
-        root, log_determinant = self._root(tail_ratio)
-        return self._own_precision_times(columns) - root.T @ (root @ columns), log_determinant
+        product = self._own_precision_times(columns) - self._in_common(columns, tail_ratio)
+        return product, self._root(tail_ratio)[2]
+
+    def _in_common(self, columns: Array, tail_ratio: float) -> Array:
+        """What rows have in common, taken off their own part by the inverse covariance."""
+        groups, low, _log = self._root(tail_ratio)
+        found = low.T @ (low @ columns)
+        for root in groups:
+            found += root.T @ (root @ columns)
+        return np.asarray(found)
 
     def square(self, data: Array, tail_ratio: float) -> Array:
         """Squared length of data sets under the inverse covariance."""
-        root, _log = self._root(tail_ratio)
-        own, common = self.own(data), root @ data
-        return np.asarray(np.einsum("ij,ij->j", own, own) - np.einsum("ij,ij->j", common, common))
+        groups, low, _log = self._root(tail_ratio)
+        own = self.own(data)
+        parts = (low @ data, *(root @ data for root in groups))
+        common = np.sum([np.einsum("ij,ij->j", part, part) for part in parts], axis=0)
+        return np.asarray(np.einsum("ij,ij->j", own, own) - common)
 
-    def _root(self, tail_ratio: float) -> tuple[Array, float]:
-        """R with V⁻¹ = diag(1 / relative²) − Rᵀ R, and the logarithm of V's determinant."""
-        if tail_ratio not in self._roots and tail_ratio > 0.0:
-            root, log_determinant = self.tail_root(tail_ratio)
-            self._roots[tail_ratio] = np.vstack([self._root(0.0)[0], root]), log_determinant
-        elif tail_ratio not in self._roots:
-            low = self.factors(0.0)
-            scaled = self._own_precision_times(low)
-            lower = np.linalg.cholesky(np.eye(low.shape[1]) + low.T @ scaled)
-            log_determinant = 2.0 * float(
-                np.sum(np.log(np.diag(lower))) + np.sum(np.log(self.relative))
-            )
-            log_determinant += float(np.sum(np.log1p(-(self._steps[2] ** 2))))
-            self._roots[tail_ratio] = solve_triangular(lower, scaled.T, lower=True), log_determinant
+    def squares(self, columns: EffectColumns) -> Array:
+        """The same of many columns, for each ratio of the scatter between tails, (levels, p)."""
+        roots = [self._root(ratio) for ratio in self.tail_ratios]
+        fixed = len(self._groups(0.0)) if self._nested else 0
+
+        def of_block(block: ColumnBlock) -> Array:
+            if self.correlation or isinstance(block, np.ndarray):
+                written = block if isinstance(block, np.ndarray) else block.toarray()
+                own = np.sum(self.own(written) ** 2, axis=0)
+            else:
+                own = np.asarray(self.relative**-2.0 @ (block * block))
+            for root in roots[0][0][:fixed]:
+                own = own - _all_squares((root,), block)
+            further = [(*groups[fixed:], low) for groups, low, _log in roots]
+            return np.array([own - _all_squares(parts, block) for parts in further])
+
+        return columns.sums(of_block)
+
+    @cached_property
+    def _nested(self) -> bool:
+        """True if the rows of a gear are of one tail, and none follows another: then what each
+        group has in common is taken out by sums over its rows.
+        """
+        if self.correlation:
+            return False
+        most = np.zeros(self.gears.max() + 1, np.int64)
+        np.maximum.at(most, self.gears, self.tails)
+        return bool(np.all(most[self.gears] == self.tails))
+
+    def _root(self, tail_ratio: float) -> _Root:
+        if tail_ratio in self._roots:
+            return self._roots[tail_ratio]
+        log_determinant = 2.0 * float(np.sum(np.log(self.relative)))
+        log_determinant += float(np.sum(np.log1p(-(self._steps[2] ** 2))))
+        groups: list[csr_array] = []
+        low = self.loadings if self._nested else self.factors(tail_ratio)
+
+        def beside_groups(columns: Array) -> Array:
+            product = self._own_precision_times(columns)
+            for root in groups:
+                product -= root.T @ (root @ columns)
+            return product
+
+        for group, scatter in self._groups(tail_ratio) if self._nested else ():
+            # Of gears within tails no two groups of one kind share a row: one column holds all.
+            weighted = beside_groups(scatter[:, None])[:, 0]
+            inner = 1.0 + np.bincount(group, scatter * weighted)
+            log_determinant += float(np.sum(np.log(inner)))
+            begins = np.r_[0, np.cumsum(np.bincount(group))]
+            rows = np.argsort(group, kind="stable")
+            values = (weighted / np.sqrt(inner)[group])[rows]
+            groups.append(csr_array((values, rows, begins), (len(inner), len(group))))
+        weighted = beside_groups(low)
+        lower = np.linalg.cholesky(np.eye(low.shape[1]) + low.T @ weighted)
+        log_determinant += 2.0 * float(np.sum(np.log(np.diag(lower))))
+        root = np.asarray(solve_triangular(lower, weighted.T, lower=True))
+        self._roots[tail_ratio] = tuple(groups), root, log_determinant
         return self._roots[tail_ratio]
 
-    def tail_root(self, tail_ratio: float) -> tuple[Array, float]:
-        """E with V⁻¹ = V₀⁻¹ − Eᵀ E, V₀ without scatter between tails, and the logarithm of V's
-        determinant.
-        """
-        log_determinant = self._root(0.0)[1]
-        if tail_ratio == 0.0:
-            return np.empty((0, len(self.relative))), log_determinant
-        indicator = tail_ratio * (self.tails[:, None] == np.arange(self.tails.max() + 1))
-        scaled, _log = self.precision_times(indicator, 0.0)
-        lower = np.linalg.cholesky(np.eye(indicator.shape[1]) + indicator.T @ scaled)
-        log_determinant += 2.0 * float(np.sum(np.log(np.diag(lower))))
-        return solve_triangular(lower, scaled.T, lower=True), log_determinant
+
+def _all_squares(roots: Sequence[Any], block: ColumnBlock) -> Array:
+    """Sum of squares of all that roots make of each column."""
+    found = np.zeros(block.shape[1])
+    for root in roots:
+        product = root @ block
+        found += (product * product).sum(axis=0)
+    return found

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.misfit.columns import EffectColumns
 
 # What is wrong, and in what: a cause with its target.
 Key = tuple[str, str | None]
@@ -22,17 +24,17 @@ _OF_EACH = ("listed", "log_prior", "size", "scales", "least", "sign", "mean", "r
 class Effects:
     """Effects that may act, several variants under one name; each has a size that is not known.
 
-    columns, shape (n, p): effect of each per unit of its size. names: what each is a variant of,
-    None where it is an entry error, nothing that anybody has to correct. listed, shape (p,): True
-    if it stands on the list of causes. log_prior, shape (p,): logarithm of how often each is
-    expected in a set of data. size, shape (p,): standard deviation of its size. scales, shape (p,):
-    True where that is one of several. least, shape (p,): what is smaller does not matter. sign,
-    shape (p,): +1 or −1 where it can have one sign only, else 0. mean, shape (p,): the only size
-    that it can have, 0 where it is free. rarity: the part of log_prior that is not belief, shape
-    (p,): variants that the rows were searched for and that are not listed.
+    columns, shape (n, p): effect of each per unit of its size, written out or not. names: what each
+    is a variant of, None where it is an entry error, nothing that anybody has to correct. listed,
+    shape (p,): True if it stands on the list of causes. log_prior, shape (p,): logarithm of how
+    often each is expected in a set of data. size, shape (p,): standard deviation of its size.
+    scales, shape (p,): True where that is one of several. least, shape (p,): what is smaller does
+    not matter. sign, shape (p,): +1 or −1 where it can have one sign only, else 0. mean, shape
+    (p,): the only size that it can have, 0 where it is free. rarity: the part of log_prior that is
+    not belief, shape (p,): variants that the rows were searched for and that are not listed.
     """
 
-    columns: Array
+    columns: Array | EffectColumns
     names: Sequence[Key | None]
     listed: Array
     log_prior: Array
@@ -47,7 +49,7 @@ class Effects:
     def joined(parts: Sequence[Effects]) -> Effects:
         """All effects of several lists in one."""
         return Effects(
-            np.hstack([e.columns for e in parts]),
+            EffectColumns.joined([e.kept for e in parts]),
             [name for e in parts for name in e.names],
             *(
                 np.concatenate([np.broadcast_to(getattr(e, what), len(e.names)) for e in parts])
@@ -57,10 +59,13 @@ class Effects:
 
     @staticmethod
     def free(
-        columns: Array, names: Sequence[Key | None], log_prior: Array | float, size: float
+        columns: Array | EffectColumns,
+        names: Sequence[Key | None],
+        log_prior: Array | float,
+        size: float,
     ) -> Effects:
         """Effects that are on no list and may have any sign."""
-        p = columns.shape[1]
+        p = len(names)
         none = np.zeros(p)
         return Effects(
             columns,
@@ -73,6 +78,11 @@ class Effects:
             none,
             none,
         )
+
+    @cached_property
+    def kept(self) -> EffectColumns:
+        """The columns, as short as they can be kept."""
+        return EffectColumns.of(self.columns)
 
     @property
     def numbered(self) -> tuple[list[Key | None], Wholes]:
@@ -87,20 +97,31 @@ class Context:
     """Effects that act all together or not at all, with what is known of them beforehand.
 
     name: what is wrong if it acts, None where nothing does. log_prior: logarithm of how often it is
-    expected. shared_in, shape (n, k): independent effects of one standard deviation each. columns:
-    the effects of an `Effects` where it acts, if they differ there; asked for only where it is
-    likely. correction: what its true prior adds to the log-likelihood of the normal one, given what
-    rows say of its own columns, aᵀx − xᵀQx / 2; raw_in, shape (n, j): those columns. listed: True
-    if it stands on the list of causes.
+    expected. shared_in, shape (n, j): its effects, each per unit of its size. root, shape (j, k):
+    of the covariance of these sizes; None if they are independent, with one standard deviation
+    each. columns: the effects of an `Effects` where it acts, if they differ there; asked for only
+    where it is likely. correction: what its true prior adds to the log-likelihood of the normal
+    one, given what rows say of its sizes, aᵀx − xᵀQx / 2. listed: True if it stands on the list of
+    causes.
     """
 
     name: Key | None
     log_prior: float
     shared_in: Array
-    columns: Callable[[], Array] | None = None
+    columns: Callable[[], EffectColumns] | None = None
     correction: Callable[[Array, Array], float] | None = None
-    raw_in: Array | None = None
+    root: Array | None = None
     listed: bool = True
+
+    @property
+    def root_of(self) -> Array:
+        """Root of the covariance of the sizes, shape (j, k)."""
+        return np.eye(self.shared_in.shape[1]) if self.root is None else self.root
+
+    @property
+    def independent_in(self) -> Array:
+        """Independent effects of one standard deviation each, shape (n, k)."""
+        return self.shared_in if self.root is None else self.shared_in @ self.root
 
     @staticmethod
     def none(n: int) -> Context:

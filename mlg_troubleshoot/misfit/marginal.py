@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
-from mlg_troubleshoot.arrays import Array, log_sum
+from mlg_troubleshoot.arrays import Array, Places, log_sum
 from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation
 
@@ -22,46 +22,60 @@ Members = tuple[int, ...]
 
 
 class Products:
-    """Inner products of effects and data, which stand last, under one noise without its tails."""
+    """Inner products of effects with each other and with the data under one noise.
 
-    def __init__(self, noise: NoiseModel, columns: Array, data: Array) -> None:
-        self.noise, self.n = noise, len(data) - noise.absorbed
-        self.columns = np.column_stack([columns, data])
-        self.weighted = noise.precision_times(self.columns, 0.0)[0]
-        self.square = np.einsum("ij,ij->j", self.columns, self.weighted)
-        self.along = self.columns.T @ self.weighted[:, -1]
-        self.tails = [
-            (root, determinant - 2.0 * chance)
-            for ratio, chance in noise.tail_levels
-            for root, determinant in [noise.tail_root(ratio)]
-        ]
-        self.common = [root @ self.columns for root, _log in self.tails]
+    A level is one ratio of the scatter between tails. square, along, shape (levels, p): of each
+    effect with itself and with the data. rest, shape (levels,): of the data. log, shape (levels,):
+    logarithm of the covariance's determinant, less twice that of the level's chance.
+    """
+
+    def __init__(self, noise: NoiseModel, columns: Array | EffectColumns, data: Array) -> None:
+        self.noise, self.columns, self.data = noise, EffectColumns.of(columns), data
+        self.n = len(data) - noise.absorbed
+        weighted, log = self._weighted(data[:, None])
+        self._weighted_data = weighted[:, :, 0]
+        self.rest = self._weighted_data @ data
+        self.log = np.array(log) - 2.0 * np.array([chance for _r, chance in noise.tail_levels])
+        self.square, self.along = self._of(self.columns)
         self._cross: dict[int, Array] = {}
+        self._onto: dict[bytes, Array] = {}
 
-    def replaced(self, columns: Array) -> Products:
-        """The same for effects that are others in part."""
-        changed = np.flatnonzero(np.any(columns != self.columns[:, :-1], axis=0))
-        if not len(changed):
-            return self
+    def _weighted(self, columns: Array) -> tuple[Array, list[float]]:
+        """Columns times the inverse covariance of each level, (levels, n, k)."""
+        found = [self.noise.precision_times(columns, ratio) for ratio, _c in self.noise.tail_levels]
+        return np.array([product for product, _log in found]), [log for _product, log in found]
+
+    def _of(self, columns: EffectColumns) -> tuple[Array, Array]:
+        return self.noise.squares(columns), columns.onto(self._weighted_data)
+
+    def replaced(self, changed: Places, columns: Array) -> Products:
+        """The same for effects of which some are others."""
         other = object.__new__(Products)
         other.__dict__.update(self.__dict__)
-        new = Products(self.noise, columns[:, changed], self.columns[:, -1])
-        for name in ("columns", "weighted", "square", "along"):
-            values = getattr(self, name).copy()
-            values[..., changed] = getattr(new, name)[..., :-1]
-            setattr(other, name, values)
-        other.common = [own.copy() for own in self.common]
-        for values, part in zip(other.common, new.common, strict=True):
-            values[:, changed] = part[:, :-1]
-        other._cross = {}
+        other.columns = self.columns.replaced(changed, columns)
+        other.square, other.along = self.square.copy(), self.along.copy()
+        other.square[:, changed], other.along[:, changed] = self._of(EffectColumns.of(columns))
+        other._cross, other._onto = {}, {}
         return other
 
-    def cross(self, members: Members) -> Array:
-        """Products of all with some of them, shape (p + 1, k)."""
-        for k in members:
-            if k not in self._cross:
-                self._cross[k] = self.columns.T @ self.weighted[:, k]
-        return np.array([self._cross[k] for k in members]).T
+    def cross(self, member: int) -> Array:
+        """Products of all effects with one of them, shape (levels, p)."""
+        if member not in self._cross:
+            self._cross[member] = self.onto(self.columns.take([member]))[0][:, 0]
+        return self._cross[member]
+
+    def onto(self, columns: Array) -> tuple[Array, Array, Array]:
+        """Products of other columns with the effects, (levels, k, p), with the data, (levels, k),
+        and with each other; those that contexts share are multiplied once.
+        """
+        weighted = self._weighted(columns)[0].swapaxes(1, 2)
+        keys = [column.tobytes() for column in columns.T]
+        new = [k for k, key in enumerate(keys) if key not in self._onto]
+        shape = (len(weighted), len(new), self.columns.p)
+        products = self.columns.onto(weighted[:, new].reshape(-1, len(self.data))).reshape(shape)
+        self._onto.update((keys[k], products[:, place]) for place, k in enumerate(new))
+        held = np.stack([self._onto[key] for key in keys], axis=1) if keys else products
+        return held, weighted @ self.data, weighted @ columns
 
 
 @dataclass(frozen=True)
@@ -89,37 +103,49 @@ class Marginal:
         self.products, self.effects, self.context = products, effects, context
         noise = products.noise
         self.floor = products.n * noise.floor_in**2
-        shared = context.shared_in / noise.scale_in
-        held = noise.precision_times(shared, 0.0)[0]
-        inner, onto = np.eye(shared.shape[1]) + shared.T @ held, held.T @ products.columns
-        self.low, log = [], []
-        for (root, determinant), common in zip(products.tails, products.common, strict=True):
-            own = root @ shared
-            lower = np.linalg.cholesky(inner - own.T @ own)
-            bent = solve_triangular(lower, onto - own.T @ common, lower=True)
-            self.low.append(np.vstack([common, bent]))
-            log.append(determinant + 2.0 * float(np.sum(np.log(np.diag(lower)))))
-        self.log = np.array(log)
-        self.square = np.array([products.square - np.sum(low**2, axis=0) for low in self.low])
-        self.along = np.array([products.along - low.T @ low[:, -1] for low in self.low])
+        held, data, inner = products.onto(context.shared_in)
+        root = context.root_of / noise.scale_in
+        lower = np.linalg.cholesky(np.eye(root.shape[1]) + root.T @ inner @ root)
+        taken = np.linalg.solve(lower, np.broadcast_to(root.T, (len(lower), *root.T.shape)))
+        bent, bent_data = taken @ held, (taken @ data[..., None])[..., 0]
+        self.log = products.log + 2.0 * np.sum(np.log(np.diagonal(lower, axis1=1, axis2=2)), axis=1)
+        self.square = products.square - np.sum(bent**2, axis=1)
+        self.along = products.along - np.einsum("rk,rkp->rp", bent_data, bent)
+        self.rest = products.rest - np.sum(bent_data**2, axis=1)
+        # What the context takes off the products of two effects: their own with its columns, and
+        # these with each other.
+        self._held, self._taken = held, taken.swapaxes(1, 2) @ taken
+        self._corrected = held, data, inner
         # Sizes in units of the noise's scale: of each level's factor, and fixed where it has none.
         factor = np.where(effects.scales, np.array(beliefs.sizes)[:, None], 1.0)
         self.spread = np.maximum(factor * effects.size, effects.least) / noise.scale_in
         self.signed = np.flatnonzero(effects.sign)
 
+    def _cross(self, members: Members, kept: list[int] | slice) -> Array:
+        """Products of some effects with the members, shape (levels, kept, k)."""
+        found = []
+        for member in members:
+            pull = np.einsum("rij,rj->ri", self._taken, self._held[:, :, member])
+            held = self._held[:, :, kept]
+            whole = self.products.cross(member)[:, kept]
+            found.append(whole - (pull[:, None] @ held)[:, 0])
+        return np.stack(found, axis=2)
+
     def _given(self, members: Members, alone: bool = False) -> _Given:
         """What members leave of the data, and of other effects, none of these if alone."""
-        effects, places, others = self.effects, list(members), slice(0 if alone else -1)
-        square, along = self.square[:, others], self.along[:, others]
-        m, rest, log = len(self.spread), self.along[:, -1], self.log
+        effects, places = self.effects, list(members)
+        square, along = self.square, self.along
+        m, rest, log = len(self.spread), self.rest, self.log
+        if alone:
+            square, along = square[:, :0], along[:, :0]
         if not places:
             none = np.empty((m * len(log), 0))
             square, along, rest, log = (np.concatenate([x] * m) for x in (square, along, rest, log))
             return _Given(square, along, rest, log, none)
         # Rows of the products that are needed, and where the members stand among them.
         kept, at = (places, list(range(len(places)))) if alone else (slice(None), places)
-        whole = self.products.cross(members)[kept]
-        cross = np.array([whole - low[:, kept].T @ low[:, places] for low in self.low])
+        others = slice(0 if alone else None)
+        cross = self._cross(members, kept)
         inner = cross[:, at]
         mean, spread = effects.mean[places], self.spread[:, places][:, None, :]
         onto = self.along[:, kept] - cross @ mean
@@ -139,7 +165,7 @@ class Marginal:
         log = log - 2.0 * np.sum(_of_sign(effects.sign[places], values, error), axis=-1)
         square = square - np.sum(left**2, axis=2)
         along = onto[:, others] - np.einsum("mrkp,mrk->mrp", left, told)
-        levels = m * len(self.low)
+        levels = m * len(self.log)
         return _Given(
             square.reshape(levels, square.shape[-1]),
             along.reshape(levels, along.shape[-1]),
@@ -168,14 +194,17 @@ class Marginal:
     def further(self, members: Members) -> tuple[Array, Array]:
         """How likely a set is with each further effect, (p,), and the expected size of that."""
         given, effects, n = self._given(members), self.effects, self.products.n
-        mean, spread = effects.mean, np.repeat(self.spread, len(self.low), axis=0)
-        along = given.along - mean * given.square
-        rest = given.rest[:, None] - mean * (2.0 * given.along - mean * given.square)
-        wider = 1.0 + spread**2 * np.maximum(given.square, 0.0)
-        rest = np.maximum(rest - spread**2 * along**2 / wider, 0.0) + self.floor
-        value = mean + spread**2 * along / wider
-        level = -0.5 * n * np.log(rest) - 0.5 * (np.log(wider) + given.log[:, None])
-        one = self.signed
+        spread = np.repeat(self.spread, len(self.log), axis=0)
+        square, along, rest = given.square, given.along, given.rest[:, None]
+        mean, one = effects.mean, self.signed
+        if mean.any():
+            rest = rest - mean * (2.0 * along - mean * square)
+            along = along - mean * square
+        wider = 1.0 + spread**2 * np.maximum(square, 0.0)
+        value = spread**2 * along / wider
+        rest = np.maximum(rest - value * along, 0.0) + self.floor
+        value = value + mean
+        level = -0.5 * (n * np.log(rest) + np.log(wider) + given.log[:, None])
         error = spread[:, one] * np.sqrt(rest[:, one] / (n * wider[:, one]))
         level[:, one] += _of_sign(effects.sign[one], value[:, one], error)
         most = np.max(level, axis=0)
@@ -189,18 +218,23 @@ class Marginal:
         """What the context's true prior adds to the normal one's likelihood, the members being as
         large as expected.
         """
-        if self.context.correction is None or self.context.raw_in is None:
+        if self.context.correction is None:
             return 0.0
         if members not in self._corrections:
-            noise, raw = self.products.noise, self.context.raw_in
-            held = self.products.columns[:, list(members)] * self.effects.size[list(members)]
-            data, free = self.products.columns[:, -1], noise.beside(held)
-            product = (
-                raw.T @ free.precision_times(np.column_stack([raw, data]), noise.tail_ratios[-1])[0]
-            )
+            # Under the largest scatter between tails; the members are part of the noise.
+            places, scale = list(members), self.products.noise.scale_in
+            held, data, inner = (part[-1] for part in self._corrected)
+            size = self.effects.size[places] / scale
+            beside = held[:, places] * size
+            own = np.eye(len(places))
+            for row, k in enumerate(members):
+                own[row] += size[row] * self.products.cross(k)[-1, places] * size
+            along = size * self.products.along[-1, places]
+            product = np.column_stack([inner, data])
+            product -= beside @ np.linalg.solve(own, np.column_stack([beside.T, along]))
             square, along = product[:, :-1], product[:, -1]
             self._corrections[members] = self.context.correction(
-                along / noise.scale_in**2, square / noise.scale_in**2
+                along / scale**2, square / scale**2
             )
         return self._corrections[members]
 

@@ -162,9 +162,9 @@ class _Search:
             )
             if about.columns is None or likely < top - OWN:
                 continue
-            columns, other = self.effects.columns.copy(), about.columns()
-            columns[:, : other.shape[1]] = other
-            own = self.products.replaced(columns)
+            columns = about.columns()
+            changed = self.effects.kept.unlike(columns)
+            own = self.products.replaced(changed, columns.take(changed))
             self._marginals[context] = Marginal(own, self.effects, about, self.beliefs)
             stale = [key for key in (*self.extended, *self._alone) if key[0] == context]
             for key in stale:
@@ -263,11 +263,12 @@ class _Search:
                 for name in key:
                     names[name] = names.get(name, 0.0) + likely
             if about.shared_in.shape[1] and total > 1e-3:
-                left = self.data - self.effects.columns[:, places] @ at.own.values
-                wide = self.noise.beside(about.shared_in)
-                expected += total * wide.share_of(about.shared_in, left)
+                left = self.data - self.effects.kept.take(places) @ at.own.values
+                independent = about.independent_in
+                wide = self.noise.beside(independent)
+                expected += total * wide.share_of(independent, left)
         acting = np.array([name is not None for name in self.effects.names], bool)
-        expected += self.effects.columns[:, acting] @ size[acting]
+        expected += self.effects.kept.times(np.where(acting, size, 0.0))
         listed |= {context.name for context in self.contexts if context.listed}
         nothing = together.get(frozenset(), 0.0)
         unlisted = sum(p for own, p in together.items() if own - listed)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis import DiagnosisTable, diagnose
 from mlg_troubleshoot.diagnosis.faults import screen_faults
+from mlg_troubleshoot.diagnosis.sides import _slopes_without
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -344,3 +345,15 @@ def test_rows_that_a_named_cause_lowers_were_not_restored(gear: Gear) -> None:
         return np.where(table.factors["tail_no"] == "N103", -0.01, 0.0)
 
     assert restored(gear, fleet(gear.model, re_rigged, noise_in=0.0008)) == set()
+
+
+def test_the_line_without_a_point_is_the_median_line_of_the_others() -> None:
+    rng = np.random.default_rng(8)
+    x = rng.integers(0, 12, 25).astype(float)
+    y = 3.0 * x + rng.normal(0.0, 4.0, 25)
+    without = _slopes_without(x, y)
+    for k in range(25):
+        (i, j), rest = np.triu_indices(24, 1), np.delete(np.arange(25), k)
+        apart = x[rest][j] != x[rest][i]
+        slopes = (y[rest][j] - y[rest][i])[apart] / (x[rest][j] - x[rest][i])[apart]
+        assert without(k) == pytest.approx(np.median(slopes))

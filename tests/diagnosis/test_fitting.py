@@ -10,6 +10,7 @@ import pytest
 from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.fitting import fit, shrunk
 
@@ -29,18 +30,54 @@ NOISE = NoiseModel(
 )
 
 
-def dense(ratio: float) -> Array:
+# Unread joints of some gears; gears that are not of one tail each.
+NOISES = (
+    NOISE,
+    replace(NOISE, of_gear=np.where(np.arange(N) % 14 < 5, RNG.uniform(0.2, 0.9, N), 0.0)),
+    replace(NOISE, gears=np.arange(N) % 11),
+)
+
+
+def dense(ratio: float, noise: NoiseModel = NOISE) -> Array:
     """The covariance written out."""
-    low = NOISE.factors(ratio)
-    return np.asarray(np.diag(NOISE.relative**2) + low @ low.T)
+    alike = noise.gears[:, None] == noise.gears
+    whole = np.diag(noise.relative**2) + noise.loadings @ noise.loadings.T
+    whole += noise.gear_ratio**2 * alike + ratio**2 * (noise.tails[:, None] == noise.tails)
+    if noise.of_gear is not None:
+        whole += alike * np.outer(noise.of_gear, noise.of_gear)
+    return np.asarray(whole)
 
 
+@pytest.mark.parametrize("noise", NOISES)
 @pytest.mark.parametrize("ratio", NOISE.tail_ratios)
-def test_the_inverse_covariance_is_that_of_the_whole_matrix(ratio: float) -> None:
+def test_the_inverse_covariance_is_that_of_the_whole_matrix(
+    ratio: float, noise: NoiseModel
+) -> None:
     columns = RNG.standard_normal((N, 3))
-    product, log_determinant = NOISE.precision_times(columns, ratio)
-    assert product == pytest.approx(np.linalg.solve(dense(ratio), columns))
-    assert log_determinant == pytest.approx(np.linalg.slogdet(dense(ratio))[1])
+    product, log_determinant = noise.precision_times(columns, ratio)
+    assert product == pytest.approx(np.linalg.solve(dense(ratio, noise), columns))
+    assert log_determinant == pytest.approx(np.linalg.slogdet(dense(ratio, noise))[1])
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_the_length_of_each_column_is_that_under_the_inverse_whatever_it_is_kept_as(
+    noise: NoiseModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mlg_troubleshoot.misfit.columns._LARGE", 0)
+    columns = RNG.standard_normal((N, 3)) * (np.arange(N)[:, None] < [N, 4, 7])
+    inverse = [np.linalg.inv(dense(ratio, noise)) for ratio in noise.tail_ratios]
+    expected = [np.einsum("ij,ik,kj->j", columns, each, columns) for each in inverse]
+    assert noise.squares(EffectColumns.made(N, iter(columns.T))) == pytest.approx(
+        np.array(expected)
+    )
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_what_a_row_scatters_by_itself_is_what_the_inverse_leaves(noise: NoiseModel) -> None:
+    data, inverse = RNG.standard_normal(N), np.linalg.inv(dense(noise.tail_ratios[-1], noise))
+    own, share = noise.own_part(data)
+    assert own == pytest.approx(noise.relative**2 * (inverse @ data))
+    assert share == pytest.approx(np.mean(noise.relative**2 * np.diag(inverse)))
 
 
 def test_a_fit_is_that_of_generalised_least_squares_with_its_errors() -> None:

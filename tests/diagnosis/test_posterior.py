@@ -17,6 +17,7 @@ from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.diagnosis.explain import MisfitProblem
 from mlg_troubleshoot.diagnosis.noise import Rows
 from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Key
 from mlg_troubleshoot.misfit.marginal import Marginal, Products
@@ -60,7 +61,11 @@ def effects(columns: Array = COLUMNS, mean: float = 0.0) -> Effects:
     )
 
 
-CONTEXTS = (Context.none(N), Context(("all", None), -2.0, 0.7 * RNG.standard_normal((N, 3))))
+ROOT = np.array([[0.7, 0.0, 0.0], [0.2, 0.6, 0.0], [-0.1, 0.3, 0.5]])
+CONTEXTS = (
+    Context.none(N),
+    Context(("all", None), -2.0, RNG.standard_normal((N, 3)), root=ROOT),
+)
 DATA = COLUMNS[:, 1] * 0.9 + np.linalg.cholesky(
     1.69 * (np.diag(NOISE.relative**2) + NOISE.factors(0.5) @ NOISE.factors(0.5).T)
 ) @ RNG.standard_normal(N)
@@ -74,7 +79,7 @@ def brute(members: tuple[int, ...], context: Context, given: Effects) -> float:
     whole = []
     grid = np.linspace(-1.5, 1.5, 241)
     for level, ratio in product(BELIEFS.sizes, NOISE.tail_ratios):
-        low = np.hstack([NOISE.factors(ratio), context.shared_in / NOISE.scale_in])
+        low = np.hstack([NOISE.factors(ratio), context.independent_in / NOISE.scale_in])
         spread = [
             (level if given.scales[k] else 1.0) * given.size[k] / NOISE.scale_in for k in members
         ]
@@ -95,6 +100,7 @@ def alone(members: tuple[int, ...], context: int, given: Effects) -> float:
 
 
 FREE = replace(effects(), sign=np.zeros(P))
+SCALED = np.linspace(1.0, 2.0, P)
 SETS = [(), (0,), (5,), (0, 3), (1, 3, 4)]
 
 
@@ -230,6 +236,23 @@ def test_what_is_rarer_beforehand_is_rarer_afterwards_by_as_much() -> None:
     assert odds[0] == pytest.approx(10.0 * odds[1], rel=1e-3)
 
 
+def test_effects_that_are_kept_by_their_rows_are_as_likely_as_written_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("mlg_troubleshoot.misfit.columns._LARGE", 0)
+    few = np.where(np.arange(N)[:, None] < [N, N, 3, 5, 2, 1], COLUMNS, 0.0)
+    kept = EffectColumns.made(N, iter(few.T))
+    assert len(kept.blocks) == 2
+    changed = Context(("all", None), -2.0, CONTEXTS[1].shared_in, lambda: kept.scaled(SCALED))
+    written = replace(changed, columns=lambda: EffectColumns.of(few * SCALED))
+    short, whole = (
+        posterior(NOISE, DATA, replace(FREE, columns=columns), (CONTEXTS[0], context), BELIEFS)
+        for columns, context in ((kept, changed), (few, written))
+    )
+    assert short.names == pytest.approx(whole.names, rel=1e-9)
+    assert short.expected_in == pytest.approx(whole.expected_in, rel=1e-9)
+
+
 def test_twice_as_much_searching_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     before = search().names
     monkeypatch.setattr("mlg_troubleshoot.misfit.posterior.BEAM", 40)
@@ -242,8 +265,9 @@ def test_what_moves_with_a_column_is_as_likely_beforehand_whatever_the_number_of
 ):
     shapes, none = RNG.standard_normal((N, 4)), np.empty((N, 0))
     by_hand = Rows(*(np.zeros(N),) * 5, none, none, 0.0, 0.0, np.zeros(N), none, none, ())
-    bank = Bank(shapes, (("day",), ("day",), ("day",), ("side",)), {})
-    problem = MisfitProblem(DATA, by_hand, (), none, bank, (), CATALOGUE, lambda _m: none, BELIEFS)
+    bank = Bank(EffectColumns.of(shapes), (("day",), ("day",), ("day",), ("side",)), {})
+    held = EffectColumns.of(none)
+    problem = MisfitProblem(DATA, by_hand, (), held, bank, (), CATALOGUE, lambda _m: held, BELIEFS)
     given = problem.effects(NOISE)
     share: dict[Key | None, float] = {}
     for name, prior in zip(given.names, np.exp(given.log_prior), strict=True):

@@ -84,9 +84,14 @@ class Block:
         return _evidence(along, square, self.changes) - 0.5 * float(normal)
 
     @property
+    def root(self) -> Array:
+        """Root of the covariance, shape (k, k). [1]"""
+        return np.asarray(np.linalg.cholesky(self.covariance), float)
+
+    @property
     def effects_in(self) -> Array:
         """Independent effects of one standard deviation each, shape (n, k). [in]"""
-        return self.columns @ np.linalg.cholesky(self.covariance)
+        return self.columns @ self.root
 
     def candidate(self, change: Array, covariance: Array) -> Candidate:
         """The cause with fitted factors, their 95 % intervals, and the joints that only count

@@ -1,0 +1,178 @@
+"""Effects column by column, in blocks: those that act in few rows are kept by these rows alone.
+
+A table of ten thousand rows has thousands of effects that act in one aircraft each; written out
+they would fill the memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from mlg_troubleshoot.arrays import Array, Places
+
+ColumnBlock = Array | csc_array
+# Computing only: numbers from which a block is large, and share of its rows in which a column acts,
+# below which it is kept by these rows.
+_LARGE, _FEW = 1_000_000, 0.2
+# Columns that are written out together.
+_AT_ONCE = 256
+
+
+@dataclass(frozen=True)
+class EffectColumns:
+    """Some columns of n rows each, p in all.
+
+    n: rows. blocks: places of some of the columns, and these, shape (n, k).
+    """
+
+    n: int
+    blocks: tuple[tuple[Places, ColumnBlock], ...]
+
+    @staticmethod
+    def of(columns: Array | EffectColumns) -> EffectColumns:
+        """Columns that are written out, or kept so already."""
+        if isinstance(columns, EffectColumns):
+            return columns
+        return EffectColumns(len(columns), ((np.arange(columns.shape[1]), columns),))
+
+    @staticmethod
+    def made(n: int, columns: Iterable[Array]) -> EffectColumns:
+        """Columns as they come, each kept as is shorter."""
+        full: list[Array] = []
+        few: list[tuple[Places, Array]] = []
+        places: tuple[list[int], list[int]] = ([], [])
+        for place, column in enumerate(columns):
+            rows = np.flatnonzero(column)
+            short = len(rows) < _FEW * n and n * (place + 1) > _LARGE
+            places[short].append(place)
+            if short:
+                few.append((rows, column[rows]))
+            else:
+                full.append(column)
+        blocks: list[tuple[Places, ColumnBlock]] = []
+        if full:
+            blocks.append((np.array(places[0]), np.column_stack(full)))
+        if few:
+            ends = np.cumsum([0, *(len(rows) for rows, _values in few)])
+            rows, values = (np.concatenate(part) for part in zip(*few, strict=True))
+            blocks.append((np.array(places[1]), csc_array((values, rows, ends), (n, len(few)))))
+        return EffectColumns(n, tuple(blocks))
+
+    @staticmethod
+    def joined(parts: Sequence[EffectColumns]) -> EffectColumns:
+        """All columns of several, one after the other."""
+        begins = np.cumsum([0, *(part.p for part in parts)])
+        blocks = [
+            (begin + places, block)
+            for begin, part in zip(begins, parts, strict=False)
+            for places, block in part.blocks
+        ]
+        n = parts[0].n
+        if n * begins[-1] <= _LARGE:
+            return EffectColumns.of(np.hstack([part.take(np.arange(part.p)) for part in parts]))
+        return EffectColumns(n, tuple(blocks))
+
+    def replaced(self, changed: Places, columns: Array) -> EffectColumns:
+        """The same with some columns, in the order of their places, in the place of others."""
+        kept = [(np.isin(places, changed, invert=True), places, b) for places, b in self.blocks]
+        others = [(places[k], block[:, k]) for k, places, block in kept]
+        return EffectColumns(self.n, (*others, (changed, columns)))
+
+    def unlike(self, other: EffectColumns) -> Places:
+        """Places of the first columns that are not the same in the other, which has as many or
+        fewer.
+        """
+        found = []
+        for begin in range(0, other.p, _AT_ONCE):
+            places = np.arange(begin, min(begin + _AT_ONCE, other.p))
+            differs = np.any(self.take(places) != other.take(places), axis=0)
+            found.append(places[differs])
+        return np.concatenate(found) if found else np.empty(0, np.intp)
+
+    @property
+    def p(self) -> int:
+        """Number of columns."""
+        return sum(len(places) for places, _block in self.blocks)
+
+    def take(self, wanted: Sequence[int] | Places) -> Array:
+        """Some of the columns written out, shape (n, k)."""
+        wanted = np.asarray(wanted, np.intp)
+        found = np.empty((self.n, len(wanted)))
+        for places, block in self.blocks:
+            at = np.searchsorted(places, wanted)
+            here = np.append(places, -1)[at] == wanted
+            if here.any():
+                some = block[:, at[here]]
+                found[:, here] = some if isinstance(some, np.ndarray) else some.toarray()
+        return found
+
+    def some(self, wanted: Places) -> EffectColumns:
+        """Some of the columns, in their order."""
+        blocks = []
+        for places, block in self.blocks:
+            kept = np.isin(places, wanted)
+            blocks.append((np.searchsorted(wanted, places[kept]), block[:, kept]))
+        return EffectColumns(self.n, tuple(blocks))
+
+    def onto(self, rows: Array) -> Array:
+        """Products of all columns with some vectors, shape (k, n): (k, p)."""
+        found = np.empty((len(rows), self.p))
+        for places, block in self.blocks:
+            found[:, places] = rows @ block
+        return found
+
+    def times(self, values: Array) -> Array:
+        """Sum of all columns, each so many times, shape (n,)."""
+        found = np.zeros(self.n)
+        for places, block in self.blocks:
+            found += block @ values[places]
+        return found
+
+    def sums(self, of_block: Callable[[ColumnBlock], Array]) -> Array:
+        """A number of each column, asked for some columns at a time, shape (..., p)."""
+        found = [
+            (places[k : k + _AT_ONCE], of_block(block[:, k : k + _AT_ONCE]))
+            for places, block in self.blocks
+            for k in range(0, len(places), _AT_ONCE)
+        ]
+        if not found:
+            return of_block(np.empty((self.n, 0)))
+        every = np.empty((*found[0][1].shape[:-1], self.p))
+        for places, values in found:
+            every[..., places] = values
+        return every
+
+    @property
+    def squares(self) -> Array:
+        """Sum of squares of each column, shape (p,)."""
+        return self.sums(lambda block: np.asarray((block * block).sum(axis=0)))
+
+    @property
+    def acting(self) -> Array:
+        """Root mean square of each column over the rows in which it acts, shape (p,)."""
+        rows = self.sums(_rows_of)
+        return np.asarray(np.sqrt(self.squares / np.maximum(rows, 1.0)))
+
+    def scaled(self, factors: Array) -> EffectColumns:
+        """Each column so many times."""
+        return EffectColumns(
+            self.n, tuple((at, _times(block, factors[at])) for at, block in self.blocks)
+        )
+
+
+def _rows_of(block: ColumnBlock) -> Array:
+    """Number of rows in which each column acts."""
+    if isinstance(block, np.ndarray):
+        return np.asarray(np.count_nonzero(block, axis=0), float)
+    return np.asarray(np.diff(block.indptr), float)
+
+
+def _times(block: ColumnBlock, factors: Array) -> ColumnBlock:
+    if isinstance(block, np.ndarray):
+        return np.asarray(block * factors)
+    values = block.data * np.repeat(factors, np.diff(block.indptr))
+    return csc_array((values, block.indices, block.indptr), block.shape)
