@@ -291,10 +291,26 @@ def test_the_rate_scales_the_prediction(gear: Gear, scene: Scene) -> None:
 def test_two_kinds_of_rows_differ_by_the_parameter(name: str, larger: str, scene: Scene) -> None:
     cause = BY_NAME[name]
     rows = scene.table.factors[cause.needs[0]] == larger
-    for candidate in cause.candidates(scene):
+    of_all = [candidate for candidate in cause.candidates(scene) if candidate.target is None]
+    assert len(of_all) == 3
+    for candidate in of_all:
         offset = cause.adjust(scene, candidate, 0.004).offset_in
         assert offset is not None
         assert np.mean(offset[rows]) - np.mean(offset[~rows]) == pytest.approx(0.004)
+
+
+def test_the_habit_of_one_technician_shifts_no_rows_of_others(scene: Scene) -> None:
+    cause = BY_NAME["approach_hysteresis"]
+    habits = [c for c in cause.candidates(scene) if c.target == "technician T-2"]
+    assert len(habits) == 3
+    own = scene.table.factors["technician_id"] == "T-2"
+    extending = scene.table.factors["approach"] == "EXTENDING"
+    for candidate in habits:
+        offset = cause.adjust(scene, candidate, 0.004).offset_in
+        assert offset is not None
+        assert not offset[~own].any()
+        apart = np.mean(offset[own & extending]) - np.mean(offset[own & ~extending])
+        assert apart == pytest.approx(0.004)
 
 
 def test_a_rigging_change_concerns_one_aircraft_or_one_of_its_gears(scene: Scene) -> None:

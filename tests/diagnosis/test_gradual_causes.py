@@ -44,6 +44,11 @@ def modified(table: DiagnosisTable, _over: Array) -> Array:
     return 0.006 * (table.quantities["day"] >= since)
 
 
+def approaching(table: DiagnosisTable, _over: Array) -> Array:
+    own = table.factors["technician_id"] == "T-2"
+    return 0.006 * (own & (table.factors["approach"] == "RETRACTING"))
+
+
 def own_column(table: DiagnosisTable, over: Array) -> DiagnosisTable:
     texts = np.where(modified(table, over) > 0.0, "POST", "PRE")
     return replace(table, factors={**table.factors, "mod_status": texts})
@@ -57,6 +62,20 @@ def test_a_technician_who_learns_is_named(gear: Gear) -> None:
     assert names(gear, fleet(gear.model, learning, rows=200)) == [
         ("technician_learning", "technician T-1")
     ]
+
+
+def test_lost_motion_in_the_rows_of_one_technician_is_named_with_the_technician(gear: Gear) -> None:
+    table = fleet(gear.model, approaching, rows=200)
+    assert names(gear, table) == [("approach_hysteresis", "technician T-2")]
+    (cause,) = diagnose(gear.model, table, gear.discrepancies).causes
+    assert cause.candidate.cause.words(cause.candidate.target).endswith("of technician T-2")
+
+
+def test_lost_motion_of_all_is_not_one_technicians(gear: Gear) -> None:
+    def of_all(table: DiagnosisTable, _over: Array) -> Array:
+        return 0.004 * (table.factors["approach"] == "RETRACTING")
+
+    assert names(gear, fleet(gear.model, of_all, rows=200)) == [("approach_hysteresis", None)]
 
 
 def test_aircraft_that_change_on_dates_of_their_own_are_named_together(gear: Gear) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from datetime import date, timedelta
 from typing import Any, ClassVar
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
 from mlg_troubleshoot.diagnosis.causes.base import (
     MOST_UNREAD,
     Candidate,
@@ -147,7 +149,9 @@ class SideDifference(_Contrast):
 
 
 class ApproachHysteresis(_Contrast):
-    """Lost motion: the reading depends on the direction of approach."""
+    """Lost motion: the reading depends on the direction of approach, of all or as the habit of one
+    technician.
+    """
 
     name: ClassVar[str] = "approach_hysteresis"
     needs: ClassVar[tuple[str, ...]] = ("approach",)
@@ -162,6 +166,30 @@ class ApproachHysteresis(_Contrast):
         "Approach mid-position always in the same direction; look for friction in the link assembly"
     )
     separates: ClassVar[str] = "one gear read twice, approached extending and retracting"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield the contrasts of all rows, and of the rows of each technician."""
+        yield from super().candidates(scene)
+        kinds = scene.table.factors[self.needs[0]]
+        people = scene.table.factors.get(TECHNICIAN_ID.variable, np.full(len(kinds), ""))
+        for person in levels(people):
+            if len(levels(kinds[people == person])) == 2:
+                for shares in self.shares:
+                    setting = {"shares": shares, "value": person}
+                    yield Candidate(self, f"technician {person}", setting)
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Shift the kinds by their shares, of one technician's rows if it is his habit."""
+        shift = super().adjust(scene, candidate, value)
+        if candidate.target is None or shift.offset_in is None:
+            return shift
+        people = scene.table.factors.get(TECHNICIAN_ID.variable, np.full(len(scene.table), ""))
+        own = people == candidate.setting["value"]
+        return replace(shift, offset_in=np.where(own, shift.offset_in, 0.0))
+
+    def words(self, target: str | None) -> str:
+        """Say whose habit it is."""
+        return self.sentence + (f", in the rows of {target}" if target else "")
 
 
 class DateStep(Cause):

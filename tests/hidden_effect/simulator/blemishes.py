@@ -290,9 +290,10 @@ def _hysteresis(scene: Scene, state: State) -> Hidden:
 
 
 def _hysteresis_of_one(scene: Scene, state: State) -> Hidden:
-    own = scene.design.technician == scene.usual(scene.design.technician)
+    person = scene.usual(scene.design.technician)
+    own = scene.design.technician == person
     state.offset += scene.size(0.0008, 0.0048) * own * (scene.design.approach == "RETRACTING")
-    return ()
+    return (("approach_hysteresis", f"technician {person}"),)
 
 
 def _modified(scene: Scene) -> tuple[Mask, Hidden]:
