@@ -11,7 +11,7 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -33,13 +33,10 @@ from mlg_troubleshoot.json_outputs import (
     SuspectCell,
 )
 from mlg_troubleshoot.outputs import SCHEMA_VERSION
-from mlg_troubleshoot.units import Sentence
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 
-_AS_THEY_ARE = frozenset((str, Sentence, int, bool, type(None)))
-_SINGLE = (Enum, np.generic)
 _JOINT = tuple(CheckedJoint.__annotations__)
 _OF_JOINT = attrgetter(*_JOINT[:-1], "alike")
 # What the geometry says of a joint of every gear, and so is not kept with each assessment.
@@ -50,19 +47,46 @@ def plain(value: Any) -> Any:
     """Return a value as JSON can hold it: records as objects, arrays as lists, names as text,
     nothing but numbers.
     """
-    kind = value.__class__
-    if kind is float:
-        return value if math.isfinite(value) else None
-    if kind in _AS_THEY_ARE:
-        return value
-    names = _field_names(kind)
+    return json.loads(as_text(value))
+
+
+def as_text(value: Any) -> str:
+    """Write a value as JSON: what `plain` makes of it, several times as fast."""
+    try:
+        return _ENCODED(value)
+    except (TypeError, ValueError):
+        # A number that is none, or a key that is not a text.
+        return _ENCODED(_cleaned(value))
+
+
+def _parts(value: Any) -> Any:
+    """What a value consists of that the encoder does not know."""
+    names = _field_names(value.__class__)
     if names:
-        return {name: plain(getattr(value, name)) for name in names}
-    if isinstance(value, _SINGLE):
-        return value.value if isinstance(value, Enum) else plain(value.item())
+        return {name: getattr(value, name) for name in names}
+    if isinstance(value, Enum):
+        return value.value
     if isinstance(value, Mapping):
-        return {str(key): plain(each) for key, each in value.items()}
-    return [plain(each) for each in (value.tolist() if isinstance(value, np.ndarray) else value)]
+        return dict(value)
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else list(value)
+
+
+def _cleaned(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, str | int):
+        return value
+    parts = value if isinstance(value, Mapping) else _parts(value)
+    if isinstance(parts, Mapping):
+        return {str(key): _cleaned(each) for key, each in parts.items()}
+    if isinstance(parts, list | tuple):
+        return [_cleaned(each) for each in parts]
+    return _cleaned(parts)
+
+
+_ENCODED = json.JSONEncoder(
+    allow_nan=False, ensure_ascii=False, check_circular=False, default=_parts
+).encode
 
 
 @cache
@@ -74,8 +98,12 @@ def written(kind: Any, record: Any = None, /, **given: Any) -> dict[str, Any]:
     """Return a record in the form of an output: each key as it is given, or as the record has
     it. The version of the schema stands in every output that has one.
     """
+    return cast("dict[str, Any]", plain(_filled(kind, record, **given)))
+
+
+def _filled(kind: Any, record: Any, /, **given: Any) -> dict[str, Any]:
     known = {"schema_version": SCHEMA_VERSION, **given}
-    return {n: plain(known[n] if n in known else getattr(record, n)) for n in kind.__annotations__}
+    return {n: known[n] if n in known else getattr(record, n) for n in kind.__annotations__}
 
 
 def check_as_json(
@@ -85,11 +113,12 @@ def check_as_json(
     warnings: Sequence[str],
     seed: int = 1,
 ) -> dict[str, Any]:
-    return {
+    whole = {
         **_head(gear, seed),
         "inspections": [_inspection(j, gear) for j in judgements],
         **_tail(problems, warnings),
     }
+    return cast("dict[str, Any]", plain(whole))
 
 
 def kept_as_json(assessment: Assessment) -> dict[str, Any]:
@@ -99,8 +128,9 @@ def kept_as_json(assessment: Assessment) -> dict[str, Any]:
     joints = [_joint(finding) for finding in assessment.joints]
     kept = [{n: each for n, each in j.items() if n not in _OF_GEOMETRY} for j in joints]
     # What the gear did is kept with the inspection; words follow from what is kept.
-    whole = assessment_as_json(assessment, kept)
-    return {n: each for n, each in whole.items() if n not in ("outcome", "in_brief")}
+    whole = _assessment(assessment, kept)
+    said = {n: each for n, each in whole.items() if n not in ("outcome", "in_brief")}
+    return cast("dict[str, Any]", plain(said))
 
 
 def check_json_pieces(
@@ -113,16 +143,12 @@ def check_json_pieces(
     """Write the same form as JSON text piece by piece, one inspection a line: a large batch never
     stands in memory.
     """
-    yield _text(_head(gear, seed))[:-1] + ', "inspections": [\n'
+    yield as_text(_head(gear, seed))[:-1] + ', "inspections": [\n'
     separator = ""
     for judgement in judgements:
-        yield separator + _text(_inspection(judgement, gear))
+        yield separator + as_text(_inspection(judgement, gear))
         separator = ",\n"
-    yield "\n], " + _text(_tail(problems, warnings))[1:] + "\n"
-
-
-def _text(value: dict[str, Any]) -> str:
-    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    yield "\n], " + as_text(_tail(problems, warnings))[1:] + "\n"
 
 
 def _head(gear: Gear, seed: int) -> dict[str, Any]:
@@ -140,7 +166,7 @@ def _tail(problems: Sequence[Problem], warnings: Sequence[str]) -> dict[str, Any
 def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:
     """One row of the input; of a row that cannot be judged every number is null."""
     if isinstance(judgement, Assessment):
-        return assessment_as_json(judgement)
+        return _assessment(judgement)
     unknown = dict.fromkeys(_JOINT)
     return {
         **dict.fromkeys(CheckedInspection.__annotations__),
@@ -169,7 +195,12 @@ def gear_as_json(gear: Gear) -> dict[str, Any]:
     )
 
 
-def assessment_as_json(a: Assessment, joints: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+def assessment_as_json(a: Assessment) -> dict[str, Any]:
+    """One gear of a check."""
+    return cast("dict[str, Any]", plain(_assessment(a)))
+
+
+def _assessment(a: Assessment, joints: list[dict[str, Any]] | None = None) -> dict[str, Any]:
     """One gear of a check; `joints` as they are kept, else all that is known of each."""
     said = [a.measured_statement] if a.measured_statement else []
     own = {
@@ -177,26 +208,26 @@ def assessment_as_json(a: Assessment, joints: list[dict[str, Any]] | None = None
         "joints": [_joint(finding) for finding in a.joints] if joints is None else joints,
         "warnings": [*said, *a.warnings],
     }
-    return written(CheckedInspection, a, **_course(a.inspection, a), **own)
+    return _filled(CheckedInspection, a, **_course(a.inspection, a), **own)
 
 
 def _course(row: Any, judgement: Judgement) -> dict[str, Any]:
     """Whose row it is, its verdict and what to do next."""
-    steps = plain(judgement.plan.steps)
+    steps = judgement.plan.steps
     return {
-        **{name: plain(getattr(row, name)) for name in ("record_id", "tail_no", "side")},
-        "outcome": plain(getattr(row, "outcome", None)),
-        "verdict": judgement.verdict.value,
+        **{name: getattr(row, name) for name in ("record_id", "tail_no", "side")},
+        "outcome": getattr(row, "outcome", None),
+        "verdict": judgement.verdict,
         "next_action": steps[0],
         "in_brief": judgement.in_brief,
         "plan": steps,
-        "end": judgement.end.value,
+        "end": judgement.end,
         "open_question": judgement.plan.open_question,
     }
 
 
 def _joint(finding: JointFinding) -> dict[str, Any]:
-    return dict(zip(_JOINT, map(plain, _OF_JOINT(finding)), strict=True))
+    return dict(zip(_JOINT, _OF_JOINT(finding), strict=True))
 
 
 def diagnosis_as_json(
