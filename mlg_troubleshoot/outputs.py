@@ -9,7 +9,8 @@ import os
 import re
 import stat
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Literal
@@ -68,8 +69,9 @@ class OutputFile:
     kind: OutputKind
 
 
-def write_bytes(path: str | Path, data: bytes) -> None:
-    """Write a file so that it appears whole or not at all.
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Callable[[bytes], object]]:
+    """Open a file to be written piece by piece so that it appears whole or not at all.
 
     A link is followed, so that it stays one. A file that is replaced keeps its mode; a new one gets
     what the umask leaves. Folders that are missing are made. Anything that is not a regular file is
@@ -78,19 +80,35 @@ def write_bytes(path: str | Path, data: bytes) -> None:
     target = Path(os.path.realpath(path))
     scratch = None
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        mode = _mode_of(target, path)
-        handle, scratch = tempfile.mkstemp(prefix=".mlg-", suffix=".part", dir=target.parent)
+        with _refused(path):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            mode = _mode_of(target, path)
+            handle, scratch = tempfile.mkstemp(prefix=".mlg-", suffix=".part", dir=target.parent)
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(scratch).chmod(mode)
-        Path(scratch).replace(target)
+            yield _refused(path)(file.write)
+            _refused(path)(file.flush)()
+        with _refused(path):
+            Path(scratch).chmod(mode)
+            Path(scratch).replace(target)
         scratch = None
-    except OSError as error:
-        raise _cannot_be_written(path, error) from error
     finally:
         if scratch is not None:
             Path(scratch).unlink(missing_ok=True)
+
+
+@contextmanager
+def _refused(path: str | Path) -> Iterator[None]:
+    """Say of what the system refuses which file it was."""
+    try:
+        yield
+    except OSError as error:
+        raise _cannot_be_written(path, error) from error
+
+
+def write_bytes(path: str | Path, data: bytes) -> None:
+    """Write a file as `whole_file` does."""
+    with whole_file(path) as write:
+        write(data)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -107,7 +125,12 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[Field]]) -> str:
     """Return a table as CSV in which no text can become a formula, whatever separator a program
     takes it to have.
     """
-    lines = [[_quoted(harmless(value)) for value in row] for row in (header, *rows)]
+    return csv_lines((header, *rows))
+
+
+def csv_lines(rows: Iterable[Sequence[Field]]) -> str:
+    """Return rows of such a table."""
+    lines = [[_quoted(harmless(value)) for value in row] for row in rows]
     return "".join(",".join(line) + "\n" for line in lines)
 
 

@@ -155,7 +155,7 @@ class Wanted(options.OutputOptions):
     ] = 1
     workers: Annotated[
         int | None,
-        typer.Option(min=1, help="Cores that judge more than 1,024 rows; all if not given."),
+        typer.Option(min=1, help="Cores that judge more than 512 rows; all if not given."),
     ] = None
     scheduler: Annotated[
         str | None,

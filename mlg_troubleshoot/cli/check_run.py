@@ -5,8 +5,10 @@ found.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,20 +19,39 @@ from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
 from mlg_troubleshoot.decision.columns import RECORD_ID, SIDE
-from mlg_troubleshoot.decision.inspection import Side
+from mlg_troubleshoot.decision.inspection import RowSource, Side
+from mlg_troubleshoot.decision.ranking import Listed, listed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.outputs import OutputFile
+from mlg_troubleshoot.outputs import OutputFile, whole_file
+from mlg_troubleshoot.parallel import Blocks
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
 from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 if TYPE_CHECKING:
+    from mlg_troubleshoot.decision.assessment import Judgement
+    from mlg_troubleshoot.records import ReadResult
+    from mlg_troubleshoot.reporting.json_form import CheckText
     from mlg_troubleshoot.store import Record
+    from mlg_troubleshoot.workflows.keep import JudgedEntry
 
 # Where the prompts write a report that was not asked for by a flag.
 _ASKED_FOR = Path("report")
+# One gear, and one before and after a repair, are shown in full.
+_FEW = 2
+
+
+@dataclass
+class _Gathered:
+    """What is still needed of judgements that went out as they came."""
+
+    lines: list[Listed] = field(default_factory=list)
+    held: list[Judgement] = field(default_factory=list)
+    entries: Blocks[JudgedEntry] = field(default_factory=Blocks)
+    annotated: dict[RowSource, task.Annotated] = field(default_factory=dict)
+    text: CheckText | None = None
 
 
 class Run:
@@ -77,42 +98,91 @@ class Run:
     def run(self) -> int:
         """Judge, show and keep; the exit code is returned."""
         load_index_table(load_gear(self._asked.gear), lambda said: output.say(f"Note: {said}"))
+        if self._files:
+            return self._check_files()
         if self._asks:
-            result = self._ask()
-        else:
-            result = self._judged()
-            self._publish(result, LengthUnit.INCH)
-            self._keep(result)
-        if result.problems and not self._wanted.as_json and not result.judgements:
-            output.say("No row could be judged.")
+            return self._ask().exit_code
+        typed = by_hand.from_flags(self._flags, self._asked)
+        if self._place is not None and RECORD_ID.name not in self._flags.typed:
+            from mlg_troubleshoot.workflows.keep import under_a_free_id
+
+            typed = under_a_free_id(typed, self._place)
+        result = task.check_inspection(typed, self._asked, self._place)
+        self._publish(result, LengthUnit.INCH)
+        self._keep(result)
         return result.exit_code
 
-    def _judged(self) -> task.CheckResult:
+    def _check_files(self) -> int:
         # The side of a FILE is that of a table without a column of sides.
-        of_one_gear = self._flags.values, self._flags.typed.keys() - {SIDE.name}
-        if self._files and any(of_one_gear):
+        if self._flags.values or self._flags.typed.keys() - {SIDE.name}:
             raise UsageError(
                 "--set, --tail, --record-id, --outcome, --measured, --margin and the flags"
                 " of repairs and of the day (--restored … --minutes) describe one gear entered by"
                 " hand, and a FILE was given as well",
                 "Give either a FILE or the values of one gear.",
             )
-        if not self._files:
-            typed = by_hand.from_flags(self._flags, self._asked)
-            if self._place is not None and RECORD_ID.name not in self._flags.typed:
-                from mlg_troubleshoot.workflows.keep import under_a_free_id
+        wanted = self._wanted
+        seen = wanted.seen(self._shown, LengthUnit.INCH)
+        # On one terminal a bar would stand between the lines of the result.
+        quiet = wanted.quiet or (wanted.as_json and sys.stdout.isatty())
+        with ExitStack() as files:
+            found = _Gathered()
+            with stages(quiet=quiet) as bar:
+                result = task.check_files(
+                    [Path(name) for name in self._files],
+                    self._asked,
+                    on_read=partial(bar, "Reading"),
+                    on_judged=partial(bar, "Judging"),
+                    store=self._place,
+                    outputs=partial(self._outputs, found, files),
+                )
+            result = replace(result, judgements=tuple(found.held))
+            if found.text is not None:
+                output.write_pieces((found.text.end,))
+            elif wanted.as_json:
+                self._write_json(result)
+            else:
+                self._show(result, seen.show, found.lines, detail=wanted.detail)
+        if wanted.annotate is not None:
+            self._annotate(result.read, found.annotated, wanted.annotate)
+        if wanted.report is not None:
+            self._write_reports(result, wanted.report, seen)
+        self._keep(result, judged=found.entries)
+        if result.problems and not wanted.as_json and not found.lines:
+            output.say("No row could be judged.")
+        return task.exit_code_of(found.lines)
 
-                typed = under_a_free_id(typed, self._place)
-            return task.check_inspection(typed, self._asked, self._place)
-        with stages(quiet=self._wanted.quiet) as bar:
-            files = [Path(name) for name in self._files]
-            return task.check_files(
-                files,
-                self._asked,
-                on_read=partial(bar, "Reading"),
-                on_judged=partial(bar, "Judging"),
-                store=self._place,
+    def _outputs(
+        self, found: _Gathered, files: ExitStack, read: task.CheckResult, total: int
+    ) -> list[task.BlockOutput]:
+        """What is made of the judgements as they come."""
+        wanted = self._wanted
+        outputs = [task.BlockOutput(listed, found.lines.extend)]
+        if wanted.as_json and total > 1:
+            from mlg_troubleshoot.reporting.json_form import CheckText, inspection_lines
+
+            text = found.text = CheckText(read.gear, read.problems, self._warnings(read), read.seed)
+            output.write_pieces((text.begin,))
+            lines = partial(inspection_lines, read.gear)
+            outputs.append(
+                task.BlockOutput(lines, lambda block: output.write_pieces((text.joined(block),)))
             )
+        if wanted.csv is not None:
+            write = files.enter_context(whole_file(wanted.csv))
+            write(task.VERDICT_HEADER.encode())
+            outputs.append(
+                task.BlockOutput(task.verdict_lines, lambda block: write(block.encode()))
+            )
+        if wanted.annotate is not None:
+            outputs.append(task.BlockOutput(task.annotated, found.annotated.update))
+        if self._place is not None:
+            from mlg_troubleshoot.workflows.keep import judged_by, packed_entries
+
+            made = partial(packed_entries, judged_by(read.gear, self._asked))
+            outputs.append(task.BlockOutput(made, lambda block: found.entries.add(*block)))
+        if total <= _FEW or wanted.report is not None:
+            outputs.append(task.BlockOutput(tuple, found.held.extend))
+        return outputs
 
     def _ask(self) -> task.CheckResult:
         if not output.can_ask():
@@ -173,44 +243,57 @@ class Run:
             entry = ask(given, visit=visit)
 
     def _publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
+        """Show and write one gear that was entered by hand."""
         wanted = self._wanted
         seen = wanted.seen(self._shown, entered_in)
         if wanted.as_json:
-            from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
-
-            warnings = (*filter(None, [self._asked.remembered]), *result.notes)
-            found = (result.gear, result.judgements, result.problems, warnings, result.seed)
-            output.write_json(
-                check_json_pieces(*found) if len(result.judgements) > 1 else check_as_json(*found)
-            )
+            self._write_json(result)
         else:
             self._show(result, seen.show, detail=wanted.detail)
         if wanted.csv is not None:
             task.write_verdicts(result, wanted.csv)
         if wanted.annotate is not None:
-            self._annotate(result, wanted.annotate)
+            self._annotate(None, {}, wanted.annotate)
         if wanted.report is not None:
             self._write_reports(result, wanted.report, seen)
 
-    def _show(self, result: task.CheckResult, unit: LengthUnit, *, detail: bool) -> None:
+    def _warnings(self, result: task.CheckResult) -> tuple[str, ...]:
+        return (*filter(None, [self._asked.remembered]), *result.notes)
+
+    def _write_json(self, result: task.CheckResult) -> None:
+        from mlg_troubleshoot.reporting.json_form import check_as_json
+
+        said = result.problems, self._warnings(result), result.seed
+        output.write_json(check_as_json(result.gear, result.judgements, *said))
+
+    def _show(
+        self,
+        result: task.CheckResult,
+        unit: LengthUnit,
+        lines: Sequence[Listed] = (),
+        *,
+        detail: bool,
+    ) -> None:
         if not self._wanted.quiet:
             notes.show_notes(result.notes)
         notes.show_problems(result.problems)
         screen = output.console(unit=unit)
         screen.asks = self._asks
-        if len(result.judgements) == 1:
+        if len(lines) < _FEW and result.judgements:
             one_gear.show(result.judgements[0], result.gear, screen, detail=detail)
-        elif result.judgements:
-            batch.show(result, screen, every=self._wanted.every)
+        elif lines:
+            batch.show(lines, result.gear, screen, every=self._wanted.every)
             both = task.before_and_after(result.judgements)
             if both is not None:
                 batch.show_before_and_after(*both, screen)
 
-    def _annotate(self, result: task.CheckResult, out: Path) -> None:
-        if result.read is not None and not result.read.layouts:
+    def _annotate(
+        self, read: ReadResult | None, said: Mapping[RowSource, task.Annotated], out: Path
+    ) -> None:
+        if read is not None and not read.layouts:
             output.say(f"{out} was not written: no table was found to annotate.")
             return
-        for loss in task.annotate(result, Path(self._files[0]), out):
+        for loss in task.annotate(read, said, Path(self._files[0]), out):
             output.say(f"Note: {loss}.")
         if not self._wanted.quiet:
             output.say(f"Annotated workbook: {out}")
@@ -239,7 +322,12 @@ class Run:
             )
         output.say_written(written, quiet=self._wanted.quiet)
 
-    def _keep(self, result: task.CheckResult, before: Record | None = None) -> None:
+    def _keep(
+        self,
+        result: task.CheckResult,
+        before: Record | None = None,
+        judged: Blocks[JudgedEntry] | None = None,
+    ) -> None:
         """Add what was found to the store; what continues a kept inspection takes its place."""
         if self._place is None:
             return
@@ -253,7 +341,7 @@ class Run:
         else:
             with stages(quiet=self._wanted.quiet) as bar:
                 progress = partial(bar, "Keeping")
-                added = keep(result, self._asked, self._place, self._same_tail(), progress)
+                added = keep(result, self._asked, self._place, self._same_tail(), progress, judged)
         if not self._wanted.quiet:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from itertools import chain
 from typing import Any
@@ -48,7 +48,7 @@ from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import Length, Sentence
 
 # Rows judged at once, by one process: bounds the memory. [1]
-_CHUNK = 1024
+AT_ONCE = 512
 
 
 def assess(
@@ -60,18 +60,13 @@ def assess(
     seed: int = 1,
     extension: Extension | None = None,
     fleet: Fleet | None = None,
-    over: Callable[..., Iterator[tuple[int, tuple[Judgement, ...]]]] | None = None,
 ) -> tuple[Judgement, ...]:
     """Judge rows: verdict, plan, repair sets and allowances; with `advice` what is worth it for one
-    gear alone. `fleet` is what other gears teach; `over` has the parts judged, here or elsewhere,
-    as `spread` does.
+    gear alone. `fleet` is what other gears teach.
     """
-    parts = [rows[start : start + _CHUNK] for start in range(0, len(rows), _CHUNK)]
+    parts = [rows[start : start + AT_ONCE] for start in range(0, len(rows), AT_ONCE)]
     task = partial(_judge_part, gear, table, seed if advice else None, extension, fleet)
-    if over is None:
-        return tuple(chain.from_iterable(map(task, parts)))
-    judged = dict(over(task, parts))
-    return tuple(chain.from_iterable(judged[place] for place in range(len(parts))))
+    return tuple(chain.from_iterable(map(task, parts)))
 
 
 def _judge_part(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from datetime import date
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Verdict
+from mlg_troubleshoot.decision.inspection import Outcome, Side
 from mlg_troubleshoot.decision.plan import Basis
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
@@ -111,28 +113,82 @@ def _places(over: Mask, contribution: Array, total_order: Array) -> Places:
     return np.argsort(order, axis=-1) + 1
 
 
-def latest_of_each_gear(judgements: Sequence[Judgement]) -> tuple[list[int], list[int]]:
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """What a list of many says of one judgement, and what orders it: a fraction of its memory.
+
+    worst_in, margin_in, chance: of the prediction; None of a row that was not judged, and the first
+    also where the linkage does not close. [in, in, 1]
+    """
+
+    record_id: str | None
+    tail_no: str | None
+    side: Side | None
+    day: date | None
+    verdict: Verdict
+    in_brief: str
+    measured: bool
+    severity: tuple[int, int, float]
+    failed: bool
+    over_limit: tuple[int, ...]
+    worst_in: float | None
+    margin_in: float | None
+    chance: float | None
+
+    @classmethod
+    def of(cls, judgement: Judgement) -> Listed:
+        row = judgement.row
+        a = judgement if isinstance(judgement, Assessment) else None
+        return cls(
+            row.record_id,
+            row.tail_no,
+            row.side,
+            None if a is None else a.inspection.inspection_date,
+            judgement.verdict,
+            judgement.in_brief,
+            a is not None and a.basis is Basis.MEASURED,
+            _severity(judgement),
+            a is not None and a.inspection.outcome is Outcome.FAILED,
+            () if a is None else tuple(f.joint for f in a.joints if f.over_limit),
+            None if a is None else a.predicted_displacement_in,
+            None if a is None else a.margin_in,
+            None if a is None else a.probability_exceed_random_directions,
+        )
+
+    @property
+    def is_judged(self) -> bool:
+        return self.margin_in is not None
+
+    @property
+    def is_fine(self) -> bool:
+        """Whether nothing about the gear needs attention."""
+        within = self.verdict is Verdict.WITHIN_MARGIN
+        return within and not self.over_limit and not self.failed
+
+
+def listed(judgements: Iterable[Judgement]) -> list[Listed]:
+    return [Listed.of(judgement) for judgement in judgements]
+
+
+def latest_of_each_gear(lines: Sequence[Listed]) -> tuple[list[int], list[int]]:
     """Places of the latest inspection of each gear and of the earlier ones, both worst first.
 
     A row whose gear or date is not known stands by itself: nothing says that it is an earlier one.
     """
     last: dict[object, tuple[date, int]] = {}
-    for place, judgement in enumerate(judgements):
-        day = judgement.inspection.inspection_date if isinstance(judgement, Assessment) else None
-        key = place if day is None else (judgement.row.tail_no, judgement.row.side)
-        if key not in last or (day or date.min) >= last[key][0]:
-            last[key] = day or date.min, place
+    for place, line in enumerate(lines):
+        key = place if line.day is None else (line.tail_no, line.side)
+        if key not in last or (line.day or date.min) >= last[key][0]:
+            last[key] = line.day or date.min, place
     latest = {place for _, place in last.values()}
-    return worst_first(judgements, latest), worst_first(
-        judgements, set(range(len(judgements))) - latest
-    )
+    return worst_first(lines, latest), worst_first(lines, set(range(len(lines))) - latest)
 
 
-def worst_first(judgements: Sequence[Judgement], places: Iterable[int]) -> list[int]:
+def worst_first(lines: Sequence[Listed], places: Iterable[int]) -> list[int]:
     """Measured beyond the margin first, then by verdict, then by the displacement against the
     margin.
     """
-    return sorted(places, key=lambda place: (_severity(judgements[place]), place))
+    return sorted(places, key=lambda place: (lines[place].severity, place))
 
 
 def _severity(judgement: Judgement) -> tuple[int, int, float]:

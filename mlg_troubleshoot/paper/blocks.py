@@ -183,8 +183,7 @@ def total_order_study(
     task = partial(compute_block, study)
     runner = spread(task, missing, workers, scheduler, threads=numba_is_installed())
     try:
-        for place, sums in runner:
-            block = missing[place]
+        for block, sums in zip(missing, runner, strict=True):
             done[block] = sums
             if state is not None:
                 _append(state, [block, sums])

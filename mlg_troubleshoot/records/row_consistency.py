@@ -154,6 +154,8 @@ def order_warnings(
             gears.setdefault((row.tail_no, row.side), []).append((place, row))
     found: dict[int, str] = {}
     for (tail, side), seen in gears.items():
+        if len(seen) == 1:
+            continue
 
         def name(n: int, seen: list[tuple[int, Inspection]] = seen) -> str:
             source = seen[n][1].source

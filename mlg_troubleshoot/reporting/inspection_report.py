@@ -15,7 +15,7 @@ from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judge
 from mlg_troubleshoot.decision.columns import SIGN_OFF
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
 from mlg_troubleshoot.decision.plan import Step
-from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear
+from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear, listed
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
     no_repair_set,
@@ -230,7 +230,7 @@ def batch_document(
     lengths = Lengths(unit)
     source = ", ".join(Path(name).name for name in provenance.input_sha256) or "inspections"
     counted = Counter(j.verdict for j in judgements)
-    latest, earlier = latest_of_each_gear(judgements)
+    latest, earlier = latest_of_each_gear(listed(judgements))
     judged = [j for j in judgements if isinstance(j, Assessment)]
 
     def linked(places: Iterable[int]) -> list[tuple[Assessment, tuple[str, str]]]:

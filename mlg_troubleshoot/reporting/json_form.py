@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
@@ -133,22 +133,26 @@ def kept_as_json(assessment: Assessment) -> dict[str, Any]:
     return cast("dict[str, Any]", plain(said))
 
 
-def check_json_pieces(
-    gear: Gear,
-    judgements: Iterable[Judgement],
-    problems: Sequence[Problem],
-    warnings: Sequence[str],
-    seed: int = 1,
-) -> Iterator[str]:
-    """Write the same form as JSON text piece by piece, one inspection a line: a large batch never
-    stands in memory.
+class CheckText:
+    """The same form as JSON text, block by block, one inspection a line: a large batch never stands
+    in memory. `begin`, the lines of each block, `end`.
     """
-    yield as_text(_head(gear, seed))[:-1] + ', "inspections": [\n'
-    separator = ""
-    for judgement in judgements:
-        yield separator + as_text(_inspection(judgement, gear))
-        separator = ",\n"
-    yield "\n], " + as_text(_tail(problems, warnings))[1:] + "\n"
+
+    def __init__(
+        self, gear: Gear, problems: Sequence[Problem], warnings: Sequence[str], seed: int = 1
+    ) -> None:
+        self.begin = as_text(_head(gear, seed))[:-1] + ', "inspections": [\n'
+        self.end = "\n], " + as_text(_tail(problems, warnings))[1:] + "\n"
+        self._joint = ""
+
+    def joined(self, lines: str) -> str:
+        """The lines of a block as they go on after the block before."""
+        joint, self._joint = self._joint, ",\n"
+        return joint + lines
+
+
+def inspection_lines(gear: Gear, judgements: Iterable[Judgement]) -> str:
+    return ",\n".join(as_text(_inspection(judgement, gear)) for judgement in judgements)
 
 
 def _head(gear: Gear, seed: int) -> dict[str, Any]:

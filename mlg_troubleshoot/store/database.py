@@ -16,6 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from itertools import islice
 from pathlib import Path
 from sys import intern
 from typing import TYPE_CHECKING, Any
@@ -506,21 +507,55 @@ class Store:
         return StoreError(f"store {self.place}: the chain does not fit{at}: {misfit.why}", _VERIFY)
 
     def add(
-        self, records: Sequence[Record], judge: Callable[[Record, Record], bool] | None = None
+        self, records: Iterable[Record], judge: Callable[[Record, Record], bool] | None = None
     ) -> Added:
         """Add records in one transaction; those that stand there already are left out.
 
-        ``judge`` is asked about a known identity, with the record kept and the new one: False
-        refuses the whole call.
+        ``records`` are gone through twice. ``judge`` is asked about a known identity, with the
+        record kept and the new one: False refuses the whole call.
         """
-        distinct = {record.identity_hash: record for record in records}
+        waiting: set[bytes] = set()
+        last: dict[bytes, Record] = {}
+        total = 0
+        for record in records:
+            total += 1
+            identity = record.identity_hash
+            if identity in waiting:
+                last[identity] = record
+            waiting.add(identity)
+        added = 0
+        others: list[Record] = []
         with self.transaction(writing=True) as connection:
-            known = self._known(connection, list(distinct))
-            others = [
-                r
-                for identity, r in known.items()
-                if judge is not None and not judge(r, distinct[identity])
-            ]
+            seq, before = self._head(connection)
+            each = iter(records)
+            while block := list(islice(each, _AT_ONCE)):
+                distinct = {}
+                for record in block:
+                    identity = record.identity_hash
+                    if identity in waiting:
+                        waiting.remove(identity)
+                        distinct[identity] = last.pop(identity, record)
+                known = self._known(connection, list(distinct))
+                others += [
+                    r
+                    for identity, r in known.items()
+                    if judge is not None and not judge(r, distinct[identity])
+                ]
+                rows = []
+                for record in (r for i, r in distinct.items() if i not in known and not others):
+                    seq += 1
+                    row = {
+                        "seq": seq,
+                        "kind": record.kind.value,
+                        **{name: getattr(record, name) for name in _TEXTS[1:]},
+                        "identity": record.identity_hash,
+                        "body": record.packed,
+                    }
+                    row["hash"] = before = _chained(before, row)
+                    rows.append(row)
+                if rows:
+                    connection.execute(_records.insert(), rows)
+                added += len(rows)
             if others:
                 named = ", ".join(
                     f"{r.record_id} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in others[:5]
@@ -531,22 +566,7 @@ class Store:
                     "If the new one is right: mlg history correct RECORD FILE. If it is another"
                     " inspection, give it its own record_id or date.",
                 )
-            new = [record for identity, record in distinct.items() if identity not in known]
-            seq, before = self._head(connection)
-            rows = []
-            for seq_new, record in enumerate(new, seq + 1):
-                row = {
-                    "seq": seq_new,
-                    "kind": record.kind.value,
-                    **{name: getattr(record, name) for name in _TEXTS[1:]},
-                    "identity": record.identity_hash,
-                    "body": record.packed,
-                }
-                row["hash"] = before = _chained(before, row)
-                rows.append(row)
-            if rows:
-                connection.execute(_records.insert(), rows)
-        return Added(len(new), len(records) - len(new))
+        return Added(added, total - added)
 
     def known(self, identities: Sequence[bytes]) -> dict[bytes, Record]:
         """Records that stand here under these identities."""

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import pickle
+import zlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, MeasuringAdvice, Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
-from mlg_troubleshoot.decision.judge_rows import assess
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
+from mlg_troubleshoot.decision.judge_rows import AT_ONCE, assess
 from mlg_troubleshoot.decision.prediction import Extension
+from mlg_troubleshoot.decision.ranking import Listed, listed
 from mlg_troubleshoot.errors import ExitCode, OutputError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.since_repairs import since_repairs
-from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
+from mlg_troubleshoot.outputs import OutputKind, csv_lines, write_text
 from mlg_troubleshoot.parallel import spread
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
@@ -57,7 +61,7 @@ class CheckOptions(TableOptions):
     extension : Extension or None
         An extension of the model.
     workers : int
-        Cores that judge more than 1,024 rows; what is found does not depend on it. A script that
+        Cores that judge more than 512 rows; what is found does not depend on it. A script that
         asks for more than one needs ``if __name__ == "__main__":``, as `multiprocessing` does.
     scheduler : distributed.Client or None
         Dask client to judge them with.
@@ -98,18 +102,25 @@ class CheckResult(TableResult):
     @property
     def exit_code(self) -> ExitCode:
         """NO_CONCLUSION if no row was judged, ATTENTION if one needs it."""
-        judged = [j for j in self.judgements if isinstance(j, Assessment)]
-        if not judged:
-            return ExitCode.NO_CONCLUSION
-        fine = all(
-            j.verdict is Verdict.WITHIN_MARGIN
-            and not any(f.over_limit for f in j.joints)
-            and j.inspection.outcome is not Outcome.FAILED
-            for j in judged
-        )
-        if fine and len(judged) == len(self.judgements):
-            return ExitCode.FINE
-        return ExitCode.ATTENTION
+        return exit_code_of(listed(self.judgements))
+
+
+def exit_code_of(lines: Sequence[Listed]) -> ExitCode:
+    """NO_CONCLUSION if no row was judged, ATTENTION if one needs it."""
+    if not any(line.is_judged for line in lines):
+        return ExitCode.NO_CONCLUSION
+    return ExitCode.FINE if all(line.is_fine for line in lines) else ExitCode.ATTENTION
+
+
+@dataclass(frozen=True, slots=True)
+class BlockOutput:
+    """Something that is made of judgements block by block, so that a long table never stands in
+    memory: `make` turns a block into what is written of it, where it was judged; `take` receives
+    that here, in the order of the rows.
+    """
+
+    make: Callable[[Sequence[Judgement]], Any]
+    take: Callable[[Any], object]
 
 
 def check_files(
@@ -118,6 +129,7 @@ def check_files(
     on_read: Callable[[int, int | None], None] | None = None,
     on_judged: Callable[[int, int], None] | None = None,
     store: Store | None = None,
+    outputs: Callable[[CheckResult, int], Sequence[BlockOutput]] | None = None,
 ) -> CheckResult:
     """Judge every inspection of the given files.
 
@@ -133,6 +145,9 @@ def check_files(
         Called with rows judged and their number.
     store : Store, optional
         What is kept: rows older than a repair that stands there count as older.
+    outputs : callable, optional
+        Called once with what was read and the number of its rows; the outputs that it returns
+        receive the judgements, which the result then does not hold.
 
     Returns
     -------
@@ -149,19 +164,26 @@ def check_files(
     options = options or CheckOptions()
     gear = load_gear(options.gear)
     read = read_many(sources, ReadOptions.of(gear, options), progress=on_read)
-    details = {
-        "problems": read.problems,
-        "notes": read.notes,
-        "inputs_sha256": read.inputs_sha256,
-        "read": read,
-    }
-    return _judge(gear, read.rows, options, on_judged, store=store, **details)
+    rows = list(read.rows)
+    if outputs is not None:
+        read = replace(read, rows=())
+    found = CheckResult(
+        gear=gear,
+        judgements=(),
+        problems=read.problems,
+        notes=read.notes,
+        inputs_sha256=read.inputs_sha256,
+        read=read,
+        seed=options.seed,
+    )
+    return _judge(found, rows, options, on_judged, store, outputs)
 
 
 def check_inspection(
     inspection: Inspection, options: CheckOptions, store: Store | None = None
 ) -> CheckResult:
-    return _judge(load_gear(options.gear), (inspection,), options, store=store)
+    found = CheckResult(gear=load_gear(options.gear), judgements=(), seed=options.seed)
+    return _judge(found, [inspection], options, store=store)
 
 
 @overload
@@ -358,48 +380,70 @@ def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Asses
 
 
 def _judge(
-    gear: Gear,
-    rows: Sequence[Inspection | InvalidRow],
+    found: CheckResult,
+    rows: list[Inspection | InvalidRow],
     options: CheckOptions,
     on_judged: Callable[[int, int], None] | None = None,
     store: Store | None = None,
-    **details: Any,
+    outputs: Callable[[CheckResult, int], Sequence[BlockOutput]] | None = None,
 ) -> CheckResult:
-    advice = len(rows) == 1 if options.advice is None else options.advice
+    """Judge rows; the list is empty afterwards."""
+    total = len(rows)
+    counting = since_repairs(rows, found.gear, store)
+    blocks = [slice(start, start + AT_ONCE) for start in range(0, total, AT_ONCE)]
+    # As they were read, and as they count since repairs: packed they take a tenth of the memory.
+    waiting = [zlib.compress(pickle.dumps((rows[at], counting[at])), 1) for at in blocks]
+    rows.clear()
+    del counting
     fleet = None
     if store is not None:
         from mlg_troubleshoot.life.fleet import expected_of
 
-        fleet = expected_of(store, gear)
-    asked: dict[str, Any] = {
-        "advice": advice,
-        "seed": options.seed,
-        "extension": options.extension,
-        "fleet": fleet,
-    }
+        fleet = expected_of(store, found.gear)
     if fleet is not None:
-        details["notes"] = (*details.get("notes", ()), fleet.text)
-    as_they_count = since_repairs(rows, gear, store)
+        found = replace(found, notes=(*found.notes, fleet.text))
+    held: list[Judgement] = []
+    wanted = [BlockOutput(tuple, held.extend)] if outputs is None else outputs(found, total)
+    task = partial(
+        _made,
+        partial(
+            assess,
+            gear=found.gear,
+            table=load_index_table(found.gear),
+            advice=total == 1 if options.advice is None else options.advice,
+            seed=options.seed,
+            extension=options.extension,
+            fleet=fleet,
+        ),
+        [output.make for output in wanted],
+    )
+    done = 0
+    single = len(waiting) == 1
+    judged = (
+        map(task, waiting) if single else spread(task, waiting, options.workers, options.scheduler)
+    )
+    for count, made in judged:
+        for output, each in zip(wanted, made, strict=True):
+            output.take(each)
+        done += count
+        if on_judged is not None:
+            on_judged(done, total)
+    return replace(found, judgements=tuple(held))
 
-    def over(task: Callable[[Any], tuple[Judgement, ...]], parts: Sequence[Any]) -> Iterator[Any]:
-        done = 0
-        for place, found in spread(task, parts, options.workers, options.scheduler):
-            done += len(found)
-            if on_judged is not None:
-                on_judged(done, len(rows))
-            yield place, found
 
-    asked["over"] = over if len(rows) > 1 else None
-    judgements = assess(as_they_count, gear, load_index_table(gear), **asked)
-    if as_they_count is not rows:
-        # What is shown and kept of an inspection is what was found, whatever counts no more.
-        judgements = tuple(
-            replace(judged, inspection=row)
-            if isinstance(judged, Assessment) and isinstance(row, Inspection)
-            else judged
-            for judged, row in zip(judgements, rows, strict=True)
-        )
-    return CheckResult(gear=gear, judgements=judgements, seed=options.seed, **details)
+def _made(
+    judge: Callable[[Sequence[Inspection | InvalidRow]], tuple[Judgement, ...]],
+    makers: Sequence[Callable[[Sequence[Judgement]], Any]],
+    block: bytes,
+) -> tuple[int, list[Any]]:
+    """Judge a block of rows; how many they are, and what is made of them."""
+    rows, counting = pickle.loads(zlib.decompress(block))
+    # What is shown and kept of an inspection is what was found, whatever counts no more.
+    judged = [
+        replace(each, inspection=row) if isinstance(each, Assessment) else each
+        for each, row in zip(judge(counting), rows, strict=True)
+    ]
+    return len(rows), [make(judged) for make in makers]
 
 
 def write_reports(
@@ -518,7 +562,8 @@ _VERDICT_HEADER = (
     *("verdict", "basis", *_NUMBERS, "joints_over_limit", "next_action", "in_brief", "end"),
     *("file", "sheet", "row"),
 )
-VERDICTS = OutputKind.marked("is not a table of verdicts", csv_text(_VERDICT_HEADER, ()))
+VERDICT_HEADER = csv_lines([_VERDICT_HEADER])
+VERDICTS = OutputKind.marked("is not a table of verdicts", VERDICT_HEADER)
 
 
 def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:
@@ -541,28 +586,52 @@ def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:
 
 def write_verdicts(result: CheckResult, file: Path) -> None:
     """Write the verdicts as CSV, one line per row of the input, in its order."""
+    write_text(file, VERDICT_HEADER + verdict_lines(result.judgements))
+
+
+def verdict_lines(judgements: Sequence[Judgement]) -> str:
+    """Lines of the CSV of verdicts, without its header."""
     rows = []
-    for judgement in result.judgements:
+    for judgement in judgements:
         row = judgement.row
         identity = (row.record_id, row.tail_no, None if row.side is None else str(row.side))
         place = (row.source.file, row.source.sheet, row.source.row)
         rows.append((*identity, *_verdict_columns(judgement).values(), *place))
-    write_csv(file, _VERDICT_HEADER, rows)
+    return csv_lines(rows)
 
 
-def annotate(result: CheckResult, source: Path, out: Path) -> tuple[str, ...]:
+class Annotated(NamedTuple):
+    """What stands in an annotated workbook about one row: its verdict, and the limits of joints
+    that are over theirs. [in]
+    """
+
+    columns: dict[str, str | float | None]
+    over_limit: dict[int, float]
+
+
+def annotated(judgements: Sequence[Judgement]) -> dict[RowSource, Annotated]:
+    return {
+        j.row.source: Annotated(
+            _verdict_columns(j),
+            {f.joint: f.limit_in for f in j.joints if f.over_limit}
+            if isinstance(j, Assessment)
+            else {},
+        )
+        for j in judgements
+    }
+
+
+def annotate(
+    read: ReadResult | None, said: Mapping[RowSource, Annotated], source: Path, out: Path
+) -> tuple[str, ...]:
     """Write a copy of the user's workbook with bad cells marked and verdict columns added."""
     from mlg_troubleshoot.records.annotate import annotate_workbook
 
-    if result.read is None:
+    if read is None:
         raise UsageError("there is no workbook to annotate", "Give the workbook as FILE.")
-    verdicts = {j.row.source: _verdict_columns(j) for j in result.judgements}
-    over_limit = {
-        j.inspection.source: {f.joint: f.limit_in for f in j.joints if f.over_limit}
-        for j in result.judgements
-        if isinstance(j, Assessment)
-    }
-    return annotate_workbook(source, out, result.read, verdicts, over_limit)
+    verdicts = {row: each.columns for row, each in said.items()}
+    over_limit = {row: each.over_limit for row, each in said.items()}
+    return annotate_workbook(source, out, read, verdicts, over_limit)
 
 
 def trial_inspection(gear: Gear) -> Inspection:

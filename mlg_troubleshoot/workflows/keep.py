@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import pickle
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
-from mlg_troubleshoot.decision.assessment import Assessment
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement
 from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.judge_rows import AT_ONCE
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, find, life_of, warnings_of, without_dashes
 from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
+from mlg_troubleshoot.parallel import Blocks
 from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
     Record,
@@ -39,43 +43,82 @@ class Kept:
     warnings: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class JudgedEntry:
+    """An inspection that was judged, and its assessment as it is kept."""
+
+    inspection: Inspection
+    assessment: bytes
+
+
+def entries(by: Mapping[str, Any], judgements: Iterable[Judgement]) -> list[JudgedEntry]:
+    """What is kept of judgements; nothing of a row that was not judged."""
+    return [
+        JudgedEntry(j.inspection, _packed(by, j)) for j in judgements if isinstance(j, Assessment)
+    ]
+
+
+def packed_entries(by: Mapping[str, Any], judgements: Iterable[Judgement]) -> tuple[bytes, int]:
+    """The same as a packed block, and how many they are."""
+    made = entries(by, judgements)
+    return pickle.dumps(made), len(made)
+
+
 def keep(
     result: CheckResult,
     options: CheckOptions,
     store: Store,
     same_tail: Callable[[str, str], bool] | None = None,
     progress: Callable[[int, int], None] = lambda _done, _total: None,
+    judged: Blocks[JudgedEntry] | None = None,
 ) -> Kept:
     """Add the judged inspections of a check and their assessments, all or none.
 
     ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they
-    are refused.
+    are refused. ``judged``: the entries of a result that does not hold its judgements.
     """
-    judged = [j for j in result.judgements if isinstance(j, Assessment)]
-    tails = _settled_tails(judged, store, same_tail)
-    written = [
-        replace(j.inspection, tail_no=tails.get(j.inspection.tail_no, j.inspection.tail_no))
-        for j in judged
-    ]
-    inspections = [inspection_record(each) for each in _under_first_ids(written, store)]
-    known = store.known([record.identity_hash for record in inspections])
-    stood = len(known)
-    records: list[Record] = []
-    each = zip(judged, written, inspections, strict=True)
-    for done, (assessment, row, record) in enumerate(each, 1):
-        # Before what was read after it.
-        records += _repairs_of(row, store)
-        # Wherever an inspection was entered again, it is the first entry that was assessed.
-        first = known.setdefault(record.identity_hash, record)
-        records += [record, assessment_record(result.gear, options, assessment, record, first)]
-        progress(done, len(judged))
+    by = judged_by(result.gear, options)
+    if judged is None:
+        judged = Blocks()
+        judged.extend(entries(by, result.judgements))
+    tails = _settled_tails((entry.inspection.tail_no for entry in judged), store, same_tail)
+
+    def written() -> Iterator[Inspection]:
+        for entry in judged:
+            tail = entry.inspection.tail_no
+            yield (
+                replace(entry.inspection, tail_no=tails[tail])
+                if tail in tails
+                else (entry.inspection)
+            )
+
+    records = Blocks[Record]()
+    first: dict[bytes, bytes] = {}
+    stood = done = 0
+    each = zip(
+        judged, written(), map(inspection_record, _under_first_ids(written(), store)), strict=True
+    )
+    while block := list(islice(each, AT_ONCE)):
+        known = store.known([record.identity_hash for _entry, _row, record in block])
+        stood += len(known.keys() - first.keys())
+        first.update({i: kept.packed for i, kept in known.items() if i not in first})
+        made: list[Record] = []
+        for entry, row, record in block:
+            # Before what was read after it.
+            made += _repairs_of(row, store)
+            # Wherever an inspection was entered again, it is the first entry that was assessed.
+            of = first.setdefault(record.identity_hash, record.packed)
+            made += [record, _assessment_record(by, entry.assessment, record, of)]
+            done += 1
+            progress(done, len(judged))
+        records.extend(made)
     store.add(
         records,
         lambda kept, new: new.kind is not RecordKind.INSPECTION or _agrees(store, kept, new),
     )
     gears = {(record.tail_no, record.side) for record in records}
-    new = len(known) - stood
-    return Kept(new, len(inspections) - new, tuple(warnings_of(store, gears)))
+    new = len(first) - stood
+    return Kept(new, len(judged) - new, tuple(warnings_of(store, gears)))
 
 
 def under_a_free_id(made: Inspection, store: Store) -> Inspection:
@@ -148,7 +191,8 @@ def supersede(store: Store, wrong: Record, result: CheckResult, options: CheckOp
         )
     record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.digest)
     repairs = [*_repairs_taken_back(store, wrong, right), *_repairs_of(right, store)]
-    judgement = assessment_record(result.gear, options, judged, record, record)
+    by = judged_by(result.gear, options)
+    judgement = _assessment_record(by, _packed(by, judged), record, record.packed)
     store.add([*repairs, record, judgement])
     return record
 
@@ -176,38 +220,41 @@ def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[
     ]
 
 
-def assessment_record(
-    gear: Gear, options: CheckOptions, assessment: Assessment, of: Record, first: Record
-) -> Record:
-    """An assessment as a record: of an inspection, which is known by its first entry."""
-    from mlg_troubleshoot.reporting.json_form import kept_as_json
+def judged_by(gear: Gear, options: CheckOptions) -> dict[str, Any]:
+    """What an assessment was made with."""
     from mlg_troubleshoot.reporting.provenance import program_version
 
-    by = {
+    return {
         "program_version": program_version(),
         "geometry_sha256": gear.geometry_sha256,
         "extension": None if options.extension is None else options.extension.describe(),
     }
-    return replace(
-        of,
-        kind=RecordKind.ASSESSMENT,
-        packed=packed({**by, "result": kept_as_json(assessment)}),
-        identity=(of.identity_hash.hex(), *map(str, by.values()), first.packed.hex()),
-    )
 
 
-def _under_first_ids(inspections: Sequence[Inspection], store: Store) -> list[Inspection]:
+def _packed(by: Mapping[str, Any], assessment: Assessment) -> bytes:
+    from mlg_troubleshoot.reporting.json_form import kept_as_json
+
+    return packed({**by, "result": kept_as_json(assessment)})
+
+
+def _assessment_record(by: Mapping[str, Any], body: bytes, of: Record, first: bytes) -> Record:
+    """An assessment as a record: of an inspection, which is known by its first entry."""
+    identity = (of.identity_hash.hex(), *map(str, by.values()), first.hex())
+    return replace(of, kind=RecordKind.ASSESSMENT, packed=body, identity=identity)
+
+
+def _under_first_ids(inspections: Iterable[Inspection], store: Store) -> Iterator[Inspection]:
     """The same row of a renamed file has another made id: it is the inspection that was kept
     first.
     """
     gears: set[GearKey] = set()
     first: dict[tuple[str, ...], Record] = {}
-
-    def under_first_id(inspection: Inspection) -> Inspection:
+    for inspection in inspections:
         row = place_in_file(inspection.record_id)
         key = (inspection.tail_no, inspection.side.value)
         if not row:
-            return inspection
+            yield inspection
+            continue
         if key not in gears:
             gears.add(key)
             for kept in store.of_gear(*key):
@@ -216,9 +263,7 @@ def _under_first_ids(inspections: Sequence[Inspection], store: Store) -> list[In
         record = inspection_record(inspection)
         kept = first.setdefault((*key, record.day, row), record)
         renamed = replace(inspection, record_id=kept.record_id)
-        return renamed if same_inspection(kept, inspection_record(renamed)) else inspection
-
-    return [under_first_id(inspection) for inspection in inspections]
+        yield renamed if same_inspection(kept, inspection_record(renamed)) else inspection
 
 
 def _agrees(store: Store, kept: Record, new: Record) -> bool:
@@ -232,7 +277,7 @@ def _agrees(store: Store, kept: Record, new: Record) -> bool:
 
 
 def _settled_tails(
-    judged: Sequence[Assessment], store: Store, same_tail: Callable[[str, str], bool] | None
+    tails: Iterable[str], store: Store, same_tail: Callable[[str, str], bool] | None
 ) -> dict[str, str]:
     """Spellings that differ only in case, blanks or dashes: never one aircraft without being
     asked.
@@ -242,7 +287,7 @@ def _settled_tails(
     for tail in known:
         by_spelling.setdefault(without_dashes(tail), tail)
     settled: dict[str, str] = {}
-    for tail in dict.fromkeys(a.inspection.tail_no for a in judged):
+    for tail in dict.fromkeys(tails):
         other = by_spelling.setdefault(without_dashes(tail), tail)
         if tail in known or other == tail:
             continue

@@ -17,7 +17,7 @@ import openpyxl
 import pytest
 
 from mlg_troubleshoot.records.cells import LETTERS
-from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
+from mlg_troubleshoot.reporting.json_form import CheckText, check_as_json, inspection_lines
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from tests.cli.conftest import mlg
 
@@ -582,13 +582,9 @@ def test_quiet_shows_no_progress(tmp_path):
 
 def test_the_json_of_a_batch_written_in_pieces_is_the_whole_form(gear, mixed):
     result = check_files([mixed], CheckOptions())
-    parts = (gear, result.judgements, result.problems, result.notes)
-    assert json.loads("".join(check_json_pieces(*parts))) == json.loads(
-        json.dumps(check_as_json(*parts))
+    text = CheckText(gear, result.problems, result.notes)
+    blocks = [inspection_lines(gear, result.judgements[at : at + 2]) for at in (0, 2)]
+    assert len(result.judgements) == 4
+    assert json.loads(text.begin + "".join(map(text.joined, blocks)) + text.end) == json.loads(
+        json.dumps(check_as_json(gear, result.judgements, result.problems, result.notes))
     )
-
-
-def test_the_json_of_nothing_judged_is_whole_too(gear):
-    assert json.loads("".join(check_json_pieces(gear, [], [], ["a note"])))["warnings"] == [
-        "a note"
-    ]

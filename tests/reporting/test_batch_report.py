@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
-from mlg_troubleshoot.decision.ranking import latest_of_each_gear, worst_first
+from mlg_troubleshoot.decision.ranking import latest_of_each_gear, listed, worst_first
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.inspection_report import batch_document
@@ -128,7 +128,7 @@ def test_of_gears_outside_the_margin_the_one_farther_beyond_its_own_stands_first
     # The gear that moves the plunger farther is allowed to do so.
     wide, narrow = judge(WORN, margin_in=0.05), judge(FAILURE, tail_no="N2")
     assert wide.predicted_displacement_in > narrow.predicted_displacement_in
-    assert worst_first([wide, narrow], [0, 1]) == [1, 0]
+    assert worst_first(listed([wide, narrow]), [0, 1]) == [1, 0]
 
 
 def test_problems_of_the_input_are_listed(summary: tuple[str, bytes]) -> None:
@@ -202,7 +202,7 @@ def twice(judge: Judge) -> list[Judgement]:
 
 
 def test_each_gear_has_one_line_with_its_latest_inspection(twice: list[Judgement]) -> None:
-    latest, earlier = latest_of_each_gear(twice)
+    latest, earlier = latest_of_each_gear(listed(twice))
     named = [
         [j.inspection.record_id for j in (twice[i] for i in places)] for places in (latest, earlier)
     ]
@@ -213,7 +213,7 @@ def test_an_inspection_without_a_date_is_no_earlier_one(
     judge: Judge, twice: list[Judgement]
 ) -> None:
     undated = judge(SOUND, record_id="undated", tail_no="N2", inspection_date=None)
-    latest, earlier = latest_of_each_gear([*twice, undated])
+    latest, earlier = latest_of_each_gear(listed([*twice, undated]))
     assert len(twice) in latest
     assert len(earlier) == 2
 

@@ -3,64 +3,56 @@
 from __future__ import annotations
 
 from collections import Counter
-from datetime import date
+from collections.abc import Sequence
 
 from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, plain_table, word
-from mlg_troubleshoot.cli.views.tables import (
-    MARKS,
-    STYLES,
-    Cell,
-    lines_of,
-    measured_outside,
-)
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
-from mlg_troubleshoot.decision.ranking import latest_of_each_gear, worst_first
+from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, Cell, lines_of
+from mlg_troubleshoot.decision.assessment import Assessment, Verdict
+from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear, worst_first
 from mlg_troubleshoot.decision.sentences import percent
-from mlg_troubleshoot.workflows.check import CheckResult
+from mlg_troubleshoot.gear.gear import Gear
 
 _LINES = 60
 
 
-def show(result: CheckResult, screen: DataConsole, *, every: bool) -> None:
+def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: bool) -> None:
     """Show a batch: how many of each verdict, worst gears first, the latest inspection of each or
     every one.
     """
-    counts = result.counts
-    listed = " · ".join(
+    counts = Counter(line.verdict for line in lines)
+    said = " · ".join(
         f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v]
     )
-    screen.print(f"{len(result.judgements)} inspections: {listed}")
-    latest, earlier = latest_of_each_gear(result.judgements)
+    screen.print(f"{len(lines)} inspections: {said}")
+    latest, earlier = latest_of_each_gear(lines)
     if earlier and not every:
         screen.print(
             f"{len(latest)} gears, the latest inspection of each; --all shows every inspection."
         )
-    places = worst_first(result.judgements, (*latest, *earlier)) if every else latest
-    ordered = [result.judgements[place] for place in places]
+    places = worst_first(lines, (*latest, *earlier)) if every else latest
+    ordered = [lines[place] for place in places]
     headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance", "next"]
     wide = screen.width >= WIDE
-    if wide or every or any(_date(judgement) is None for judgement in ordered):
+    if wide or every or any(line.day is None for line in ordered):
         headings.insert(5, "record")
     if wide:
         headings.insert(-2, f"margin {screen.unit}")
     rows = []
-    for judgement in ordered[:_LINES]:
-        cells = _cells(judgement, screen)
+    for line in ordered[:_LINES]:
+        cells = _cells(line, screen)
         rows.append([cells[heading.split(" ")[0]] for heading in headings])
-    for line in lines_of(screen, headings, rows, "chance", ("chance", "date", "record")):
-        screen.print(line, no_wrap=True, overflow="ellipsis")
+    for shown in lines_of(screen, headings, rows, "chance", ("chance", "date", "record")):
+        screen.print(shown, no_wrap=True, overflow="ellipsis")
     if len(ordered) > _LINES:
         screen.print(f"… and {len(ordered) - _LINES} more; --csv or --json lists all of them.")
-    worn = Counter(
-        f.joint for j in ordered if isinstance(j, Assessment) for f in j.joints if f.over_limit
-    )
+    worn = Counter(joint for line in ordered for joint in line.over_limit)
     if worn:
         joints = ", ".join(f"#{joint} on {count}" for joint, count in worn.most_common())
         screen.print(f"Joints over their limit: {joints} of these.")
     screen.print(
-        f"Model: {result.gear.name}, geometry {result.gear.provenance}. 'worst' is the displacement"
+        f"Model: {gear.name}, geometry {gear.provenance}. 'worst' is the displacement"
         " in the worst directions, a bound; 'chance' is of exceeding the margin with random"
         " directions. Troubleshooting aid, not maintenance data; within margin is not an approval"
         " for return to service.",
@@ -68,33 +60,24 @@ def show(result: CheckResult, screen: DataConsole, *, every: bool) -> None:
     )
 
 
-def _date(judgement: Judgement) -> date | None:
-    return judgement.inspection.inspection_date if isinstance(judgement, Assessment) else None
-
-
-def _cells(judgement: Judgement, screen: DataConsole) -> dict[str, Cell]:
-    row = judgement.row
+def _cells(line: Listed, screen: DataConsole) -> dict[str, Cell]:
+    style = STYLES[line.verdict]
     cells: dict[str, Cell] = {
-        "": MARKS[judgement.verdict],
-        "verdict": Text(
-            judgement.verdict.value.removesuffix("_MARGIN"), style=STYLES[judgement.verdict]
-        ),
-        "tail": word(row.tail_no),
-        "side": str(row.side or "?"),
-        "record": word(row.record_id),
-        "next": judgement.in_brief,
+        "": MARKS[line.verdict],
+        "verdict": Text(line.verdict.value.removesuffix("_MARGIN"), style=style),
+        "tail": word(line.tail_no),
+        "side": str(line.side or "?"),
+        "record": word(line.record_id),
+        "next": line.in_brief,
         **dict.fromkeys(("date", "worst", "margin", "chance"), "-"),
     }
-    if isinstance(judgement, Assessment):
-        worst = judgement.predicted_displacement_in
-        chance = judgement.probability_exceed_random_directions
-        day = _date(judgement)
-        cells["date"] = "-" if day is None else day.isoformat()
-        cells["worst"] = "open" if worst is None else screen.length(worst)
-        cells["margin"] = screen.length(judgement.margin_in)
-        cells["chance"] = "-" if chance is None else percent(chance)
-        if measured_outside(judgement):
-            cells["verdict"] = Text("OUT, MEASURED", style=STYLES[judgement.verdict])
+    if line.margin_in is not None:
+        cells["date"] = "-" if line.day is None else line.day.isoformat()
+        cells["worst"] = "open" if line.worst_in is None else screen.length(line.worst_in)
+        cells["margin"] = screen.length(line.margin_in)
+        cells["chance"] = "-" if line.chance is None else percent(line.chance)
+        if line.measured:
+            cells["verdict"] = Text("OUT, MEASURED", style=style)
     return cells
 
 
