@@ -2,7 +2,8 @@
 libraries only.
 
 It is started by its path (see :mod:`~mlg_troubleshoot.reporting.pdf`), reads jobs from standard
-input and answers each on standard output: a line of JSON, then the bytes it announces.
+input and answers each on standard output: a line of JSON, then the bytes it announces. Its
+arguments are the fonts that a document may name.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import io
 import json
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import unquote
 
@@ -29,13 +31,16 @@ from pypdf.generic import (
 _HERE = "https://report.invalid/"
 
 
-def serve(requests: BinaryIO, answers: BinaryIO) -> None:
+def serve(requests: BinaryIO, answers: BinaryIO, fonts: Mapping[str, bytes]) -> None:
     import plutoprint
 
-    class Refuse(plutoprint.ResourceFetcher):
-        """Fetches nothing: ``data:`` URLs never get here, and nothing else is allowed."""
+    class OwnFonts(plutoprint.ResourceFetcher):
+        """Fetches the fonts of reports and nothing else; ``data:`` URLs never get here."""
 
         def fetch_url(self, url: str) -> Any:
+            font = fonts.get(url.removeprefix(_HERE))
+            if font is not None:
+                return plutoprint.ResourceData(font, "font/ttf", "")
             raise PermissionError(f"a report may not fetch {url[:80]}")
 
     while line := requests.readline():
@@ -44,7 +49,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         try:
             size = getattr(plutoprint, f"PAGE_SIZE_{job['page'].upper()}")
             book = plutoprint.Book(size)
-            book.custom_resource_fetcher = Refuse()
+            book.custom_resource_fetcher = OwnFonts()
             # Links within the document become named destinations only where the document has an
             # address.
             book.load_html(html, base_url=_HERE)
@@ -141,4 +146,5 @@ def check_fonts(document: PdfReader | PdfWriter) -> bool:
 
 
 if __name__ == "__main__":
-    serve(sys.stdin.buffer, sys.stdout.buffer)
+    named = {Path(file).name: Path(file).read_bytes() for file in sys.argv[1:]}
+    serve(sys.stdin.buffer, sys.stdout.buffer, named)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 import re
 import struct
 import unicodedata
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from mlg_troubleshoot.errors import OutputError
 
@@ -95,12 +94,9 @@ def _sound(character: str) -> str:
 
 @cache
 def font_faces() -> str:
-    """Return the ``@font-face`` rules of the bundled fonts, the fonts themselves inside."""
-    rules = []
-    for weight, name in FONT_FILES.items():
-        data = base64.b64encode((templates_folder() / name).read_bytes()).decode("ascii")
-        rules.append(
-            f"@font-face{{font-family:'Report Sans';font-weight:{weight};"
-            f"src:url(data:font/ttf;base64,{data}) format('truetype')}}"
-        )
-    return "".join(rules)
+    """Return the ``@font-face`` rules of the bundled fonts, which the PDF engine knows by name."""
+    return "".join(
+        f"@font-face{{font-family:'Report Sans';font-weight:{weight};"
+        f"src:url({PurePath(name).name}) format('truetype')}}"
+        for weight, name in FONT_FILES.items()
+    )

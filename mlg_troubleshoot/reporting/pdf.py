@@ -15,6 +15,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from mlg_troubleshoot.reporting.glyphs import FONT_FILES, templates_folder
+
 # A page takes 0.03 to 0.1 s: what takes longer than this does not end. [s]
 TIME_LIMIT_S = 30
 
@@ -53,10 +55,11 @@ class PdfEngine:
         if not engine_is_installed():
             raise PdfError("the PDF engine plutoprint is not installed")
         if self._process is None or self._process.poll() is not None:
+            fonts = [str(templates_folder() / name) for name in FONT_FILES.values()]
             # -P keeps this folder off the child's module path: html.py here would shadow the
             # standard library's.
             self._process = subprocess.Popen(
-                [sys.executable, "-P", str(Path(__file__).with_name("engine.py"))],
+                [sys.executable, "-P", str(Path(__file__).with_name("engine.py")), *fonts],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

@@ -7,9 +7,8 @@ import os
 import re
 import threading
 import unicodedata
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import BinaryIO
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.outputs import OutputKind, write_bytes
+from mlg_troubleshoot.parallel import spread
 from mlg_troubleshoot.reporting.glyphs import missing_characters, spell_out
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
@@ -162,43 +162,31 @@ def publish_all(
     progress: Progress | None = None,
 ) -> list[WrittenReport]:
     """Write many documents, the PDFs in several child processes."""
-    count = min(4, os.cpu_count() or 1)
     own = threading.local()
-    started = list[PdfEngine]()
-
-    def start_engine() -> None:
-        own.engine = PdfEngine()
-        started.append(own.engine)
-
-    def one(document: Document) -> WrittenReport:
-        return publish(document, directory, formats=formats, page=page, engine=own.engine)
-
-    written: list[WrittenReport] = []
-    waiting: deque[Future[WrittenReport]] = deque()
-
-    def collect() -> None:
-        written.append(waiting.popleft().result())
-        if progress is not None:
-            progress(len(written), total)
-
-    pool = ThreadPoolExecutor(count, initializer=start_engine)
+    started: list[PdfEngine] = []
     seen: Counter[str] = Counter()
-    try:
+
+    def numbered() -> Iterator[Document]:
         for document in documents:
             # Files of inspections that carry the same identity are numbered: none overwrites
             # another.
             seen[document.stem] += 1
             again = seen[document.stem]
-            named = document if again == 1 else replace(document, stem=f"{document.stem}-{again}")
-            waiting.append(pool.submit(one, named))
-            # Documents are handed out a few at a time, so that a long batch does not stand in
-            # memory.
-            if len(waiting) > 2 * count:
-                collect()
-        while waiting:
-            collect()
+            yield document if again == 1 else replace(document, stem=f"{document.stem}-{again}")
+
+    def one(document: Document) -> WrittenReport:
+        if not hasattr(own, "engine"):
+            own.engine = PdfEngine()
+            started.append(own.engine)
+        return publish(document, directory, formats=formats, page=page, engine=own.engine)
+
+    written: list[WrittenReport] = []
+    try:
+        for report in spread(one, numbered(), min(4, os.cpu_count() or 1), threads=True):
+            written.append(report)
+            if progress is not None:
+                progress(len(written), total)
         return written
     finally:
-        pool.shutdown(cancel_futures=True)
         for engine in started:
             engine.close()

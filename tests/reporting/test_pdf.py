@@ -25,6 +25,8 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import pdf
 from mlg_troubleshoot.reporting.engine import check_fonts
 from mlg_troubleshoot.reporting.glyphs import font_faces
+from mlg_troubleshoot.reporting.html import render
+from mlg_troubleshoot.reporting.inspection_report import inspection_document
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError, sections_of
 from mlg_troubleshoot.reporting.provenance import ReportProvenance, provenance_of
 
@@ -212,6 +214,11 @@ def test_a_pdf_without_a_font_is_refused() -> None:
 def test_a_font_that_is_only_named_is_refused(failure: Made) -> None:
     with pytest.raises(ValueError, match=r"DejaVuSans.* is not embedded"):
         check_fonts(opened(failure.pdf.replace(b"/FontFile2", b"/Fontfile2")))
+
+
+def test_a_page_names_its_fonts_and_carries_none(judge: Judge, gear: Gear) -> None:
+    document = inspection_document(judge(FAILURE), gear, provenance_of(gear, {}))
+    assert len(render(document, "A4", for_pdf=True)) < 200_000
 
 
 def test_nothing_is_fetched_from_the_network() -> None:
