@@ -33,7 +33,7 @@ class Blocks(Generic[_Item]):
     """
 
     def __init__(self) -> None:
-        self._file = SpooledTemporaryFile(_IN_MEMORY)  # noqa: SIM115
+        self._file = SpooledTemporaryFile(_IN_MEMORY)  # noqa: SIM115 - closed below
         finalize(self, self._file.close)
         self._sizes: list[int] = []
         self._count = 0
