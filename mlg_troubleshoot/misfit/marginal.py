@@ -121,6 +121,12 @@ class Marginal:
         self.spread = np.maximum(factor * effects.size, effects.least) / noise.scale_in
         self.signed = np.flatnonzero(effects.sign)
 
+    @cached_property
+    def _every_spread(self) -> tuple[Array, Array]:
+        """Standard deviation of each effect's size in each level, and its square."""
+        spread = np.repeat(self.spread, len(self.log), axis=0)
+        return spread, spread**2
+
     def _cross(self, members: Members, kept: list[int] | slice) -> Array:
         """Products of some effects with the members, shape (levels, kept, k)."""
         found = []
@@ -153,18 +159,18 @@ class Marginal:
         wide = spread * onto[None, :, at]
         own = spread[..., None] * inner[None] * spread[:, :, None, :]
         lower = np.linalg.cholesky(np.eye(len(places)) + own)
-        scaled = spread[..., None] * cross[None, :, others].transpose(0, 1, 3, 2)
-        left = np.linalg.solve(lower, np.concatenate([scaled, wide[..., None]], axis=-1))
-        left, told = left[..., :-1], left[..., -1]
+        root = np.linalg.inv(lower)
+        scaled = root * spread[..., None, :]
+        left = scaled @ cross[None, :, others].swapaxes(2, 3)
+        told = np.einsum("mrij,mrj->mri", root, wide)
         rest = rest - np.sum(told**2, axis=-1)
         log = log + 2.0 * np.sum(np.log(np.diagonal(lower, axis1=2, axis2=3)), axis=-1)
-        root = np.linalg.inv(lower)
         values = mean + spread * np.einsum("mrji,mrj->mri", root, told)
         error = spread * np.linalg.norm(root, axis=2)
         error *= np.sqrt((np.maximum(rest, 0.0) + self.floor)[..., None] / self.products.n)
         log = log - 2.0 * np.sum(_of_sign(effects.sign[places], values, error), axis=-1)
-        square = square - np.sum(left**2, axis=2)
-        along = onto[:, others] - np.einsum("mrkp,mrk->mrp", left, told)
+        square = square - np.einsum("mrkp,mrkp->mrp", left, left)
+        along = onto[:, others] - (told[:, :, None] @ left)[:, :, 0]
         levels = m * len(self.log)
         return _Given(
             square.reshape(levels, square.shape[-1]),
@@ -182,26 +188,30 @@ class Marginal:
             -0.5 * self.products.n * np.log(np.maximum(rest, 0.0) + self.floor) - 0.5 * log
         )
 
-    def explanation(self, number: int, members: Members) -> Explanation:
+    def explanation(
+        self, number: int, members: Members, given: _Given | None = None
+    ) -> Explanation:
         """How likely a set is, and how large its members are expected to be."""
-        given = self._given(members, alone=True)
+        given = given or self._given(members, alone=True)
         level = self._likelihood(given.rest, given.log)
         whole = float(log_sum(level))
         values = np.exp(level - whole) @ given.values
         likely = whole - np.log(len(level)) + self._prior(members) + self.corrected(members)
         return Explanation(number, members, likely, values)
 
-    def further(self, members: Members) -> tuple[Array, Array]:
-        """How likely a set is with each further effect, (p,), and the expected size of that."""
+    def extended(self, number: int, members: Members) -> tuple[Explanation, Array, Array]:
+        """A set by itself, and how likely it is with each further effect, (p,), and the expected
+        size of that.
+        """
         given, effects, n = self._given(members), self.effects, self.products.n
-        spread = np.repeat(self.spread, len(self.log), axis=0)
+        spread, wide = self._every_spread
         square, along, rest = given.square, given.along, given.rest[:, None]
         mean, one = effects.mean, self.signed
         if mean.any():
             rest = rest - mean * (2.0 * along - mean * square)
             along = along - mean * square
-        wider = 1.0 + spread**2 * np.maximum(square, 0.0)
-        value = spread**2 * along / wider
+        wider = 1.0 + wide * np.maximum(square, 0.0)
+        value = wide * along / wider
         rest = np.maximum(rest - value * along, 0.0) + self.floor
         value = value + mean
         level = -0.5 * (n * np.log(rest) + np.log(wider) + given.log[:, None])
@@ -212,7 +222,8 @@ class Marginal:
         total = np.sum(chance, axis=0)
         whole, values = most + np.log(total), np.sum(chance * value, axis=0) / total
         prior = self._prior(members) + effects.log_prior - np.log(len(level))
-        return whole + prior + self.corrected(members), values
+        further = whole + prior + self.corrected(members)
+        return self.explanation(number, members, given), further, values
 
     def corrected(self, members: Members) -> float:
         """What the context's true prior adds to the normal one's likelihood, the members being as

@@ -122,14 +122,16 @@ class _Search:
         key = context, members
         if key in self.extended:
             return
-        further, values = self.marginal(context).further(tuple(sorted(members)))
+        places = tuple(sorted(members))
+        own, further, values = self.marginal(context).extended(context, places)
+        own = self._alone.setdefault(key, own)
         taken = {int(self.number[k]) for k in members} - {0}
         further[np.isin(self.number, list(taken))] = -np.inf
         further[list(members)] = -np.inf
         if len(members) >= self.most:
             further[:] = -np.inf
         leading = tuple(np.argsort(-further)[: BEAM + 1].tolist())
-        self.extended[key] = _Extended(self.alone(context, members), further, values, leading)
+        self.extended[key] = _Extended(own, further, values, leading)
 
     @property
     def best(self) -> float:

@@ -123,7 +123,7 @@ def test_an_effect_of_only_one_size_counts_with_that() -> None:
 @pytest.mark.parametrize("members", SETS)
 def test_a_further_effect_makes_a_set_as_likely_as_both_together(members: tuple[int, ...]) -> None:
     marginal = Marginal(Products(NOISE, COLUMNS, DATA), FREE, CONTEXTS[1], BELIEFS)
-    further, _values = marginal.further(members)
+    _own, further, _values = marginal.extended(1, members)
     for k in set(range(P)) - set(members):
         both = tuple(sorted({*members, k}))
         assert further[k] == pytest.approx(marginal.explanation(1, both).log_posterior, abs=1e-8)
@@ -135,7 +135,7 @@ def test_a_further_effect_of_only_one_size_is_expected_as_large_as_both_together
 ) -> None:
     given = replace(effects(mean=0.7), sign=np.zeros(P))
     marginal = Marginal(Products(NOISE, COLUMNS, DATA), given, CONTEXTS[1], BELIEFS)
-    further, values = marginal.further(members)
+    _own, further, values = marginal.extended(1, members)
     for k in {0, 3} - set(members):
         both = tuple(sorted({*members, k}))
         whole = marginal.explanation(1, both)
