@@ -88,7 +88,7 @@ class MisfitProblem:
         acting = self.columns.acting
         exact = np.array([c.cause.exact or 0.0 for c in self.candidates])
         usual = beliefs.shape_size * scale / acting
-        stated = [c.cause.plausible for c in self.candidates]
+        stated = [beliefs.plausible.get(c.cause.name, c.cause.plausible) for c in self.candidates]
         plausible = np.where(stated == np.array(None), usual, np.array(stated, float))
         listed = Effects(
             self.columns,

@@ -36,6 +36,9 @@ class Beliefs:
     rarer : mapping of str to float
         How often a cause is what is wrong, over how often any other one is; 1 where it is not
         named. [1]
+    plausible : mapping of str to float
+        How large the parameter of a cause is where it acts, as one standard deviation; as the cause
+        states it where it is not named. [unit of the parameter]
     surveyed : float
         The same of another linkage than the drawn one, where the drawn one was measured. [1]
     sure : float
@@ -53,6 +56,7 @@ class Beliefs:
     form: float = 0.1
     exact: float = 0.1
     rarer: Mapping[str, float] = field(default_factory=dict)
+    plausible: Mapping[str, float] = field(default_factory=dict)
     surveyed: float = 0.1
     sure: float = 0.9
     alike: float = 0.985

@@ -33,15 +33,21 @@ class BeliefsFile(Table):
     alike: _Share = _OWN.alike
     surveyed: AboveZero = _OWN.surveyed
     rarer: dict[Name, AboveZero] = msgspec.field(default_factory=dict)
+    plausible: dict[Name, AboveZero] = msgspec.field(default_factory=dict)
 
 
-def load_beliefs(path: Path, sure: float, causes: Collection[str]) -> Beliefs:
-    """Read what is believed; a name among the rarer ones that is not a cause is refused."""
+def load_beliefs(
+    path: Path, sure: float, causes: Collection[str], sized: Collection[str]
+) -> Beliefs:
+    """Read what is believed; a name that is not of a cause is refused, and the size of one that has
+    no single parameter, or one value of it only.
+    """
     remedy = "Give a TOML file with schema = 1. Its keys stand in docs/explanation/diagnosis.md."
     file = read_toml(path, BeliefsFile, remedy)
-    for name in file.content.rarer:
-        if name not in causes:
-            raise file.fail(("rarer", name), f"one of {', '.join(sorted(causes))}")
+    for key, known in (("rarer", causes), ("plausible", sized)):
+        for name in getattr(file.content, key):
+            if name not in known:
+                raise file.fail((key, name), f"one of {', '.join(sorted(known))}")
     values = msgspec.structs.asdict(file.content)
     del values["schema"]
     return Beliefs(**values, sure=sure)

@@ -115,8 +115,10 @@ def diagnose_files(
     own = tuple(cause for file in options.cause_files for cause in load_causes(Path(file)))
     beliefs = Beliefs(sure=options.sure)
     if options.beliefs_file is not None:
-        names = {cause.name for cause in with_own(own)}
-        beliefs = load_beliefs(Path(options.beliefs_file), options.sure, names)
+        causes = with_own(own)
+        names = {cause.name for cause in causes}
+        sized = {cause.name for cause in causes if cause.sized}
+        beliefs = load_beliefs(Path(options.beliefs_file), options.sure, names, sized)
     reading = replace(
         ReadOptions.of(gear, options),
         clearance_hard_max_in=_ANY_LENGTH_IN,

@@ -20,6 +20,7 @@ from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 
 ROOT = Path(__file__).parents[2]
 NAMES = {"geometry", "rigging_offset"}
+SIZED = {"rigging_offset"}
 
 
 def written(folder: Path, text: str) -> Path:
@@ -29,7 +30,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def test_a_file_without_keys_believes_what_the_program_does(tmp_path: Path) -> None:
-    assert load_beliefs(written(tmp_path, "schema = 1"), 0.9, NAMES) == Beliefs()
+    assert load_beliefs(written(tmp_path, "schema = 1"), 0.9, NAMES, SIZED) == Beliefs()
 
 
 def test_every_belief_but_the_bar_can_be_stated_in_the_file() -> None:
@@ -41,15 +42,18 @@ def test_the_example_of_the_page_is_read(tmp_path: Path) -> None:
     page = (ROOT / "docs/explanation/diagnosis.md").read_text(encoding="utf-8")
     example = re.search(r"```toml\n(.*?)```", page, re.DOTALL)
     assert example is not None
-    found = load_beliefs(written(tmp_path, example[1]), 0.95, NAMES)
+    found = load_beliefs(written(tmp_path, example[1]), 0.95, NAMES, SIZED)
     assert (found.expected, found.sure) == (0.3, 0.95)
     assert found.rarer == {"geometry": 0.1, "rigging_offset": 2.0}
+    assert found.plausible == {"rigging_offset": 0.01}
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
         ("schema = 1\n[rarer]\ngeometri = 0.1", "geometri"),
+        ("schema = 1\n[plausible]\ngeometry = 0.1", "geometry"),
+        ("schema = 1\n[plausible]\nrigging_offset = 0", "rigging_offset"),
         ("schema = 1\nunlisted = 2.0", "unlisted"),
         ("schema = 1\nexpectd = 0.3", "expectd"),
         ("expected = 0.3", "schema"),
@@ -59,7 +63,7 @@ def test_what_is_wrong_in_the_file_is_named_by_its_key(
     text: str, says: str, tmp_path: Path
 ) -> None:
     with pytest.raises(GearFileError) as caught:
-        load_beliefs(written(tmp_path, text), 0.9, NAMES)
+        load_beliefs(written(tmp_path, text), 0.9, NAMES, SIZED)
     assert says in caught.value.message
 
 
@@ -73,6 +77,12 @@ def test_a_cause_that_is_all_but_unknown_in_this_fleet_is_not_named(tmp_path: Pa
     (cause,) = named()
     rarer = written(tmp_path, f"schema = 1\n[rarer]\n{cause} = 1e-12\n")
     assert cause not in named("--beliefs", str(rarer))
+
+
+def test_a_cause_that_is_only_plausible_at_far_larger_sizes_is_not_named(tmp_path: Path) -> None:
+    (cause,) = named()
+    larger = written(tmp_path, f"schema = 1\n[plausible]\n{cause} = 1e9\n")
+    assert cause not in named("--beliefs", str(larger))
 
 
 def probability_of_another_linkage(gear: Path | str, beliefs: Path | None = None) -> float:

@@ -135,6 +135,8 @@ class Cause(ABC):
     """+1 or −1 where physics allows one sign of the parameter only, else 0."""
     exact: ClassVar[float | None] = None
     """The only value that the parameter can have, if there is one."""
+    sized: ClassVar[bool] = True
+    """False if how large it is does not hang on one parameter that may have any value."""
     extends: ClassVar[bool] = True
     """False if it is about what was written and not about the model: it is taken out of the
     analysis only.

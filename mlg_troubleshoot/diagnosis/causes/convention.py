@@ -32,6 +32,7 @@ class ConventionSlip(Cause):
 
     name: ClassVar[str] = "convention_slip"
     parameter: ClassVar[str] = "share_of_slip"
+    sized: ClassVar[bool] = False
     trial: ClassVar[float] = 1.0
     sign: ClassVar[int] = 1
     exact: ClassVar[float | None] = 1.0

@@ -127,6 +127,7 @@ class JointFactors(Cause):
     """
 
     parameter: ClassVar[str] = "share_of_change"
+    sized: ClassVar[bool] = False
     trial: ClassVar[float] = 1.0
     bounds: ClassVar[tuple[float, float]]
 
