@@ -10,13 +10,13 @@ the pins, and how far gears are worn, is assumed, or learned from a fleet (`flee
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import RepairSet
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import RiggingCheck
@@ -41,8 +41,8 @@ from mlg_troubleshoot.decision.wear_levels import (
     LEVELS,
     MEAN,
     SHARES,
+    Doubted,
     level_chances,
-    surely_worn,
 )
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -53,14 +53,16 @@ _LINKAGE = blur(PRIORS.linkage_u_in)
 class _Unread:
     """A gear of which nothing was read, with its pins at rest in one way.
 
-    unread, worn: characteristic functions of its joints, and of those beyond their limit, (levels,
-    joints, terms). fresh: of new parts, (joints, terms). bend: by how much each joint moves the
+    by_share: characteristic functions of its joints by what they are worn to, (joints, shares,
+    terms); unread, worn: of unread ones, and of those beyond their limit, (levels, joints, terms).
+    fresh: of new parts, (joints, terms). bend: by how much each joint moves the
     plunger on average. [1/in] exceeds: chance of leaving the margin. [1]
     """
 
     pins: Pins
     amplification: Array
     bend: Array
+    by_share: Array
     unread: Array
     worn: Array
     fresh: Array
@@ -84,6 +86,7 @@ def _unread(gear: Gear) -> tuple[_Unread, _Unread]:
                 pins,
                 amplification,
                 bend if pins is RANDOM else 0.0 * bend,
+                waves,
                 unread,
                 np.einsum("ls,jst->ljt", BEYOND, waves),
                 pins.waves(FREQUENCIES * (amplification * gear.new_parts_in)[:, None]),
@@ -101,7 +104,8 @@ class _Believed:
     fits: density of the plunger's reading. levels: chances of the levels of wear, (n, levels). [1]
     worn: chance that each unread joint is beyond its limit. [1] waves: characteristic function of
     each joint, (n, joints, terms). exceeds: chance that the joints hold the plunger beyond its
-    margin, whatever it reads. [1]
+    margin, whatever it reads. [1] by_share: density of the plunger's reading by what each joint in
+    doubt is worn to, (readings, shares).
     """
 
     unread: _Unread
@@ -110,6 +114,7 @@ class _Believed:
     worn: Array
     waves: Array
     exceeds: Array
+    by_share: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -197,20 +202,38 @@ class Causes:
         Given the plunger's reading, joints that are left as they are keep their directions, and
         what is restored takes new ones. [1]
         """
+        return self._over_pins(
+            row, lambda each: self._second_repair(row, members, each, each.waves[row])
+        )
+
+    def second_if_worn(self, row: int, restored: Mask, joints: Places) -> Array:
+        """The same once some joints are restored and one of `joints` with them, each in turn being
+        beyond its limit. [1]
+        """
+        members = restored | np.eye(len(restored), dtype=bool)[joints]
+
+        def second(each: _Believed) -> Array:
+            levels = each.levels[row]
+            worn = np.tensordot(levels, each.unread.worn[:, joints], 1)
+            waves = np.repeat(each.waves[row][None], len(joints), axis=0)
+            waves[np.arange(len(joints)), joints] = worn / (levels @ BEYOND.sum(axis=1))
+            return self._second_repair(row, members, each, waves)
+
+        return self._over_pins(row, second)
+
+    def _over_pins(self, row: int, chance_of: Callable[[_Believed], Array]) -> Array:
+        """A chance, averaged over how the pins rest."""
         loaded = float(self.loaded[row])
         chances = ((1.0 - loaded, self.by_pins[0]), (loaded, self.by_pins[1]))
         # What is less likely than this moves no decision.
         return np.asarray(
-            sum(
-                chance * self._second_repair(row, members, each)
-                for chance, each in chances
-                if chance > 1e-3
-            )
+            sum(chance * chance_of(each) for chance, each in chances if chance > 1e-3)
         )
 
-    def _second_repair(self, row: int, members: Mask, believed_of: _Believed) -> Array:
+    def _second_repair(
+        self, row: int, members: Mask, believed_of: _Believed, waves: Array
+    ) -> Array:
         unread = believed_of.unread
-        waves = believed_of.waves[row]
         pins = unread.pins
         gear = self.cases.gear
         margin = float(self.cases.margin_in[row])
@@ -236,7 +259,8 @@ def believed(cases: Cases) -> Causes:
     """Weigh what may be the matter with n gears, by everything that is known of each."""
     levels = level_chances(cases)
     u = np.hypot(cases.mean_u_in, 1e-4)
-    both = tuple(_believed(cases, unread, levels, u) for unread in _unread(cases.gear))
+    doubted = Doubted.of(cases, levels)
+    both = tuple(_believed(cases, unread, levels, u, doubted) for unread in _unread(cases.gear))
     chances = np.array([1.0 - cases.fleet.loaded, cases.fleet.loaded])[:, None]
     chances = chances * [each.fits for each in both]
     chances /= chances.sum(axis=0)
@@ -246,11 +270,23 @@ def believed(cases: Cases) -> Causes:
     )
     read = cases.measured
     mean_in = np.where(read, cases.filled(0.0), (likely @ MEAN)[:, None] * cases.gear.limits_in)
-    worn = np.where(read, surely_worn(cases, levels), np.clip(worn, 0.0, 1.0))
-    return _weighed(cases, both, mean_in, worn, likely, u)
+    worn = np.where(read, 0.0, np.clip(worn, 0.0, 1.0))
+    found = _weighed(cases, both, mean_in, worn, likely, u)
+    # Readings in doubt, given where the plunger of a gear that failed stands.
+    of = doubted.rows
+    told = (cases.failed & np.isfinite(cases.mean_in))[of, None]
+    random, held = (each.by_share for each in both)
+    by_joints = (1.0 - cases.fleet.loaded) * random + cases.fleet.loaded * held
+    by_joints *= (np.sqrt(2.0 * np.pi) * u[of] / STEP_IN)[:, None]
+    by_joints += (found.usually * found.by_rigging[of])[:, None]
+    chances = doubted.chances * np.where(told, by_joints, 1.0)
+    worn[of, doubted.joints] = (chances @ (SHARES > 1.0)) / chances.sum(axis=1)
+    return found
 
 
-def _believed(cases: Cases, unread: _Unread, levels: Array, u: Array) -> _Believed:
+def _believed(
+    cases: Cases, unread: _Unread, levels: Array, u: Array, doubted: Doubted
+) -> _Believed:
     pins = unread.pins
     read = cases.measured
     known = pins.waves(FREQUENCIES * (unread.amplification * cases.filled(0.0))[:, :, None])
@@ -261,16 +297,24 @@ def _believed(cases: Cases, unread: _Unread, levels: Array, u: Array) -> _Believ
     worn = np.repeat((levels @ BEYOND.sum(axis=1))[:, None], read.shape[1], axis=1)
     fits = np.ones(len(cases))
     likely = levels.copy()
+    by_share = np.ones(doubted.chances.shape)
     rows = np.flatnonzero(np.isfinite(cases.mean_in))
     if len(rows):
         at = np.exp(-1j * FREQUENCIES * np.abs(cases.mean_in[rows])[:, None])
         at = (at if pins is HELD else at.real) * blur(u[rows]) * _LINKAGE
+        whole = np.zeros((len(cases), len(FREQUENCIES)), at.dtype)
+        whole[rows] = at
         fits[rows], likely[rows], worn[rows] = _given_plunger(
             unread, read[rows], known[rows], levels[rows], at
         )
+        rest = waves[doubted.rows]
+        rest[np.arange(len(rest)), doubted.joints] = 1.0
+        rest = np.prod(rest, axis=1) * whole[doubted.rows]
+        moved = np.matmul(unread.by_share[doubted.joints], rest[:, :, None])[:, :, 0].real
+        by_share = np.maximum(pins.sense * (0.5 + moved), 0.0)
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
-    return _Believed(unread, fits, likely, worn, waves, exceeds)
+    return _Believed(unread, fits, likely, worn, waves, exceeds, by_share)
 
 
 def _given_plunger(

@@ -358,7 +358,7 @@ def _warnings(
             "With these clearances some linkages of the ensemble do not close: the uncertainty is"
             " unknown."
         )
-    else:
+    elif inspection.clearance_in:
         differs = plunger_reading.disagreement(inspection, *worst_in, u)
         if differs is not None:
             warnings.append(differs)

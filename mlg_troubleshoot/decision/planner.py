@@ -389,11 +389,17 @@ class _PlanBuilder:
         if best is None or not chosen:
             return chosen
         sound = [n for n in best.joints if n not in self.over_limit]
-        places = [self.numbers.index(n) for n in chosen]
-        worn = f.causes.worn[i]
-        saved = minutes_to_restore(self.gear, sound, self.opened) if sound else 0.0
-        saved *= 1.0 - float(np.prod(1.0 - worn[places]))
-        return chosen if saved > minutes_to_measure(self.gear, chosen, self.opened) else ()
+        if not sound:
+            return ()
+        # A reading saves the sound joints where it finds one worn that is enough without them. It
+        # opens no area that the repair opens anyway.
+        places = np.array([self._place(n) for n in chosen])
+        second = f.causes.second_if_worn(i, self.cases.over_limit[i], places)
+        spared = 1.0 - float(np.prod(1.0 - f.causes.worn[i, places] * (1.0 - second)))
+        anyway = self.opened | {self.gear.joint(n).area for n in (*self.over_limit, *chosen)}
+        saved = spared * minutes_to_restore(self.gear, sound, anyway)
+        opened = self.opened | {self.gear.joint(n).area for n in best.joints}
+        return chosen if saved > minutes_to_measure(self.gear, chosen, opened) else ()
 
     def _to_verdict(self) -> Plan:
         """A gear without a complaint: read until there is a verdict, restore what is over its

@@ -2,15 +2,18 @@
 A verdict takes unread joints at their bounds.
 
 No wear rate of this gear is public, so the prior knows no fleet: the shares of one gear's joints
-are exponential about a level that they have in common, and a few joints are worn out for reasons
-of their own. What was read on a gear tells its level, and through it what to expect of the rest.
+are exponential about a level that they have in common, up to the limit at which an overhaul
+restores them; a few joints are worn out for reasons of their own, more on gears that are worn more.
+What was read on a gear tells its level, and through it what to expect of the rest.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
 from mlg_troubleshoot.decision.priors import PRIORS
@@ -29,10 +32,11 @@ TOO_CLOSE = 0.8
 
 
 def _densities() -> Array:
-    even = np.exp(-SHARES / LEVELS[:, None])
-    even /= even.sum(axis=1, keepdims=True)
     out = np.where(SHARES > 1.0, 1.0, 0.0)
-    return np.asarray((1.0 - PRIORS.worn_out) * even + PRIORS.worn_out * out / out.sum())
+    even = np.exp(-SHARES / LEVELS[:, None]) * (1.0 - out)
+    even /= even.sum(axis=1, keepdims=True)
+    chance = np.geomspace(*PRIORS.worn_out, len(LEVELS))[:, None]
+    return np.asarray((1.0 - chance) * even + chance * out / out.sum())
 
 
 # Chance of each share at each level, (levels, shares); of those beyond the limit; mean and variance
@@ -52,30 +56,38 @@ def level_chances(cases: Cases) -> Array:
     return np.asarray(chances / chances.sum(axis=1, keepdims=True))
 
 
-def surely_worn(cases: Cases, levels: Array) -> Array:
-    """Chance that each joint that was read is beyond its limit, (n, joints). [1]
+@dataclass(frozen=True, slots=True, eq=False)
+class Doubted:
+    """Readings over the limit, each with the chance of what the joint is really worn to.
 
     A gauge may have an error of scale, and a reading may be the total play; neither is likely of a
     joint that was measured again.
+
+    rows, joints: places of the gears and of their joints. chances: of `SHARES`, not normalised,
+    (readings, shares). [1]
     """
-    limits = cases.gear.limits_in
-    chance = np.zeros(cases.measured.shape)
-    rows, joints = np.nonzero(cases.over_limit)
-    read = (cases.clearance_in[rows, joints] / limits[joints])[:, None]
-    u = (cases.gauge_u_in[rows, joints] / limits[joints])[:, None]
-    again = cases.own_gauge[rows, joints][:, None]
-    logs = []
-    slip = -np.expm1(-PRIORS.wrong_readings / len(limits))
-    for factor, share in ((1.0, 1.0 - slip), (2.0, slip)):
-        spread = np.hypot(u, np.where(again, 0.0, PRIORS.gauge_scale * factor * SHARES))
-        log = -0.5 * ((read - factor * SHARES) / spread) ** 2 - np.log(spread)
-        logs.append(np.where(again & (factor > 1.0), -np.inf, log + np.log(share)))
-    # The level by the other readings: this one is in doubt.
-    others = levels[rows] / DENSITIES[:, np.minimum(read[:, 0] / SHARE, 49.0).astype(int)].T
-    weight = np.logaddexp(*logs) + np.log(others @ DENSITIES)
-    weight = np.exp(weight - weight.max(axis=1, keepdims=True))
-    chance[rows, joints] = (weight @ (SHARES > 1.0)) / weight.sum(axis=1)
-    return chance
+
+    rows: Places
+    joints: Places
+    chances: Array
+
+    @classmethod
+    def of(cls, cases: Cases, levels: Array) -> Doubted:
+        limits = cases.gear.limits_in
+        rows, joints = np.nonzero(cases.over_limit)
+        read = (cases.clearance_in[rows, joints] / limits[joints])[:, None]
+        u = (cases.gauge_u_in[rows, joints] / limits[joints])[:, None]
+        again = cases.own_gauge[rows, joints][:, None]
+        logs = []
+        slip = -np.expm1(-PRIORS.wrong_readings / len(limits))
+        for factor, share in ((1.0, 1.0 - slip), (2.0, slip)):
+            spread = np.hypot(u, np.where(again, 0.0, PRIORS.gauge_scale * factor * SHARES))
+            log = -0.5 * ((read - factor * SHARES) / spread) ** 2 - np.log(spread)
+            logs.append(np.where(again & (factor > 1.0), -np.inf, log + np.log(share)))
+        # The level by the other readings: this one is in doubt.
+        others = levels[rows] / DENSITIES[:, np.minimum(read[:, 0] / SHARE, 49.0).astype(int)].T
+        weight = np.logaddexp(*logs) + np.log(others @ DENSITIES)
+        return cls(rows, joints, np.exp(weight - weight.max(axis=1, keepdims=True)))
 
 
 class Unread:

@@ -195,8 +195,8 @@ def test_an_unmeasured_joint_is_called_so_and_not_zero(failure: Run) -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"clearance_3_in": "0.010"}, "Measure again #3"),
-        ({"clearance_3_in": "0.010", "measured_again": "3"}, "Restore #3"),
+        ({"clearance_3_in": "0.009"}, "Measure again #3"),
+        ({"clearance_3_in": "0.009", "measured_again": "3"}, "Restore #3"),
         ({"clearance_4_in": ""}, "Measure #4"),
         ({"side": ""}, "Correct cell C3"),
         ({"outcome": "FAILED"}, "Read the plunger"),

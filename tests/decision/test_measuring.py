@@ -11,6 +11,8 @@ import pytest
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.causes import believed
+from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.next_joint import (
     COST_OF_WRONG_WITHIN,
     decision_risk,
@@ -26,9 +28,9 @@ from mlg_troubleshoot.decision.wear_levels import (
     MEAN,
     SHARES,
     VARIANCE,
+    Doubted,
     Unread,
     level_chances,
-    surely_worn,
 )
 from mlg_troubleshoot.gear.directions import random_directions, worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -135,7 +137,22 @@ def test_the_uncertainty_of_the_advice_is_that_of_the_verdict(gear: Gear, judge:
 def doubt(gear: Gear, clearance_in: dict[int, float], joint: int, **more: Any) -> float:
     """Chance that a joint that reads over its limit is within it."""
     one = Cases.of(gear, [inspected(clearance_in, **more)])
-    return float(1.0 - surely_worn(one, level_chances(one))[0, joint - 1])
+    readings = Doubted.of(one, level_chances(one))
+    (place,) = np.flatnonzero(readings.joints == joint - 1)
+    chances = readings.chances[place]
+    return float(chances[SHARES <= 1.0].sum() / chances.sum())
+
+
+def test_a_plunger_that_needs_the_worn_joint_confirms_its_reading(gear: Gear) -> None:
+    read = every_joint(0.0015, j3=0.0095)
+    alone, by_rigging, needed = (
+        believed(Cases.of(gear, [inspected(read, outcome=Outcome.FAILED, readings_in=at)])).worn[
+            0, 2
+        ]
+        for at in ((), (0.05,), (0.032,))
+    )
+    assert alone == pytest.approx(by_rigging, abs=0.02)
+    assert needed > alone + 0.08
 
 
 def test_a_reading_little_over_its_limit_is_in_doubt(gear: Gear) -> None:
@@ -191,7 +208,8 @@ def test_missing_critical_joints_stand_before_all_others(gear: Gear) -> None:
 
 
 def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
-    worth = [w for w in outlook(Cases.of(gear, [inspected({4: 0.0005})])).worth if w.critical]
+    read = dict.fromkeys((1, 4, 5), 0.001)
+    worth = [w for w in outlook(Cases.of(gear, [inspected(read)])).worth if w.critical]
     assert worth[0].risk_drop > 0.0
     assert worth[0].risk_drop / worth[0].minutes == max(w.risk_drop / w.minutes for w in worth)
     # The variance alone would choose another joint.
@@ -201,7 +219,7 @@ def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
 def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access(
     gear: Gear,
 ) -> None:
-    critical = dict.fromkeys(range(1, 6), 0.0017)
+    critical = dict.fromkeys(range(1, 6), 0.0014)
     worth = {w.joint: w for w in outlook(Cases.of(gear, [inspected(critical)])).worth}
     assert worth[8].risk_drop > worth[6].risk_drop
     assert list(worth).index(6) < list(worth).index(8)
@@ -245,10 +263,11 @@ def test_an_expectation_of_either_side_goes_before_too_close() -> None:
     assert enough(0.01, too_close=0.95) is Verdict.OUTSIDE_MARGIN
 
 
+@pytest.mark.parametrize("read_in", [0.0016, 0.0020, 0.0024])
 def test_the_chance_of_being_too_close_is_that_of_gears_drawn_from_the_same_distribution(
-    gear: Gear,
+    gear: Gear, read_in: float
 ) -> None:
-    measured = dict.fromkeys(range(1, 6), 0.0024)
+    measured = dict.fromkeys(range(1, 6), read_in)
     clearance = drawn_wear(gear, measured, 3000, np.random.default_rng(12))
     found = predict(
         gear,
@@ -259,8 +278,9 @@ def test_the_chance_of_being_too_close_is_that_of_gears_drawn_from_the_same_dist
     )
     p = found.probability_within(np.full(3000, MARGIN_IN), np.zeros(3000))
     truth = np.mean((p > 0.05) & (p < 0.95))
+    # A few joints that are worn out make the sum less normal than it is taken to be.
     assert outlook(Cases.of(gear, [inspected(measured)])).too_close == pytest.approx(
-        truth, abs=0.05
+        truth, abs=0.06
     )
 
 

@@ -239,3 +239,10 @@ def test_plunger_readings_that_disagree_over_the_margin_do_not_clear_the_gear(
 
 def test_plunger_readings_that_scatter_by_their_repeatability_agree(judge: Judge) -> None:
     assert judge(every_joint(0.0012), readings_in=(0.0305, 0.029)).verdict is Verdict.WITHIN_MARGIN
+
+
+def test_a_displacement_is_not_called_beyond_the_clearances_where_none_was_entered(
+    judge: Judge,
+) -> None:
+    said = [" ".join(judge(read, readings_in=(0.036,)).warnings) for read in ({}, {3: 0.001})]
+    assert ["what the entered clearances can do" in each for each in said] == [False, True]

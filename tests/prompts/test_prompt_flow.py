@@ -13,6 +13,7 @@ from mlg_troubleshoot.cli.prompts.answers import judge, plunger_in
 from mlg_troubleshoot.cli.prompts.conversation import Effect, Turn, answer
 from mlg_troubleshoot.cli.prompts.flow import Ask, Flow
 from mlg_troubleshoot.cli.prompts.sketch import sketch
+from mlg_troubleshoot.decision.columns import PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -653,6 +654,12 @@ def test_nothing_is_computed_without_a_single_clearance(flow: Flow) -> None:
     turn = play(flow, ["done", *ENTERS, ""])
     assert turn.effect is Effect.NONE
     assert "nothing to compute" in said(turn)
+
+
+def test_the_review_leads_back_to_the_plunger(flow: Flow) -> None:
+    turn = play(flow, ["done", *ENTERS, "", "more", "p .041", ""])
+    assert turn.state.ask is Ask.REVIEW
+    assert PLUNGER_DISPLACEMENT.name in turn.state.answers.more
 
 
 def test_a_plunger_reading_alone_is_computed(flow: Flow) -> None:

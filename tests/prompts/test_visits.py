@@ -341,3 +341,15 @@ def test_a_result_of_the_prompts_names_no_column_of_a_file(
     assert "counts as older than the repair" in shown
     for column in ("rigging_checked", "outcome_date", "plunger_date"):
         assert column not in shown
+
+
+def test_an_area_that_next_opened_stays_open_until_the_repair(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36")
+    visit(*GEAR, "y", "yes")
+    assert "again" in visit(*GEAR, "y", "18").screen
+    assert life(store).inspections[-1].inspection.open_areas == ("sidestay",)
+    visit(*GEAR, "n 3", "1")
+    assert life(store).inspections[-1].inspection.open_areas == ()

@@ -244,7 +244,7 @@ class Flow:
         if word == "n":
             return self._go_on(state.answers)
         if word == "y" and visit.todo:
-            return self._go_on(visit.begun(self.today))
+            return self._go_on(visit.begun(self.today, self.gear))
         if word == "c":
             return Turn(State(Ask.REVIEW, visit.answers))
         if word == "u" and visit.before is not None:
@@ -270,7 +270,7 @@ class Flow:
         if text is None or answers.more.get("repair_date") == before.more.get("repair_date"):
             return answers
         read = judge_more(repaired, text, answers.unit, self.gear)
-        return answers.reopened(read.restored_joints)
+        return answers.with_more(open_areas=None).reopened(read.restored_joints)
 
     def _step(self, state: State, typed: str) -> Turn[State]:
         column = str(state.at)
@@ -444,6 +444,8 @@ class Flow:
             return Turn(State(Ask(typed.lower()), answers, from_review=True))
         if typed.lower() in pages.DETAILS:
             return Turn(State(Ask.DETAIL, answers, pages.DETAILS[typed.lower()], from_review=True))
+        if typed.lower() == "more":
+            return Turn(State(Ask.MORE, answers))
         number = re.fullmatch(r"#?\s*(\d{1,4})", typed)
         if number is not None:
             return self._jump(replace(state, from_review=True), int(number[1]))
@@ -457,7 +459,7 @@ class Flow:
             return again(
                 state,
                 "No joint has a clearance and the plunger was not read, so there is nothing to"
-                " compute. Type a joint number, or b to go back to the plunger.",
+                " compute. Type a joint number, or more to enter the plunger.",
             )
         if state.answers.unit_question(self.gear):
             return Turn(replace(state, ask=Ask.CONFIRM_UNIT))

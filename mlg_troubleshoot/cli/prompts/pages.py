@@ -209,7 +209,7 @@ def next_page(visit: Visit) -> Page:
         ("y", "I did NEXT") if visit.todo else ("", ""),
         ("r", "report"),
         ("c", "correct"),
-        ("u", "take back") if visit.before else ("", ""),
+        ("u", "undo") if visit.before else ("", ""),
         ("d", "details"),
         ("n", "new"),
     ]
@@ -536,7 +536,8 @@ REVIEW_HELP = (
         " Enter.",
     ),
     keys(("tail", "tail number"), ("side", "LH or RH"), ("unit", "in, thou or mm")),
-    keys(("reading", "radial, diametral, total play"), ("b", "back, to outcome, plunger, margin")),
+    keys(("reading", "radial, diametral, total play"), ("b", "back")),
+    keys(("more", "outcome, plunger, margin, repairs, the day")),
     keys(
         *((word, column.replace("_id", "").replace("_", " ")) for word, column in DETAILS.items())
     ),

@@ -61,15 +61,24 @@ class Visit:
     joints: tuple[int, ...]
     before: Answers | None = None
 
-    def begun(self, today: date | None) -> Answers:
-        """The answers with what NEXT asks for still to come, on the day of this visit."""
+    def begun(self, today: date | None, gear: Gear) -> Answers:
+        """The answers with what NEXT asks for still to come, on the day of this visit.
+
+        What is read opens its areas until a repair, or the end of the day, closes them.
+        """
+        inspected = self.row.inspection_date
+        same_day = today is None or inspected is None or today <= inspected
+        opened = {*self.row.open_areas} if same_day and self.action is not Action.RESTORE else set()
+        if self.action in _WITH_JOINTS:
+            opened |= {gear.joint(number).area for number in self.joints}
         answers = replace(self.answers, todo=self.todo)
+        answers = answers.with_more(open_areas="; ".join(sorted(opened)) or None)
         if self.action is Action.MEASURE_AGAIN:
             names = " ".join(map(str, {*self.row.measured_again, *self.joints}))
             answers = answers.with_more(measured_again=names)
-        if today is None or self.row.inspection_date is None:
+        if today is None or inspected is None:
             return answers
-        return answers.with_more(inspection_date=max(today, self.row.inspection_date).isoformat())
+        return answers.with_more(inspection_date=max(today, inspected).isoformat())
 
     def completed(self, read: Inspection) -> Inspection:
         """What was typed, with what only the kept inspection says: prompts do not ask for all."""
@@ -192,7 +201,8 @@ def answers_of(row: Inspection, gear: Gear, continues: str) -> Answers:
     return Answers(
         tail_no=row.tail_no,
         side=row.side,
-        unit=unit,
+        # Without a clearance the unit of the next ones is asked for again.
+        unit=unit if row.entered else None,
         convention=row.convention,
         record_id=row.record_id,
         joints=MappingProxyType(joints),
