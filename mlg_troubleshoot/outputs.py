@@ -30,6 +30,7 @@ _SIGNS = r"=+\-@＝＋－＠"
 _FORMULA = re.compile(
     rf'(\A(?=[{_BREAKS}])|(?:\A|[;|{_BREAKS}])(?=(?:[^\S{_BREAKS}]|")*[{_SIGNS}]))'
 )
+_SEPARATORS = re.compile(r'[,;|\t"\r\n]')
 # How a file of SQLite begins: such a file is a store, of this program or of another.
 _DATABASE = b"SQLite format 3\0"
 _STANDARD_OUTPUT = "-"
@@ -136,11 +137,7 @@ def csv_lines(rows: Iterable[Sequence[Field]]) -> str:
 
 def _quoted(field: str) -> str:
     """A field that stays one whichever separator a program takes the file to have."""
-    return (
-        '"' + field.replace('"', '""') + '"'
-        if any(sign in field for sign in ',;|\t"\r\n')
-        else field
-    )
+    return '"' + field.replace('"', '""') + '"' if _SEPARATORS.search(field) else field
 
 
 def harmless(value: Field) -> str:

@@ -219,7 +219,9 @@ class Length:
         return cls(value_in, len(f"{value_in:.4g}".partition(".")[2]))
 
     def said_in(self, unit: LengthUnit) -> str:
-        decimals = max(self.decimals - LengthUnit.INCH.decimals + unit.decimals, 0)
+        decimals = self.decimals
+        if unit is not LengthUnit.INCH:
+            decimals = max(decimals - LengthUnit.INCH.decimals + unit.decimals, 0)
         number = f"{unit.from_inches(self.value_in):{'+' if self.sign else ''}.{decimals}f}"
         return f"{number} {unit}" if self.named else number
 

@@ -327,12 +327,19 @@ def _given_plunger(
     beyond = BEYOND.sum(axis=1)
     fits = np.empty_like(levels)
     worn = np.zeros((len(at), len(LEVELS), count))
+    # Where every joint was read, no level changes anything, and no joint is asked about.
+    whole = read.all(axis=1)
+    through = np.prod(known[whole], axis=1) * at[whole]
+    fits[whole] = 0.5 + np.sum(through.real, axis=1)[:, None]
+    some = np.flatnonzero(~whole)
     for k in range(len(LEVELS)):
-        waves = np.where(read[:, :, None], known, unread.unread[k])
+        waves = np.where(read[some, :, None], known[some], unread.unread[k])
         ahead, behind = _products(waves)
-        fits[:, k] = 0.5 + np.sum((ahead[-1] * at).real, axis=1)
+        fits[some, k] = 0.5 + np.sum((ahead[-1] * at[some]).real, axis=1)
         for j in range(count):
-            rest = ahead[j] * behind[j + 1] * at
+            asked = np.flatnonzero(~read[some, j])
+            rest = np.zeros_like(at)
+            rest[some[asked]] = ahead[j][asked] * behind[j + 1][asked] * at[some[asked]]
             worn[:, k, j] = 0.5 * beyond[k] + (rest @ unread.worn[k, j]).real
     fits = np.maximum(fits, 1e-12)
     worn = np.maximum(worn, 0.0)

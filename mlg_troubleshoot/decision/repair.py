@@ -190,10 +190,10 @@ def _variance(members: Sequence[Array]) -> Array:
     n = len(members)
     total = np.zeros_like(members[0])
     square = np.zeros_like(members[0])
-    for member in members:
+    for member in members[1:]:
         off = member - members[0]
         total += off
-        square += off * off
+        square += np.multiply(off, off, out=off)
     return np.maximum(square - total * total / n, 0.0) / max(n - 1, 1)
 
 

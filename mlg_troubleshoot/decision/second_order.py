@@ -73,10 +73,13 @@ class Response:
         others lead. [in]
         """
         n, joints = clearance_in.shape
-        links = np.zeros((n, 2 * joints))
         towards = np.reshape(sense, (-1, 1, 1))
-        for _ in range(5):
-            gradient = towards * (self.gradient + links @ self.curvature).reshape(n, joints, 2)
+        # Without links the gradient is the same for every gear.
+        gradient = towards * self.gradient.reshape(joints, 2)
+        links = np.zeros((n, 2 * joints))
+        for step in range(5):
+            if step:
+                gradient = towards * (self.gradient + links @ self.curvature).reshape(n, joints, 2)
             length = np.maximum(np.hypot(gradient[..., :1], gradient[..., 1:]), 1e-300)
             links = (gradient / length * clearance_in[..., None]).reshape(n, 2 * joints)
         return links

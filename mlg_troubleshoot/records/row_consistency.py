@@ -226,13 +226,17 @@ def _near(value_in: float, expected_in: float) -> bool:
 
 def _scale(own: Clearances, usual: Clearances, common: list[int], off: list[int]) -> str:
     measurable = [joint for joint in common if usual[joint] > _FIT_IN]
+
+    def fits(factor: float, joint: int) -> bool:
+        return abs(own[joint] / factor - usual[joint]) <= 0.15 * usual[joint]
+
     for factor, meaning in _SCALES:
-        fits = {j for j in measurable if abs(own[j] / factor - usual[j]) <= 0.15 * usual[j]}
-        said = f"{_times(factor)} this gear's other inspections: {meaning}?"
-        if len(measurable) >= 3 and len(fits) == len(measurable):
-            return f"all clearances of this row are {said}"
-        if len(off) == 1 and off[0] in fits and factor not in (2.0, 0.5):
-            return f"joint {off[0]} is {said}"
+        said = f"this gear's other inspections: {meaning}?"
+        if len(measurable) >= 3 and all(fits(factor, joint) for joint in measurable):
+            return f"all clearances of this row are {_times(factor)} {said}"
+        alone = len(off) == 1 and off[0] in measurable and factor not in (2.0, 0.5)
+        if alone and fits(factor, off[0]):
+            return f"joint {off[0]} is {_times(factor)} {said}"
     return ""
 
 

@@ -440,7 +440,9 @@ def _made(
     rows, counting = pickle.loads(zlib.decompress(block))
     # What is shown and kept of an inspection is what was found, whatever counts no more.
     judged = [
-        replace(each, inspection=row) if isinstance(each, Assessment) else each
+        each
+        if each.row is row or not isinstance(each, Assessment)
+        else replace(each, inspection=row)
         for each, row in zip(judge(counting), rows, strict=True)
     ]
     return len(rows), [make(judged) for make in makers]
