@@ -440,9 +440,9 @@ def _made(
     rows, counting = pickle.loads(zlib.decompress(block))
     # What is shown and kept of an inspection is what was found, whatever counts no more.
     judged = [
-        each
-        if each.row is row or not isinstance(each, Assessment)
-        else replace(each, inspection=row)
+        replace(each, inspection=row)
+        if isinstance(each, Assessment) and each.inspection is not row
+        else each
         for each, row in zip(judge(counting), rows, strict=True)
     ]
     return len(rows), [make(judged) for make in makers]
