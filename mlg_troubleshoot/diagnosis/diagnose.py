@@ -21,7 +21,13 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
 from mlg_troubleshoot.diagnosis.condition import BY_CHANCE, DataCondition
-from mlg_troubleshoot.diagnosis.explain import Finding, MisfitProblem, explain, p_value_of
+from mlg_troubleshoot.diagnosis.explain import (
+    Finding,
+    MisfitProblem,
+    WeighedCause,
+    explain,
+    p_value_of,
+)
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import (
     LEAST_ALONG,
@@ -165,6 +171,9 @@ class Diagnosis(Result):
         Root mean square of that effect. [in]
     probabilities : mapping of (str, str or None) to float
         Probability that each cause acts, by its name and target. [1]
+    weighed : tuple of WeighedCause
+        What Bayes' rule makes of every name: how often it is expected, what the rows say of it
+        alone, how likely it is; the one with the highest odds first.
     p_nothing, p_unlisted : float
         Probability that nothing is wrong, and that something is that no list has. [1]
     p_left : float
@@ -221,6 +230,7 @@ class Diagnosis(Result):
     unlisted_variables: tuple[str, ...]
     unlisted_rms_in: float
     probabilities: Mapping[Key, float]
+    weighed: tuple[WeighedCause, ...]
     p_nothing: float
     p_unlisted: float
     p_left: float
@@ -646,6 +656,7 @@ def _report(
         unlisted_variables=finding.variables,
         unlisted_rms_in=finding.unlisted_rms_in,
         probabilities=finding.follows.listed,
+        weighed=finding.weighed,
         p_nothing=chances.nothing,
         p_unlisted=chances.unlisted,
         p_left=finding.left,

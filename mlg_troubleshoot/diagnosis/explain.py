@@ -15,7 +15,7 @@ from math import erfc, sqrt
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, log_sum
 from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
@@ -150,6 +150,30 @@ class MisfitProblem:
         return shares | {UNLISTED: beliefs.expected - sum(shares.values())}
 
 
+@dataclass(frozen=True, slots=True)
+class WeighedCause:
+    """What Bayes' rule makes of one name.
+
+    Parameters
+    ----------
+    cause, target : str or None
+        The name; ``unlisted`` with the columns that something on no list moves with.
+    beforehand : float
+        How often it is expected in a table, before a misfit is looked at. [1]
+    evidence : float
+        Logarithm of how many times likelier the misfits are if it alone acts than if nothing does,
+        over all its variants, days and sizes as they are expected. [1]
+    probability : float
+        Probability that it acts, alone or with others. [1]
+    """
+
+    cause: str
+    target: str | None
+    beforehand: float
+    evidence: float
+    probability: float
+
+
 @dataclass(frozen=True)
 class Finding:
     """What the posterior says.
@@ -193,6 +217,28 @@ class Finding:
     def verdict(self) -> Verdict:
         """NONE, NAMED, AMBIGUOUS or UNLISTED."""
         return self.follows.verdict
+
+    @property
+    def weighed(self) -> tuple[WeighedCause, ...]:
+        """What Bayes' rule makes of every name, the one with the highest odds alone first."""
+        found = self.posterior
+        alone: dict[Key, list[tuple[float, float]]] = {}
+        names, priors = found.effects.names, found.effects.log_prior.tolist()
+        for name, prior, odds in zip(names, priors, found.over_nothing.tolist(), strict=True):
+            if name is not None:
+                alone.setdefault(name, []).append((prior, odds))
+        bare = {e.context: e.log_posterior for e in found.likeliest if not e.members}
+        for number, context in enumerate(found.contexts):
+            if context.name is not None:
+                odds = bare[number] - bare[0]
+                alone.setdefault(context.name, []).append((context.log_prior, odds))
+        each = []
+        for name, terms in alone.items():
+            prior, odds = (float(log_sum(np.array(part))) for part in zip(*terms, strict=True))
+            probability = found.names.get(name, 0.0)
+            each.append(WeighedCause(*name, float(np.exp(prior)), odds - prior, probability))
+        order = sorted(each, key=lambda own: -own.evidence - np.log(own.beforehand))
+        return tuple(order)
 
     @property
     def posterior(self) -> MisfitPosterior:

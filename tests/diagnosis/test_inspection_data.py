@@ -9,9 +9,11 @@ import re
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from mlg_troubleshoot.diagnosis import Diagnosis
+from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 
 from ..hidden_effect import data_sets
@@ -49,6 +51,26 @@ def test_the_puzzle_does_not_give_the_answer_away() -> None:
 def test_the_p_value_of_the_residual_tells_an_effect_on_no_list_from_noise() -> None:
     assert diagnosis("measured_frozen_grease.csv").remainder_p < 0.001
     assert diagnosis("measured_nothing_wrong.csv").remainder_p > 0.1
+
+
+def test_the_odds_of_a_name_are_what_is_expected_times_what_the_rows_say_of_it() -> None:
+    found = diagnosis("measured_pressure.csv")
+    (named,), first = found.causes, found.weighed[0]
+    assert (first.cause, first.target) == named.candidate.key
+    # The share of sets with slips of single rows is nearly that of nothing with the same slips.
+    odds = np.log(named.probability / found.p_nothing)
+    assert np.log(first.beforehand) + first.evidence == pytest.approx(odds, abs=0.5)
+
+
+def test_every_cause_that_may_act_is_expected_as_often_as_any_other() -> None:
+    expected: dict[str, float] = {}
+    for own in diagnosis("measured_pressure.csv").weighed:
+        expected[own.cause] = expected.get(own.cause, 0.0) + own.beforehand
+    # Of the aircraft that a modification may be of only the likeliest are offered.
+    share = Beliefs().expected * (1.0 - Beliefs().unlisted) / len(CATALOGUE)
+    listed = {name: p for name, p in expected.items() if name not in {"unlisted", "modification"}}
+    assert len(listed) > 15
+    assert listed == pytest.approx(dict.fromkeys(listed, share))
 
 
 def test_the_command_makes_the_data_sets_again_byte_for_byte(tmp_path: Path) -> None:
