@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from math import erfc, sqrt
 
 import numpy as np
@@ -66,6 +66,13 @@ class MisfitProblem:
         """Misfit less what pins scatter. [in]"""
         return self.misfit - EXPECTED_SLOPE * self.rows.predicted_in
 
+    @cached_property
+    def shapes(self) -> EffectColumns:
+        """What no list has, the same in all rows last, of unit size where it acts."""
+        constant = EffectColumns.of(np.ones((len(self.misfit), 1)))
+        every = EffectColumns.joined([self.bank.columns, constant])
+        return every.scaled(1.0 / every.acting)
+
     def candidate(self, key: Key, found: MisfitPosterior | None = None) -> Candidate:
         """The likeliest candidate of a name, or all-joint effects."""
         own = [k for k, c in enumerate(self.candidates) if c.key == key]
@@ -104,12 +111,10 @@ class MisfitProblem:
             exact,
             rarity,
         )
-        shapes = EffectColumns.joined([self.bank.columns, EffectColumns.of(np.ones((n, 1)))])
-        shapes = shapes.scaled(1.0 / shapes.acting)
         named = [(UNLISTED, _BY.join(names)) for names in (*self.bank.variables, ("all rows",))]
         alike = Counter(named)
         share = np.log([shares[UNLISTED] / (len(alike) * alike[name]) for name in named])
-        free = Effects.free(shapes, named, share, beliefs.shape_size * scale)
+        free = Effects.free(self.shapes, named, share, beliefs.shape_size * scale)
         far = np.sort(np.argsort(-np.abs(self.expected - np.median(self.expected)))[:_MOST_SLIPS])
         slip = float(np.log(beliefs.slips / n))
         slips = Effects.free(
@@ -335,9 +340,7 @@ def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
     """p-value of the shape of the bank that stands out most in a residual, as one of all of them
     (Bonferroni).
     """
-    constant = np.ones((len(left), 1))
-    shapes = EffectColumns.joined([problem.bank.columns, EffectColumns.of(constant)])
-    fitted = fit(noise, constant, left)
+    shapes, fitted = problem.shapes, fit(noise, np.ones((len(left), 1)), left)
     settled = noise.with_tails(fitted.tail_ratio)
     product, _log = settled.precision_times(left[:, None], fitted.tail_ratio)
     spread = fitted.scale * np.sqrt(settled.squares(shapes)[0])

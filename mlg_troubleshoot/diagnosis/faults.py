@@ -119,7 +119,8 @@ class _Meant:
     """What a row was meant to be, NaN where that is not known.
 
     kind: entry error that made what is written of it; none if it is as written.
-    cells: what is wrong: column, what is written, what was meant.
+    cells: what is wrong in the readings: column, what is written, what was meant; of the likeliest
+    one also in the clearances.
     evidence: log-density of what is written given what was meant. [1]
     """
 
@@ -261,20 +262,21 @@ class _Screen:
         found += np.where(read, self.near(place, self.misfit_of(place, meant)), 0.0)
         if logsumexp(found) - written < Beliefs().odds:
             return None
-        return meant[int(np.argmax(found))]
+        best = meant[int(np.argmax(found))]
+        written = self.table.clearance_in[place]
+        column = [f"clearance_{number}_in" for number in self.model.joint_numbers]
+        return replace(best, cells=(*_cells(column, written, best.clearance), *best.cells))
 
     def errors(self, place: int) -> Iterator[_Meant]:
         """Every entry error that a row may hold."""
-        row, numbers = self.as_written(place), self.model.joint_numbers
+        row = self.as_written(place)
         written = row.clearance
         known = [int(j) for j in np.flatnonzero(written > 0.0)]
-        column = [f"clearance_{number}_in" for number in numbers]
 
         def clearances(kind: str, joints: list[int], right: Array, evidence: float) -> _Meant:
             meant = written.copy()
             meant[joints] = right
-            cells = _cells(column, written, meant)
-            return replace(row, clearance=meant, kind=kind, cells=cells, evidence=evidence)
+            return _Meant(meant, row.readings, row.extension, kind, (), evidence)
 
         for joints in [*([j] for j in known), *([known] if len(known) > 1 else [])]:
             # A gear may be worn less than any other: then all its clearances are small.

@@ -19,7 +19,7 @@ ColumnBlock = Array | csc_array
 # below which it is kept by these rows.
 _LARGE, _FEW = 1_000_000, 0.2
 # Columns that are written out together.
-_AT_ONCE = 256
+_AT_ONCE = 64
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,13 @@ class EffectColumns:
         full: list[Array] = []
         few: list[tuple[Places, Array]] = []
         places: tuple[list[int], list[int]] = ([], [])
+        blocks: list[tuple[Places, ColumnBlock]] = []
+
+        def written_out() -> None:
+            blocks.append((np.array(places[0]), np.column_stack(full)))
+            places[0].clear()
+            full.clear()
+
         for place, column in enumerate(columns):
             rows = np.flatnonzero(column)
             short = len(rows) < _FEW * n and n * (place + 1) > _LARGE
@@ -53,9 +60,10 @@ class EffectColumns:
                 few.append((rows, column[rows]))
             else:
                 full.append(column)
-        blocks: list[tuple[Places, ColumnBlock]] = []
+            if len(full) == _AT_ONCE:
+                written_out()
         if full:
-            blocks.append((np.array(places[0]), np.column_stack(full)))
+            written_out()
         if few:
             ends = np.cumsum([0, *(len(rows) for rows, _values in few)])
             rows, values = (np.concatenate(part) for part in zip(*few, strict=True))
@@ -115,7 +123,8 @@ class EffectColumns:
         blocks = []
         for places, block in self.blocks:
             kept = np.isin(places, wanted)
-            blocks.append((np.searchsorted(wanted, places[kept]), block[:, kept]))
+            some = block if kept.all() else block[:, kept]
+            blocks.append((np.searchsorted(wanted, places[kept]), some))
         return EffectColumns(self.n, tuple(blocks))
 
     def onto(self, rows: Array) -> Array:
