@@ -86,7 +86,7 @@ def run(task: Any) -> dict[str, Any]:
 def bins(
     records: list[dict[str, Any]], oftener: Callable[[list[str]], float] = MIXTURES["as drawn"]
 ) -> list[tuple[float, float, int, float, float]]:
-    """Of each bin: its edges, how many causes were stated in it, their mean, and the share of them
+    """Of each bin in which something was stated: its edges, how many causes were stated in it, their mean, and the share of them
     that acts, as if fleets with something wrong were so much oftener.
 
     Fleets of another linkage are left out, and that as a cause: whether it shows in their rows is
@@ -108,10 +108,9 @@ def bins(
     found = []
     for low, high in pairwise(EDGES):
         own = said[(said[:, 0] >= low) & ((said[:, 0] < high) | (high == 1.0))]
-        stated, acts = (
-            np.average(own[:, :2], axis=0, weights=own[:, 2]) if len(own) else np.full(2, np.nan)
-        )
-        found.append((low, high, len(own), float(stated), float(acts)))
+        if len(own):
+            stated, acts = np.average(own[:, :2], axis=0, weights=own[:, 2])
+            found.append((low, high, len(own), float(stated), float(acts)))
     return found
 
 
