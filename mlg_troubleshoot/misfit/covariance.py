@@ -18,6 +18,8 @@ from mlg_troubleshoot.misfit.columns import ColumnBlock, EffectColumns
 # inverse of what each row scatters by itself; the logarithm of V's determinant.
 _Root = tuple[tuple[csr_array, ...], Array, float]
 
+# Computing only: rows times gears up to which a table is small.
+_SMALL = 100_000
 # Rows further out than this many standard deviations count less, and may be entry errors.
 FAR = 3.0
 
@@ -196,7 +198,7 @@ class NoiseModel:
     def squares(self, columns: EffectColumns) -> Array:
         """The same of many columns, for each ratio of the scatter between tails, (levels, p)."""
         roots = [self._root(ratio) for ratio in self.tail_ratios]
-        fixed = len(self._groups(0.0)) if self._nested else 0
+        fixed = 0 if self._small or not self._nested else len(self._groups(0.0))
 
         def of_block(block: ColumnBlock) -> Array:
             if self.correlation or isinstance(block, np.ndarray):
@@ -221,6 +223,11 @@ class NoiseModel:
         most = np.zeros(self.gears.max() + 1, np.int64)
         np.maximum.at(most, self.gears, self.tails)
         return bool(np.all(most[self.gears] == self.tails))
+
+    @property
+    def _small(self) -> bool:
+        """True if sums over groups are soonest had with all rows written out."""
+        return bool(len(self.relative) * (self.gears.max() + 1) <= _SMALL)
 
     def _root(self, tail_ratio: float) -> _Root:
         if tail_ratio in self._roots:
@@ -249,6 +256,8 @@ class NoiseModel:
         lower = np.linalg.cholesky(np.eye(low.shape[1]) + low.T @ weighted)
         log_determinant += 2.0 * float(np.sum(np.log(np.diag(lower))))
         root = np.asarray(solve_triangular(lower, weighted.T, lower=True))
+        if self._small:
+            root, groups = np.vstack([root, *(own.toarray() for own in groups)]), []
         self._roots[tail_ratio] = tuple(groups), root, log_determinant
         return self._roots[tail_ratio]
 

@@ -38,6 +38,12 @@ NOISES = (
 )
 
 
+@pytest.fixture(params=[0, 100_000], ids=["large", "small"], autouse=True)
+def size_of_table(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each fact holds of tables that are treated as large and as small."""
+    monkeypatch.setattr("mlg_troubleshoot.misfit.covariance._SMALL", request.param)
+
+
 def dense(ratio: float, noise: NoiseModel = NOISE) -> Array:
     """The covariance written out."""
     alike = noise.gears[:, None] == noise.gears
@@ -54,7 +60,7 @@ def test_the_inverse_covariance_is_that_of_the_whole_matrix(
     ratio: float, noise: NoiseModel
 ) -> None:
     columns = RNG.standard_normal((N, 3))
-    product, log_determinant = noise.precision_times(columns, ratio)
+    product, log_determinant = replace(noise).precision_times(columns, ratio)
     assert product == pytest.approx(np.linalg.solve(dense(ratio, noise), columns))
     assert log_determinant == pytest.approx(np.linalg.slogdet(dense(ratio, noise))[1])
 
@@ -67,15 +73,14 @@ def test_the_length_of_each_column_is_that_under_the_inverse_whatever_it_is_kept
     columns = RNG.standard_normal((N, 3)) * (np.arange(N)[:, None] < [N, 4, 7])
     inverse = [np.linalg.inv(dense(ratio, noise)) for ratio in noise.tail_ratios]
     expected = [np.einsum("ij,ik,kj->j", columns, each, columns) for each in inverse]
-    assert noise.squares(EffectColumns.made(N, iter(columns.T))) == pytest.approx(
-        np.array(expected)
-    )
+    kept = EffectColumns.made(N, iter(columns.T))
+    assert replace(noise).squares(kept) == pytest.approx(np.array(expected))
 
 
 @pytest.mark.parametrize("noise", NOISES)
 def test_what_a_row_scatters_by_itself_is_what_the_inverse_leaves(noise: NoiseModel) -> None:
     data, inverse = RNG.standard_normal(N), np.linalg.inv(dense(noise.tail_ratios[-1], noise))
-    own, share = noise.own_part(data)
+    own, share = replace(noise).own_part(data)
     assert own == pytest.approx(noise.relative**2 * (inverse @ data))
     assert share == pytest.approx(np.mean(noise.relative**2 * np.diag(inverse)))
 

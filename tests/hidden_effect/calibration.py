@@ -86,8 +86,9 @@ def run(task: Any) -> dict[str, Any]:
 def bins(
     records: list[dict[str, Any]], oftener: Callable[[list[str]], float] = MIXTURES["as drawn"]
 ) -> list[tuple[float, float, int, float, float]]:
-    """Of each bin in which something was stated: its edges, how many causes were stated in it, their mean, and the share of them
-    that acts, as if fleets with something wrong were so much oftener.
+    """Of each bin in which something was stated: its edges, how many causes were stated in it,
+    their mean, and the share of them that acts, as if fleets with something wrong were so much
+    oftener.
 
     Fleets of another linkage are left out, and that as a cause: whether it shows in their rows is
     not known.
