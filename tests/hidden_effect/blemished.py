@@ -36,13 +36,17 @@ from tests.hidden_effect.simulator import (
 from tests.hidden_effect.simulator.blemishes import PLUNGER, Rows
 
 Record = dict[str, Any]
-Task = tuple[str, str, int, str | None]
+Task = tuple[str, str, int, str | None, int | None]
 
 FIRST_SEED = 34_000
 
 
-def tasks(cases: list[str], fleets: int, first_seed: int, beside: bool) -> list[tuple[int, Task]]:
-    """Case, form, seed and the cause beside it of every fleet, with a number of its own."""
+def tasks(
+    cases: list[str], fleets: int, first_seed: int, beside: bool, rows: int | None = None
+) -> list[tuple[int, Task]]:
+    """Case, form, seed, the cause beside it and the rows of every fleet, with a number of its
+    own.
+    """
     causes = list(CATALOGUE)
     listed = []
     for case in cases:
@@ -51,7 +55,7 @@ def tasks(cases: list[str], fleets: int, first_seed: int, beside: bool) -> list[
             for form in FORMS:
                 cause = causes[(place + i) % len(causes)] if beside else None
                 number = first_seed + 10_000 * (2 * place + FORMS.index(form)) + i
-                listed.append((number + 5_000 * beside, (case, form, first_seed + i, cause)))
+                listed.append((number + 5_000 * beside, (case, form, first_seed + i, cause, rows)))
     return listed
 
 
@@ -83,8 +87,8 @@ def unseen_rms(rows: Rows, folder: Path, *options: str) -> float:
 
 def run(numbered: tuple[int, Task]) -> Record:
     """Draw a fleet, have its table diagnosed, and only then compare with what is true."""
-    number, (case, form, seed, beside) = numbered
-    rows, truth = blemished_fleet(case, form, seed, beside=beside)
+    number, (case, form, seed, beside, count) = numbered
+    rows, truth = blemished_fleet(case, form, seed, beside=beside, rows=count)
     with tempfile.TemporaryDirectory() as place:
         file, extension = Path(place) / "fleet.csv", Path(place) / "extension.toml"
         write_rows(rows, file)
@@ -235,11 +239,18 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--cases", default=",".join(BLEMISHES))
     parser.add_argument("--beside", action="store_true", help="with a listed cause at S = 14")
+    parser.add_argument(
+        "--rows", type=int, help="rows of every fleet, even; 60 to 400 if not given"
+    )
     parser.add_argument("--keep", type=Path, help="file to keep records in, to go on after a stop")
     parser.add_argument("--workers", type=int, default=1)
     arguments = parser.parse_args()
     listed = tasks(
-        arguments.cases.split(","), arguments.fleets, arguments.first_seed, arguments.beside
+        arguments.cases.split(","),
+        arguments.fleets,
+        arguments.first_seed,
+        arguments.beside,
+        arguments.rows,
     )
     numbered = [(number, (number, task)) for number, task in listed]
     show(study.mapped(run, numbered, arguments.workers, arguments.keep))
