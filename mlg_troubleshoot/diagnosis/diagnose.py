@@ -44,6 +44,7 @@ from mlg_troubleshoot.diagnosis.noise import (
 )
 from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of, scene_at
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.wear import visits
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
@@ -57,6 +58,8 @@ from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import MM_PER_IN
 
 LEAST_ROWS = 20
+# Times the rows of a table beyond which further ones are not counted. [1]
+_MOST_TIMES = 20
 # Share of rows from which data faults are not errors in single cells. [1]
 _MANY_FAULTS = 0.15
 # Measured over predicted displacement: further from 1 than this, or negative, is not a misfit. [1]
@@ -147,6 +150,32 @@ class NamedCause(Term):
         return {name: (min(low[name], high[name]), max(low[name], high[name])) for name in low}
 
 
+@dataclass(frozen=True, slots=True)
+class FurtherInspections:
+    """What would split the likeliest causes that the data cannot separate.
+
+    Parameters
+    ----------
+    between : tuple of Candidate
+        The two causes that it splits, or the one that it distinguishes from nothing.
+    gear : str
+        Gear in which the two differ most at its latest inspection.
+    apart_in : float
+        How far they differ there. [in]
+    inspections : int or None
+        Further inspections like these after which one of the two leads by as much as a name needs;
+        None if no number would do.
+    power : float
+        Chance that it does, whichever acts. [1]
+    """
+
+    between: tuple[Candidate, ...]
+    gear: str
+    apart_in: float
+    inspections: int | None
+    power: float = 0.8
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class Diagnosis(Result):
     """What the measured data say about the model.
@@ -161,6 +190,9 @@ class Diagnosis(Result):
         The whole set that the data cannot separate; empty unless AMBIGUOUS.
     beside : tuple of NamedCause
         The set of which something acts in addition to what is named; empty unless NAMED.
+    further : FurtherInspections or None
+        What would split the likeliest of such a set, all-joint effects left out; None if none is
+        open.
     unlisted_variables : tuple of str
         Columns that an effect outside the catalogue moves with.
     not_testable : tuple of (str, str)
@@ -227,6 +259,7 @@ class Diagnosis(Result):
     causes: tuple[NamedCause, ...]
     also_possible: tuple[NamedCause, ...]
     beside: tuple[NamedCause, ...]
+    further: FurtherInspections | None
     unlisted_variables: tuple[str, ...]
     unlisted_rms_in: float
     probabilities: Mapping[Key, float]
@@ -653,6 +686,7 @@ def _report(
         causes=causes,
         also_possible=() if causes else open_,
         beside=open_ if causes else (),
+        further=_further(case, open_),
         unlisted_variables=finding.variables,
         unlisted_rms_in=finding.unlisted_rms_in,
         probabilities=finding.follows.listed,
@@ -775,6 +809,34 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
 
     named = sorted((found(key) for key in finding.said), key=lambda cause: -cause.effect_rms_in)
     return tuple(named), tuple(found(key) for key in finding.open)
+
+
+def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections | None:
+    """Where the likeliest of a set differs most from its likeliest rival, another one or nothing,
+    and how many further inspections like these distinguish them.
+    """
+    problem, finding, table = case.problem, case.finding, case.scene.table
+    single = {c.key for c in problem.candidates}
+    rivals = [cause.candidate for cause in open_ if cause.candidate.key in single][:2]
+    if not rivals:
+        return None
+    chances = [finding.probability(rival.key) for rival in rivals]
+    if finding.posterior.nothing > min(chances[1:], default=0.0):
+        rivals, chances = rivals[:1], [chances[0], finding.posterior.nothing]
+    noise, apart, none = finding.noise, np.zeros(len(table)), np.empty((len(table), 0))
+    for rival, sign in zip(rivals, (1.0, -1.0), strict=False):
+        own = [k for k, c in enumerate(problem.candidates) if c.key == rival.key]
+        column = problem.columns.take([max(own, key=finding.posterior.of_effect.item)])
+        value = shrunk(noise, column, none, np.empty((0, 0)), problem.expected)[0]
+        apart += sign * (column @ value)
+    latest = np.array([rows[-1] for rows in visits(table).values()])
+    place = int(latest[np.argmax(np.abs(apart[latest]))])
+    squared = float(noise.square(apart[:, None], noise.tail_ratios[-1])[0]) / noise.scale_in**2
+    lead = abs(float(np.log(chances[0]) - np.log(max(chances[1], np.finfo(float).tiny))))
+    times = problem.beliefs.further(float(np.sqrt(squared)), lead)
+    count = int(np.ceil(times * len(table))) if times <= _MOST_TIMES else None
+    gear, apart_in = str(table.gears[place]), float(abs(apart[place]))
+    return FurtherInspections(tuple(rivals), gear, apart_in, count)
 
 
 def _interval(value: float, error: float) -> tuple[float, float]:

@@ -422,7 +422,7 @@ def restored_joints(
             f"clearance_{scene.joints[worst[row]]}_in",
             "restored_joint",
             f"{written[row, worst[row]]:g}",
-            f"{clearance[row, worst[row]]:.4g}",
+            f"{round(float(changed[row, worst[row]]), 4):g}",
         )
         for row in found
     )

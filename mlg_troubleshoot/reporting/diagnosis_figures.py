@@ -57,13 +57,14 @@ class Residuals:
         """What residuals can be drawn against."""
         table = self.diagnosis.used
         clearances = (CLEARANCE.header(joint) for joint in self.joints)
-        return ("predicted", *table.quantities, *table.factors, *clearances)
+        floats = (AXIAL_FLOAT.header(joint) for joint in self.joints)
+        further = floats if table.axial_float_in is not None else ()
+        return ("predicted", *table.quantities, *table.factors, *clearances, *further)
 
     @property
     def covariates(self) -> tuple[str, ...]:
-        """Columns beside clearances and prediction, but for the aircraft."""
-        table = self.diagnosis.used
-        return (*table.quantities, *(name for name in table.factors if name != TAIL_NO.variable))
+        """Columns beside the prediction, but for the aircraft."""
+        return tuple(name for name in self.columns[1:] if name != TAIL_NO.variable)
 
     @property
     def before_in(self) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, BY_NAME, CLEARANCE, COVARIATES
-from mlg_troubleshoot.diagnosis import Diagnosis, NamedCause
+from mlg_troubleshoot.diagnosis import Candidate, Diagnosis, NamedCause
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import environment
@@ -83,6 +83,11 @@ def chance_words(chance: float) -> str:
 def name_words(cause: str) -> str:
     """Name a cause as a person would: its identifier is for files."""
     return cause.replace("_", " ")
+
+
+def target_words(candidate: Candidate) -> str:
+    """Name a cause with its target."""
+    return " ".join(filter(None, (name_words(candidate.cause.name), candidate.target)))
 
 
 def cause_words(cause: NamedCause) -> str:
@@ -175,6 +180,7 @@ environment().filters.update(
     chance_words=chance_words,
     name_words=name_words,
     cause_words=cause_words,
+    target_words=target_words,
     column_words=column_words,
     condition_words=condition_words,
 )

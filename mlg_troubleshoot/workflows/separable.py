@@ -50,10 +50,7 @@ TAILS = 20
 VISITS = 5
 ROW_IN = 0.0025
 _BELIEFS = Beliefs()
-# Quantile of the normal distribution for 80 % power, and the distance in log-likelihood at which
-# two are distinguished with it: d²/2 − 0.84 d is the odds from which something is said. [1]
-_POWER = 0.84
-_APART = _POWER + float(np.sqrt(_POWER**2 + 2 * _BELIEFS.odds))
+_APART = _BELIEFS.apart_from()
 # Columns in addition to clearances, cheapest first: written down anyway, read off, to be measured.
 FURTHER = {
     column.variable: column

@@ -16,6 +16,7 @@ from mlg_troubleshoot.diagnosis.faults import screen_faults
 from mlg_troubleshoot.diagnosis.sides import _slopes_without
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
 
 from .conftest import fleet
 
@@ -312,6 +313,13 @@ def test_rows_whose_worst_joint_was_restored_between_the_readings_are_named(gear
 def test_the_fleet_of_such_rows_is_not_named(gear: Gear) -> None:
     table, _rows, _moved = restored_between_the_readings(gear)
     assert diagnose(gear.model, table, gear.discrepancies).verdict == "NONE"
+
+
+def test_what_to_do_about_such_rows_is_said(gear: Gear) -> None:
+    table, rows, _moved = restored_between_the_readings(gear)
+    said = seven_lines(diagnose(gear.model, table, gear.discrepancies))
+    assert f"Enter the clearances of {len(rows)} rows" in said[-1].text
+    assert "joint restored between its reading and the plunger's" in said[0].text
 
 
 def test_such_rows_are_found_beside_a_cause(gear: Gear) -> None:

@@ -24,6 +24,7 @@ from mlg_troubleshoot.diagnosis.causes.linkage import OutOfPlaneTilt
 from mlg_troubleshoot.diagnosis.causes.together import LoadDirections, OtherGeometry
 from mlg_troubleshoot.diagnosis.scene import build_scene, scene_at
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.wear import visits
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.directions import worst_case, worst_of_sense
@@ -282,6 +283,54 @@ def test_a_cause_is_named_from_the_probability_that_is_asked_for(gear: Gear) -> 
         for sure in (0.8, 0.95)
     ]
     assert verdicts == ["NAMED", "AMBIGUOUS"]
+
+
+def turned_pin(gear: Gear, rows: int, seed: int) -> DiagnosisTable:
+    return fleet(
+        gear.model, lambda t, _o: -0.45 * t.clearance_in[:, 3], rows=rows, tails=8, seed=seed
+    )
+
+
+def test_a_set_says_in_which_gear_its_likeliest_causes_differ_most(gear: Gear) -> None:
+    table = turned_pin(gear, 80, 306)
+    found = diagnose(gear.model, table, gear.discrepancies)
+    assert found.verdict == "AMBIGUOUS"
+    assert found.further is not None
+    assert [c.key for c in found.further.between] == [("direction_not_worst_case", "joint 4")]
+    latest = [rows[-1] for rows in visits(table).values()]
+    most = max(latest, key=table.clearance_in[:, 3].item)
+    assert found.further.gear == table.gears[most]
+    assert found.further.apart_in < 0.45 * 2.4 * table.clearance_in[most, 3]
+
+
+def test_after_the_further_inspections_that_are_asked_for_the_cause_is_named(gear: Gear) -> None:
+    table = turned_pin(gear, 80, 306)
+    further = diagnose(gear.model, table, gear.discrepancies).further
+    assert further is not None
+    assert further.inspections is not None
+    assert 20 < further.inspections < 200
+    more = turned_pin(gear, 80 + further.inspections, 906)
+    (cause,) = diagnose(gear.model, more, gear.discrepancies).causes
+    assert cause.candidate.key == ("direction_not_worst_case", "joint 4")
+
+
+def test_where_nothing_is_open_nothing_further_is_asked_for(gear: Gear) -> None:
+    assert diagnose(gear.model, fleet(gear.model), gear.discrepancies).further is None
+
+
+def test_what_to_do_about_a_set_names_joint_gear_number_and_power(gear: Gear) -> None:
+    found = diagnose(gear.model, turned_pin(gear, 80, 306), gear.discrepancies)
+    assert found.further is not None
+    said = seven_lines(found)[-1].text
+    assert "that joint" not in said
+    assert f"best on {found.further.gear}, where direction not worst case joint 4 acts" in said
+    assert f"{found.further.inspections} further inspections like these" in said
+    assert "with 80 % power" in said
+
+
+def test_the_further_data_of_a_distance_are_more_where_the_rival_leads() -> None:
+    beliefs = Beliefs()
+    assert beliefs.further(3.0, 0.0) < beliefs.further(3.0, 2.0) < beliefs.further(2.0, 2.0)
 
 
 def test_one_pin_far_off_and_the_others_alike_are_directions_under_load() -> None:

@@ -133,5 +133,6 @@ def test_the_report_draws_the_residuals_against_every_column(tmp_path: Path) -> 
     mlg("diagnose", tmp_path / "fleet.csv", "--convention", "RADIAL", "--report", tmp_path)
     page = next(tmp_path.glob("*.html")).read_text(encoding="utf-8")
     section = page[page.index('id="columns"') :]
-    labels = ("temperature, °C", "hydraulic pressure, psi", "days since", "gauge", "mod status")
+    labels = ["temperature, °C", "hydraulic pressure, psi", "days since", "gauge", "mod status"]
+    labels += [f"clearance of joint {joint}" for joint in range(1, 11)]
     assert [label for label in labels if f"against {label}" not in section] == []
