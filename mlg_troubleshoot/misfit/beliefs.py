@@ -81,7 +81,7 @@ class Beliefs:
 
     def further(self, distance: float, lead: float) -> float:
         """How many times the data are needed again for that, if two explanations that were fitted
-        to them are so far apart: what is looked for is found too large, four times in five by less
+        to them are so far apart: what is looked for is found too large, with 80 % power by less
         than a standard error's share. [1]
         """
         return float((self.apart_from(lead) / max(distance - _SHORT, 1e-9)) ** 2)

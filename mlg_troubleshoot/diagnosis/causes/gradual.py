@@ -220,8 +220,8 @@ def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], flo
 
 
 def _of_value(scene: Scene, factor: str, candidate: Candidate) -> Mask:
-    """Rows that have the value of a candidate, all rows if it has none, shape (n,)."""
-    value = candidate.setting["value"]
-    if value is None:
+    """Rows that have the value of a candidate, all rows if it has no target, shape (n,)."""
+    if candidate.target is None:
         return np.ones(len(scene.table), bool)
-    return np.asarray(scene.table.factors.get(factor, np.full(len(scene.table), "")) == value)
+    texts = scene.table.factors.get(factor, np.full(len(scene.table), ""))
+    return np.asarray(texts == candidate.setting["value"])
