@@ -1,11 +1,12 @@
 """How often ``diagnose_simulation`` is right where rows follow each other, beside other methods.
 
-``python -m tests.benchmarks.bench_series nulls|power|rivals|speed [--draws 25] [--seed 0]
+``python -m tests.benchmarks.bench_series nulls|power|smooth|rivals|speed [--draws 25] [--seed 0]
 [--noise KIND ...] [--size 14] [--without-series]`` prints a line for each noise:
 
 - ``nulls``: nothing is wrong; share of draws with a cause, with the verdict NAMED, with an alarm;
 - ``power``: one parameter is wrong by so many standard deviations of the mean of white noise:
   named, in the set, a wrong unique name, and how many 95 % intervals of it hold the true value;
+- ``smooth``: something smooth is wrong that no suspect is, by 40 of these: the verdicts;
 - ``rivals``: nothing, one parameter, or something smooth that no suspect is, by this diagnosis, by
   BIC with least squares, by BIC with first-order autoregressive residuals, and by all suspects
   under a Gaussian process: names, error of the prediction in and beyond the range of the rows,
@@ -35,6 +36,8 @@ from tests.simulation.rigs import Array, Rig
 from tests.simulation.timed_rigs import NOISES, TIMED, scatter
 
 Labels = NDArray[np.int64]
+# Size of what no suspect is, in standard deviations of the mean of white noise.
+SMOOTH = 40.0
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,7 @@ def draws(kind: str, size: float, smooth: bool, wanted: argparse.Namespace) -> I
 def counted(draw: Draw, found: SimulationDiagnosis) -> Counter[str]:
     """What is right and wrong in a diagnosis, 1 each."""
     count = Counter(draws=1, alarm=int(found.verdict is not Verdict.NONE))
-    count["NAMED"] += found.verdict is Verdict.NAMED
+    count[str(found.verdict)] += 1
     causes = [{cause.name, *cause.aliases} for cause in found.causes]
     if draw.name is None:
         count["a cause"] += bool(causes)
@@ -119,11 +122,11 @@ def counted(draw: Draw, found: SimulationDiagnosis) -> Counter[str]:
     return count
 
 
-def rates(wanted: argparse.Namespace, size: float) -> None:
+def rates(wanted: argparse.Namespace, size: float, smooth: bool) -> None:
     """Print what is right and wrong for each noise."""
     for kind in wanted.noise:
         total: Counter[str] = Counter()
-        for draw in draws(kind, size, False, wanted):
+        for draw in draws(kind, size, smooth, wanted):
             total += counted(draw, draw.diagnosed(not wanted.without_series))
         print(f"{kind:8}", dict(total), flush=True)
 
@@ -146,7 +149,11 @@ def ours(draw: Draw, kept: NDArray[np.bool_]) -> Answer:
         series=draw.series[kept],
         time=np.flatnonzero(kept).astype(float),
     )
-    names = {name for cause in found.named for name in (cause.name, *cause.aliases)}
+    # A class is named, not a member.
+    names = {
+        str(draw.name) if draw.name in (cause.name, *cause.aliases) else cause.name
+        for cause in found.named
+    }
     return Answer(names, draw.rig.predict(found.parameters)[:, 0])
 
 
@@ -253,7 +260,7 @@ def rivals(wanted: argparse.Namespace) -> None:
         for world, size, smooth in (
             ("nothing", 0.0, False),
             ("one", wanted.size, False),
-            ("smooth", 40.0, True),
+            ("smooth", SMOOTH, True),
         ):
             count: dict[str, Counter[str]] = defaultdict(Counter)
             errors: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
@@ -308,7 +315,7 @@ def speed() -> None:
 def main() -> None:
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("what", choices=["nulls", "power", "rivals", "speed"])
+    parser.add_argument("what", choices=["nulls", "power", "smooth", "rivals", "speed"])
     parser.add_argument("--draws", type=int, default=25, help="draws of each of the eight rigs")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--size", type=float, default=14.0)
@@ -320,7 +327,8 @@ def main() -> None:
     elif wanted.what == "rivals":
         rivals(wanted)
     else:
-        rates(wanted, wanted.size if wanted.what == "power" else 0.0)
+        size = {"nulls": 0.0, "power": wanted.size, "smooth": SMOOTH}[wanted.what]
+        rates(wanted, size, wanted.what == "smooth")
 
 
 if __name__ == "__main__":
