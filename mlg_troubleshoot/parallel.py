@@ -64,6 +64,12 @@ class Blocks(Generic[_Item]):
         return self._count
 
 
+def packed(make: Callable[[_Part], Sequence[Any]], part: _Part) -> tuple[bytes, int]:
+    """What is made of a part as a block of a long list, and how many items it has."""
+    made = make(part)
+    return pickle.dumps(made), len(made)
+
+
 def spread(
     task: Callable[[_Part], _Found],
     parts: Iterable[_Part],

@@ -24,7 +24,7 @@ from mlg_troubleshoot.decision.ranking import Listed, listed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import OutputFile, whole_file
-from mlg_troubleshoot.parallel import Blocks
+from mlg_troubleshoot.parallel import Blocks, packed
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
@@ -47,7 +47,7 @@ _FEW = 2
 class _Gathered:
     """What is still needed of judgements that went out as they came."""
 
-    lines: list[Listed] = field(default_factory=list)
+    lines: Blocks[Listed] = field(default_factory=Blocks)
     held: list[Judgement] = field(default_factory=list)
     entries: Blocks[JudgedEntry] = field(default_factory=Blocks)
     annotated: dict[RowSource, task.Annotated] = field(default_factory=dict)
@@ -142,7 +142,7 @@ class Run:
             elif wanted.as_json:
                 self._write_json(result)
             else:
-                self._show(result, seen.show, found.lines, detail=wanted.detail)
+                self._show(result, seen.show, [*found.lines], detail=wanted.detail)
         if wanted.annotate is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
         if wanted.report is not None:
@@ -157,7 +157,7 @@ class Run:
     ) -> list[task.BlockOutput]:
         """What is made of the judgements as they come."""
         wanted = self._wanted
-        outputs = [task.BlockOutput(listed, found.lines.extend)]
+        outputs = [task.BlockOutput(partial(packed, listed), lambda block: found.lines.add(*block))]
         if wanted.as_json and total > 1:
             from mlg_troubleshoot.reporting.json_form import CheckText, inspection_lines
 
@@ -176,9 +176,9 @@ class Run:
         if wanted.annotate is not None:
             outputs.append(task.BlockOutput(task.annotated, found.annotated.update))
         if self._place is not None:
-            from mlg_troubleshoot.workflows.keep import judged_by, packed_entries
+            from mlg_troubleshoot.workflows.keep import entries, judged_by
 
-            made = partial(packed_entries, judged_by(read.gear, self._asked))
+            made = partial(packed, partial(entries, judged_by(read.gear, self._asked)))
             outputs.append(task.BlockOutput(made, lambda block: found.entries.add(*block)))
         if total <= _FEW or wanted.report is not None:
             outputs.append(task.BlockOutput(tuple, found.held.extend))

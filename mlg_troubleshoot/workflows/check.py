@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -105,11 +105,12 @@ class CheckResult(TableResult):
         return exit_code_of(listed(self.judgements))
 
 
-def exit_code_of(lines: Sequence[Listed]) -> ExitCode:
+def exit_code_of(lines: Iterable[Listed]) -> ExitCode:
     """NO_CONCLUSION if no row was judged, ATTENTION if one needs it."""
-    if not any(line.is_judged for line in lines):
+    states = {(line.is_judged, line.is_fine) for line in lines}
+    if not any(judged for judged, _fine in states):
         return ExitCode.NO_CONCLUSION
-    return ExitCode.FINE if all(line.is_fine for line in lines) else ExitCode.ATTENTION
+    return ExitCode.FINE if all(fine for _judged, fine in states) else ExitCode.ATTENTION
 
 
 @dataclass(frozen=True, slots=True)

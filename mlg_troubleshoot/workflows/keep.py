@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -56,12 +55,6 @@ def entries(by: Mapping[str, Any], judgements: Iterable[Judgement]) -> list[Judg
     return [
         JudgedEntry(j.inspection, _packed(by, j)) for j in judgements if isinstance(j, Assessment)
     ]
-
-
-def packed_entries(by: Mapping[str, Any], judgements: Iterable[Judgement]) -> tuple[bytes, int]:
-    """The same as a packed block, and how many they are."""
-    made = entries(by, judgements)
-    return pickle.dumps(made), len(made)
 
 
 def keep(

@@ -1,10 +1,11 @@
-"""Cold starts and large pieces of work of two trees, in turns: ``python
-tests/benchmarks/bench_cold.py --base FOLDER [--runs 7] [--before PATH] -- check FILE``.
+"""Cold starts and large pieces of work of two trees, in turns: ``python -m
+tests.benchmarks.bench_cold --base FOLDER [--runs 7] [--before PATH] [--batches | -- check FILE]``.
 
 Not collected by pytest. FOLDER is a checkout of the version before; ``--before`` is put into its
 ``PYTHONPATH``, for libraries of that time. Each run is a process of its own, the trees take turns,
 and what is compared is the processor's time (user and system), so that other work on the machine
-changes both alike. The import of numpy is the measure of the machine.
+changes both alike. The import of numpy is the measure of the machine. Memory is the largest sum
+over a process and its children, where the system tells (Linux), else that of the largest of them.
 """
 
 from __future__ import annotations
@@ -19,15 +20,29 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from . import bench_batch
+
 ROOT = Path(__file__).parents[2]
 # A process of its own starts what is measured: the memory of who starts it counts as its own.
 MEASURE = """
-import json, resource, subprocess, sys
+import json, os, resource, subprocess, sys, time
+def pages(pid):
+    own = int(open(f"/proc/{pid}/statm").read().split()[1])
+    return own + sum(map(pages, open(f"/proc/{pid}/task/{pid}/children").read().split()))
 of = subprocess.DEVNULL
-code = subprocess.run([sys.executable, *sys.argv[1:]], stdout=of, stderr=of).returncode
+process = subprocess.Popen([sys.executable, *sys.argv[1:]], stdout=of, stderr=of)
+together = 0
+while process.poll() is None:
+    try:
+        together = max(together, pages(process.pid) * os.sysconf("SC_PAGE_SIZE") // 1024)
+    except (OSError, IndexError):
+        pass
+    time.sleep(0.05)
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
-print(json.dumps([code, used.ru_utime + used.ru_stime, used.ru_maxrss]))
+seconds = used.ru_utime + used.ru_stime
+print(json.dumps([process.returncode, seconds, max(used.ru_maxrss, together)]))
 """
+STORE = "store.sqlite"
 ONE_GEAR = ["check", str(ROOT / "inspection_data" / "failure_case.csv")]
 
 
@@ -48,12 +63,29 @@ def run(tree: Path, command: Sequence[str], environment: dict[str, str]) -> tupl
     return seconds, memory / (1024.0 if sys.platform != "darwin" else 1024.0**2)
 
 
+def batches(folder: Path) -> list[list[str]]:
+    """Checks of made tables, a joint in twenty not read: on one core and on two, kept, reported."""
+    few, many = folder / "60.csv", folder / "10000.csv"
+    bench_batch.write_csv(few, 60, 0.05)
+    bench_batch.write_csv(many, 10_000, 0.05)
+    out = ["--csv", str(folder / "verdicts.csv"), "--force"]
+    kept = ["--keep", "--store", str(folder / STORE)]
+    return [
+        [str(many), "--workers", "1", *out],
+        [str(many), "--workers", "2", *out],
+        [str(many), "--workers", "2", "--json"],
+        [str(many), "--workers", "1", *kept],
+        [str(few), "--report", str(folder / "report"), "--force"],
+    ]
+
+
 def main() -> None:
     """Print the medians of both trees."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--base", type=Path, required=True)
     parser.add_argument("--before", default="")
     parser.add_argument("--runs", type=int, default=7)
+    parser.add_argument("--batches", action="store_true", help="tables instead of cold starts")
     parser.add_argument("command", nargs="*", help="a command of mlg instead of the usual ones")
     given = parser.parse_args()
     start = ["-m", "mlg_troubleshoot"]
@@ -61,6 +93,8 @@ def main() -> None:
     usual.append([*start, *ONE_GEAR, "--json"])
     commands = [[*start, *given.command]] if given.command else usual
     with tempfile.TemporaryDirectory() as compiled:
+        if given.batches:
+            commands = [[*start, "check", *each] for each in batches(Path(compiled))]
         # Installed packages are compiled once.
         own = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
         own["PYTHONPYCACHEPREFIX"] = compiled
@@ -70,8 +104,10 @@ def main() -> None:
         }
         for command in commands:
             found: dict[Path, list[tuple[float, float]]] = {tree: [] for tree in sides}
-            for turn in range(given.runs + (not given.command)):
+            for turn in range(given.runs + 1 - bool(given.command)):
                 for tree, environment in sides.items():
+                    # Each run keeps what no other one has kept.
+                    (Path(compiled) / STORE).unlink(missing_ok=True)
                     taken = run(tree, command, environment)
                     # The first run of a short command compiles.
                     if turn or given.command:
