@@ -53,7 +53,9 @@ class JudgedEntry:
 def entries(by: Mapping[str, Any], judgements: Iterable[Judgement]) -> list[JudgedEntry]:
     """What is kept of judgements; nothing of a row that was not judged."""
     return [
-        JudgedEntry(j.inspection, _packed(by, j)) for j in judgements if isinstance(j, Assessment)
+        JudgedEntry(j.inspection, packed_assessment(by, j))
+        for j in judgements
+        if isinstance(j, Assessment)
     ]
 
 
@@ -101,7 +103,7 @@ def keep(
             made += _repairs_of(row, store)
             # Wherever an inspection was entered again, it is the first entry that was assessed.
             of = first.setdefault(record.identity_hash, record.packed)
-            made += [record, _assessment_record(by, entry.assessment, record, of)]
+            made += [record, assessment_record(by, entry.assessment, record, of)]
             done += 1
             progress(done, len(judged))
         records.extend(made)
@@ -185,7 +187,7 @@ def supersede(store: Store, wrong: Record, result: CheckResult, options: CheckOp
     record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.digest)
     repairs = [*_repairs_taken_back(store, wrong, right), *_repairs_of(right, store)]
     by = judged_by(result.gear, options)
-    judgement = _assessment_record(by, _packed(by, judged), record, record.packed)
+    judgement = assessment_record(by, packed_assessment(by, judged), record, record.packed)
     store.add([*repairs, record, judgement])
     return record
 
@@ -224,13 +226,13 @@ def judged_by(gear: Gear, options: CheckOptions) -> dict[str, Any]:
     }
 
 
-def _packed(by: Mapping[str, Any], assessment: Assessment) -> bytes:
+def packed_assessment(by: Mapping[str, Any], assessment: Assessment) -> bytes:
     from mlg_troubleshoot.reporting.json_form import kept_as_json
 
     return packed({**by, "result": kept_as_json(assessment)})
 
 
-def _assessment_record(by: Mapping[str, Any], body: bytes, of: Record, first: bytes) -> Record:
+def assessment_record(by: Mapping[str, Any], body: bytes, of: Record, first: bytes) -> Record:
     """An assessment as a record: of an inspection, which is known by its first entry."""
     identity = (of.identity_hash.hex(), *map(str, by.values()), first.hex())
     return replace(of, kind=RecordKind.ASSESSMENT, packed=body, identity=identity)

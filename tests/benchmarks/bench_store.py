@@ -36,7 +36,7 @@ from mlg_troubleshoot.reporting.life_json import fleet_as_json
 from mlg_troubleshoot.store import Record, Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import CheckOptions
-from mlg_troubleshoot.workflows.keep import assessment_record
+from mlg_troubleshoot.workflows.keep import assessment_record, judged_by, packed_assessment
 
 T = TypeVar("T")
 
@@ -86,6 +86,7 @@ def records(drawn: list[list[Inspection]], gear: Gear) -> list[Record]:
     """Turn inspections and their assessments into records, as keeping does."""
     flat = [inspection for own in drawn for inspection in own]
     judged = assess(flat[::100], gear, read_index_table(gear))
+    by = judged_by(gear, CheckOptions())
     found: list[Record] = []
     for n, inspection in enumerate(flat):
         of = judged[n // 100]
@@ -93,11 +94,10 @@ def records(drawn: list[list[Inspection]], gear: Gear) -> list[Record]:
         found.append(inspection_record(inspection))
         found.append(
             assessment_record(
-                gear,
-                CheckOptions(),
-                replace(of, inspection=inspection),
+                by,
+                packed_assessment(by, replace(of, inspection=inspection)),
                 found[-1],
-                found[-1],
+                found[-1].packed,
             )
         )
     return found
