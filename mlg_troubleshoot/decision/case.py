@@ -128,11 +128,6 @@ class Cases:
         )
 
     @property
-    def joints_done(self) -> Mask:
-        """True for a gear that retracted, with every joint read and none over its limit."""
-        return np.asarray(self.retracted & (self.measured & ~self.over_limit).all(axis=1))
-
-    @property
     def questions(self) -> tuple[str, ...]:
         """What must be answered about the entry of each gear before it can be cleared; empty if
         nothing.

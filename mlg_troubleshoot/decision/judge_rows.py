@@ -128,7 +128,7 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
         p_lower,
         batch.lower.standard_uncertainty(cases.margin_u_in),
         questions,
-        cases.joints_done,
+        np.asarray(cases.retracted & (cases.measured & ~cases.over_limit).all(axis=1)),
     )
     planned = plans(cases, judged, causes, causes.with_chances(sets))
     return [
@@ -306,7 +306,14 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
         done = bool(judged.joints_done[i])
         failed = bool(cases.failed[i])
         clears = bool(plunger.clears[i])
-        return sentences.within(margin, said, failed=failed, clears=clears, joints_done=done)
+        return sentences.within(
+            margin,
+            said,
+            failed=failed,
+            clears=clears,
+            joints_done=done,
+            repaired=cases.inspections[i].is_repaired,
+        )
     return sentences.inconclusive(margin, said, float(judged.p_within[i]))
 
 

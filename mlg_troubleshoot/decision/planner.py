@@ -67,8 +67,9 @@ class Judged:
     """What the verdict found about n gears.
 
     order: places of the joints in the order of their rank. p_within, u_in: chance that the worst
-    case is within the margin, its uncertainty against the margin. [1, in] questions, joints_done:
-    as `Cases` says them, found once.
+    case is within the margin, its uncertainty against the margin. [1, in] questions: as
+    `Cases` says them, found once. joints_done: gears that retracted, with every joint read and none
+    over its limit.
     """
 
     verdicts: Sequence[Verdict]
@@ -431,8 +432,13 @@ class _PlanBuilder:
         if self.over:
             self._restore_over_limit()
             return self._done()
-        done = bool(self.judged.joints_done[self.row]) and where is End.WITHIN
-        return self._done() if done else self._end(where)
+        done = bool(self.cases.retracted[self.row]) and not (self._left_unread() or self.over_limit)
+        return self._done() if done and where is End.WITHIN else self._end(where)
+
+    def _left_unread(self) -> list[int]:
+        """Joints that nobody read and that no step reads."""
+        asked = {n for step in self.steps for n in step.joints}
+        return [n for n in self._joints(~self.cases.measured[self.row]) if n not in asked]
 
     def _try(
         self, joints: Sequence[int], best: RepairSet | None = None, *, expected: bool = False
@@ -464,8 +470,7 @@ class _PlanBuilder:
         text = sentences.done(
             repaired=restored,
             recorded=self.inspection.is_repaired and not restored,
-            # What the steps before this one read is not known yet.
-            unread=not self.steps and not cases.measured[i].all(),
+            unread=bool(self._left_unread()),
             over=bool((cases.over_limit[i] & ~cases.restorable[i]).any()),
         )
         self._step(Action.DONE, 0.0, text)

@@ -251,10 +251,16 @@ def explained(explained_in: float, unexplained_in: float) -> Sentence:
 
 
 def within(
-    margin_in: float, said: Predicted, *, failed: bool, clears: bool, joints_done: bool
+    margin_in: float,
+    said: Predicted,
+    *,
+    failed: bool,
+    clears: bool,
+    joints_done: bool,
+    repaired: bool,
 ) -> Sentence:
     """Headline of WITHIN_MARGIN."""
-    then = "Continue fault isolation; not a release."
+    then = "Not a release." if repaired else "Continue fault isolation; not a release."
     if failed:
         then = FAILED_BUT_WITHIN if clears else FAILED_AND_UNREAD
     then = ALL_WITHIN_LIMITS if joints_done else then

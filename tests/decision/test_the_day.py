@@ -131,3 +131,25 @@ def test_no_plunger_is_read_while_a_joint_over_its_limit_waits_for_its_spare(jud
     gear = every_joint(0.0005, j3=0.009)
     found = judge(gear, outcome=Outcome.FAILED, **repaired, no_spare=(3,))
     assert found.next_action.text.startswith("Stop for today: #3")
+
+
+def test_an_expected_end_speaks_of_the_joints_that_will_have_been_read(judge: Judge) -> None:
+    ends = [
+        judge({n: c for n, c in every_joint(0.0003, j3=0.0148).items() if n not in left}, **FAILED)
+        .plan.steps[-1]
+        .text
+        for left in ((), (8,))
+    ]
+    assert ends[0].startswith("Joints are within limits; record the repair.")
+    assert ends[1].startswith("The joints that were read are within limits; record the repair.")
+
+
+@pytest.mark.parametrize(("outcome", "end"), [(Outcome.RETRACTED, End.DONE), (None, End.WITHIN)])
+def test_an_expected_end_is_that_of_the_gear_once_its_joints_are_read(
+    outcome: Outcome | None, end: End, judge: Judge
+) -> None:
+    found = judge(
+        {n: c for n, c in every_joint(0.0018).items() if n not in (7, 8)}, outcome=outcome
+    )
+    whole = judge(every_joint(0.0018), outcome=outcome)
+    assert (found.next_action.action, found.end, whole.end) == (Action.MEASURE, end, end)

@@ -59,3 +59,11 @@ def test_fault_isolation_goes_on_where_the_gear_did_not_retract(
 def test_fault_isolation_goes_on_where_a_joint_was_not_read(judge: Judge) -> None:
     read = {number: value for number, value in every_joint(0.0005).items() if number != 10}
     assert "No further action" not in judge(read, outcome=Outcome.RETRACTED).next_action.text
+
+
+def test_the_headline_of_a_repaired_gear_sends_nobody_to_fault_isolation(judge: Judge) -> None:
+    plain, repaired = (
+        judge(every_joint(0.0005), **more).headline for more in ({}, {"restored_joints": (3,)})
+    )
+    assert plain.endswith("Continue fault isolation; not a release.")
+    assert repaired.endswith("Not a release.")

@@ -926,6 +926,12 @@ def test_the_day_is_taken_on_one_line(flow: Flow) -> None:
     assert read.rigging_checked is RiggingCheck.YES
 
 
+def test_one_limit_of_the_day_is_lifted_and_the_others_stand(flow: Flow) -> None:
+    answers = play(flow, [*TEN, "c 4, w 3, t 180", "w none, t none"]).state.answers
+    read = answers.inspection(flow.gear, "R1")
+    assert (read.cannot_reach, read.no_spare, read.minutes_available) == ((4,), (), None)
+
+
 def test_a_joint_that_does_not_exist_is_not_taken_as_restored(flow: Flow) -> None:
     turn = play(flow, [*TEN, "n 3 14"])
     assert "restored_joints" not in turn.state.answers.more

@@ -259,7 +259,8 @@ _JOINTS = r"\#?\d{1,3}(?![.\d])(?:(?:\s*[,;]\s*|\s+)\#?\d{1,3}(?![.\d]))*"
 # allows, what the gear did, the plunger, the margin.
 _ITEM = re.compile(
     rf"""\s*[,;]?\s*(?:
-        (?:n|new)\s*[=:]?\s*(?P<restored_joints>{_JOINTS})
+        (?P<lifted>[cwot])\s+none(?![a-z])
+      | (?:n|new)\s*[=:]?\s*(?P<restored_joints>{_JOINTS})
       | (?:a|again)\s*[=:]?\s*(?P<measured_again>{_JOINTS})
       | (?:c|cannot\s+reach)\s*[=:]?\s*(?P<cannot_reach>{_JOINTS})
       | (?:w|no\s+spare)\s*[=:]?\s*(?P<no_spare>{_JOINTS})
@@ -318,6 +319,9 @@ def _taken(item: re.Match[str], answers: Answers, gear: Gear) -> tuple[Answers, 
     if did == "x":
         gone = answers.with_more(**dict.fromkeys(_REPLACEABLE))
         return gone, "– outcome, plunger, margin, repairs, the day: none"
+    if item["lifted"]:
+        column = DAY[item["lifted"].lower()]
+        return answers.with_more(**{column: None}), f"– {column.replace('_', ' ')}: none"
     if did:
         column = OUTCOME.name
         text = "FAILED" if did[0] == "f" else "RETRACTED"

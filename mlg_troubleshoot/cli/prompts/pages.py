@@ -455,7 +455,7 @@ MORE_HELP = (
     note(
         "n: they are as after the repair. What you type after n is later: p, f and r count again.",
     ),
-    note("All on one line is fine: f p .041 m .028 n 3 5. x removes them all."),
+    note("All on one line is fine: f p .041 m .028 n 3 5. w none: that is over; x removes all."),
 )
 
 

@@ -73,6 +73,8 @@ class Visit:
             opened |= {gear.joint(number).area for number in self.joints}
         answers = replace(self.answers, todo=self.todo)
         answers = answers.with_more(open_areas="; ".join(sorted(opened)) or None)
+        if not same_day:
+            answers = answers.with_more(minutes_available=None)
         if self.action is Action.MEASURE_AGAIN:
             names = " ".join(map(str, {*self.row.measured_again, *self.joints}))
             answers = answers.with_more(measured_again=names)

@@ -139,8 +139,8 @@ def _short_table(a: Assessment, screen: DataConsole) -> Table:
         )
     order = {number: place for place, number in enumerate(to_read)}
     listed = sorted(a.ranked, key=lambda f: order.get(f.joint, len(order)))
-    for f in listed[:_JOINTS]:
-        cells = list(_joint_cells(f, screen)[:5])
+    for place, f in enumerate(listed[:_JOINTS], start=1):
+        cells = [str(place), *_joint_cells(f, screen)[1:5]]
         if typed:
             entered = row.entered.get(f.joint)
             cells.insert(2, "-" if entered is None else _as_typed(entered))
