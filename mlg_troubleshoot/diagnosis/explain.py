@@ -237,13 +237,14 @@ class Finding:
             if context.name is not None:
                 odds = bare[number] - bare[0]
                 alone.setdefault(context.name, []).append((context.log_prior, odds))
-        each = []
+        each: list[tuple[float, WeighedCause]] = []
         for name, terms in alone.items():
             prior, odds = (float(log_sum(np.array(part))) for part in zip(*terms, strict=True))
             probability = found.names.get(name, 0.0)
-            each.append(WeighedCause(*name, float(np.exp(prior)), odds - prior, probability))
-        order = sorted(each, key=lambda own: -own.evidence - np.log(own.beforehand))
-        return tuple(order)
+            weighed = WeighedCause(*name, float(np.exp(prior)), odds - prior, probability)
+            each.append((odds, weighed))
+        each.sort(key=lambda own: -own[0])
+        return tuple(weighed for _odds, weighed in each)
 
     @property
     def posterior(self) -> MisfitPosterior:
