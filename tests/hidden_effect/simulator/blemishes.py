@@ -297,7 +297,9 @@ def _hysteresis_of_one(scene: Scene, state: State) -> Hidden:
 
 
 def _modified(scene: Scene) -> tuple[Mask, Hidden]:
-    """Rows after the modification of half of the tails, each at its own date."""
+    """Rows after the modification of half of the tails, each at its own date; true of the table is
+    that of the tails of which it has rows on both sides of the date.
+    """
     design = scene.design
     tails = np.unique(design.tail[scene.seen].astype(str))
     chosen = np.sort(scene.rng.choice(tails, len(tails) // 2, replace=False))
@@ -305,7 +307,12 @@ def _modified(scene: Scene) -> tuple[Mask, Hidden]:
     for tail in chosen:
         own = design.tail == tail
         after |= own & (design.day >= np.quantile(design.day[own], scene.rng.uniform(0.3, 0.7)))
-    return after, (("modification", f"tails {','.join(chosen)}"),)
+    shown = [
+        str(tail)
+        for tail in chosen
+        if len(set(after[scene.seen & (design.tail == tail)].tolist())) == 2
+    ]
+    return after, (("modification", f"tails {','.join(shown)}"),)
 
 
 def _modification(scene: Scene, state: State) -> Hidden:
