@@ -28,7 +28,7 @@ from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.likely_worn import explain
-from mlg_troubleshoot.decision.next_joint import outlook
+from mlg_troubleshoot.decision.next_joint import enough, outlook
 from mlg_troubleshoot.decision.plan import minutes_to_measure
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.decision.second_order import responses
@@ -213,7 +213,8 @@ def _verdicts(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> list[Verd
 def _expected(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> Verdict | None:
     """Which verdict the distribution that ranks readings is enough for."""
     so_far = inspection({j + 1: float(read[j]) for j in np.flatnonzero(measured)})
-    return outlook(Cases.of(gear, [so_far])).enough
+    ahead = outlook(Cases.of(gear, [so_far]))
+    return enough(ahead.within, ahead.too_close)
 
 
 Order = Callable[[Gear, Array, NDArray[np.bool_]], int]
