@@ -17,9 +17,9 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life import remembered
 from mlg_troubleshoot.life.folding import GearKey, GearLife, lives
 from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
-from mlg_troubleshoot.store import Store, StoreError, inspection_record
+from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
-from mlg_troubleshoot.workflows.check import CheckOptions, check_inspection
+from mlg_troubleshoot.workflows.check import CheckOptions, check_files, check_inspection
 from mlg_troubleshoot.workflows.history import Lives, show_fleet, show_lives, void
 from mlg_troubleshoot.workflows.keep import keep
 
@@ -81,6 +81,28 @@ def test_where_few_gears_state_their_landings_all_of_them_are_learnt_from(tmp_pa
     model = fit_fleet((by_key[key] for key in teachers_first(by_key)), load_gear())
     assert model is not None
     assert {unit.split()[0] for unit in model.paths} == set(last)
+
+
+def test_a_store_kept_in_many_blocks_is_the_one_kept_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    batch = Path(__file__).parents[2] / "inspection_data" / "fleet_batch.csv"
+    result = check_files([batch, batch], CheckOptions())
+    at_once, in_blocks = (Store(tmp_path / f"{name}.sqlite") for name in ("one", "many"))
+    kept = keep(result, CheckOptions(), at_once)
+    monkeypatch.setattr("mlg_troubleshoot.workflows.keep.AT_ONCE", 7)
+    monkeypatch.setattr("mlg_troubleshoot.store.database._AT_ONCE", 5)
+    assert keep(result, CheckOptions(), in_blocks) == kept
+    assert [*in_blocks.export()] == [*at_once.export()]
+
+
+def test_rows_that_stand_twice_in_a_call_are_kept_once_as_they_stood_last(tmp_path: Path) -> None:
+    batch = Path(__file__).parents[2] / "inspection_data" / "fleet_batch.csv"
+    store = Store(tmp_path / "store.sqlite")
+    kept = keep(check_files([batch, batch], CheckOptions()), CheckOptions(), store)
+    stored = [record for record in store.all() if record.kind is RecordKind.INSPECTION]
+    assert len(stored) == kept.new == kept.known == len(store.all()) - kept.new
+    assert all("the same inspection as row" in str(record.body) for record in stored)
 
 
 def test_keeping_says_how_far_it_is_also_where_rows_state_repairs(tmp_path: Path) -> None:
