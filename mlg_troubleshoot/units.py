@@ -238,7 +238,8 @@ class Sentence(str):
     def of(cls, template: str, *facts: object) -> Sentence:
         """Make a sentence; each ``{}`` stands for a `Length`, another sentence or a text."""
         made = cls(template.format(*(said_in(fact, LengthUnit.INCH) for fact in facts)))
-        made._template, made._facts = template, facts
+        made._template = template
+        made._facts = facts
         return made
 
     @classmethod

@@ -157,7 +157,8 @@ def open_question(unread: Sequence[int], over: Sequence[int]) -> str | None:
 def never_read(unread: Sequence[int], minutes: float) -> str:
     """What a plan that ends leaves unread."""
     if len(unread) == 1:
-        what, them = f"{joint_list(unread)} was not read and may be over its limit", "it"
+        what = f"{joint_list(unread)} was not read and may be over its limit"
+        them = "it"
     else:
         what = f"{joint_list(unread)} were not read; one or more may be over its limit"
         them = "them"

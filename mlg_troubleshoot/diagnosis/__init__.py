@@ -3,7 +3,7 @@ gain.
 """
 
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Cause, Scene, load_causes
-from mlg_troubleshoot.diagnosis.condition import DataCondition, data_condition, doubt_of
+from mlg_troubleshoot.diagnosis.data_condition import DataCondition, data_condition, doubt_of
 from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
 from mlg_troubleshoot.diagnosis.explain import WeighedCause
 from mlg_troubleshoot.diagnosis.extension import (

@@ -131,7 +131,8 @@ def _distinct(
 ) -> Bank:
     """Drop shapes that are constant, or that a candidate of the catalogue has already."""
     n = catalogue.n
-    variables, spreads = list[tuple[str, ...]](), list[float]()
+    variables = list[tuple[str, ...]]()
+    spreads = list[float]()
 
     def varied() -> Iterator[Array]:
         for shape, names in shapes:
@@ -143,7 +144,9 @@ def _distinct(
 
     columns = EffectColumns.made(n, varied())
     one = np.full((1, n), 1.0 / n)
-    mean, about, spread = catalogue.onto(one)[0], columns.onto(one)[0], np.array(spreads)
+    mean = catalogue.onto(one)[0]
+    about = columns.onto(one)[0]
+    spread = np.array(spreads)
     size = np.sqrt(np.maximum(catalogue.squares / n - mean**2, 0.0))
     varying = np.flatnonzero(size)
     alike = np.zeros(columns.p)

@@ -20,7 +20,7 @@ from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
-from mlg_troubleshoot.diagnosis.condition import BY_CHANCE, DataCondition
+from mlg_troubleshoot.diagnosis.data_condition import BY_CHANCE, DataCondition
 from mlg_troubleshoot.diagnosis.explain import (
     Finding,
     MisfitProblem,
@@ -339,7 +339,8 @@ def diagnose(
     """
     # The matrices are small: threads that wait for each other cost several times what they save.
     with threadpool_limits(1, "blas"):
-        where, report_progress = where or Discrepancies(), progress or (lambda _share: None)
+        where = where or Discrepancies()
+        report_progress = progress or (lambda _share: None)
         read = len(table)
         table = _answerable(table)
         (scene, rows), faults = _without_faults(model, table, where, None)
@@ -354,7 +355,8 @@ def diagnose(
         testable = [cause for cause in catalogue if set(cause.needs) <= told]
         blind = [cause for cause in catalogue if cause not in testable]
         not_testable = tuple((c.name, next(n for n in c.needs if n not in told)) for c in blind)
-        told_by, beliefs = (testable, blind), beliefs or Beliefs()
+        told_by = (testable, blind)
+        beliefs = beliefs or Beliefs()
         case = _explained(scene, rows, told_by, ensemble, beliefs)
         report_progress(0.6)
         if case.acts:
@@ -492,11 +494,13 @@ def _explained(
         bool(table.doubt),
     )
     finding = explain(problem)
-    best, effects = finding.best, finding.posterior.effects
+    best = finding.best
+    effects = finding.posterior.effects
     chosen = tuple(k for k in best.members if k < len(moving))
     others = [k for k in best.members if k >= len(moving)]
     block = blocks[best.context - 1] if best.context else None
-    known, spread = effects.kept.take(others), np.diag(effects.size[others] ** 2)
+    known = effects.kept.take(others)
+    spread = np.diag(effects.size[others] ** 2)
     if block is not None:
         known = np.hstack([block.columns, known])
         spread = block_diag(block.covariance, spread)
@@ -549,11 +553,9 @@ def _comparable(
     """Refuse measured displacements that cannot be what the prediction is of: sign, unit, or a
     gauge that is stuck.
     """
-    measured_in, predicted_in, contribution_in = (
-        measured_in[at_mid],
-        predicted_in[at_mid],
-        contribution_in[at_mid],
-    )
+    measured_in = measured_in[at_mid]
+    predicted_in = predicted_in[at_mid]
+    contribution_in = contribution_in[at_mid]
     if not len(measured_in):
         return
     if np.ptp(measured_in) == 0.0:
@@ -600,9 +602,11 @@ def _explained_by_clearances(
         about_zero = robust_scale(np.hstack([left, -left]))
         near = np.abs(left) <= FAR * max(about_zero, 1e-9)
     in_mm = predicted_in[:, None] - (1.0 - 1.0 / MM_PER_IN) * contribution_in
-    simple, measured = np.column_stack([predicted_in, in_mm])[near], measured_in[near]
+    simple = np.column_stack([predicted_in, in_mm])[near]
+    measured = measured_in[near]
     one = measured[:, None] - simple * (measured @ simple / np.sum(simple**2, axis=0))
-    unexplained, constant = np.mean(left[near] ** 2), np.var(measured)
+    unexplained = np.mean(left[near] ** 2)
+    constant = np.var(measured)
     if no_sign_slip:
         return bool(
             len(measured) * np.log(constant / unexplained)
@@ -668,7 +672,8 @@ def _report(
     not_testable: tuple[tuple[str, str], ...],
     case: _Case,
 ) -> Diagnosis:
-    misfit, finding = case.problem.misfit, case.finding
+    misfit = case.problem.misfit
+    finding = case.finding
     causes, open_ = _told(case)
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
@@ -736,12 +741,15 @@ def _gain(case: _Case) -> Gain:
 
     What else acts, being one of a set, is noise of the size that it was found with.
     """
-    noise, block, said = case.finding.noise, case.block, case.finding.said
+    noise = case.finding.noise
+    block = case.block
+    said = case.finding.said
     keys = [case.problem.candidates[k].key for k in case.chosen]
     firm = [place for place, key in enumerate(keys) if key in said]
     others = [case.effect(place)[:, None] for place in range(len(keys)) if place not in firm]
     if block is not None and (block.cause.name, None) not in said:
-        others, block = [*others, block.effects_in], None
+        others = [*others, block.effects_in]
+        block = None
     if others:
         noise = noise.beside(np.hstack(others))
     return measure_gain(
@@ -774,10 +782,12 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
     """The causes that are named, by effect, and those of which something acts, the likeliest
     first.
     """
-    finding, candidates = case.finding, case.problem.candidates
+    finding = case.finding
+    candidates = case.problem.candidates
     fitted: dict[Key, NamedCause] = {}
     for place, k in enumerate(case.chosen):
-        value, error = float(case.values[place]), float(np.sqrt(case.covariance[place, place]))
+        value = float(case.values[place])
+        error = float(np.sqrt(case.covariance[place, place]))
         key = candidates[k].key
         fitted[key] = NamedCause(
             candidates[k],
@@ -788,7 +798,8 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
             finding.class_probability(key),
         )
     if case.block is not None:
-        k, key = len(case.chosen), (case.block.cause.name, None)
+        k = len(case.chosen)
+        key = (case.block.cause.name, None)
         change = case.values[k:]
         candidate = case.block.candidate(change, case.covariance[k:, k:])
         fitted[key] = NamedCause(
@@ -815,15 +826,20 @@ def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections |
     """Where the likeliest of a set differs most from its likeliest rival, another one or nothing,
     and how many further inspections like these distinguish them.
     """
-    problem, finding, table = case.problem, case.finding, case.scene.table
+    problem = case.problem
+    finding = case.finding
+    table = case.scene.table
     single = {c.key for c in problem.candidates}
     rivals = [cause.candidate for cause in open_ if cause.candidate.key in single][:2]
     if not rivals:
         return None
     chances = [finding.probability(rival.key) for rival in rivals]
     if finding.posterior.nothing > min(chances[1:], default=0.0):
-        rivals, chances = rivals[:1], [chances[0], finding.posterior.nothing]
-    noise, apart, none = finding.noise, np.zeros(len(table)), np.empty((len(table), 0))
+        rivals = rivals[:1]
+        chances = [chances[0], finding.posterior.nothing]
+    noise = finding.noise
+    apart = np.zeros(len(table))
+    none = np.empty((len(table), 0))
     for rival, sign in zip(rivals, (1.0, -1.0), strict=False):
         own = [k for k, c in enumerate(problem.candidates) if c.key == rival.key]
         column = problem.columns.take([max(own, key=finding.posterior.of_effect.item)])
@@ -835,7 +851,8 @@ def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections |
     lead = abs(float(np.log(chances[0]) - np.log(max(chances[1], np.finfo(float).tiny))))
     times = problem.beliefs.further(float(np.sqrt(squared)), lead)
     count = int(np.ceil(times * len(table))) if times <= _MOST_TIMES else None
-    gear, apart_in = str(table.gears[place]), float(abs(apart[place]))
+    gear = str(table.gears[place])
+    apart_in = float(abs(apart[place]))
     return FurtherInspections(tuple(rivals), gear, apart_in, count)
 
 

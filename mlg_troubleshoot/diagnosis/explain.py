@@ -83,7 +83,9 @@ class MisfitProblem:
 
     def effects(self, noise: NoiseModel) -> Effects:
         """All that may act alone, with how often and how large it is expected."""
-        n, beliefs, scale = len(self.misfit), self.beliefs, noise.scale_in
+        n = len(self.misfit)
+        beliefs = self.beliefs
+        scale = noise.scale_in
         shares = self._shares()
         targets = Counter(name for name, _target in {c.key for c in self.candidates})
         variants = Counter(c.key for c in self.candidates)
@@ -228,7 +230,8 @@ class Finding:
         """What Bayes' rule makes of every name, the one with the highest odds alone first."""
         found = self.posterior
         alone: dict[Key, list[tuple[float, float]]] = {}
-        names, priors = found.effects.names, found.effects.log_prior.tolist()
+        names = found.effects.names
+        priors = found.effects.log_prior.tolist()
         for name, prior, odds in zip(names, priors, found.over_nothing.tolist(), strict=True):
             if name is not None:
                 alone.setdefault(name, []).append((prior, odds))
@@ -254,8 +257,10 @@ class Finding:
 
 def explain(problem: MisfitProblem) -> Finding:
     """Say how likely each explanation of a table is, and what follows."""
-    data, rows = problem.expected, problem.rows
-    noise, contexts = build_noise(data, rows), problem.contexts()
+    data = problem.expected
+    rows = problem.rows
+    noise = build_noise(data, rows)
+    contexts = problem.contexts()
     found = posterior(noise, data, problem.effects(noise), contexts, problem.beliefs)
     for _ in range(_ROUNDS - 1):
         left = _noise_beside(problem, found.expected_in)
@@ -263,7 +268,8 @@ def explain(problem: MisfitProblem) -> Finding:
             left, data, problem.effects(left), contexts, problem.beliefs, found.likeliest[:1]
         )
         settled = _same(found, again)
-        found, noise = again, left
+        found = again
+        noise = left
         if settled:
             break
     return _said(problem, found, noise)
@@ -271,7 +277,8 @@ def explain(problem: MisfitProblem) -> Finding:
 
 def _same(one: MisfitPosterior, other: MisfitPosterior) -> bool:
     """Tell whether two posteriors have one likeliest explanation."""
-    first, second = one.likeliest[0], other.likeliest[0]
+    first = one.likeliest[0]
+    second = other.likeliest[0]
     return (first.context, set(first.members)) == (second.context, set(second.members))
 
 
@@ -292,9 +299,11 @@ def _said(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> 
     if problem.doubtful:
         rivals_only |= blocks
     follows = Conclusion(found, problem.beliefs, blocks, rivals_only)
-    said, aliases = follows.sure, follows.aliases
+    said = follows.sure
+    aliases = follows.aliases
     if follows.verdict in {Verdict.NONE, Verdict.UNLISTED}:
-        said, aliases = (), ()
+        said = ()
+        aliases = ()
     open_ = follows.open_beside(said)
     variables, size = _unlisted(found, follows.verdict)
     counted = {*said, *aliases}
@@ -341,7 +350,8 @@ def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
     """p-value of the shape of the bank that stands out most in a residual, as one of all of them
     (Bonferroni).
     """
-    shapes, fitted = problem.shapes, fit(noise, np.ones((len(left), 1)), left)
+    shapes = problem.shapes
+    fitted = fit(noise, np.ones((len(left), 1)), left)
     settled = noise.with_tails(fitted.tail_ratio)
     product, _log = settled.precision_times(left[:, None], fitted.tail_ratio)
     spread = fitted.scale * np.sqrt(settled.squares(shapes)[0])
@@ -366,6 +376,7 @@ def _unlisted(found: MisfitPosterior, verdict: Verdict) -> tuple[tuple[str, ...]
 
 def _smallest(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> float:
     """Root mean square of an effect that is likelier than nothing with 80 % power. [in]"""
-    n, prior = len(problem.misfit), found.effects.log_prior[found.effects.listed]
+    n = len(problem.misfit)
+    prior = found.effects.log_prior[found.effects.listed]
     often = float(np.exp(np.median(prior))) if len(prior) else problem.beliefs.expected
     return problem.beliefs.seen_from(often, n) * noise.scale_in / float(np.sqrt(n))

@@ -29,7 +29,9 @@ from mlg_troubleshoot.units import SLIPS
 
 # Degree of the curve along the stroke, rounds to fit it, median distances from it within which rows
 # count, and rows from which there is one.
-_BEND, _BEND_ROUNDS, _BEND_FAR = 6, 4, 6
+_BEND = 6
+_BEND_ROUNDS = 4
+_BEND_FAR = 6
 LEAST_ALONG = 8
 # Share of rows with an entry error, each kind as often. [1]
 _WRONG = 0.005
@@ -221,7 +223,8 @@ class _Screen:
         """
         clearance = np.array([row.clearance for row in meant])
         readings = np.array([row.readings for row in meant])
-        spread, known = self.usual.spread[place], np.isfinite(clearance)
+        spread = self.usual.spread[place]
+        known = np.isfinite(clearance)
         clearance = np.where(known, clearance, self.usual.expected[place])
         wear = _normal(self.usual.off(clearance, place), spread)
         others = self.inspection == self.inspection[place]
@@ -236,7 +239,8 @@ class _Screen:
         wear = np.logaddexp(wear, np.where(clearance < _WORN_OUT_IN, rare, -np.inf))
         # A row that lies off the wear of its gear altogether says little of two of its joints.
         apart = np.where(known, -2.0 * (wear + np.log(spread * np.sqrt(2.0 * np.pi))), 0.0)
-        count, apart = known.sum(axis=1), np.maximum(apart.sum(axis=1), 0.0)
+        count = known.sum(axis=1)
+        apart = np.maximum(apart.sum(axis=1), 0.0)
         together = 0.5 * (_FREEDOM + count)
         wear = gammaln(together) - together * np.log1p(apart / _FREEDOM)
         wear -= 0.5 * count * np.log(_FREEDOM * np.pi) + np.where(known, np.log(spread), 0.0).sum(1)
@@ -258,7 +262,9 @@ class _Screen:
         kept = np.flatnonzero(possible)
         if not len(kept):
             return None
-        meant, found, read = [meant[k] for k in kept], found[kept], read[kept]
+        meant = [meant[k] for k in kept]
+        found = found[kept]
+        read = read[kept]
         found += np.where(read, self.near(place, self.misfit_of(place, meant)), 0.0)
         if logsumexp(found) - written < Beliefs().odds:
             return None
@@ -345,7 +351,8 @@ def screen_faults(
 ) -> tuple[DiagnosisTable, tuple[DataFault, ...], Mask]:
     """Find data faults, and repair them for the analysis where one entry error explains them."""
     screen, suspects = _suspects(model, table, explained)
-    clearance, readings = table.clearance_in.copy(), table.readings_in.copy()
+    clearance = table.clearance_in.copy()
+    readings = table.readings_in.copy()
     extension = table.extension_in.copy()
     faults: list[DataFault] = []
     for place in np.flatnonzero(suspects):
@@ -393,8 +400,10 @@ def restored_joints(
 
     accounts: what an account leaves of the misfit, shape (n,) [in], and its logarithmic prior.
     """
-    table, written = scene.table, scene.table.clearance_in
-    known, rows = np.isfinite(written), np.arange(len(table))
+    table = scene.table
+    written = scene.table.clearance_in
+    known = np.isfinite(written)
+    rows = np.arange(len(table))
     joints = known.any(axis=0)
     worst = np.where(known, written, -1.0).argmax(axis=1)
     new = np.zeros(written.shape[1])
@@ -404,7 +413,8 @@ def restored_joints(
     effect = predicted(scene.model, table, changed)[0] - scene.over_in
     effect = np.where(known.any(axis=1) & ~table.along, effect, 0.0)
     habit = np.log(beliefs.expected * beliefs.unlisted / len(_RESTORED))
-    likely, chances = [], []
+    likely = []
+    chances = []
     for left, prior in accounts:
         for side, share in ((1.0, 0.0), *((side, s) for side in (1.0, -1.0) for s in _RESTORED)):
             evidence, chance = _mixture(left, side * effect, share)
@@ -433,7 +443,8 @@ def _mixture(left: Array, effect: Array, share: float) -> tuple[float, Array]:
     level and scatter by expectation and maximisation.
     """
     off = np.column_stack([left, left - effect])
-    level, scatter = float(np.median(left)), _scale(left)
+    level = float(np.median(left))
+    scatter = _scale(left)
     prior = np.log([1.0 - share, share]) if share else np.array([0.0, -np.inf])
     for _ in range(_MIXTURE_ROUNDS):
         each = prior + _density(off - level, scatter)
@@ -492,7 +503,8 @@ def _bend(table: DiagnosisTable, left: Array) -> Array:
     """Smooth curve of the rows along the stroke over their extension, most rows near it: that is an
     effect. [in]
     """
-    at, bend = np.nan_to_num(table.extension_in), np.zeros(len(left))
+    at = np.nan_to_num(table.extension_in)
+    bend = np.zeros(len(left))
     near = table.along & np.isfinite(left)
     for _ in range(_BEND_ROUNDS):
         if near.sum() < LEAST_ALONG:

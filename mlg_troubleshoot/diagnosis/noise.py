@@ -28,7 +28,8 @@ from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 EXPECTED_SLOPE = -0.0045
 # Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the
 # slope [1]; twice that where clearances are read no better than the plunger.
-BIAS_IN, SLOPE = 0.0001, 0.003
+BIAS_IN = 0.0001
+SLOPE = 0.003
 # Doubt whether clearances were read as well as declared: standard deviation of the share of the
 # declared error, and so of the drawing. [1]
 SHARE_DOUBT = 0.35
@@ -44,10 +45,12 @@ HABIT = 0.035
 # Scatter between the gears of a tail, between gauges, and between technicians, over that of a row,
 # before the data are looked at: median, and spread of its logarithm; and the ratios that are tried,
 # from three spreads below it to four above.
-USUAL_RATIO, RATIO_SPREAD = 0.1, 0.6
+USUAL_RATIO = 0.1
+RATIO_SPREAD = 0.6
 _RATIOS = USUAL_RATIO * np.exp(RATIO_SPREAD * np.linspace(-3, 4, 24))
 # With fewer levels nothing can be told; with more the first tell enough.
-_LEAST_LEVELS, _MOST_LEVELS = 4, 400
+_LEAST_LEVELS = 4
+_MOST_LEVELS = 400
 # Ratios of the scatter between tails to the scatter of a row that are tried: nodes of a sum.
 TAIL_RATIOS = (0.0, *np.geomspace(0.15, 2.0, 8).tolist())
 # The first estimate of the scatter has all in it that effects of unknown size explain.
@@ -163,7 +166,8 @@ def build_noise(
     """
     rest = misfit if explained is None else misfit - explained
     wide = rows.along_in if effects_in is None else np.hstack([rows.along_in, effects_in])
-    noise, gears = _scatter(rest, rest, rows), tail_numbers(rows.gears)
+    noise = _scatter(rest, rest, rows)
+    gears = tail_numbers(rows.gears)
     unread = rows.unread_in if rows.unread_in.any() else np.empty((len(rest), 0))
     for _ in range(_ROUNDS if wide.size + unread.size else 0):
         known = noise.beside(wide)
@@ -205,7 +209,8 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
         small * SLOPE * predicted / scale,
         SHARE_DOUBT * rows.drawn_in / scale,
     ]
-    trends, habits = small * HABIT * rows.trends, small * HABIT * rows.habits
+    trends = small * HABIT * rows.trends
+    habits = small * HABIT * rows.habits
     gear_ratio = float(np.hypot(USUAL_RATIO, read * READ_GEAR_RATIO))
     ratios = _tail_ratios(rest / (scale * relative), numbers, gear_ratio)
     loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, trends, habits])
@@ -259,7 +264,8 @@ def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, sprea
         return expected
     held = np.column_stack([np.ones(len(rest)), levels])
     product, _log = noise.precision_times(np.column_stack([held, rest]), noise.tail_ratios[-1])
-    inner, along = held.T @ product[:, :-1], held.T @ product[:, -1]
+    inner = held.T @ product[:, :-1]
+    along = held.T @ product[:, -1]
     square, score = _apart(inner, along, 0)
     most = int(np.argmax(score**2 / np.maximum(np.diag(square), 1e-9)))
     square, score = _apart(square, score, most)

@@ -83,10 +83,8 @@ def _scene(
     u_read = share * float(np.sqrt(np.nanmean(read_in**2)))
     along = unknown_along(model, table, clearance, scene.over_in, scene.directions)
     if not np.nan_to_num(table.clearance_in).any():
-        along, shared_in = (
-            np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)]),
-            np.zeros(len(table)),
-        )
+        along = np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)])
+        shared_in = np.zeros(len(table))
     return scene, Rows(
         scene.over_in,
         table.tails,
@@ -139,10 +137,12 @@ def _share_of_declared(misfit: Array, drawn: Array) -> float:
     nothing if they do not.
     """
     known = np.isfinite(misfit) & np.isfinite(drawn)
-    y, d = misfit[known], drawn[known]
+    y = misfit[known]
+    d = drawn[known]
     if len(y) < 3 or np.ptp(d) == 0.0:
         return 1.0
-    share, level = 1.0, float(np.median(y - d))
+    share = 1.0
+    level = float(np.median(y - d))
     for _ in range(20):
         rest = y - level - share * d
         scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-9)

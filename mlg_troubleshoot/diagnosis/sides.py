@@ -29,8 +29,10 @@ def swapped_sides(table: DiagnosisTable) -> list[tuple[int, str, str]]:
     """Find rows whose landings do not lie on their own gear's line over time but on the other
     side's.
     """
-    side, tail = table.factors.get("side"), table.factors.get("tail_no")
-    landings, day = table.quantities.get("gear_landings"), table.quantities.get("day")
+    side = table.factors.get("side")
+    tail = table.factors.get("tail_no")
+    landings = table.quantities.get("gear_landings")
+    day = table.quantities.get("day")
     if side is None or tail is None or landings is None or day is None:
         return []
     swapped: list[int] = []
@@ -61,10 +63,13 @@ def _landings_a_day(table: DiagnosisTable) -> float:
     """Landings a day between inspections of one gear, median over the fleet; 0 if none was
     inspected twice.
     """
-    day, landings, gears = table.quantities["day"], table.quantities["gear_landings"], table.gears
+    day = table.quantities["day"]
+    landings = table.quantities["gear_landings"]
+    gears = table.gears
     known = np.flatnonzero(np.isfinite(day) & np.isfinite(landings))
     order = known[np.lexsort((day[known], gears[known]))]
-    later, earlier = order[1:], order[:-1]
+    later = order[1:]
+    earlier = order[:-1]
     again = (gears[later] == gears[earlier]) & (day[later] > day[earlier])
     if not again.any():
         return 0.0
@@ -77,7 +82,8 @@ def _pairs(table: DiagnosisTable, rows: Places, rate: float) -> tuple[int, int |
     """Days on which a tail was inspected on both sides, and the row that was most likely written to
     the wrong side.
     """
-    side, day = table.factors["side"], table.quantities["day"]
+    side = table.factors["side"]
+    day = table.quantities["day"]
     days = [float(d) for d in np.unique(day[rows][np.isfinite(day[rows])])]
     pairs = 0
     suspects: list[Places] = []
@@ -95,7 +101,8 @@ def _pairs(table: DiagnosisTable, rows: Places, rate: float) -> tuple[int, int |
     near = [_nearness_to_other_side(table, others, int(row), rate) for row in two]
     # A gear may be inspected twice a day: then neither row lies with the other side, or both do
     # alike.
-    apart, likely = abs(near[0] - near[1]), max(near)
+    apart = abs(near[0] - near[1])
+    likely = max(near)
     clear = apart >= 2 * _NEARER and likely >= (_NEARER if pairs == 1 else -_NEARER)
     if not (clear or (pairs > 1 and likely > 0.0 and apart >= _NEARER / 2)):
         return pairs, None
@@ -104,7 +111,8 @@ def _pairs(table: DiagnosisTable, rows: Places, rate: float) -> tuple[int, int |
 
 def _nearness_to_other_side(table: DiagnosisTable, others: Places, row: int, rate: float) -> float:
     """How much nearer a row is to the other side's landings and wear than to its own side's. [1]"""
-    side, day = table.factors["side"], table.quantities["day"]
+    side = table.factors["side"]
+    day = table.quantities["day"]
     landings = table.quantities["gear_landings"]
     total = 0.0
     for sign, wanted in ((1.0, True), (-1.0, False)):
@@ -171,7 +179,8 @@ def _slopes_without(x: Array, y: Array) -> Callable[[int], float]:
     """
     i, j = np.triu_indices(len(x), 1)
     apart = np.abs(x[j] - x[i]) > 1e-9
-    i, j = i[apart], j[apart]
+    i = i[apart]
+    j = j[apart]
     slope = (y[j] - y[i]) / (x[j] - x[i])
     order = np.argsort(slope)
     ordered = slope[order]

@@ -42,14 +42,17 @@ _HEAVY_TAILS = 1.5
 # Wear of a joint that nobody read over the mean of the read ones: standard deviation between joints
 # of the fleet, between gears, and between inspections of one gear. Supposed, from the read joints
 # of simulated fleets. [1]
-JOINTS_APART, GEARS_APART, ROWS_APART = 0.35, 0.5, 0.4
+JOINTS_APART = 0.35
+GEARS_APART = 0.5
+ROWS_APART = 0.4
 # Mean radial wear of joints where none was read, moderate; heavy wear is twice that. [in]
 _MODERATE_IN = 0.003
 UNREAD_IN = (_MODERATE_IN, 2 * _MODERATE_IN)
 # How far all joints of such a fleet, and of one of its gears, may be worn more or less together,
 # over that. Of 100 sound simulated fleets (seeds 20,000 and on) two alarmed, seven where wear was
 # half as much again. [1]
-FLEET_TOGETHER, GEARS_TOGETHER = 0.5, 0.25
+FLEET_TOGETHER = 0.5
+GEARS_TOGETHER = 0.25
 # Where landings fall in a larger share of visits they do not follow the dates: half of them would
 # fall by chance. [1]
 _MOST_FALLS = 1.0 / 3.0
@@ -58,7 +61,8 @@ _MOST_FALLS = 1.0 / 3.0
 OWN_GEAR = GEARS_APART**2 / (JOINTS_APART**2 + GEARS_APART**2 + ROWS_APART**2)
 # Standard deviations, supposed: how much further that may follow one read joint, and of exponents
 # of wear. [1]
-FOLLOWS, BENT = 0.2, 0.1
+FOLLOWS = 0.2
+BENT = 0.1
 
 
 @dataclass(frozen=True)
@@ -112,12 +116,14 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     """
     readings = table.clearance_in
     if not np.nan_to_num(readings).any():
-        none, unread = np.zeros_like(readings), np.where(np.isfinite(readings), 0.0, unread_in)
+        none = np.zeros_like(readings)
+        unread = np.where(np.isfinite(readings), 0.0, unread_in)
         return LikelyClearances(
             landed_share(table)[:, None] * unread, none, unread, none, none, none[:, :0]
         )
     history, kilo, landed = fleet_history(table)
-    known, noise = np.isfinite(readings), history.reading_in2
+    known = np.isfinite(readings)
+    noise = history.reading_in2
     # What wear is to be expected of an inspection without its landings is not known: its readings
     # stand.
     both = history.scatter_in2 + noise
@@ -132,13 +138,15 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     spread = np.where(known, 0.0, np.sqrt(history.scatter_in2))
     shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))
     left = np.where(known, np.sqrt(trust * noise + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
-    common, together = np.zeros_like(readings), np.empty((len(readings), 0))
+    common = np.zeros_like(readings)
+    together = np.empty((len(readings), 0))
     seen = np.isfinite(readings).any(axis=0)
     if seen.any() and not seen.all():
         lines = np.polyfit(kilo, history.expected_in[:, seen], 1 if np.ptp(kilo) > 0.0 else 0)
         lines = np.maximum(np.polyval(lines[:, None], kilo[:, None]), _TIGHT_IN)
         own = np.where(landed[:, None] | ~known, history.expected_in, readings)[:, seen]
-        further, n = np.where(lines > _TIGHT_IN, own / lines - 1.0, 0.0), int(seen.sum())
+        further = np.where(lines > _TIGHT_IN, own / lines - 1.0, 0.0)
+        n = int(seen.sum())
         apart = float(np.mean(further**2) / max(np.mean(np.mean(further, axis=1) ** 2), 1e-12))
         alike = OWN_GEAR if n == 1 else np.clip((n - apart) / (n - 1), 0.0, 1.0)
         line = np.mean(lines, axis=1, keepdims=True)
@@ -161,7 +169,8 @@ def gears_of(table: DiagnosisTable) -> Places:
     gear is another.
     """
     of_gear = np.unique(table.gears, return_inverse=True)[1]
-    begun, falls = np.zeros(len(table), np.intp), 0
+    begun = np.zeros(len(table), np.intp)
+    falls = 0
     landings = table.quantities.get("gear_landings")
     if landings is not None and "day" in table.quantities:
         order = visits(table).values()
@@ -231,11 +240,15 @@ def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
     their own and together. The rows of one inspection, at one number of landings or on one day,
     share their wear.
     """
-    gears, worn = gears_of(table), landed_share(table)
-    own, inspection = gears[:, None] == gears, inspection_of(table)
+    gears = gears_of(table)
+    worn = landed_share(table)
+    own = gears[:, None] == gears
+    inspection = inspection_of(table)
     visit = inspection[:, None] == inspection
-    each, all_in = unread_in @ unread_in.T, unread_in.sum(axis=1)
-    together, grown = np.outer(all_in, all_in), np.outer(worn, worn)
+    each = unread_in @ unread_in.T
+    all_in = unread_in.sum(axis=1)
+    together = np.outer(all_in, all_in)
+    grown = np.outer(worn, worn)
     covariance = (1.0 + grown) * (FLEET_TOGETHER**2 * together + JOINTS_APART**2 * each)
     covariance += own * grown * (GEARS_TOGETHER**2 * together + GEARS_APART**2 * each)
     values, vectors = np.linalg.eigh(covariance + visit * grown * ROWS_APART**2 * each)
@@ -247,7 +260,8 @@ def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
     """Expect every joint in each row, readings rounded to the steps they show; the landings, and
     which are known.
     """
-    readings, gears = table.clearance_in, gears_of(table)
+    readings = table.clearance_in
+    gears = gears_of(table)
     kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
     worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
     rounded = (
@@ -290,8 +304,10 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     shape = reading_in.shape
     # Joints run along the last axis; a row that lacks a joint has no weight in it.
     y = reading_in.reshape(len(gears), -1)
-    known, x = np.isfinite(y), kilo[:, None]
-    y, here = np.where(known, y, 0.0), known.astype(float)
+    known = np.isfinite(y)
+    x = kilo[:, None]
+    y = np.where(known, y, 0.0)
+    here = known.astype(float)
     declared = np.maximum(reading_in2.reshape(y.shape), _TIGHT_IN**2)
     by_gear = csr_array((np.ones(len(gears)), (gears, np.arange(len(gears)))))
     # Gears of which a joint was never read say nothing about the fleet.
@@ -299,9 +315,12 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     many = known & (read[gears] >= 3)
     mean = y.sum(axis=0) / here.sum(axis=0)
     fleet, spread = _fleet(x, y, here)
-    least, least_spread = np.maximum(_LEAST_LEVEL * mean, _TIGHT_IN), 1e-6 * spread
+    least = np.maximum(_LEAST_LEVEL * mean, _TIGHT_IN)
+    least_spread = 1e-6 * spread
     level = np.maximum(fleet[0] + fleet[1] * x, least)
-    scatter, share, far = np.full(y.shape[1], _SCATTER**2), np.ones(y.shape[1]), np.ones(y.shape)
+    scatter = np.full(y.shape[1], _SCATTER**2)
+    share = np.ones(y.shape[1])
+    far = np.ones(y.shape)
     seen = (read > 0.0) / (read > 0.0).sum(axis=0)
     told = many.sum(axis=0) >= _LEAST_ROWS
     lines = unsure = np.empty(0)
@@ -315,8 +334,10 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
         square = (y - fitted) ** 2 + _variance(unsure, gears, x)
         far = np.minimum(1.0, FAR * np.sqrt(variance / np.maximum(square, 1e-30)))
         square = square * far**2
-        worn, error = scatter * level**2, share * declared
-        part, size = worn / (worn + error), np.maximum(many.sum(axis=0), 1)
+        worn = scatter * level**2
+        error = share * declared
+        part = worn / (worn + error)
+        size = np.maximum(many.sum(axis=0), 1)
         larger = np.sum(many * (part**2 * square + part * error) / level**2, axis=0) / size
         better = (
             np.sum(many * ((1.0 - part) ** 2 * square + (1.0 - part) * worn) / declared, axis=0)
@@ -341,7 +362,8 @@ def _fleet(x: Array, y: Array, here: Array) -> tuple[Array, Array]:
     lie about it.
     """
     size = here.sum(axis=0)
-    mean_x, mean_y = (here * x).sum(axis=0) / size, (here * y).sum(axis=0) / size
+    mean_x = (here * x).sum(axis=0) / size
+    mean_y = (here * y).sum(axis=0) / size
     off = here * (x - mean_x)
     apart = np.sum(off * off, axis=0)
     sloped = np.where(here > 0.0, np.abs(off), 0.0).max(axis=0) > 0.0
@@ -362,7 +384,9 @@ def _lines(
     j = weight.shape[1]
     sums = by_gear @ np.hstack([weight, weight * x, weight * x * x, weight * y, weight * x * y])
     w, wx, wxx, wy, wxy = sums.reshape(len(sums), 5, j).swapaxes(0, 1)
-    aa, ab, bb = w + p[0], wx + p[1], wxx + p[2]
+    aa = w + p[0]
+    ab = wx + p[1]
+    bb = wxx + p[2]
     right = wy + p[0] * fleet[0] + p[1] * fleet[1], wxy + p[1] * fleet[0] + p[2] * fleet[1]
     # Rounding must not make level and rate of a gear exactly one.
     det = np.maximum(aa * bb - ab * ab, 1e-12 * aa * bb)

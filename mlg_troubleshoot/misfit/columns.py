@@ -17,7 +17,8 @@ from mlg_troubleshoot.arrays import Array, Places
 ColumnBlock = Array | csc_array
 # Computing only: numbers from which a block is large, and share of its rows in which a column acts,
 # below which it is kept by these rows.
-_LARGE, _FEW = 1_000_000, 0.2
+_LARGE = 1_000_000
+_FEW = 0.2
 # Columns that are written out together.
 _AT_ONCE = 64
 

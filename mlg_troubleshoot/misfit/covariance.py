@@ -104,7 +104,8 @@ class NoiseModel:
             return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
         order = np.lexsort((self.time, self.chain))
         follows = np.diff(self.chain[order]) == 0
-        row, before = order[1:][follows], order[:-1][follows]
+        row = order[1:][follows]
+        before = order[:-1][follows]
         return row, before, self.correlation ** (self.time[row] - self.time[before])
 
     def own(self, columns: Array) -> Array:
@@ -257,7 +258,8 @@ class NoiseModel:
         log_determinant += 2.0 * float(np.sum(np.log(np.diag(lower))))
         root = np.asarray(solve_triangular(lower, weighted.T, lower=True))
         if self._small:
-            root, groups = np.vstack([root, *(own.toarray() for own in groups)]), []
+            root = np.vstack([root, *(own.toarray() for own in groups)])
+            groups = []
         self._roots[tail_ratio] = tuple(groups), root, log_determinant
         return self._roots[tail_ratio]
 

@@ -30,7 +30,9 @@ class Products:
     """
 
     def __init__(self, noise: NoiseModel, columns: Array | EffectColumns, data: Array) -> None:
-        self.noise, self.columns, self.data = noise, EffectColumns.of(columns), data
+        self.noise = noise
+        self.columns = EffectColumns.of(columns)
+        self.data = data
         self.n = len(data) - noise.absorbed
         weighted, log = self._weighted(data[:, None])
         self._weighted_data = weighted[:, :, 0]
@@ -55,7 +57,8 @@ class Products:
         other.columns = self.columns.replaced(changed, columns)
         other.square, other.along = self.square.copy(), self.along.copy()
         other.square[:, changed], other.along[:, changed] = self._of(EffectColumns.of(columns))
-        other._cross, other._onto = {}, {}
+        other._cross = {}
+        other._onto = {}
         return other
 
     def cross(self, member: int) -> Array:
@@ -100,21 +103,25 @@ class Marginal:
     def __init__(
         self, products: Products, effects: Effects, context: Context, beliefs: Beliefs
     ) -> None:
-        self.products, self.effects, self.context = products, effects, context
+        self.products = products
+        self.effects = effects
+        self.context = context
         noise = products.noise
         self.floor = products.n * noise.floor_in**2
         held, data, inner = products.onto(context.shared_in)
         root = context.root_of / noise.scale_in
         lower = np.linalg.cholesky(np.eye(root.shape[1]) + root.T @ inner @ root)
         taken = np.linalg.solve(lower, np.broadcast_to(root.T, (len(lower), *root.T.shape)))
-        bent, bent_data = taken @ held, (taken @ data[..., None])[..., 0]
+        bent = taken @ held
+        bent_data = (taken @ data[..., None])[..., 0]
         self.log = products.log + 2.0 * np.sum(np.log(np.diagonal(lower, axis1=1, axis2=2)), axis=1)
         self.square = products.square - np.sum(bent**2, axis=1)
         self.along = products.along - np.einsum("rk,rkp->rp", bent_data, bent)
         self.rest = products.rest - np.sum(bent_data**2, axis=1)
         # What the context takes off the products of two effects: their own with its columns, and
         # these with each other.
-        self._held, self._taken = held, taken.swapaxes(1, 2) @ taken
+        self._held = held
+        self._taken = taken.swapaxes(1, 2) @ taken
         self._corrected = held, data, inner
         # Sizes in units of the noise's scale: of each level's factor, and fixed where it has none.
         factor = np.where(effects.scales, np.array(beliefs.sizes)[:, None], 1.0)
@@ -139,11 +146,16 @@ class Marginal:
 
     def _given(self, members: Members, alone: bool = False) -> _Given:
         """What members leave of the data, and of other effects, none of these if alone."""
-        effects, places = self.effects, list(members)
-        square, along = self.square, self.along
-        m, rest, log = len(self.spread), self.rest, self.log
+        effects = self.effects
+        places = list(members)
+        square = self.square
+        along = self.along
+        m = len(self.spread)
+        rest = self.rest
+        log = self.log
         if alone:
-            square, along = square[:, :0], along[:, :0]
+            square = square[:, :0]
+            along = along[:, :0]
         if not places:
             none = np.empty((m * len(log), 0))
             square, along, rest, log = (np.concatenate([x] * m) for x in (square, along, rest, log))
@@ -153,7 +165,8 @@ class Marginal:
         others = slice(0 if alone else None)
         cross = self._cross(members, kept)
         inner = cross[:, at]
-        mean, spread = effects.mean[places], self.spread[:, places][:, None, :]
+        mean = effects.mean[places]
+        spread = self.spread[:, places][:, None, :]
         onto = self.along[:, kept] - cross @ mean
         rest = rest - 2.0 * self.along[:, places] @ mean + (inner @ mean) @ mean
         wide = spread * onto[None, :, at]
@@ -203,10 +216,15 @@ class Marginal:
         """A set by itself, and how likely it is with each further effect, (p,), and the expected
         size of that.
         """
-        given, effects, n = self._given(members), self.effects, self.products.n
+        given = self._given(members)
+        effects = self.effects
+        n = self.products.n
         spread, wide = self._every_spread
-        square, along, rest = given.square, given.along, given.rest[:, None]
-        mean, one = effects.mean, self.signed
+        square = given.square
+        along = given.along
+        rest = given.rest[:, None]
+        mean = effects.mean
+        one = self.signed
         if mean.any():
             rest = rest - mean * (2.0 * along - mean * square)
             along = along - mean * square
@@ -220,7 +238,8 @@ class Marginal:
         most = np.max(level, axis=0)
         chance = np.exp(level - most)
         total = np.sum(chance, axis=0)
-        whole, values = most + np.log(total), np.sum(chance * value, axis=0) / total
+        whole = most + np.log(total)
+        values = np.sum(chance * value, axis=0) / total
         prior = self._prior(members) + effects.log_prior - np.log(len(level))
         further = whole + prior + self.corrected(members)
         return self.explanation(number, members, given), further, values
@@ -233,7 +252,8 @@ class Marginal:
             return 0.0
         if members not in self._corrections:
             # Under the largest scatter between tails; the members are part of the noise.
-            places, scale = list(members), self.products.noise.scale_in
+            places = list(members)
+            scale = self.products.noise.scale_in
             held, data, inner = (part[-1] for part in self._corrected)
             size = self.effects.size[places] / scale
             beside = held[:, places] * size
@@ -243,7 +263,8 @@ class Marginal:
             along = size * self.products.along[-1, places]
             product = np.column_stack([inner, data])
             product -= beside @ np.linalg.solve(own, np.column_stack([beside.T, along]))
-            square, along = product[:, :-1], product[:, -1]
+            square = product[:, :-1]
+            along = product[:, -1]
             self._corrections[members] = self.context.correction(
                 along / scale**2, square / scale**2
             )

@@ -15,12 +15,15 @@ from mlg_troubleshoot.misfit.marginal import Marginal, Products
 
 # Computing only: more of each must not change what is said. Effects that act together at most; sets
 # that are extended with a context and without; sets that every step is taken from.
-MOST, BEAM, _LEADING = 4, 16, 6
+MOST = 4
+BEAM = 16
+_LEADING = 6
 # Log-likelihood behind the likeliest set from which one is not extended; half of it is that from
 # which the own effects of a context are not asked for. Of what lies twice as far behind the sets
 # are not kept.
 REACH = 9.2
-OWN, _TRACE = REACH / 2, float(np.exp(-2 * REACH))
+OWN = REACH / 2
+_TRACE = float(np.exp(-2 * REACH))
 
 
 @dataclass(frozen=True)
@@ -185,7 +188,8 @@ class _Search:
 
     def _nearest(self, kind: bool) -> tuple[int, frozenset[int]] | None:
         """The likeliest set that was not extended itself, in a context or in none."""
-        top, found = self.best - REACH, None
+        top = self.best - REACH
+        found = None
         for (context, members), at in self.extended.items():
             if bool(context) != kind:
                 continue
@@ -194,7 +198,8 @@ class _Search:
                     break
                 both = members | {k}
                 if (context, both) not in self.extended:
-                    top, found = float(at.further[k]), (context, both)
+                    top = float(at.further[k])
+                    found = (context, both)
                     break
         return found
 
@@ -205,7 +210,8 @@ class _Search:
         order = sorted(self.extended.values(), key=lambda e: -e.own.log_posterior)[:_LEADING]
         before = len(self.extended)
         for at in order:
-            context, members = at.own.context, frozenset(at.own.members)
+            context = at.own.context
+            members = frozenset(at.own.members)
             for other in range(len(self.contexts)):
                 if self.alone(other, members).log_posterior > self.best - REACH:
                     self.extend(other, members)
@@ -239,13 +245,15 @@ class _Search:
         )
         names: dict[Key, float] = {}
         together: dict[frozenset[Key], float] = {}
-        of_effect, size = np.zeros(len(self.number)), np.zeros(len(self.number))
+        of_effect = np.zeros(len(self.number))
+        size = np.zeros(len(self.number))
         expected = np.zeros(len(self.data))
         listed = {
             name for name, own in zip(self.effects.names, self.effects.listed, strict=True) if own
         }
         for context, _members, at in parts:
-            chance, own = np.exp(at.further - whole), float(np.exp(at.own.log_posterior - whole))
+            chance = np.exp(at.further - whole)
+            own = float(np.exp(at.own.log_posterior - whole))
             total = own + float(chance.sum())
             places = list(at.own.members)
             of_effect += chance

@@ -109,7 +109,8 @@ class Candidate:
             return "the same inspections with every joint read"
         if self.stands_in:
             return f"the same inspections with {' and '.join(self.cause.needs)} recorded for each"
-        text, target = self.cause.separates, self.target or ""
+        text = self.cause.separates
+        target = self.target or ""
         if target.startswith("joint"):
             text = text.replace("that joint", target).replace("the two joints", target)
         return text

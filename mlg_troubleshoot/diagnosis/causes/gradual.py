@@ -26,7 +26,8 @@ from mlg_troubleshoot.units import DAYS_PER_YEAR
 # A gauge is calibrated once a year; in which month is not known.
 _MONTHS = 12
 # Aircraft from which on a step is one of several; turns in which steps and their size settle. [1]
-_LEAST_AIRCRAFT, _TURNS = 3, 20
+_LEAST_AIRCRAFT = 3
+_TURNS = 20
 _TAILS = "tails "
 # Times in which a beginner comes down to a third of what he was off, from two months on, each
 # twice the last. [d]
@@ -80,7 +81,8 @@ class TechnicianLearning(Cause):
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield each technician from his first day on, with each time in which he learns."""
-        days, people = scene.table.quantities["day"], scene.table.factors["technician_id"]
+        days = scene.table.quantities["day"]
+        people = scene.table.factors["technician_id"]
         for person in levels(people):
             own = days[(people == person) & np.isfinite(days)]
             if len(np.unique(own)) < 2:
@@ -137,7 +139,8 @@ class Modification(Cause):
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Shift the rows with that value, or those of the aircraft from its date on."""
-        setting, table = candidate.setting, scene.table
+        setting = candidate.setting
+        table = scene.table
         if "column" in setting:
             return offset(scene, _of_value(scene, setting["column"], candidate), value)
         after = np.zeros(len(table), bool)
@@ -165,7 +168,8 @@ class Modification(Cause):
 
 def _apart(scene: Scene, column: str) -> list[str]:
     """Values that a column sets apart: of two the one that came later; the other is the rest."""
-    texts, found = scene.table.factors[column], [*levels(scene.table.factors[column])]
+    texts = scene.table.factors[column]
+    found = [*levels(scene.table.factors[column])]
     days = scene.table.quantities.get("day", scene.table.row.astype(float))
     if len({*texts} - {""}) == 2 and len(found) == 2:
         return [max(found, key=lambda value: float(np.nanmean(days[texts == value])))]
@@ -184,7 +188,8 @@ def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], flo
         The day of each modified aircraft, and the logarithm of the chance of just these steps: no
         more than what all that are as likely have together.
     """
-    days, tails = scene.table.quantities["day"], scene.table.tails
+    days = scene.table.quantities["day"]
+    tails = scene.table.tails
     rows = {t: np.flatnonzero((tails == t) & np.isfinite(days + misfit)) for t in levels(tails)}
     # One visit after it is enough: that other aircraft have the same step holds it.
     offered = {t: np.unique(days[own])[1:].tolist() for t, own in rows.items()}
@@ -204,7 +209,9 @@ def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], flo
             return {}, 0.0
         scatter = np.nanstd(misfit - level - size * chance)
         gain = size * (misfit - level - 0.5 * size) / scatter**2
-        steps, rarity, chance = {}, 0.0, np.zeros(len(tails))
+        steps = {}
+        rarity = 0.0
+        chance = np.zeros(len(tails))
         for tail, own in rows.items():
             count = len(after[tail])
             gains = np.r_[0.0, after[tail] @ gain[own]]

@@ -44,7 +44,8 @@ ALONE = 0.03
 NEAR = ALONE / 3
 # Changes of one joint that stand for all; rounds that settle the evidence to 0.02, but of a spread
 # far behind another.
-_LIKELY, _ROUNDS = 250, 8
+_LIKELY = 250
+_ROUNDS = 8
 # Degree of the polynomials in the extension that stand for the curves of linkages between those of
 # the ensemble.
 _DEGREE = 6
@@ -98,7 +99,8 @@ class Block:
         together.
         """
         count = len(self.joints)
-        change, covariance = change[:count], covariance[:count, :count]
+        change = change[:count]
+        covariance = covariance[:count, :count]
         error = np.sqrt(np.diag(covariance))
         together = covariance / np.outer(error, error)
         np.fill_diagonal(together, 0.0)
@@ -152,7 +154,8 @@ class JointFactors(Cause):
         found = self.covariances(scene.model, ensemble)
         # What each adds is taken so that together they are the displacement: with all at nothing
         # nothing moves.
-        total, at_mid = np.sum(scene.contribution_in, axis=1), ~scene.table.along
+        total = np.sum(scene.contribution_in, axis=1)
+        at_mid = ~scene.table.along
         whole = np.divide(
             scene.over_in, total, out=np.ones_like(total), where=at_mid & (total > 0.0)
         )
@@ -186,7 +189,8 @@ class LoadDirections(JointFactors):
 
     def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
         """Second moments of what normal angles change, about none."""
-        alike, own = np.ones((len(model.joint_numbers),) * 2), np.eye(len(model.joint_numbers))
+        alike = np.ones((len(model.joint_numbers),) * 2)
+        own = np.eye(len(model.joint_numbers))
         return [np.mean(change) ** 2 * alike + np.var(change) * own for change in _changes()]
 
     def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
@@ -246,11 +250,9 @@ class OtherGeometry(JointFactors):
         # A linkage that does not close with clearances that were read is not the one that they were
         # read in.
         closes = np.isfinite(bent).all(axis=1)
-        bent, apart, closing = (
-            bent[closes],
-            apart[closes],
-            [ensemble[k] for k in np.flatnonzero(closes).tolist()],
-        )
+        bent = bent[closes]
+        apart = apart[closes]
+        closing = [ensemble[k] for k in np.flatnonzero(closes).tolist()]
         curves = _curves(scene, ensemble)
         columns = np.column_stack([found[0].columns, *bent, curves])
         even = block_diag(np.eye(len(bent)) / max(len(bent), 1), np.eye(curves.shape[1]))
@@ -306,8 +308,10 @@ def _evidence(along: Array, square: Array, changes: Array) -> float:
     for _ in range(_ROUNDS):
         inner = square + np.diag(precise)
         spread = np.linalg.inv(inner)
-        mean, own = spread @ (along + pull), np.diag(spread)
-        others, push = np.maximum(1.0 / own - precise, 0.0), mean / own - pull
+        mean = spread @ (along + pull)
+        own = np.diag(spread)
+        others = np.maximum(1.0 / own - precise, 0.0)
+        push = mean / own - pull
         weight = push[:, None] * changes - 0.5 * others[:, None] * changes**2
         size = log_sum(weight.T)[:, None]
         chance = np.exp(weight - size)

@@ -28,12 +28,16 @@ _STEPS_IN = tuple(
 # Share of values on a step, or of rows that show a habit, that may be exceptions. [1]
 _EXCEPTIONS = 0.05
 # With fewer values, or rows, nothing is said of them; a value is a multiple within this. [1]
-_LEAST_VALUES, _LEAST_ROWS, _LEAST_JOINTS, _ON_STEP = 20, 5, 5, 0.02
+_LEAST_VALUES = 20
+_LEAST_ROWS = 5
+_LEAST_JOINTS = 5
+_ON_STEP = 0.02
 # Share of clearances that are known to be cut off, from which their effects are. [1]
 _MANY_CUT = 0.1
 # Values before the last one that lead to it, and the chance that it is more frequent by so much;
 # it is twenty times there at all in few sound tables. [1]
-_LED_BY, _PILED_BY_CHANCE = 3, 0.01
+_LED_BY = 3
+_PILED_BY_CHANCE = 0.01
 # Chance of a false statement about the data of a table. [1]
 BY_CHANCE = 0.001
 
@@ -82,7 +86,8 @@ def data_condition(table: DiagnosisTable, gear: Gear) -> tuple[tuple[DataConditi
     tuple of DataCondition, ndarray of bool of shape (n,)
         What was seen, and the rows that tell nothing further.
     """
-    twice, copies = _duplicates(table), _copies(table)
+    twice = _duplicates(table)
+    copies = _copies(table)
     equal = _identical(table)
     limits = equal & _at_limits(table, gear)
     # Where most rows are like that it is how the gears are, not how one was written.
@@ -180,7 +185,8 @@ def _before(table: DiagnosisTable) -> Places:
 
 def _copies(table: DiagnosisTable) -> Mask:
     """Rows whose clearances are those of the gear's inspection before, more than chance allows."""
-    before, values = _before(table), table.clearance_in
+    before = _before(table)
+    values = table.clearance_in
     later = before >= 0
     # The least value may stand for all that are smaller.
     least = np.min(values[values > 0.0], initial=np.inf)
@@ -199,7 +205,8 @@ def _identical(table: DiagnosisTable) -> Mask:
     """Rows in which many joints were read and all have one value that is not zero, more than chance
     allows of the values of the other rows.
     """
-    values, known = table.clearance_in, np.isfinite(table.clearance_in)
+    values = table.clearance_in
+    known = np.isfinite(table.clearance_in)
     low = np.where(known, values, np.inf).min(axis=1)
     count = known.sum(axis=1)
     same = (np.where(known, values, -np.inf).max(axis=1) == low) & (low > 0.0)
@@ -330,7 +337,8 @@ def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
     partly = blank.any(axis=1)
     if partly.sum() < _LEAST_ROWS:
         return
-    where, share = "blank clearances", float(blank.mean())
+    where = "blank clearances"
+    share = float(blank.mean())
     # Read in order until one is worn: that one is the largest.
     joints = values.shape[1]
     last = joints - 1 - np.argmax(~np.isnan(values)[:, ::-1], axis=1)
@@ -376,7 +384,8 @@ def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
         return
     over = worst_case(gear.model, np.nan_to_num(table.clearance_in[use])).over_in
     known = np.isfinite(over)
-    one, other = over[known & read], over[known & ~read]
+    one = over[known & read]
+    other = over[known & ~read]
     if mannwhitneyu(one, other).pvalue < BY_CHANCE:
         more = "more" if np.median(one) > np.median(other) else "less"
         yield DataCondition(
@@ -393,7 +402,8 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
     landings = table.quantities.get("gear_landings")
     if landings is None or "day" not in table.quantities:
         return
-    order, numbers = visits(table), gears_of(table)
+    order = visits(table)
+    numbers = gears_of(table)
     fell: list[str] = []
     pooled = overhauls = gears = 0
     for name, rows in order.items():

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.diagnosis import diagnose
 from mlg_troubleshoot.diagnosis.causes import RiggingOffset
-from mlg_troubleshoot.diagnosis.condition import data_condition, doubt_of
+from mlg_troubleshoot.diagnosis.data_condition import data_condition, doubt_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.diagnosis.wear import gears_of
 from mlg_troubleshoot.gear.directions import worst_case
