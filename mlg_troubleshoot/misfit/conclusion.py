@@ -40,7 +40,7 @@ class Conclusion:
         """NONE, NAMED, AMBIGUOUS or UNLISTED."""
         if self.posterior.nothing >= 0.5:
             return Verdict.NONE
-        if self.posterior.unlisted >= 0.5 or not self.listed:
+        if self.posterior.unlisted >= min(0.5, self.any_of(self.listed)):
             return Verdict.UNLISTED
         return Verdict.NAMED if self.sure else Verdict.AMBIGUOUS
 

@@ -70,6 +70,8 @@ def concluded(
         ({(A,): 0.6, (B,): 0.4}, MisfitVerdict.AMBIGUOUS),
         ({(SHAPE,): 0.6, (A,): 0.4}, MisfitVerdict.UNLISTED),
         ({(SHAPE, A): 0.6, (A,): 0.4}, MisfitVerdict.UNLISTED),
+        ({(): 0.49, (SHAPE,): 0.44, (A,): 0.04, (B,): 0.03}, MisfitVerdict.UNLISTED),
+        ({(): 0.49, (SHAPE,): 0.24, (A,): 0.14, (B,): 0.13}, MisfitVerdict.AMBIGUOUS),
         ({(SHAPE, A): 0.4, (A,): 0.6}, MisfitVerdict.NAMED),
     ],
 )
