@@ -11,7 +11,6 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from xml.etree.ElementTree import ParseError
 
 from mlg_troubleshoot.records.cells import LETTERS, MAX_COLUMNS, MAX_ROWS, column_letters
 from mlg_troubleshoot.records.source import COPY_THE_TABLE, FileRefusedError
@@ -41,7 +40,8 @@ _ZIP_ERRORS = (
 )
 # What openpyxl, xlrd and the parser of XML raise on damaged bytes: a part or an attribute that is
 # missing, a wrong kind of element or value, a place outside the texts or the bytes, XML that is not
-# well-formed, a text in no known encoding, arithmetic on wrong lengths, their own checks.
+# well-formed (a SyntaxError, with lxml or without), a text in no known encoding, arithmetic on
+# wrong lengths, their own checks.
 _PARSER_ERRORS = (
     ArithmeticError,
     AssertionError,
@@ -51,8 +51,8 @@ _PARSER_ERRORS = (
     MemoryError,
     NameError,
     OSError,
-    ParseError,
     RuntimeError,
+    SyntaxError,
     TypeError,
     ValueError,
     struct.error,

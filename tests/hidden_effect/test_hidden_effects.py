@@ -230,7 +230,6 @@ def test_two_causes_of_single_joints_are_not_taken_for_another_linkage_or_direct
     ("unlisted", "part"),
     [
         ("lost_motion_under_load", "elastic_compliance"),
-        ("approach_of_one_technician", "technician_bias"),
         ("pressure_of_one_gauge", "gauge_bias"),
     ],
 )
