@@ -572,13 +572,5 @@ OFF_CATALOGUE: dict[str, Cause] = {
             lambda rng, d: {"gauge": pick(rng, d.gauge, 20), "middle_day": float(d.day.mean())},
             lambda d, p: (d.gauge == p["gauge"]) * (d.day - p["middle_day"]) / 200.0,
         ),
-        off_list(
-            "approach_of_one_technician",
-            ("technician_id", "approach"),
-            lambda rng, d: {"technician": pick(rng, d.technician, 20)},
-            lambda d, p: (
-                (d.technician == p["technician"]) * np.where(d.approach == "RETRACTING", 1.0, -1.0)
-            ),
-        ),
     )
 }
