@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records.cells import NumberFormat, OddCell
+from mlg_troubleshoot.records.cells import NumberFormat, OddCell, OddKind
 
 HEADER = (
     "record_id",
@@ -209,3 +209,9 @@ def test_a_format_of_two_sections_shows_a_number_below_zero_by_the_second() -> N
     cell = shown.cell(-1.5, epoch_1904=False)
     assert isinstance(cell, OddCell)
     assert cell.text == "1.5 mm"
+
+
+def test_a_number_that_is_shown_with_two_digits_is_read_with_its_zero() -> None:
+    shown = NumberFormat.of("00")
+    assert shown is not None
+    assert shown.cell(7.0, epoch_1904=False) == OddCell(OddKind.PADDED, "07", None, 7.0)
