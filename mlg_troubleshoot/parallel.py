@@ -100,13 +100,9 @@ def _on_cluster(
 ) -> Iterator[_Found]:
     held = client.scatter(task, broadcast=True, hash=False)
     asked = (client.submit(_called, held, part, pure=False) for part in parts)
-    waiting = deque(islice(asked, _AHEAD * max(1, sum(client.nthreads().values()))))
+    waiting: deque[Any] = deque()
     try:
-        while waiting:
-            found = waiting[0].result()
-            waiting.popleft()
-            waiting.extend(islice(asked, 1))
-            yield found
+        yield from _in_order(asked, _AHEAD * max(1, sum(client.nthreads().values())), waiting)
     finally:
         client.cancel(list(waiting))
 
@@ -130,17 +126,22 @@ def _on_this_machine(
     asked = (pool.submit(called, part) for part in parts)
     waiting: deque[Future[Any]] = deque()
     try:
-        waiting.extend(islice(asked, _AHEAD * workers))
-        while waiting:
-            found = waiting[0].result()
-            waiting.popleft()
-            waiting.extend(islice(asked, 1))
-            yield found
+        yield from _in_order(asked, _AHEAD * workers, waiting)
     finally:
         for child in active_children() if waiting and not threads else ():
             # Interrupted: nobody waits for the parts that are being computed.
             child.terminate()
         pool.shutdown(cancel_futures=True)
+
+
+def _in_order(asked: Iterator[Any], ahead: int, waiting: deque[Any]) -> Iterator[Any]:
+    """Results of what is asked for, in its order; those that are still computed are waiting."""
+    waiting.extend(islice(asked, ahead))
+    while waiting:
+        found = waiting[0].result()
+        waiting.popleft()
+        waiting.extend(islice(asked, 1))
+        yield found
 
 
 def _called(task: Callable[[_Part], _Found], part: _Part) -> _Found:

@@ -92,7 +92,7 @@ class Run:
             scheduler=wanted.scheduler and options.dask_client(wanted.scheduler),
         )
         self._records = options.Records(wanted.store, tables.gear)
-        # A store that nothing is kept in is not opened: SQLAlchemy is a third of a check.
+        # A store in which no record will be kept is not opened: SQLAlchemy is a third of a check.
         self._place = self._records.kept if wanted.keep or self._asks else None
 
     def run(self) -> int:

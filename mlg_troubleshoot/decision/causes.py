@@ -243,7 +243,7 @@ class Causes:
             new = np.prod(np.where(members[:, :, None], unread.fresh, 1.0), axis=1)
             return np.asarray(1.0 - inside(left * new, np.full(len(left), margin)))
         gone = np.prod(np.where(members[:, :, None], waves, 1.0), axis=1) * blur(self.u_in[row])
-        # The density of what is left, given that all together read x.
+        # The density of the remainder, given that all together read x.
         away = np.exp(-1j * FREQUENCIES * abs(x))
         given = density(left) * density(gone * away)[:, ::-1]
         given /= np.maximum(given.sum(axis=1, keepdims=True), 1e-300)

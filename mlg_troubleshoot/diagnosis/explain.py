@@ -30,7 +30,7 @@ from mlg_troubleshoot.misfit.fitting import fit
 from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
-# The noise is estimated again from what is left as long as that changes the likeliest explanation,
+# The noise is estimated again from the residual as long as that changes the likeliest explanation,
 # so often at most.
 _ROUNDS = 3
 # Computing only: rows that may be a slip each, those that lie furthest off.

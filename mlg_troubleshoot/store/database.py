@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA_VERSION = 1
-# What SQLite writes into the head of a file so that it can be told from another program's: "mlg1".
+# What SQLite writes into the head of a file so that it is recognised as this one's: "mlg1".
 # [1]
 APPLICATION_ID = 0x6D6C6731
 GENESIS = "0" * 64
