@@ -94,7 +94,7 @@ class Slip:
 # The one table of slips: suggested wherever they would explain a value, never applied.
 SLIPS: dict[str, Slip] = {
     "unit": Slip(MM_PER_IN, "millimetres read as inches", "inches read as millimetres"),
-    "point": Slip(10.0, "a slipped decimal point", "a slipped decimal point"),
+    "point": Slip(10.0, "a misplaced decimal point", "a misplaced decimal point"),
     "convention": Slip(
         2.0,
         "a diametral clearance or total play read as radial",

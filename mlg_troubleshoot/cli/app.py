@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from inspect import cleandoc
 from types import ModuleType, SimpleNamespace
 from typing import Any, cast
 
@@ -44,6 +45,14 @@ def _load_help_pages() -> None:
         del sys.modules[name]
 
 
+def _unwrap_help(command: Any) -> None:
+    """Leave the line breaks within a paragraph to the screen: typer keeps those of a docstring."""
+    paragraphs = cleandoc(command.help or "").split("\n\n")
+    command.help = "\n\n".join(each.replace("\n", " ") for each in paragraphs)
+    for each in getattr(command, "commands", {}).values():
+        _unwrap_help(each)
+
+
 class CommandGroup(TyperGroup):
     """All commands behind one boundary; without a command the help is shown."""
 
@@ -51,6 +60,7 @@ class CommandGroup(TyperGroup):
         given = list(sys.argv[1:] if args is None else args)
         if not given or _ASK_FOR_HELP.intersection(given):
             _load_help_pages()
+            _unwrap_help(self)
         with Boundary():
             code = super().main(given or ["--help"], *more, **{**named, "standalone_mode": False})
             raise SystemExit(code if given else ExitCode.USAGE)

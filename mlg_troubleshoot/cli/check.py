@@ -30,30 +30,30 @@ EPILOG = (
 # Flags of one gear entered by hand: what each gives to its column as it is typed, and its help.
 _OF_ONE_GEAR: options.ColumnFlags = {
     TAIL_NO.name: ("--tail", None, "Tail number, with --set or the prompts."),
-    SIDE.name: ("--side", "LH|RH", "Which gear; with FILE, where it has no column of sides."),
+    SIDE.name: ("--side", "LH|RH", "Side of the gear; with FILE, used where no column gives it."),
     RECORD_ID.name: ("--record-id", None, "Identifier of the record."),
-    OUTCOME.name: ("--outcome", "RETRACTED|FAILED", "What the gear did."),
+    OUTCOME.name: ("--outcome", "RETRACTED|FAILED", "Outcome of the retraction."),
     PLUNGER_DISPLACEMENT.name: (
         "--measured",
         "VALUE",
         "Measured plunger displacement at mid-position, e.g. 0.041in.",
     ),
     MARGIN.name: ("--margin", "VALUE", "This gear's own margin, e.g. 0.028in."),
-    DATE.name: ("--date", "DATE", "Day of the inspection, e.g. 2026-03-04."),
+    DATE.name: ("--date", "DATE", "Date of the inspection, e.g. 2026-03-04."),
     LANDINGS.name: ("--landings", "N", "Landings since overhaul."),
     "restored_joints": ("--restored", "JOINTS", "Joints restored since, e.g. 3,5."),
-    "repair_date": ("--repair-date", "DATE", "When, e.g. '2026-03-04 14:30'."),
-    "plunger_date": ("--plunger-date", "DATE", "When the plunger was read."),
-    "outcome_date": ("--outcome-date", "DATE", "When the outcome was seen."),
+    "repair_date": ("--repair-date", "DATE", "Date of that repair, e.g. '2026-03-04 14:30'."),
+    "plunger_date": ("--plunger-date", "DATE", "Date of the plunger reading."),
+    "outcome_date": ("--outcome-date", "DATE", "Date of the outcome."),
     "rigging_checked": (
         "--rigging-checked",
         "no|yes|corrected",
-        "Rigging and lock roller: looked at, or set right.",
+        "Rigging and lock roller: checked (yes) or corrected.",
     ),
-    "measured_again": ("--measured-again", "JOINTS", "Read with another gauge too."),
+    "measured_again": ("--measured-again", "JOINTS", "Joints measured again with another gauge."),
     "cannot_reach": ("--cannot-reach", "JOINTS", "Joints out of reach today, e.g. 4."),
     "no_spare": ("--no-spare", "JOINTS", "Joints without a spare part, e.g. 3."),
-    "open_areas": ("--open", "AREAS", "Areas that are open, e.g. sidestay."),
+    "open_areas": ("--open", "AREAS", "Areas that are open already, e.g. sidestay."),
     "minutes_available": ("--minutes", "MIN", "Minutes left for the work today."),
 }
 
@@ -155,11 +155,11 @@ class Wanted(options.OutputOptions):
     ] = 1
     workers: Annotated[
         int | None,
-        typer.Option(min=1, help="Cores that judge more than 512 rows; all if not given."),
+        typer.Option(min=1, help="Processor cores for more than 512 rows; all if not given."),
     ] = None
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="Dask cluster that judges them."),
+        typer.Option(metavar="ADDRESS", help="Dask cluster that judges the rows."),
     ] = None
 
 

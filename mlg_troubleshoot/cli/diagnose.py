@@ -40,7 +40,10 @@ def diagnose(
         typer.Option(
             min=0.5,
             max=0.999,
-            help="Probability from which a cause is named: of ten named at 0.9 nine are right.",
+            help=(
+                "Lowest probability at which a cause is named; at 0.9, nine of ten named causes are"
+                " right."
+            ),
         ),
     ] = 0.9,
     beliefs: Annotated[
@@ -48,7 +51,7 @@ def diagnose(
         typer.Option(
             "--beliefs",
             metavar="FILE.toml",
-            help="How often and how large things are expected to be wrong in your fleet.",
+            help="Prior probabilities and sizes of effects in your fleet.",
         ),
     ] = None,
     tables: options.Tables,

@@ -14,9 +14,7 @@ def doctor(
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
-    """Check whether this installation can do everything; exit 1 if something that should work does
-    not.
-    """
+    """Check that every part of this installation works; exit 1 if not."""
     from mlg_troubleshoot.workflows import doctor as task
 
     findings = task.examine_installation(gear)

@@ -49,7 +49,7 @@ def fleet(
     ] = None,
     sort: Annotated[
         str,
-        typer.Option(metavar="worst|due|tail|minutes", parser=_order, help="What stands first."),
+        typer.Option(metavar="worst|due|tail|minutes", parser=_order, help="Order of the gears."),
     ] = "worst",
     csv: Annotated[
         Path | None, typer.Option(metavar="OUT.csv", help="The gears as CSV, one line per gear.")
@@ -107,7 +107,7 @@ def _show(found: Lives) -> None:
     gear = found.gear
     lines = fleet_lines(found.lives, found.forecasts, found.order)
     headings = (
-        *("tail", "side", "last seen", "verdict", "look at"),
+        *("tail", "side", "last seen", "verdict", "inspect"),
         *("to limit", "to margin", "next due", "next action"),
     )
     styles = {each.value: style for each, style in STYLES.items()}
@@ -132,10 +132,10 @@ def _show(found: Lives) -> None:
     console.print(
         f"{len(lines)} gears; landings left are those from the last inspection, median (5 %): to"
         " the limit of any joint, with the one that most likely reaches its limit first; to the"
-        " margin by the worst-case bound. 'look at' is the joint to look at first today."
+        " margin by the worst-case bound. 'inspect' is the joint to inspect first today."
     )
     history.show_warnings(console, found.lives)
-    spare = ("look at", "last seen", "to limit", "to margin")
+    spare = ("inspect", "last seen", "to limit", "to margin")
     for shown in lines_of(console, headings, rows, "", spare):
         console.print(shown, no_wrap=True, overflow="ellipsis")
     if len(lines) > _LINES:

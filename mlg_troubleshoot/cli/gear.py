@@ -80,9 +80,7 @@ def _show(gear: Gear) -> None:
 def verify(
     context: typer.Context, as_json: options.Json = False, _version: options.Version = False
 ) -> None:
-    """Print every number of the paper with the value of the model; exit 1 if a required value does
-    not hold.
-    """
+    """Print every number of the paper and that of the model; exit 1 if a required one fails."""
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.paper import verification
 

@@ -127,7 +127,7 @@ class _Course:
         return Page((BLANK, line((question, Tone.STRONG)), *shown, line(f"as: {example}")), " > ")
 
     def help(self, state: int) -> tuple[Line, ...]:
-        return (note(f"One line, as: {_QUESTIONS[state][2]}. Enter continues."), _KEYS)
+        return (note(f"One line, for example: {_QUESTIONS[state][2]}. Enter continues."), _KEYS)
 
     def back(self, state: int) -> Turn[int]:
         return Turn(max(state - 1, 0))
@@ -139,7 +139,7 @@ class _Course:
             try:
                 value = read(rest if key in _TABLES else [name, *rest])
             except (ValueError, IndexError):
-                return again(state, f"{typed!r}: expected a line as: {example}")
+                return again(state, f"{typed!r}: expected a line such as: {example}")
             if key in _TABLES:
                 self.values.setdefault(key, {})[name] = value
                 write_text(self.file, tomli_w.dumps(self.values))

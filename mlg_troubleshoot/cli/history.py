@@ -35,7 +35,7 @@ Side = Annotated[str, typer.Argument(metavar="LH|RH", help="Which gear.")]
 RecordId = Annotated[
     str, typer.Argument(metavar="RECORD", help="Record id, or the start of its hash.")
 ]
-Day = Annotated[str, typer.Option("--date", metavar="YYYY-MM-DD", help="Day of the repair.")]
+Day = Annotated[str, typer.Option("--date", metavar="YYYY-MM-DD", help="Date of the repair.")]
 Landings = Annotated[
     str | None, typer.Option("--landings", metavar="N", help="Landings at the repair.")
 ]
@@ -65,9 +65,7 @@ def show(
     no_forecast: options.NoForecast = False,
     shown: options.OutputOptions,
 ) -> None:
-    """Show the records: the gears and their latest state, or one gear's life with the forecast of
-    each joint.
-    """
+    """Show all gears with their latest state, or the life of one gear with its forecast."""
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.prompts.visit import unit_entered
     from mlg_troubleshoot.gear.gear_file import load_gear
@@ -408,8 +406,9 @@ def verify(
     ] = None,
     records: options.Records,
 ) -> None:
-    """Check the chain and name the first record that does not fit (exit code 1). It does not prove
-    who wrote a record.
+    """Check the chain and name the first record that does not fit (exit code 1).
+
+    This does not prove who wrote a record.
 
     The last hash is printed. Note it elsewhere and pass it to --expect later: this shows whether
     records were removed.
@@ -478,9 +477,7 @@ def export(*, file: Chain, records: options.Records, force: options.Force = Fals
 
 @options.flat
 def import_chain(*, file: Chain, records: options.Records) -> None:
-    """Read an exported chain into an empty store, or the rest of it into a store that contains its
-    beginning.
-    """
+    """Read an exported chain into an empty store, or its later records into the same store."""
     from mlg_troubleshoot.workflows import history
 
     added = history.import_file(records.kept, file)

@@ -30,13 +30,13 @@ def new(
     ] = None,
     limit: Annotated[
         float | None,
-        typer.Option(metavar="IN", help="Of LINKAGE.json: radial limit of every joint."),
+        typer.Option(metavar="IN", help="For LINKAGE.json: radial limit of every joint."),
     ] = None,
     margin: Annotated[
         float | None,
-        typer.Option(metavar="IN", help="Of LINKAGE.json: allowed displacement of the output."),
+        typer.Option(metavar="IN", help="For LINKAGE.json: allowed displacement of the output."),
     ] = None,
-    unit: Annotated[str, typer.Option(metavar="in|mm", help="Of LINKAGE.json: its unit.")] = "in",
+    unit: Annotated[str, typer.Option(metavar="in|mm", help="For LINKAGE.json: its unit.")] = "in",
     force: options.Force = False,
     _version: options.Version = False,
 ) -> None:
@@ -90,7 +90,7 @@ def _asked(answers: Path) -> Path:
 def _say(gear: Gear, file: Path) -> None:
     picture = gear.plot().save(file.with_suffix(".svg"))
     output.write(f"Gear: {file}, {len(gear.joints)} joints. Table: {gear.indices_file}")
-    output.write(f"Drawn as understood: {picture}. Use it: mlg check FILE --gear {file}")
+    output.write(f"Drawing of the gear as read: {picture}. Use it: mlg check FILE --gear {file}")
 
 
 def draw(

@@ -129,7 +129,7 @@ Report = Annotated[
     typer.Option("--report", metavar="DIR", help="Write printable reports to this folder."),
 ]
 Paper = Annotated[
-    PaperSize | None, typer.Option("--page", help="Paper of the report; A4 unless remembered.")
+    PaperSize | None, typer.Option("--page", help="Paper size of the report; A4 unless remembered.")
 ]
 Show = Annotated[
     str | None,

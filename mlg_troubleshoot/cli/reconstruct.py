@@ -40,9 +40,7 @@ def reconstruct(
         ),
     ] = None,
     name: Annotated[str, typer.Option(help="Name of the new linkage.")] = "N",
-    minutes: Annotated[
-        float, typer.Option(min=0.01, help="Minutes after which to give up.")
-    ] = 15.0,
+    minutes: Annotated[float, typer.Option(min=0.01, help="Time limit in minutes.")] = 15.0,
     out: Annotated[
         Path | None,
         typer.Option(metavar="OUT.toml", help="Write the linkage as a member of an ensemble."),

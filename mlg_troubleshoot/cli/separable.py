@@ -27,9 +27,7 @@ def separable(
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
-    """Show which causes the planned columns could distinguish, and from which size on, before
-    anything is measured.
-    """
+    """Show which causes the planned columns could distinguish, and at what size of effect."""
     from mlg_troubleshoot.workflows.separable import separable as planned
 
     names = (
@@ -53,7 +51,7 @@ def separable(
         "detected",
         "looks most like",
         "distinguished",
-        "cheapest column that splits them",
+        "cheapest column that distinguishes them",
     )
     table = output.plain_table(None, *headings, right=("detected", "distinguished"))
     for cause in (c for c in causes if c.missing_column is None):

@@ -39,7 +39,7 @@ def survey(
         Path | None,
         typer.Argument(
             metavar="[FILE.csv|FILE.xlsx]",
-            help="Template to write; after ask: where answers are kept.",
+            help="Template to write; after ask: file for the answers.",
         ),
     ] = None,
     write: Annotated[
@@ -51,10 +51,10 @@ def survey(
         typer.Option(
             "--for",
             metavar="INSPECTIONS",
-            help="Inspections whose displacement to narrow, instead of the indices.",
+            help="Narrow the displacement of these inspections instead of the indices.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the starts and draws.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
     wanted: options.OutputOptions,
     _version: options.Version = False,
 ) -> None:
@@ -184,12 +184,12 @@ def _show(result: SurveyResult, console: output.DataConsole) -> None:
     for warning in result.warnings:
         console.sentence(Sentence.of("Note: {}.", warning))
     if result.suggestion is None:
-        console.print("No further reading would narrow this by 1 %: you can stop.")
+        console.print("No further reading would narrow the intervals by 1 %: you can stop.")
     else:
         share = 100 * result.suggestion.narrowing
         console.sentence(
             Sentence.of(
-                "Next: {}; narrows this by about {} %.",
+                "Next reading: {}; narrows the 90 % intervals by about {} %.",
                 result.suggestion.reading.words,
                 f"{share:.0f}",
             )

@@ -89,7 +89,7 @@ class _Sheet:
     def help(self, state: int) -> tuple[Line, ...]:
         unit = _unit(self._row(state))
         return (
-            note(f"A number, as 7.15 or 181.6 mm, in {unit} where it has no unit."),
+            note(f"A number such as 7.15 or 181.6 mm, in {unit} where it has no unit."),
             _KEYS,
         )
 
@@ -106,7 +106,7 @@ class _Sheet:
         if found is None:
             return again(
                 state,
-                f"{typed!r}: expected a number, as 7.15 or 181.6 mm, in {unit} where it has no"
+                f"{typed!r}: expected a number such as 7.15 or 181.6 mm, in {unit} where it has no"
                 " unit.",
             )
         before = self.rows[state]

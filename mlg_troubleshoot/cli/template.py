@@ -25,9 +25,7 @@ def template(
     show: options.Show = None,
     _version: options.Version = False,
 ) -> None:
-    """Write an empty inspection workbook for mlg check, or a one-page form (.pdf, .html) to fill in
-    by hand.
-    """
+    """Write an empty inspection workbook, or a one-page form (.pdf, .html) to fill in by hand."""
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.outputs import TO_FILL_IN, OutputFile

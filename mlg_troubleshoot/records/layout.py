@@ -368,7 +368,7 @@ class ColumnReader:
                 0,
                 (
                     RECORD_ID.name,
-                    f"a column {RECORD_ID.name}, by which the rows of one inspection are gathered",
+                    f"a column {RECORD_ID.name} that identifies the rows of one inspection",
                 ),
             )
         elif RECORD_ID not in fields:

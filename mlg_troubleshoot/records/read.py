@@ -313,7 +313,7 @@ def _read_book(
         found.layouts += part.layouts
         found.invalid_content |= part.invalid_content
     if not found.rows and not found.problems:
-        raise FileRefusedError("no_rows", "there is no inspection in it")
+        raise FileRefusedError("no_rows", "it contains no inspection")
 
 
 def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Candidate]:
@@ -390,7 +390,7 @@ def _nothing_found(
     if name is not None:
         return FileRefusedError(
             "sheet_hidden",
-            f"the inspections stand on the hidden sheet {name!r}",
+            f"the inspections are on the hidden sheet {name!r}",
             "inspections on a sheet that can be seen",
             f'Unhide the sheet, or name it: --sheet "{name}".',
             sheet=name,

@@ -68,9 +68,7 @@ def read_table(
     tick(taken % _PROGRESS_ROWS)
     table.finish()
     placed = (
-        f"the header stands in row {' and '.join(map(str, header.rows_used))}"
-        if header.row > 1
-        else ""
+        f"the header is in row {' and '.join(map(str, header.rows_used))}" if header.row > 1 else ""
     )
     read, carried = columns.notes()
     about = "; ".join([*table.notes(), *_hidden_notes(sheet, columns, header.row)])

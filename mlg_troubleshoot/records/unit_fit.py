@@ -150,7 +150,7 @@ def _small_question(
         if convention is ClearanceConvention.RADIAL
         else ", or is it a radial clearance (factor 2)"
     )
-    return f"{said}: has the decimal point slipped{factor}?"
+    return f"{said}: is the decimal point misplaced{factor}?"
 
 
 def _large_question(
@@ -246,7 +246,7 @@ def scale_slip(
     ten = SLIPS["point"].factor
     if _usual(value_in / ten, plausible_max_in):
         found.append(
-            f"Has the decimal point slipped (factor {ten:g})? It would be {entered / ten:.4g}"
+            f"Is the decimal point misplaced (factor {ten:g})? It would be {entered / ten:.4g}"
             f" {unit.value}."
         )
     return " ".join(found)

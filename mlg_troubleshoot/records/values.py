@@ -39,8 +39,8 @@ _USUAL = {
         " the cell as a number (or text) and enter the value again."
     ),
     "date_ambiguous": (
-        "Which number is the day and which the month is not guessed. Enter year-month-day, for"
-        " example 2026-03-04, or say the order with --dates dmy, mdy or ymd."
+        "The order of day and month is not guessed. Enter year-month-day, for"
+        " example 2026-03-04, or state the order with --dates dmy, mdy or ymd."
     ),
     "date_in_the_future": "Check the year, and the clock of this computer.",
     "date_invalid": "Enter year-month-day, for example 2026-03-04.",
@@ -64,10 +64,10 @@ _USUAL = {
     ),
     "outcome_unknown": "Enter RETRACTED or FAILED, or leave it blank if it is not known.",
     "out_of_range": "Check the number and the unit, or leave it blank if it is not known.",
-    "text_control_character": "It holds a line break or an invisible character. Enter it again.",
-    "text_unwritable": "It holds a character that no file can carry. Enter the text again.",
+    "text_control_character": "It contains a line break or an invisible character. Enter it again.",
+    "text_unwritable": "It contains a character that cannot be stored. Enter the text again.",
     "unit_missing": (
-        "Nothing says the unit. Write it with the value (0.013 in, 13 thou, 0.33 mm) or in the"
+        "The unit is missing. Write it with the value (0.013 in, 13 thou, 0.33 mm) or in the"
         " header (_in, _thou, _mm), or pass --unit."
     ),
 }

@@ -272,8 +272,7 @@ class _Rows(WorkSheetParser):
             letters = reference.rstrip("0123456789")
             if reference[len(letters) :] != str(self.row_counter):
                 raise damaged(
-                    f"cell {reference!r} of sheet {self._sheet.name!r} stands in row"
-                    f" {self.row_counter}"
+                    f"cell {reference!r} of sheet {self._sheet.name!r} is in row {self.row_counter}"
                 )
             self.col_counter = column_index_from_string(letters)
         return self.col_counter - 1

@@ -15,7 +15,7 @@ from mlg_troubleshoot.units import LengthUnit
 _WORDS = ("DATA", "MISFIT", "CAUSE", "MODEL", "GAIN", "LEFT", "DO")
 _KINDS = {
     "mm_as_in": "millimetres entered as inches",
-    "factor_10": "decimal point slipped",
+    "factor_10": "misplaced decimal point",
     "swapped_joints": "two joints swapped",
     "swapped_side": "left and right swapped",
     "implausible": "implausible",

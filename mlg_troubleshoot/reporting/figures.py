@@ -29,6 +29,8 @@ ACCENT = "#0b4f8a"
 TEXT_SIZE = 11
 # Average width of a character of the report's font, per unit of its size.
 _CHARACTER = 0.62
+# Size of the numbers of an axis and of the words of a legend. [px]
+_TICK_SIZE = 9.5
 
 Anchor = Literal["start", "middle", "end"]
 Marker = Literal["circle", "square", "diamond", "triangle", "cross", "ring"]
@@ -241,7 +243,7 @@ class Plot:
         canvas: Canvas,
         x: Axis,
         y: Axis,
-        left: float = 52.0,
+        left: float | None = None,
         right: float = 12.0,
         top: float = 10.0,
         bottom: float = 38.0,
@@ -249,6 +251,11 @@ class Plot:
         self.canvas = canvas
         self.x = x
         self.y = y
+        if left is None:
+            # The label of the vertical axis ends 16 units from the edge; its numbers follow it.
+            ticks = nice_ticks(y.low, y.high)
+            widths = [text_width(number(v, decimals_of(ticks)), _TICK_SIZE) for v in ticks]
+            left = max(52.0, 24.0 + max(widths))
         self.area = (left, top, canvas.width - right, canvas.height - bottom)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
@@ -271,7 +278,7 @@ class Plot:
                 x0 - 5,
                 y + 3.5,
                 number(value, decimals_of(ticks)),
-                size=9.5,
+                size=_TICK_SIZE,
                 anchor="end",
                 colour=SOFT,
             )
@@ -281,7 +288,7 @@ class Plot:
         for value, text in marks or [(value, number(value, decimals_of(ticks))) for value in ticks]:
             x, _ = self.at(value, self.y.low)
             self.canvas.line(x, y1, x, y1 + 4, colour=SOFT)
-            self.canvas.text(x, y1 + 14, text, size=9.5, anchor="middle", colour=SOFT)
+            self.canvas.text(x, y1 + 14, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
         self.canvas.line(x0, y1, x1, y1, colour=SOFT)
         self.canvas.line(x0, y0, x0, y1, colour=SOFT)
         self.canvas.text((x0 + x1) / 2, y1 + 29, self.x.label, size=10, anchor="middle")
@@ -309,7 +316,7 @@ class Plot:
                 width=1.0 if value == 0.0 else 0.5,
             )
             text = number(value, decimals_of(ticks))
-            self.canvas.text(x, y1 + 13, text, size=9.5, anchor="middle", colour=SOFT)
+            self.canvas.text(x, y1 + 13, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
         self.canvas.line(x0, y1, x1, y1, colour=SOFT)
         self.canvas.text((x0 + x1) / 2, y1 + 27, self.x.label, size=10, anchor="middle")
 
@@ -333,12 +340,12 @@ class Plot:
         """Draw the legend on one line, from its left end. [canvas units]"""
         for one in series:
             self.canvas.line(x, y, x + 24, y, colour=one.colour, width=one.width, dash=one.dash)
-            self.canvas.text(x + 28, y + 3.5, one.label, size=9.5)
-            x += 40 + text_width(one.label, 9.5)
+            self.canvas.text(x + 28, y + 3.5, one.label, size=_TICK_SIZE)
+            x += 40 + text_width(one.label, _TICK_SIZE)
         for shape, label in markers:
             self.canvas.marker(shape, x + 6, y, 4.5)
-            self.canvas.text(x + 15, y + 3.5, label, size=9.5)
-            x += 27 + text_width(label, 9.5)
+            self.canvas.text(x + 15, y + 3.5, label, size=_TICK_SIZE)
+            x += 27 + text_width(label, _TICK_SIZE)
 
 
 @dataclass(frozen=True, slots=True)

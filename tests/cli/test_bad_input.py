@@ -176,7 +176,7 @@ def test_an_empty_tail_number_is_refused() -> None:
         ("--convention", "RADIUS", "RADIAL"),
         ("--unit", "furlong", "in, thou or mm"),
         ("--outcome", "STUCK", "RETRACTED or FAILED"),
-        ("--measured", "0.041", "says the unit"),
+        ("--measured", "0.041", "unit is missing"),
         ("--measured", "4in", "plunger displacement from -0.5 to 0.5 in"),
         ("--margin", "0in", "a margin above 0"),
         ("--gear", "a380", "there is no gear 'a380'"),
@@ -205,7 +205,7 @@ def test_annotating_standard_input_is_refused_before_anything_is_shown(tmp_path:
 
 def test_a_template_that_was_not_filled_in_says_so(tmp_path: Path) -> None:
     mlg("template", tmp_path / "empty.xlsx")
-    refused(mlg("check", tmp_path / "empty.xlsx"), 3, "there is no inspection in it")
+    refused(mlg("check", tmp_path / "empty.xlsx"), 3, "it contains no inspection")
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,7 @@ def test_in_a_table_every_unit_and_convention_gives_the_same(
 def test_without_a_unit_it_is_refused() -> None:
     found = mlg(*HAND, "--convention", "RADIAL", "--set", "3=0.013", "--set", "5=0.007")
     assert (found.code, found.out) == (2, "")
-    assert "Nothing says the unit" in found.err
+    assert "The unit is missing" in found.err
 
 
 def test_without_a_convention_it_is_refused() -> None:

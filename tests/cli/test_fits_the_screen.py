@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -67,6 +68,17 @@ def test_a_key_and_its_meaning_stay_on_one_line(
     for line in capsys.readouterr().err.splitlines():
         assert not line.endswith("=")
         assert not line.strip().startswith("=")
+
+
+@pytest.mark.parametrize("command", [("check",), ("diagnose",), ("history", "verify")])
+def test_a_line_of_the_help_is_broken_where_the_screen_ends(
+    command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "70")
+    lines = mlg(*command, "--help").out.partition("╭")[0].rstrip().splitlines()
+    for line, following in pairwise(map(str.strip, lines)):
+        if line and following:
+            assert len(f" {line} {following.split()[0]}") > 68
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")

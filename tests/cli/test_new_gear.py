@@ -169,7 +169,7 @@ def test_answers_are_kept_when_the_prompt_is_left(tmp_path: Path) -> None:
 def test_a_line_that_cannot_be_read_is_asked_again(tmp_path: Path) -> None:
     asked = Typed("door linkage", "O nought 0", "q")
     ask_gear(tmp_path / "short.toml", asked)
-    assert "expected a line as: O 0 0" in asked.said
+    assert "expected a line such as: O 0 0" in asked.said
 
 
 def test_an_edited_gear_is_checked_at_once_and_its_renewed_table_is_named(gear: Path) -> None:

@@ -81,7 +81,7 @@ def test_what_is_no_such_reading_is_asked_again_and_not_kept(file: Path, answer:
 
 def test_a_question_mark_says_what_can_be_typed(file: Path) -> None:
     terminal, _, values = typed(file, "?", "done")
-    assert "A number, as 7.15 or 181.6 mm, in in where it has no unit." in terminal.said
+    assert "A number such as 7.15 or 181.6 mm, in in where it has no unit." in terminal.said
     assert values == {}
 
 

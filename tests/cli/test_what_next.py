@@ -42,7 +42,7 @@ def test_the_next_joint_is_named_with_its_minutes(incomplete: str) -> None:
 
 
 def test_what_the_plan_expects_stands_below_with_its_minutes_and_its_end(failure: str) -> None:
-    assert re.search(r"Then, as expected: measure #\d.* \(\d+ min\).* record the repair", failure)
+    assert re.search(r"Expected after that: measure #\d.* \(\d+ min\).* record the repair", failure)
 
 
 def test_nothing_else_is_to_be_measured_while_next_is_the_plunger(failure: str) -> None:

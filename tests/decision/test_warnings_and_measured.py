@@ -135,7 +135,7 @@ AS_TOTAL_PLAY = {"convention": ClearanceConvention.TOTAL_PLAY}
     ("factor", "entry", "words"),
     [
         (25.4, IN_MILLIMETRES, "inches read as millimetres (factor 25.4)"),
-        (10.0, {}, "a slipped decimal point (factor 10)"),
+        (10.0, {}, "a misplaced decimal point (factor 10)"),
         (2.0, AS_TOTAL_PLAY, "a radial clearance read as diametral or total play (factor 2)"),
     ],
 )
@@ -165,7 +165,7 @@ def test_an_entry_error_is_suggested_where_it_explains_the_displacement_to_a_twe
 ) -> None:
     text = disagreement(inspected({}, readings_in=(0.02 * 10.0 * off,)), 0.02, -0.02, 0.001)
     assert text is not None
-    assert ("a slipped decimal point" in text) == suggested
+    assert ("a misplaced decimal point" in text) == suggested
 
 
 @pytest.mark.parametrize("factor", [25.4, 10.0, 2.0])

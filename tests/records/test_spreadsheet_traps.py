@@ -266,7 +266,7 @@ def test_14_a_header_further_down_is_found_and_said(read, xlsx):
     rows = [["Main landing gear"], [], ["Printed", "2026-03-04"], HEADER, GOOD]
     result = read(xlsx(rows), "t.xlsx")
     assert result.rows[0].source.row == 5
-    assert any("header stands in row 4" in note for note in result.notes)
+    assert any("header is in row 4" in note for note in result.notes)
 
 
 def test_14_a_header_below_row_20_is_not_searched_for(read, xlsx):

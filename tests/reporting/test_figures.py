@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.figures import Axis, Bar, Canvas, Plot, Series, draw_bar, nice_ticks
+from mlg_troubleshoot.reporting.figures import (
+    Axis,
+    Bar,
+    Canvas,
+    Plot,
+    Series,
+    draw_bar,
+    nice_ticks,
+    text_width,
+)
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.reporting.inspection_figures import margin_gauge, plunger_curve
@@ -78,6 +87,17 @@ def test_a_plot_puts_the_ends_of_its_axes_on_its_frame() -> None:
     plot = Plot(Canvas(100, 80, "t"), Axis("x", 2.0, 4.0), Axis("y", -1.0, 1.0), 10, 10, 5, 15)
     assert plot.at(2.0, -1.0) == (10.0, 65.0)
     assert plot.at(4.0, 1.0) == (90.0, 5.0)
+
+
+def test_the_numbers_of_the_vertical_axis_do_not_touch_its_label() -> None:
+    canvas = Canvas(335, 236, "t")
+    Plot(canvas, Axis("x", 0.0, 1.0), Axis("measured, in", -0.0105, 0.006)).draw_axes()
+    (ends,) = {
+        float(text.split('x="')[1].split('"')[0])
+        for text in canvas.svg().split("<text")
+        if 'anchor="end"' in text
+    }
+    assert ends - text_width("−0.005", 9.5) >= 16.0
 
 
 def test_an_axis_around_values_holds_them_all() -> None:

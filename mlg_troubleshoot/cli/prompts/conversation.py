@@ -91,7 +91,7 @@ def answer(course: Course[S], state: S, text: str) -> Turn[S]:
     """What a typed line leads to; the words for back, help and stop are the same everywhere."""
     typed = text.strip()
     if not typed.isprintable() or "\ufffd" in typed:
-        return again(state, "A key that does nothing here, perhaps an arrow. Type the line again.")
+        return again(state, "That key (an arrow?) does nothing here. Type the line again.")
     match typed.lower():
         case "q" | "quit":
             return Turn(state, effect=Effect.STOP)

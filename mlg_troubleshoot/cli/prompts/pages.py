@@ -133,7 +133,7 @@ def reread_page(answers: Answers, old: LengthUnit) -> Page:
     shown = (
         BLANK,
         warning(f"{count} {were} typed as {old.words}, to be read as {new}?"),
-        choice("y", f"yes, {they} had {new} all along"),
+        choice("y", f"yes, {they} always meant {new}"),
         choice("n", f"no, {old.words} stay; only the next readings are {new}"),
     )
     return Page(shown, " y or n > ")
@@ -148,7 +148,7 @@ def offer_page(saved: Session, gear: Gear) -> Page:
             f" {len(gear.joints)} joints measured.",
         ),
         choice("y", "resume it"),
-        choice("n", "begin a new one and put the old one away"),
+        choice("n", "begin a new one and set the old one aside"),
     )
     return Page(shown, " Resume it? y or n > ")
 
@@ -168,11 +168,9 @@ _STEP_ASKS = {
 # Where Enter takes what NEXT says.
 STEP_ENTERS = {"restored_joints": "these joints"}
 NEXT_HELP = (
-    note("y: you have done NEXT; only what it asks for is asked, all other readings stand."),
-    note(
-        "c: the whole table, to correct any answer. u: back to what stood before the last answer."
-    ),
-    note("f, p .041, n 3 5 … are taken as at the optional answers. Nothing is erased."),
+    note("y: you have done NEXT; only its readings are asked for; all others are kept."),
+    note("c: the whole table, to correct any answer. u: undo the last answer."),
+    note("f, p .041, n 3 5 … work as in the optional answers. Nothing is erased."),
 )
 
 
@@ -341,7 +339,7 @@ def joint_help(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
             ("b", "back"),
             ("#7", "go to joint 7"),
         ),
-        keys(("done", "measure no more"), ("q", "save and stop")),
+        keys(("done", "stop measuring"), ("q", "save and stop")),
     ]
     return tuple(shown)
 

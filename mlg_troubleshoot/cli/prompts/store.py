@@ -214,7 +214,7 @@ def read_session(draft: Draft) -> Session:
 def _damaged(session_id: str, why: str) -> DamagedSessionError:
     return DamagedSessionError(
         f"the saved inspection {session_id} is damaged ({why.splitlines()[0][:200]}).",
-        "It is put away and not offered again: begin again with mlg check.",
+        "It is set aside and not offered again: begin again with mlg check.",
     )
 
 

@@ -243,7 +243,9 @@ def _joint_cells(f: JointFinding, screen: DataConsole) -> tuple[str, ...]:
 
 
 def _repair_table(a: Assessment, screen: DataConsole) -> Table:
-    title = Text("Repairs: sure in the worst case, or to try and read the plunger again")
+    title = Text(
+        "Repairs: sure = within the margin in the worst case; try = restore, then read the plunger"
+    )
     numbers = ("minutes", f"worst case {screen.unit}", "within", "second repair")
     table = plain_table(None, "restore", "kind", *numbers, right=numbers, title=title)
     for s in a.repair_sets or ():
