@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import mannwhitneyu, norm, poisson, spearmanr
+from scipy.special import ndtri, pdtrc
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
@@ -198,7 +198,7 @@ def _copies(table: DiagnosisTable) -> Mask:
     others = both & ~full[:, None]
     usual = (same & others).sum(axis=0) / np.maximum(others.sum(axis=0), 1)
     expected = float(np.sum(np.prod(np.where(both, usual, 1.0), axis=1)[later & (count > 0)]))
-    return np.asarray(full & (poisson.sf(full.sum() - 1, expected) < BY_CHANCE))
+    return np.asarray(full & (pdtrc(full.sum() - 1, expected) < BY_CHANCE))
 
 
 def _identical(table: DiagnosisTable) -> Mask:
@@ -324,7 +324,7 @@ def _more_than_led_to(counts: Array) -> bool:
             np.arange(-_LED_BY, 0), np.log(before), 1, w=np.sqrt(before), cov="unscaled"
         )
         error = np.sqrt(1.0 / counts[place] + covariance[1, 1])
-        surely[place] = np.log(counts[place]) - line[1] - norm.isf(_PILED_BY_CHANCE) * error
+        surely[place] = np.log(counts[place]) - line[1] + ndtri(_PILED_BY_CHANCE) * error
     return bool(surely[-1] > max(0.0, float(surely[:-1].max())))
 
 
@@ -371,6 +371,9 @@ def _only_worn(table: DiagnosisTable, use: Mask) -> bool:
     least = float(np.nanmin(table.clearance_in[use]))
     if landings is None or least <= 2.0 * float(np.median(table.gauge_u_in)):
         return False
+    # Only where it is needed: the import of scipy.stats takes as long as a diagnosis.
+    from scipy.stats import spearmanr
+
     use = use & np.isfinite(landings)
     blanks = np.isnan(table.clearance_in[use]).sum(axis=1)
     return bool(spearmanr(landings[use], blanks, alternative="less").pvalue < BY_CHANCE)
@@ -384,6 +387,8 @@ def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
         return
     over = worst_case(gear.model, np.nan_to_num(table.clearance_in[use])).over_in
     known = np.isfinite(over)
+    from scipy.stats import mannwhitneyu
+
     one = over[known & read]
     other = over[known & ~read]
     if mannwhitneyu(one, other).pvalue < BY_CHANCE:

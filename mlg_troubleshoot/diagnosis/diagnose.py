@@ -9,8 +9,7 @@ from functools import cache
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.optimize import lsq_linear
-from scipy.stats import chi2
+from scipy.special import chdtri
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Mask
@@ -595,6 +594,8 @@ def _explained_by_clearances(
     Nor one scale with one joint that was written in millimetres. What is not an entry error is
     reported only beyond chance.
     """
+    from scipy.optimize import lsq_linear
+
     near = np.ones(len(measured_in), bool)
     for _ in range(4):
         factors = lsq_linear(contribution_in[near], measured_in[near], (-1.0, 1.0)).x
@@ -610,11 +611,11 @@ def _explained_by_clearances(
     if no_sign_slip:
         return bool(
             len(measured) * np.log(constant / unexplained)
-            > chi2.isf(BY_CHANCE, contribution_in.shape[1])
+            > chdtri(contribution_in.shape[1], BY_CHANCE)
         )
     alone = min(np.mean(one**2, axis=0).min(), constant)
-    surely = len(measured) * np.log(alone / unexplained) > chi2.isf(
-        BY_CHANCE, contribution_in.shape[1]
+    surely = len(measured) * np.log(alone / unexplained) > chdtri(
+        contribution_in.shape[1], BY_CHANCE
     )
     return bool(unexplained < _CLEARLY_LESS * alone or (surely and alone > _NO_SCALE * constant))
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -51,8 +51,9 @@ _RATIOS = USUAL_RATIO * np.exp(RATIO_SPREAD * np.linspace(-3, 4, 24))
 # With fewer levels nothing can be told; with more the first tell enough.
 _LEAST_LEVELS = 4
 _MOST_LEVELS = 400
-# Ratios of the scatter between tails to the scatter of a row that are tried: nodes of a sum.
-TAIL_RATIOS = (0.0, *np.geomspace(0.15, 2.0, 8).tolist())
+# Ratios of the scatter between tails to the scatter of a row that are tried, nodes of a sum: none,
+# and from one spread above the usual ratio on.
+TAIL_RATIOS = (0, *(USUAL_RATIO * np.exp(RATIO_SPREAD * np.arange(1, 6))).tolist())
 # The first estimate of the scatter has all in it that effects of unknown size explain.
 _ROUNDS = 2
 # With fewer tails none of them can be left out.
@@ -275,7 +276,7 @@ def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, sprea
     likelihood = 0.5 * np.sum(pull / (1.0 + weight) - np.log1p(weight), axis=1)
     likelihood -= 0.5 * (np.log(_RATIOS / expected) / spread) ** 2
     chance = np.exp(likelihood - likelihood.max())
-    largest = float(norm.ppf(1.0 - 0.25 / count)) ** 2 / count
+    largest = float(ndtri(1.0 - 0.25 / count)) ** 2 / count
     return float(np.sqrt(chance @ _RATIOS**2 / chance.sum() / (1.0 - largest)))
 
 
@@ -306,7 +307,7 @@ def _tail_ratios(standard: Array, tails: Wholes, gear_ratio: float) -> tuple[flo
     square = (mean - level) ** 2
     kept = np.ones(len(count), bool)
     kept[np.argmax(square / (chance + np.median(square)))] = False
-    largest = float(norm.ppf(1.0 - 0.25 / len(count))) ** 2 / len(count)
+    largest = float(ndtri(1.0 - 0.25 / len(count))) ** 2 / len(count)
     between = float(np.mean(square[kept])) / (1.0 - largest)
     most = float(np.sqrt(max(between - float(np.mean(chance[kept])), 0.0)))
     return (*(ratio for ratio in TAIL_RATIOS if ratio < most), most) if most > 0.0 else (0.0,)

@@ -28,13 +28,9 @@ _SETTLED = 3
 _LEAST_LEVEL = 0.25
 # No joint is tighter, and no reading surer, than this for the purpose. [in]
 _TIGHT_IN = 1e-5
-# Scatter of wear about its line at the start, as a share of the level. [1]
-_SCATTER = 0.15
 # Rows of gears with three readings or more that are needed to distinguish errors of reading from
 # scatter of wear.
 _LEAST_ROWS = 20
-# A reading is overruled by at most this many standard deviations of its error.
-_MOST_SIGMAS = 2.0
 # Single gears wear further off the fleet than a normal distribution has it: of ten fleets with 30
 # or 50 % of the clearances blank (seeds 2,001,555 and on) three had a worn gear named as re-rigged
 # at 1, none at this. [1]
@@ -51,18 +47,18 @@ UNREAD_IN = (_MODERATE_IN, 2 * _MODERATE_IN)
 # How far all joints of such a fleet, and of one of its gears, may be worn more or less together,
 # over that. Of 100 sound simulated fleets (seeds 20,000 and on) two alarmed, seven where wear was
 # half as much again. [1]
-FLEET_TOGETHER = 0.5
-GEARS_TOGETHER = 0.25
+FLEET_TOGETHER = GEARS_APART
+GEARS_TOGETHER = FLEET_TOGETHER / 2
 # Where landings fall in a larger share of visits they do not follow the dates: half of them would
 # fall by chance. [1]
-_MOST_FALLS = 1.0 / 3.0
+_MOST_FALLS = 1 / 3
 # How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the
 # others: the share of its variance that is the gear's. [1]
 OWN_GEAR = GEARS_APART**2 / (JOINTS_APART**2 + GEARS_APART**2 + ROWS_APART**2)
 # Standard deviations, supposed: how much further that may follow one read joint, and of exponents
 # of wear. [1]
 FOLLOWS = 0.2
-BENT = 0.1
+BENT = FOLLOWS / 2
 
 
 @dataclass(frozen=True)
@@ -133,7 +129,7 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     read = np.where(known, readings, history.expected_in)
     drawn = history.expected_in + trust * (read - history.expected_in)
     # A reading is never overruled by more than its own uncertainty makes likely.
-    reach = _MOST_SIGMAS * np.sqrt(noise)
+    reach = FAR * np.sqrt(noise)
     likely = np.where(known, np.clip(drawn, read - reach, read + reach), drawn)
     spread = np.where(known, 0.0, np.sqrt(history.scatter_in2))
     shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))
@@ -318,7 +314,7 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     least = np.maximum(_LEAST_LEVEL * mean, _TIGHT_IN)
     least_spread = 1e-6 * spread
     level = np.maximum(fleet[0] + fleet[1] * x, least)
-    scatter = np.full(y.shape[1], _SCATTER**2)
+    scatter = np.full(y.shape[1], ROWS_APART**2)
     share = np.ones(y.shape[1])
     far = np.ones(y.shape)
     seen = (read > 0.0) / (read > 0.0).sum(axis=0)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.misfit.beliefs import Beliefs
@@ -32,7 +31,7 @@ _ROUNDED = 0.01
 _MOST = 12
 _ROUNDS = 8
 # Computing only: where a nominal value may be far off, in trials, and how many of these are tried.
-_FAR_TRIALS = (-30.0, -10.0, -3.0, 3.0, 10.0, 30.0)
+_FAR_TRIALS = tuple(way * size for size in _SIZES[2:5] for way in (-1, 1))
 _STARTS = 3
 # Correlation of rows that follow each other at most, and how near the likeliest one is sought.
 _CORRELATED = 0.99
@@ -369,6 +368,8 @@ class Study:
         def unlikely(correlation: float) -> float:
             evidence = judged(correlation).follows.posterior.log_evidence
             return -evidence - float(np.log1p(-(correlation**2)))
+
+        from scipy.optimize import minimize_scalar
 
         limits = (0.0, _CORRELATED)
         likeliest = minimize_scalar(

@@ -21,7 +21,7 @@ _LEADING = 6
 # Log-likelihood behind the likeliest set from which one is not extended; half of it is that from
 # which the own effects of a context are not asked for. Of what lies twice as far behind the sets
 # are not kept.
-REACH = 9.2
+REACH = float(np.log(10_000))
 OWN = REACH / 2
 _TRACE = float(np.exp(-2 * REACH))
 

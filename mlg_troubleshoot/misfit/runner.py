@@ -24,7 +24,7 @@ _STEP = 0.1
 _EVEN = 1e-3
 _ITERATIONS = 30
 # Marquardt's damping: none first, then more until the sum of squares falls.
-_DAMPING = (0.0, 0.03, 0.3, 3.0, 30.0)
+_DAMPING = (0, *(3 * np.logspace(-2, 1, 4)).tolist())
 # What a simulation raises where it has no answer for some values. All else is a fault in its code,
 # or in how it is called, and is passed on.
 FAILURES = (ArithmeticError, ValueError, RuntimeError)

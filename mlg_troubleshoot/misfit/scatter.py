@@ -17,10 +17,9 @@ from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 from mlg_troubleshoot.misfit.design import basis_of
 from mlg_troubleshoot.misfit.runner import least_squares
 
-# Scatter between groups over that of a reading: median and spread of its logarithm beforehand, and
-# what is tried.
+# Scatter between groups over that of a reading: its median beforehand, about which its logarithm
+# has a standard deviation of one, and what is tried.
 _GROUP_RATIO = 0.15
-_GROUP_SPREAD = 1.0
 _GROUP_RATIOS = tuple((_GROUP_RATIO * 3.0 ** np.arange(-1, 5)).tolist())
 # Share of the variance of a reading that grows with the square of the prediction: what is tried.
 _GROWING = (0.5, 0.9, 0.99)
@@ -68,7 +67,7 @@ class Readings:
                 tails[index] = self.group[self.row[index]] * len(self.outputs) + place
         relative = scale / unit
         grouped = self.group is not None
-        away = np.log(np.array(_GROUP_RATIOS) / _GROUP_RATIO) / _GROUP_SPREAD
+        away = np.log(np.array(_GROUP_RATIOS) / _GROUP_RATIO)
         chances = np.exp(-0.5 * away**2) / np.sum(np.exp(-0.5 * away**2))
         basis = basis_of(free / scale[:, None])
         noise = NoiseModel(

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
-from scipy.stats import t as student
+from scipy.special import chdtrc, stdtrit
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.covariance import FAR
 from mlg_troubleshoot.misfit.held_out import blocks_of, folds_of
 from mlg_troubleshoot.misfit.linearised import FittedPoint, JudgedPoint, Study, key_of
 from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
@@ -28,12 +28,8 @@ from mlg_troubleshoot.misfit.simulation_result import (
 )
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
-# Share of the squared misfit that a cause takes away beside a discrepancy: most of it.
-_MOST_OF_IT = 0.5
 # Difference of two equal calls, over the smallest effect, from which derivatives are off.
 _DRAWN = 0.01
-# Standard errors by which a row resembles the one before it, that chance exceeds once in 1,000.
-_ALIKE = 3.1
 
 
 def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong, how rows belong together
@@ -201,7 +197,7 @@ def _causes(study: Study, at: JudgedPoint) -> list[int]:
     while at.follows.verdict is Verdict.UNLISTED:
         shares = {k: _share(at, causes, k) for k in first if k not in causes}
         most = max(shares, key=shares.__getitem__, default=-1)
-        if shares.get(most, 0.0) <= _MOST_OF_IT:
+        if 2.0 * shares.get(most, 0.0) <= 1.0:
             break
         causes.append(most)
     for k in causes[::-1]:
@@ -222,7 +218,7 @@ def _reach(study: Study, at: JudgedPoint, k: int, others: Sequence[int]) -> floa
     """
     context = at.follows.reported([key_of(study.runner.names[k])]).context
     degrees = max(at.noise.worth - at.noise.absorbed - len(others) - 1, 1.0)
-    return float(student.ppf(0.975, degrees) * at.linear([k, *others], context).errors[0])
+    return float(stdtrit(degrees, 0.975) * at.linear([k, *others], context).errors[0])
 
 
 def _share(at: JudgedPoint, others: Sequence[int], k: int) -> float:
@@ -424,7 +420,7 @@ class _Report:
         for index in self.study.outputs:
             along += float(own[index][1:] @ own[index][:-1])
             square += float(own[index] @ own[index])
-        return bool(along > _ALIKE * square / np.sqrt(len(own)))
+        return bool(along > FAR * square / np.sqrt(len(own)))
 
     def remainder_p(self) -> float:
         """p-value of the smooth shape that stands out most in the residual, as one of all of them
@@ -445,5 +441,5 @@ class _Report:
             mean = float(np.trace(spread))
             square = float(np.sum(spread**2))
             size = float(np.sum((shape.T @ weighed) ** 2)) / variance
-            chances.append(len(patterns) * float(chi2.sf(size * mean / square, mean**2 / square)))
+            chances.append(len(patterns) * float(chdtrc(mean**2 / square, size * mean / square)))
         return min(chances)

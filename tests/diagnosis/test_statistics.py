@@ -100,7 +100,7 @@ def test_the_share_removed_has_an_interval_of_95_percent_over_tails() -> None:
     assert (low, high) == pytest.approx(norm.interval(0.95, 1.0 - share, error), abs=0.3 * error)
 
 
-@pytest.mark.parametrize(("spread_deg", "k"), [(25.0, 0), (45.0, 1), (70.0, 2), (None, 3)])
+@pytest.mark.parametrize(("spread_deg", "k"), [(25.0, 0), (45.0, 1), (90.0, 2), (None, 3)])
 def test_resting_places_of_pins_have_the_moments_of_their_angles(
     gear: Gear, spread_deg: float | None, k: int
 ) -> None:
@@ -113,8 +113,8 @@ def test_resting_places_of_pins_have_the_moments_of_their_angles(
     )
     change = np.cos(angles) - 1.0
     found = LoadDirections().covariances(gear.model, ())[k]
-    assert found[0, 0] == pytest.approx(np.mean(change**2), abs=0.005)
-    assert found[0, 1] == pytest.approx(np.mean(change) ** 2, abs=0.005)
+    assert found[0, 0] == pytest.approx(np.mean(change**2), abs=0.007)
+    assert found[0, 1] == pytest.approx(np.mean(change) ** 2, abs=0.007)
 
 
 @pytest.mark.parametrize(

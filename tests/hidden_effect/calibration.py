@@ -49,14 +49,13 @@ OF_DEPARTURES = {
     "one group": 18,
 }
 # Other fleets than those that are drawn: how much oftener each occurs, by what is wrong in it.
+_LISTED = {*simulator.CATALOGUE, "load_directions", "convention_slip", "geometry"}
 _EVERY_SECOND = tuple(simulator.CATALOGUE)[::2]
 MIXTURES: dict[str, Callable[[list[str]], float]] = {
     "as drawn": lambda _wrong: 1.0,
     "nothing wrong three times as often": lambda wrong: 1.0 if wrong else 3.0,
     "nothing wrong a third as often": lambda wrong: 1.0 if wrong else 1.0 / 3.0,
-    "unlisted three times as often": lambda wrong: (
-        3.0 if set(wrong) - {*simulator.CATALOGUE, "load_directions", "convention_slip"} else 1.0
-    ),
+    "unlisted three times as often": lambda wrong: 3.0 if set(wrong) - _LISTED else 1.0,
     "every second cause three times as often, the others a third": lambda wrong: float(
         np.prod(
             [3.0 if c in _EVERY_SECOND else 1.0 / 3.0 for c in wrong if c in simulator.CATALOGUE]
@@ -83,6 +82,12 @@ def run(task: Any) -> dict[str, Any]:
     return study.run(task) if isinstance(task, dict) else departures.run(task)
 
 
+def _wrong(record: dict[str, Any]) -> list[tuple[str, str | None]]:
+    """All that is wrong in a fleet, its linkage included."""
+    other = [("geometry", None)] if record.get("linkage", "A") != "A" else []
+    return [*map(tuple, record["truth"]), *other]
+
+
 def bins(
     records: list[dict[str, Any]], oftener: Callable[[list[str]], float] = MIXTURES["as drawn"]
 ) -> list[tuple[float, float, int, float, float]]:
@@ -90,20 +95,18 @@ def bins(
     their mean, and the share of them that acts, as if fleets with something wrong were so much
     oftener.
 
-    Fleets of another linkage are left out, and that as a cause: whether it shows in their rows is
-    not known.
+    Another linkage is a cause like any other. Without its fleets the others would be right too
+    often: what is stated of it, beside them, would count against them, and where it acts would not.
     """
     said = np.array(
         [
             (
                 float(p),
-                any(study._same((cause, target), tuple(t)) for t in r["truth"]),
-                oftener([str(name) for name, _target in r["truth"]]),
+                any(study._same((cause, target), t) for t in _wrong(r)),
+                oftener([str(name) for name, _target in _wrong(r)]),
             )
             for r in records
-            if r.get("linkage", "A") == "A"
             for cause, target, p in r.get("probabilities", ())
-            if cause != "geometry"
         ]
     ).reshape(-1, 3)
     found = []

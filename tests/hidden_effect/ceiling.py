@@ -4,10 +4,12 @@ nearest rival's.
     python -m tests.hidden_effect.ceiling --write
 
 Two effects that look alike are told apart, at best, by the likelihood ratio of the true effect and
-the rival that fits it best. In independent normal noise, and with everything else known, that ratio
-has mean g and variance 2 g, with g half the squared distance of the two in units of the noise; so
-the best test is right with the probability Φ(√(g / 2)). Scatter between tails, other rivals,
-unknown sizes and unknown noise only make it harder.
+the rival that fits it best. In normal noise, with its size, the scatter between tails and
+everything else known, the logarithm of that ratio has mean g and variance 2 g, with g half the
+squared distance of the two in units of the noise. So the best test prefers the true effect with
+the probability Φ(√(g / 2)), and is as sure of it as a name needs, both being equally likely
+beforehand, with Φ((g − odds) / √(2 g)). Other rivals, unknown sizes and unknown noise only make it
+harder.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import json
 from collections import defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,18 +27,25 @@ import numpy as np
 from scipy.stats import norm
 
 from mlg_troubleshoot import load_gear
+from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.diagnosis import diagnose
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
-from tests.hidden_effect import simulator
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+from tests.hidden_effect import simulator, study
 from tests.hidden_effect.as_table import as_table
 from tests.hidden_effect.study import PLAN, Task, tasks
 
+# Share of what goes wrong that a cause has which is known not to act.
+NEVER = 1e-6
 RESULT = Path(__file__).with_name("ceiling_result.json")
 GROUPS = ("single:10", "single:15", "single:25")
 
 
-def chance(task: Task) -> tuple[str, str, float]:
-    """Group, cause, and chance that the best test prefers the true effect to its nearest rival."""
+def chance(task: Task) -> tuple[str, str, float, float]:
+    """Group, cause, and chances that the best test prefers the true effect to its nearest rival,
+    and that it is sure of it.
+    """
     fleet = simulator.draw_fleet(task["seed"], faults=False, **task["arguments"])
     ((cause, target),) = fleet.label.causes
     table, gear = as_table(fleet.table), load_gear()
@@ -44,14 +54,63 @@ def chance(task: Task) -> tuple[str, str, float]:
     rivals = [
         c for kind in CATALOGUE for c in kind.candidates(scene) if not _same(c.key, (cause, target))
     ]
-    columns = effect_columns(scene, rivals)
-    truth = fleet.label.truth_term[usable]
+    own = whitened(fleet, usable, effect_columns(scene, rivals))
+    columns = own[:, 1:]
+    truth = own[:, 0]
     along = truth @ columns
     sign = np.array([c.cause.sign for c in rivals])
     allowed = (sign == 0) | (np.sign(along) == sign)
     explained = np.where(allowed, along**2 / np.maximum(np.sum(columns**2, axis=0), 1e-300), 0.0)
-    gap = 0.5 * float(truth @ truth - np.max(explained)) / fleet.label.noise_rms_in**2
-    return str(task["group"]), cause, float(norm.cdf(np.sqrt(max(gap, 0.0) / 2.0)))
+    gap = max(0.5 * float(truth @ truth - np.max(explained)), 1e-9)
+    first, sure = norm.cdf((gap - np.array([0.0, Beliefs().odds])) / np.sqrt(2.0 * gap))
+    return str(task["group"]), cause, float(first), float(sure)
+
+
+def whitened(fleet: simulator.Fleet, usable: Mask, columns: Array) -> Array:
+    """The true effect, then others, in units of the noise: readings of one tail share a scatter."""
+    both = np.column_stack([fleet.label.truth_term[usable], columns])
+    tails = np.unique(np.asarray(fleet.table["tail_no"])[usable], return_inverse=True)[1]
+    shared = (fleet.spec.tail_share * fleet.label.repeatability_in) ** 2
+    alone = fleet.label.noise_rms_in**2 - shared
+    own = (tails[:, None] == np.arange(tails.max() + 1)).astype(float)
+    count = own.sum(axis=0)
+    taken = (1.0 - 1.0 / np.sqrt(1.0 + count * shared / alone)) / count
+    return np.asarray((both - own @ (taken[:, None] * (own.T @ both))) / np.sqrt(alone))
+
+
+def known(task: Task) -> dict[str, bool]:
+    """Whether the true cause alone is named: as it is; if it is known beforehand that the study's
+    causes alone may act; and if clearances are read without error, the effect being as large as
+    before.
+    """
+    spec = simulator.draw_spec(task["seed"], **task["arguments"])
+    fleet = simulator.simulate_fleet(spec, task["seed"])
+    hidden = tuple(
+        simulator.EffectSpec(e.cause, e.target, None, dict(e.parameters))
+        for e in fleet.label.effects
+    )
+    exact = replace(spec, clearance_noise=0.0, blank_share=0.0, effects=hidden)
+    others = {cause.name: NEVER for cause in CATALOGUE if cause.name not in simulator.CATALOGUE}
+    only = Beliefs(rarer=others, unlisted=NEVER)
+    return {
+        "as it is": _named(fleet, Beliefs()),
+        "only the study's causes": _named(fleet, only),
+        "clearances without error": _named(
+            simulator.simulate_fleet(exact, task["seed"]), Beliefs()
+        ),
+    }
+
+
+def _named(fleet: simulator.Fleet, beliefs: Beliefs) -> bool:
+    gear = load_gear()
+    found = diagnose(
+        gear.model,
+        as_table(fleet.table),
+        gear.discrepancies,
+        ensemble=gear.ensemble_models[1:],
+        beliefs=beliefs,
+    )
+    return bool(study.compare(fleet, found)["right"])
 
 
 def _same(key: tuple[str, str | None], truth: tuple[str, str | None]) -> bool:
@@ -65,18 +124,31 @@ def ceiling(plan: Sequence[Task], workers: int) -> dict[str, Any]:
         found = list(pool.map(chance, plan, chunksize=8))
     groups: dict[str, list[float]] = defaultdict(list)
     causes: dict[str, list[float]] = defaultdict(list)
-    for group, cause, right in found:
-        groups[group].append(right)
-        groups["S >= 10"].append(right)
+    named: dict[str, list[float]] = defaultdict(list)
+    for group, cause, right, sure in found:
+        for name in (group, "S >= 10"):
+            groups[name].append(right)
+            named[name].append(sure)
         if group == "single:10":
             causes[cause].append(right)
     return {
         "fleets": len(found),
         "right": {name: float(np.mean(values)) for name, values in groups.items()},
+        "named": {name: float(np.mean(values)) for name, values in named.items()},
         "right_by_cause_s10": {
             name: float(np.mean(values)) for name, values in sorted(causes.items())
         },
     }
+
+
+def worth(fleets: int, first_seed: int, workers: int) -> dict[str, int]:
+    """How many of some fleets with one cause, five in nine of S = 10 and the others of 15, have it
+    named alone.
+    """
+    plan = {"single:10": round(fleets * 5 / 9), "single:15": fleets - round(fleets * 5 / 9)}
+    with ProcessPoolExecutor(workers) as pool:
+        found = list(pool.map(known, tasks(plan, first_seed), chunksize=4))
+    return {"fleets": len(found), **{name: sum(f[name] for f in found) for name in found[0]}}
 
 
 def sentence(result: dict[str, Any]) -> str:
@@ -87,7 +159,9 @@ def sentence(result: dict[str, Any]) -> str:
         "the best possible test between the true effect and its nearest rival alone would be right"
         f" in {100 * result['right']['single:10']:.1f} % at S = 10 ({listed}),"
         f" {100 * result['right']['single:15']:.1f} % at 15 and"
-        f" {100 * result['right']['single:25']:.1f} % at 25"
+        f" {100 * result['right']['single:25']:.1f} % at 25; it would be as sure as a name needs in"
+        f" {100 * result['named']['single:10']:.1f}, {100 * result['named']['single:15']:.1f} and"
+        f" {100 * result['named']['single:25']:.1f} %"
     )
 
 
@@ -95,8 +169,13 @@ def main() -> None:
     """Compute the ceiling on the study's fleets."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--known", type=int, help="of so many fleets only: what knowledge is worth")
+    parser.add_argument("--first-seed", type=int, default=study.FIRST_SEED)
     parser.add_argument("--write", action="store_true", help=f"write {RESULT.name}")
     arguments = parser.parse_args()
+    if arguments.known:
+        print(json.dumps(worth(arguments.known, arguments.first_seed, arguments.workers), indent=1))
+        return
     result = ceiling([task for task in tasks(PLAN) if task["group"] in GROUPS], arguments.workers)
     print(json.dumps(result, indent=1))
     print(sentence(result))

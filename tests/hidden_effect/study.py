@@ -103,7 +103,7 @@ def run(task: Task) -> Record:
         "group": task["group"],
         "seed": task["seed"],
         "seconds": seconds,
-        **_compare(fleet, found),
+        **compare(fleet, found),
     }
 
 
@@ -126,7 +126,7 @@ def _same(name: tuple[str, str | None], truth: tuple[str, str | None]) -> bool:
     )
 
 
-def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
+def compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
     label = fleet.label
     truth = [(cause, target) for cause, target in label.causes]
     listed = {name for name, _target in truth} <= set(simulator.CATALOGUE)

@@ -22,8 +22,10 @@ def test_fleets_with_nothing_wrong_count_three_times_where_they_are_so_much_ofte
     assert (0.8, 0.95, 2, pytest.approx(0.9), pytest.approx(0.25)) in found
 
 
-def test_fleets_of_another_linkage_say_nothing_of_how_far_probabilities_hold() -> None:
-    assert bins([{**WRONG, "linkage": "B"}]) == []
+def test_another_linkage_is_a_cause_that_acts_in_its_fleets() -> None:
+    said = {"truth": [], "probabilities": [("geometry", None, 0.9)]}
+    assert bins([{**said, "linkage": "B"}])[0][-1] == 1.0
+    assert bins([{**said, "linkage": "A"}])[0][-1] == 0.0
 
 
 def test_the_figures_show_the_tables_of_the_committed_result() -> None:

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.linalg import block_diag
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from mlg_troubleshoot.arrays import Array, log_sum
 from mlg_troubleshoot.diagnosis.along import predicted
@@ -26,9 +26,9 @@ from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.model import LinkageModel
 
 # Standard deviations of the angle between a pin's resting place and the worst direction that are
-# tried; the last one stands for evenly all around. Fleets with 40°, 90° and all around lie within a
-# factor 1.6 of one of them. [deg]
-SPREADS_DEG = (25.0, 45.0, 70.0, 180.0)
+# tried; the last one stands for evenly all around. Without the smallest three of 28 fleets of 20 to
+# 30° had a rate or a joint named, with it none (seeds 881,200,000 and on). [deg]
+SPREADS_DEG = (25, 45, 90, 180)
 # A linkage halfway to another member of the ensemble, which moves the plunger up to 1.8 times as
 # far. [1]
 _HALFWAY = 0.5
@@ -290,8 +290,7 @@ def _changes() -> list[Array]:
     half = (np.arange(_LIKELY) + 0.5) / _LIKELY
     spreads = np.radians(SPREADS_DEG)
     return [
-        np.cos(np.pi * half if s >= np.pi else s * norm.ppf(0.5 + 0.5 * half)) - 1.0
-        for s in spreads
+        np.cos(np.pi * half if s >= np.pi else s * ndtri(0.5 + 0.5 * half)) - 1.0 for s in spreads
     ]
 
 
