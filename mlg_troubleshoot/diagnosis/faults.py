@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import gammaln, logsumexp
 
-from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.arrays import Array, Mask, Places, log_sum
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.causes.base import Scene
 from mlg_troubleshoot.diagnosis.noise import robust_scale
@@ -420,7 +420,7 @@ def restored_joints(
             evidence, chance = _mixture(left, side * effect, share)
             likely.append(evidence + prior + (habit if share else 0.0))
             chances.append(chance if side > 0.0 else np.zeros(len(table)))
-    chance = np.exp(np.array(likely) - logsumexp(likely)) @ np.array(chances)
+    chance = np.exp(np.array(likely) - log_sum(np.array(likely))) @ np.array(chances)
     found = np.flatnonzero(chance >= beliefs.sure)
     clearance = written.copy()
     if len(found):
@@ -448,7 +448,7 @@ def _mixture(left: Array, effect: Array, share: float) -> tuple[float, Array]:
     prior = np.log([1.0 - share, share]) if share else np.array([0.0, -np.inf])
     for _ in range(_MIXTURE_ROUNDS):
         each = prior + _density(off - level, scatter)
-        total = logsumexp(each, axis=1)
+        total = log_sum(each.T)
         chance = np.exp(each - total[:, None])
         # Rows far out in the tails of Student's t count less.
         far = chance * (_FREEDOM + 1.0) / (_FREEDOM + ((off - level) / scatter) ** 2)

@@ -22,7 +22,7 @@ from mlg_troubleshoot.misfit.runner import least_squares
 _GROUP_RATIO = 0.15
 _GROUP_RATIOS = tuple((_GROUP_RATIO * 3.0 ** np.arange(-1, 5)).tolist())
 # Share of the variance of a reading that grows with the square of the prediction: what is tried.
-_GROWING = (0.5, 0.9, 0.99)
+_GROWING = tuple(1 - 1 / k for k in (2, 10, 100))
 # Standard deviation of nuisance parameters, over the scatter of a reading: whatever they are.
 _WIDE = 1e4
 # Rows that stand for all in a smooth shape; lengths in units of the median distance of the rows.

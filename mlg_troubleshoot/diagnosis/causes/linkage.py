@@ -20,8 +20,8 @@ from mlg_troubleshoot.gear.adjustment import Adjustment
 
 # Temperature at which lengths are as drawn (ISO 1), and usual pressure of aircraft hydraulics
 # (MIL-H-5440).
-REFERENCE_TEMPERATURE_C = 20.0
-REFERENCE_PRESSURE_PSI = 3000.0
+REFERENCE_TEMPERATURE_C = 20
+REFERENCE_PRESSURE_PSI = 3000
 # Exponents with which parts wear with landings: nodes of a Gauss-Hermite quadrature over the
 # normal logarithm of what is believed of joints that nobody read.
 _WEAR_EXPONENTS = tuple(np.exp(BENT * np.sqrt(3) * np.arange(-1, 2)).round(2).tolist())

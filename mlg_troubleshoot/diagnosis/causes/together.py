@@ -29,13 +29,10 @@ from mlg_troubleshoot.gear.model import LinkageModel
 # tried; the last one stands for evenly all around. Without the smallest three of 28 fleets of 20 to
 # 30° had a rate or a joint named, with it none (seeds 881,200,000 and on). [deg]
 SPREADS_DEG = (25, 45, 90, 180)
-# A linkage halfway to another member of the ensemble, which moves the plunger up to 1.8 times as
-# far. [1]
-_HALFWAY = 0.5
 # Spread of the true linkage about the drawn one over that of the ensemble, and of what it changes
-# in all joints alike: another member, one half as far, and one that nobody has calibrated on the
-# published failure, as the ensemble is. [1]
-LINKAGES = ((1, 0), (_HALFWAY, 0), (1, _HALFWAY))
+# in all joints alike: another member, one half as far (members move the plunger up to 1.8 times as
+# far), and one that nobody has calibrated on the published failure, as the ensemble is. [1]
+LINKAGES = ((1, 0), (1 / 2, 0), (1, 1 / 2))
 # Difference of a true linkage in addition to the ensemble's spread, each joint alone: an eighth of
 # the largest. [1]
 ALONE = 0.03
