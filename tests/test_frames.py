@@ -302,6 +302,15 @@ def test_a_small_check_shows_its_report() -> None:
     assert "Batch summary" in page
 
 
+def test_a_check_of_more_gears_than_a_report_is_read_for_shows_its_table() -> None:
+    many = pd.concat([sheet(11)] * 201, ignore_index=True)
+    assert "<iframe" not in mlg.check(many)._repr_html_()
+
+
+def test_a_result_without_a_report_shows_its_table() -> None:
+    assert "<table" in result("indices")._repr_html_()
+
+
 PICTURES = [
     ("check", "linkage", {"row": 3}),
     ("check", "stroke", {}),

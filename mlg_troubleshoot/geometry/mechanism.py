@@ -168,8 +168,7 @@ class Mechanism:
     planes: planes, parents first. steps: steps in the order of the mechanism, from the input to the
     output. reference_input: input at which the points are given. [in or rad] virtual_links: numbers
     of all virtual links, in order. Raises `MechanismError` if a plane, point, step or the output
-    refers to what is not there, a point is located
-      never or twice, or a virtual link is used twice.
+    refers to what is not there, a point is located never or twice, or a virtual link is used twice.
     """
 
     planes: tuple[Plane, ...]

@@ -112,6 +112,20 @@ def test_from_python_a_linkage_becomes_a_gear_with_its_table(tmp_path: Path) -> 
     assert len(read_index_table(gear).joints) == 4
 
 
+def test_a_linkage_of_pylinkage_moves_ten_degrees_up_to_its_position_unless_told(
+    tmp_path: Path,
+) -> None:
+    pylinkage = pytest.importorskip("pylinkage.mechanism")
+    linkage = pylinkage.fourbar(1.0, 3.0, 3.0, 4.0, initial_angle=0.5)
+    written = []
+    for n, travel in enumerate([{}, {"travel_deg": (-10.0, 0.0)}, {"travel_deg": (-9.0, 0.0)}]):
+        file = tmp_path / str(n) / "theirs.toml"
+        file.parent.mkdir()
+        from_pylinkage(linkage, file, limit=0.001, margin=0.01, **travel)
+        written.append(file.read_text())
+    assert written[0] == written[1] != written[2]
+
+
 def test_without_a_terminal_a_new_gear_needs_a_short_form(tmp_path: Path) -> None:
     found = mlg("gear", "new", tmp_path / "mine.toml")
     assert found.code == 2

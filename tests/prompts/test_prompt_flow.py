@@ -492,6 +492,14 @@ def test_no_advice_is_asked_for_when_no_joint_is_left(gear: Gear) -> None:
     assert "Stop." not in said(play(flow, [*minor, *[".004"] * 5]))
 
 
+@pytest.mark.parametrize(("width", "told"), [(80, True), (60, False)])
+def test_what_was_typed_stands_where_the_screen_has_room_for_it(
+    flow: Flow, width: int, told: bool
+) -> None:
+    page = text_of(flow.page(play(flow, [*TEN, *ENTERS]).state, width).lines)
+    assert ("typed" in page, "short link outer bearing" in page) == (told, True)
+
+
 # The optional answers.
 
 
