@@ -175,9 +175,9 @@ def _read(
     return DataFile(path, raw, decode(path, raw, kind))
 
 
-def walk(values: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
+def walk(values: Any) -> Iterator[tuple[Place, Any]]:
     """Walk over all values, those at the top first; nothing deeper than allowed."""
-    level = [(place, values)]
+    level: list[tuple[Place, Any]] = [((), values)]
     while level:
         yield from level
         level = [

@@ -5,7 +5,6 @@ Its modules are its doors: who keeps an inspection needs no forecast, which is s
 
 __all__ = [
     "chronology",
-    "fleet",
     "folding",
     "forecast",
     "landings_left",

@@ -1,4 +1,6 @@
-"""What the records say about the past: how often the advice was right, inspections in a row."""
+"""What the records say about the past: inspections in a row, how often the advice was right, and
+how worn gears usually are.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +8,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
+from mlg_troubleshoot.decision.fleet import Fleet
+from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife, life_of
-from mlg_troubleshoot.store import RecordKind, Store
+from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_from
 
 # Inspections that stand side by side on a page.
 _SIDE_BY_SIDE = 4
+# Newest inspections that a fleet is judged by, which give a share to a few percent; fewest gears.
+_MOST = 500
+_FEWEST = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,3 +132,18 @@ def seen_before(judgements: Sequence[Judgement], store: Store) -> list[list[Past
         return side_by_side(life_of(store, *key), judgement) if key in known else []
 
     return [of(judgement) for judgement in judgements]
+
+
+def expected_of(store: Store, gear: Gear) -> Fleet | None:
+    """Learn from the last inspection of each gear among the newest that are kept; None with too
+    few that fit this linkage.
+    """
+    from mlg_troubleshoot.decision.learning import learned
+
+    joints = set(gear.joint_numbers)
+    last: dict[tuple[str, str], Record] = {}
+    for record in store.newest(RecordKind.INSPECTION, _MOST):
+        last.setdefault((record.tail_no, record.side), record)
+    found = [inspection_from(record) for record in last.values()]
+    rows = [row for row in found if row.clearance_in and set(row.clearance_in) <= joints]
+    return learned(gear, rows) if len(rows) >= _FEWEST else None

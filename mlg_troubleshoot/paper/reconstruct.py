@@ -202,9 +202,9 @@ class _Search:
                 break
         return vector
 
-    def _slopes(self, vector: Array, value: Array, step: float = STEP) -> Array:
+    def _slopes(self, vector: Array, value: Array) -> Array:
         columns = [
-            (self.residuals(vector + moved) - value) / step for moved in step * np.eye(len(vector))
+            (self.residuals(vector + moved) - value) / STEP for moved in STEP * np.eye(len(vector))
         ]
         return np.clip(np.array(columns).T, -1e6, 1e6)
 

@@ -398,7 +398,7 @@ def _judge(
     del counting
     fleet = None
     if store is not None:
-        from mlg_troubleshoot.life.fleet import expected_of
+        from mlg_troubleshoot.life.looking_back import expected_of
 
         fleet = expected_of(store, found.gear)
     if fleet is not None:

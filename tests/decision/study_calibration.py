@@ -18,7 +18,7 @@ import numpy as np
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.likely_worn import explain
-from mlg_troubleshoot.life.fleet import expected_of
+from mlg_troubleshoot.life.looking_back import expected_of
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from tests.benchmarks.worn_gears import LIMIT_IN, displacement, worst
 from tests.decision.technician import (

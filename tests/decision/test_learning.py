@@ -14,7 +14,7 @@ from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.learning import learned
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.fleet import expected_of
+from mlg_troubleshoot.life.looking_back import expected_of
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from mlg_troubleshoot.workflows.keep import keep
