@@ -140,6 +140,12 @@ class ClearanceConvention(StrEnum):
             ) from None
 
 
+def with_unit(text: str, unit: LengthUnit) -> str:
+    """Write a length as it was entered, with its unit where the text does not state one."""
+    end = text.rstrip(".")[-1:]
+    return text if end.isalpha() or end in "\"″”'" else f"{text} {unit}"
+
+
 @dataclass(frozen=True, slots=True)
 class WrittenLength:
     """A length as it was written: the number, its unit if one was written, and the text itself."""

@@ -14,7 +14,7 @@ from typing import Any
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.results import Result
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, with_unit
 
 
 class Side(StrEnum):
@@ -96,6 +96,10 @@ class EnteredClearance:
     text: str
     unit: LengthUnit
     bound: str = ""
+
+    def __str__(self) -> str:
+        """The reading with its unit, stated once: ``.013 in``, ``13thou``, ``<0.002 in``."""
+        return self.bound + with_unit(self.text, self.unit)
 
 
 @dataclass(frozen=True, slots=True)

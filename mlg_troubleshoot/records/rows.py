@@ -599,10 +599,9 @@ class RowReader:
     ) -> str:
         slip = scale_slip(radial_in, text.unit, scale, self._options.clearance_confirm_above_in)
         return Sentence.of(
-            "joint {}: {} {} is {} radial, above {}: check the reading.{}",
+            "joint {}: {} is {} radial, above {}: check the reading.{}",
             joint,
-            text.text,
-            text.unit,
+            str(text),
             Length.brief(radial_in),
             Length.brief(self._options.clearance_confirm_above_in),
             f" {slip}" if slip else "",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
 from mlg_troubleshoot.decision.columns import SIGN_OFF
-from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.inspection import Outcome, RowSource, Side
 from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear, listed
 from mlg_troubleshoot.decision.sentences import (
@@ -163,7 +163,7 @@ def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]
         {
             "f": f,
             "location": gear.joint(f.joint).location,
-            "entered": _as_entered(a.inspection.entered.get(f.joint)),
+            "entered": a.inspection.entered.get(f.joint),
             "state": joint_state(f),
             "mark": joint_mark(str(f.joint), joint_state(f)),
             "bar": drawn.contribution_bar(f, longest, gauge_u(f.joint), lengths),
@@ -186,13 +186,6 @@ def _allowance(finding: JointFinding) -> float | None:
     if finding.allowance_in is None or finding.clearance_in is None:
         return None
     return max(0.0, min(finding.allowance_in, finding.limit_in - finding.clearance_in))
-
-
-def _as_entered(entered: EnteredClearance | None) -> str | None:
-    """The entered text, with its unit if the text does not say it."""
-    if entered is None or any(c.isalpha() or c in '"″”' for c in entered.text):
-        return None if entered is None else entered.text
-    return f"{entered.text} {entered.unit}"
 
 
 def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:

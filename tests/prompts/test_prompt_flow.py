@@ -65,7 +65,7 @@ def test_no_question_of_the_heading_has_a_default(flow: Flow, place: int) -> Non
     before = play(flow, ["N1", "l", "i", "r"][:place], Answers())
     after = answer(flow, before.state, "")
     assert after.state == before.state
-    assert "Enter alone enters nothing" in said(after)
+    assert "Enter alone is not an answer" in said(after)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_enter_alone_enters_nothing_and_offers_s(flow: Flow) -> None:
     assert turn.state.answers.joints == {}
     assert (
         said(turn).strip()
-        == "Enter alone enters nothing. Type the clearance, or s if it was not measured."
+        == "Enter alone is not an answer. Type the clearance, or s if it was not measured."
     )
 
 
@@ -449,7 +449,7 @@ def test_order_date_landings_technician_and_gauge_are_asked_once_and_reach_the_i
 def test_a_date_that_is_none_is_asked_again(flow: Flow) -> None:
     turn = play(flow, [*TEN, "", "", "some day"])
     assert (turn.state.ask, turn.state.at) == (Ask.DETAIL, "inspection_date")
-    assert "is not taken" in said(turn)
+    assert "is not accepted" in said(turn)
 
 
 def test_a_line_of_the_sign_off_page_is_changed_from_the_review(flow: Flow) -> None:

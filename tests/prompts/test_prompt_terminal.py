@@ -132,7 +132,7 @@ def test_back_skip_and_a_wrong_value_work_as_typed(start: Start) -> None:
     child.expect_exact("RESULT N123AB LH {1: 0.005, 3: 0.0205}")
     text = " ".join(without_colour(seen).split())
     assert "enter 0.013" in text
-    assert "Enter alone enters nothing" in text
+    assert "Enter alone is not an answer" in text
     assert "0.33 mm would be 0.01299 in" in text
     assert "yes, it is really 0.0205 in = 0.521 mm radial" in text
 

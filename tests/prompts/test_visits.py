@@ -299,7 +299,7 @@ def test_a_visit_that_changes_nothing_appends_nothing(visit: Visit, store: Sessi
 @pytest.mark.parametrize("typed", ["8,5", "abc"])
 def test_what_is_said_of_a_reading_at_a_prompt_is_not_about_files(visit: Visit, typed: str) -> None:
     screen = visit(*GEAR, "t", "t", typed, *PLAY, *ENTERS, "").screen
-    assert "is not taken" in screen
+    assert "is not accepted" in screen
     assert "--decimal-comma" not in screen
     assert "leave it blank" not in screen
 

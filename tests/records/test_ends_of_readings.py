@@ -43,6 +43,15 @@ def test_it_is_said_that_an_end_is_counted(gear: Gear) -> None:
     )
 
 
+def test_a_reading_is_written_with_its_end_and_its_unit_once(gear: Gear) -> None:
+    written = [str(inspection(gear, cell).entered[3]) for cell in ("<0.002", "<0.002in", ".013")]
+    assert written == ["<0.002 in", "<0.002in", ".013 in"]
+
+
+def test_a_warning_states_the_unit_of_a_reading_once(gear: Gear) -> None:
+    assert any("joint 3: 0.016in is 0.016 in" in w for w in inspection(gear, "0.016in").warnings)
+
+
 @pytest.mark.parametrize("cell", [">0.012", "> .012 in", "≥0.012", "go 0.012"])
 def test_a_reading_above_the_limit_is_over_it(gear: Gear, cell: str) -> None:
     assert gear.joints[2].is_over_limit(inspection(gear, cell).clearance_in[3])

@@ -248,7 +248,7 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
     read, problems = judge_length(column, typed, options)
     if problems or not isinstance(read, Inspection):
         raise UsageError(
-            f"{typed!r} is not taken: expected {problems[0].expected}",
+            f"{typed!r} is not accepted: expected {problems[0].expected}",
             at_prompt(problems[0].remedy),
         )
     return read

@@ -651,7 +651,7 @@ def _not_taken(typed: str, remedy: str) -> str:
     return (
         f"{typed!r} is not an answer here. {remedy}"
         if typed
-        else f"Enter alone enters nothing. {remedy}"
+        else f"Enter alone is not an answer. {remedy}"
     )
 
 

@@ -14,7 +14,7 @@ from mlg_troubleshoot.cli.prompts.visit import Visit
 from mlg_troubleshoot.decision.columns import BY_NAME, DATE, MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, said_in
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, said_in, with_unit
 
 CONVENTION_NAMES = {
     convention: convention.lower().replace("_", " ") for convention in ClearanceConvention
@@ -39,7 +39,7 @@ JOINT_KEYS = keys(
 )
 FACTOR_TWO = warning(
     "DIAMETRAL and TOTAL PLAY are twice RADIAL. ",
-    "The wrong one is off by a factor of 2 and can reverse the verdict.",
+    "The wrong choice is a factor of 2 and can reverse the verdict.",
 )
 
 
@@ -161,7 +161,7 @@ STEP_LETTERS = {
 }
 _STEP_ASKS = {
     PLUNGER_DISPLACEMENT.name: "Plunger off mid-position, + over-travel, {unit}",
-    "rigging_checked": "Rigging and roller: yes = looked at, or corrected",
+    "rigging_checked": "Rigging and roller: yes = checked, or corrected",
     "restored_joints": "Restored joints",
     "outcome": "The gear: r = retracted, f = failed",
 }
@@ -182,7 +182,11 @@ def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
     for number in gear.joint_numbers:
         reading = answers.reading(number)
         day = visit.read_on.get(number) or "no date"
-        what = "not measured" if reading is None else f"{_as_typed(reading)}, {day}"
+        what = (
+            "not measured"
+            if reading is None
+            else f"{with_unit(reading.written.text, reading.unit)}, {day}"
+        )
         rows.append(f"#{number} {what}")
     kind = "" if answers.convention is None else f" ({CONVENTION_NAMES[answers.convention]})"
     more = [f"{BY_NAME[name].plain} {text}" for name, text in answers.more.items()]
@@ -254,7 +258,11 @@ def joint_page(
     kind = "" if answers.convention is None else f" {CONVENTION_NAMES[answers.convention]}"
     reading = answers.reading(number)
     enter = _keeps(
-        _as_typed(reading) if reading else "not measured" if number in answers.joints else None
+        with_unit(reading.written.text, reading.unit)
+        if reading
+        else "not measured"
+        if number in answers.joints
+        else None
     )
     if not enter and suggested not in (None, number):
         enter = f" (Enter goes to #{suggested})"
@@ -282,7 +290,7 @@ def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | N
 
 
 def refusal_lines(typed: str, number: int, said: str) -> tuple[Line, ...]:
-    return (line((f"✗ #{number}  {typed} is not taken: ", Tone.BAD), said),)
+    return (line((f"✗ #{number}  {typed} is not accepted: ", Tone.BAD), said),)
 
 
 def echo_lines(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
@@ -334,12 +342,12 @@ def joint_help(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
             f"  {example}   0.013 in   13 thou   0.33 mm   0 (measured, no play)",
         ),
         keys(
-            ("Enter", "keeps what is there"),
+            ("Enter", "keep the value shown"),
             ("s", "not measured"),
             ("b", "back"),
             ("#7", "go to joint 7"),
         ),
-        keys(("done", "stop measuring"), ("q", "save and stop")),
+        keys(("done", "no more joints"), ("q", "save and stop")),
     ]
     return tuple(shown)
 
@@ -362,7 +370,7 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
 
     shown = (
         BLANK,
-        rule(f"{identity(answers)} · if you know it · numbers in {unit.words}", width),
+        rule(f"{identity(answers)} · optional · numbers in {unit.words}", width),
         row("f", "", "the gear FAILED to retract", outcome if outcome == "FAILED" else None),
         row("r", "", "the gear RETRACTED", outcome if outcome == "RETRACTED" else None),
         row(
@@ -380,8 +388,8 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
         *(
             row(key, example, meaning, answers.more.get(DAY[key]))
             for key, example, meaning in (
-                ("n", "3 5", "I have restored these joints since"),
-                ("g", "yes", "rigging and roller looked at (or: g corrected)"),
+                ("n", "3 5", "these joints were restored since"),
+                ("g", "yes", "rigging and roller checked (or: g corrected)"),
                 ("a", "3", "measured again with another gauge"),
                 ("c", "4", "these joints cannot be reached today"),
                 ("w", "3", "without a spare part for these joints"),
@@ -430,7 +438,7 @@ DETAIL_HELP = (
     note(
         "Printed on the sign-off page of the report. Enter leaves it empty; x removes it.",
     ),
-    note("A date as today, 2026-03-04 or 4-Mar-2026. done leaves the other lines empty."),
+    note("A date such as today, 2026-03-04 or 4-Mar-2026. done leaves the other lines empty."),
 )
 
 
@@ -444,16 +452,16 @@ def detail_page(answers: Answers, column: str, today: date | None) -> Page:
 
 MORE_HELP = (
     note(
-        "f or r: what the gear did. If clearances do not explain a failure, the result says so.",
+        "f or r: the outcome. If clearances do not explain a failure, the result says so.",
     ),
     note(
         "p: plunger position minus mid-position with the Down Lock released; − is under-travel.",
     ),
     note("m: the displacement that this gear allows, as found at rigging."),
     note(
-        "n: they are as after the repair. What you type after n is later: p, f and r count again.",
+        "n: enter the clearances as after the repair. p, f and r typed after n count as after it.",
     ),
-    note("All on one line is fine: f p .041 m .028 n 3 5. w none: that is over; x removes all."),
+    note("All on one line is fine: f p .041 m .028 n 3 5. w none: no longer so; x removes all."),
 )
 
 
@@ -517,7 +525,7 @@ def _review_row(
             indent=0,
             rigid=True,
         )
-    values = f"{_as_typed(reading)[:10]:>11}"[:as_typed]
+    values = f"{with_unit(reading.written.text, reading.unit)[:10]:>11}"[:as_typed]
     for each in (reading.as_read_in, reading.radial_in)[: 1 + twice]:
         values += "".join(f"{unit.shown(each):>9}" for unit in _units_shown(answers.unit))
     flag = (
@@ -548,11 +556,6 @@ def _units_shown(unit: LengthUnit | None) -> tuple[LengthUnit, ...]:
         if unit in (None, LengthUnit.INCH)
         else (unit or LengthUnit.INCH,)
     )
-
-
-def _as_typed(reading: Reading) -> str:
-    text = reading.written.text
-    return text if text[-1:].isalpha() or text[-1:] in "\"″”'" else f"{text} {reading.unit.value}"
 
 
 def _keeps(value: str | None) -> str:

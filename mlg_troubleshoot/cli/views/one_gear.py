@@ -17,7 +17,6 @@ from mlg_troubleshoot.cli.views.tables import (
     what_follows,
 )
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
-from mlg_troubleshoot.decision.inspection import EnteredClearance
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
@@ -143,13 +142,9 @@ def _short_table(a: Assessment, screen: DataConsole) -> Table:
         cells = [str(place), *_joint_cells(f, screen)[1:5]]
         if typed:
             entered = row.entered.get(f.joint)
-            cells.insert(2, "-" if entered is None else _as_typed(entered))
+            cells.insert(2, "-" if entered is None else str(entered))
         table.add_row(*cells, style="bold" if f.over_limit else "")
     return table
-
-
-def _as_typed(entered: EnteredClearance) -> str:
-    return entered.text if entered.text[-1:].isalpha() else f"{entered.text} {entered.unit.value}"
 
 
 def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
