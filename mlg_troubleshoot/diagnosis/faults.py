@@ -214,7 +214,7 @@ class _Screen:
         if not kept.any():
             return np.zeros(len(misfit))
         density = _density(misfit[:, None] - self.rest[kept], self.scale_in)
-        density = logsumexp(density, b=weight[kept] / weight.sum(), axis=1)
+        density = log_sum((density + np.log(weight[kept] / weight.sum())).T)
         return np.asarray(np.where(np.isfinite(misfit), density, -np.inf))
 
     def evidence(self, place: int, meant: list[_Meant]) -> Array:
