@@ -15,10 +15,10 @@ from scipy.sparse import csc_array
 from mlg_troubleshoot.arrays import Array, Places
 
 ColumnBlock = Array | csc_array
-# Computing only: numbers from which a block is large, and share of its rows in which a column acts,
-# below which it is kept by these rows.
+# Computing only: numbers from which a block is large; a column that acts in fewer than one row of
+# so many is kept by these rows.
 _LARGE = 1_000_000
-_FEW = 0.2
+_FEW = 5
 # Columns that are written out together.
 _AT_ONCE = 64
 
@@ -55,7 +55,7 @@ class EffectColumns:
 
         for place, column in enumerate(columns):
             rows = np.flatnonzero(column)
-            short = len(rows) < _FEW * n and n * (place + 1) > _LARGE
+            short = _FEW * len(rows) < n and n * (place + 1) > _LARGE
             places[short].append(place)
             if short:
                 few.append((rows, column[rows]))
