@@ -564,4 +564,4 @@ def test_what_is_in_the_set_is_not_said_to_be_ruled_out() -> None:
 def test_the_lines_say_what_may_act_beside_a_sure_cause_and_what_to_read() -> None:
     lines = {line.word: line.text for line in seven_lines(found("a gauge and a scale"))}
     assert "Also acts, but cannot be identified: The calibration rate" in lines["CAUSE"]
-    assert "To settle what acts as well, take" in lines["DO"]
+    assert "To identify the further effect, take" in lines["DO"]

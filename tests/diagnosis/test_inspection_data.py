@@ -39,7 +39,7 @@ def test_every_data_set_is_described(file: str) -> None:
 
 
 def test_the_data_sets_are_called_synthetic() -> None:
-    assert "**All of them are synthetic**" in PUZZLE
+    assert "**All tables are synthetic**" in PUZZLE
 
 
 def test_the_puzzle_does_not_give_the_answer_away() -> None:
