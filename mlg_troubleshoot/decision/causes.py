@@ -29,6 +29,7 @@ from mlg_troubleshoot.decision.waves import (
     HALF_IN,
     HELD,
     RANDOM,
+    SMOOTHED,
     STEP_IN,
     Pins,
     blur,
@@ -56,7 +57,7 @@ class _Unread:
     by_share: characteristic functions of its joints by what they are worn to, (joints, shares,
     terms); unread, worn: of unread ones, and of those beyond their limit, (levels, joints, terms).
     fresh: of new parts, (joints, terms). bend: by how much each joint moves the
-    plunger on average. [1/in] exceeds: chance of leaving the margin. [1]
+    plunger on average. [1/in] exceeds: chance of leaving the margin, by level of wear. [1]
     """
 
     pins: Pins
@@ -66,7 +67,7 @@ class _Unread:
     unread: Array
     worn: Array
     fresh: Array
-    exceeds: float
+    exceeds: Array
 
 
 @lru_cache(maxsize=4)
@@ -80,7 +81,8 @@ def _unread(gear: Gear) -> tuple[_Unread, _Unread]:
     for pins in (RANDOM, HELD):
         waves = pins.waves(FREQUENCIES * reach[:, None, None] * SHARES[:, None])
         unread = np.einsum("ls,jst->ljt", DENSITIES, waves)
-        everything = np.prod(unread, axis=1).mean(axis=0) * _LINKAGE
+        everything = np.prod(unread, axis=1) * _LINKAGE
+        margin = np.full(len(LEVELS), gear.margin.value)
         found.append(
             _Unread(
                 pins,
@@ -90,7 +92,7 @@ def _unread(gear: Gear) -> tuple[_Unread, _Unread]:
                 unread,
                 np.einsum("ls,jst->ljt", BEYOND, waves),
                 pins.waves(FREQUENCIES * (amplification * gear.new_parts_in)[:, None]),
-                float(1.0 - inside(everything[None], np.array([gear.margin.value]))[0]),
+                1.0 - inside(everything, margin),
             )
         )
     random, held = found
@@ -103,9 +105,10 @@ class _Believed:
 
     fits: density of the plunger's reading. levels: chances of the levels of wear, (n, levels). [1]
     worn: chance that each unread joint is beyond its limit. [1] waves: characteristic function of
-    each joint, (n, joints, terms). exceeds: chance that the joints hold the plunger beyond its
-    margin, whatever it reads. [1] by_share: density of the plunger's reading by what each joint in
-    doubt is worn to, (readings, shares).
+    each joint given the plunger's reading, (n, joints, terms); sums: of all together whatever it
+    reads, (n, terms). exceeds: chance that the joints hold the plunger beyond its margin, whatever
+    it reads; usually: the same of a gear of the fleet of which nothing was read. [1] by_share:
+    density of the plunger's reading by what each joint in doubt is worn to, (readings, shares).
     """
 
     unread: _Unread
@@ -113,8 +116,17 @@ class _Believed:
     levels: Array
     worn: Array
     waves: Array
+    sums: Array
     exceeds: Array
+    usually: float
     by_share: Array
+
+    def of_failures(self, outside: Array, within: Array) -> tuple[Array, Array]:
+        """Densities of the plunger's reading among failures of the joints and of something else,
+        by how many of each there are.
+        """
+        elsewhere = (1.0 - self.usually) * PRIORS.joints_for_one_elsewhere
+        return outside / self.usually, within / elsewhere
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,12 +138,13 @@ class Causes:
     worn: chance that each joint is beyond its limit. [1]
     levels: chances of the levels of wear, (n, levels). [1]
     exceeds: chance with random directions that the joints hold the plunger beyond its margin,
-    unread ones by their wear, whatever the plunger reads; leaves: the same, with the chance that
-    loads hold the pins. [1]
+    unread ones by their wear, whatever the plunger reads. [1]
+    before_plunger: how many failures of the joints there are for each of something else, by the
+    readings of the joints alone. [1]
     loaded: chance that loads hold the pins near their worst directions, the joints being the cause.
-    usually: the chance `leaves` of a gear of which nothing was read. [1]
-    outside, within: densities of the plunger's reading where the joints hold it beyond its margin
-    and where they do not, with random pins and with held ones; by_rigging: where rigging does. [1]
+    [1] outside, within: densities of the plunger's reading where the joints hold it beyond its
+    margin and where they do not, with random pins and with held ones; by_rigging: where rigging
+    does, by how many such failures there are for each of the joints. [1]
     """
 
     cases: Cases
@@ -141,9 +154,8 @@ class Causes:
     worn: Array
     levels: Array
     exceeds: Array
-    leaves: Array
+    before_plunger: Array
     loaded: Array
-    usually: float
     outside: tuple[Array, ...]
     within: tuple[Array, ...]
     by_rigging: Array
@@ -156,15 +168,10 @@ class Causes:
         """How much likelier the plunger's reading is if loads hold the pins. [1]"""
         likely = []
         for each, outside, within in zip(self.by_pins, self.outside, self.within, strict=True):
-            failed = outside / each.unread.exceeds + within / PRIORS.joints_for_one_elsewhere
-            failed = failed + self.by_rigging
+            joints, elsewhere = each.of_failures(outside, within)
+            failed = joints + elsewhere + self.by_rigging
             likely.append(np.where(self.cases.failed, failed, outside + within))
         return np.asarray(likely[1] / np.maximum(likely[0], 1e-300))
-
-    @property
-    def expected_elsewhere(self) -> float:
-        """Chance of leaving the margin from which the joints are the likelier cause. [1]"""
-        return self.usually / PRIORS.joints_for_one_elsewhere
 
     @property
     def leverage(self) -> Array:
@@ -243,6 +250,7 @@ class Causes:
             new = np.prod(np.where(members[:, :, None], unread.fresh, 1.0), axis=1)
             return np.asarray(1.0 - inside(left * new, np.full(len(left), margin)))
         gone = np.prod(np.where(members[:, :, None], waves, 1.0), axis=1) * blur(self.u_in[row])
+        gone = gone * SMOOTHED
         # The density of the remainder, given that all together read x.
         away = np.exp(-1j * FREQUENCIES * abs(x))
         given = density(left) * density(gone * away)[:, ::-1]
@@ -271,16 +279,16 @@ def believed(cases: Cases) -> Causes:
     read = cases.measured
     mean_in = np.where(read, cases.filled(0.0), (likely @ MEAN)[:, None] * cases.gear.limits_in)
     worn = np.where(read, 0.0, np.clip(worn, 0.0, 1.0))
-    found = _weighed(cases, both, mean_in, worn, likely, u)
-    # Readings in doubt, given where the plunger of a gear that failed stands.
+    found = _weighed(cases, both, mean_in, worn, likely, u, doubted.if_restored(read, levels))
+    # Readings in doubt, given where the plunger stands.
     of = doubted.rows
-    told = (cases.failed & np.isfinite(cases.mean_in))[of, None]
-    random, held = (each.by_share for each in both)
-    by_joints = (1.0 - cases.fleet.loaded) * random + cases.fleet.loaded * held
-    by_joints *= (np.sqrt(2.0 * np.pi) * u[of] / STEP_IN)[:, None]
-    by_joints += (found.usually * found.by_rigging[of])[:, None]
-    chances = doubted.chances * np.where(told, by_joints, 1.0)
-    worn[of, doubted.joints] = (chances @ (SHARES > 1.0)) / chances.sum(axis=1)
+    told = np.isfinite(cases.mean_in[of, None])
+    random, held = (each.by_share / each.usually for each in both)
+    by_cause = (1.0 - cases.fleet.loaded) * random + cases.fleet.loaded * held
+    by_cause *= (np.sqrt(2.0 * np.pi) * u[of] / STEP_IN)[:, None]
+    by_cause += found.by_rigging[of, None]
+    chances = doubted.chances * np.where(told, by_cause, 1.0)
+    worn[of, doubted.joints] = np.minimum((chances @ (SHARES > 1.0)) / chances.sum(axis=1), 1.0)
     return found
 
 
@@ -293,7 +301,8 @@ def _believed(
     known = known * blur(pins.cosine * unread.amplification * cases.gauge_u_in)
     flat = unread.unread.reshape(len(LEVELS), -1)
     waves = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
-    exceeds = 1.0 - inside(np.prod(waves, axis=1) * _LINKAGE, cases.margin_in)
+    sums = _sums(unread, read, known, levels)
+    exceeds = 1.0 - inside(sums, cases.margin_in)
     worn = np.repeat((levels @ BEYOND.sum(axis=1))[:, None], read.shape[1], axis=1)
     fits = np.ones(len(cases))
     likely = levels.copy()
@@ -314,7 +323,23 @@ def _believed(
         by_share = np.maximum(pins.sense * (0.5 + moved), 0.0)
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
-    return _Believed(unread, fits, likely, worn, waves, exceeds, by_share)
+    usually = float(unread.exceeds @ (cases.fleet.levels or np.full(len(LEVELS), 1 / len(LEVELS))))
+    return _Believed(unread, fits, likely, worn, waves, sums, exceeds, usually, by_share)
+
+
+def _sums(unread: _Unread, read: Mask, known: Array, levels: Array) -> Array:
+    """Characteristic function of the sum of all joints: the unread ones of a gear are worn to one
+    level, whichever it is.
+    """
+    whole = read.all(axis=1)
+    sums = np.prod(known, axis=1)
+    some = np.flatnonzero(~whole)
+    each = sum(
+        levels[some, k, None] * np.prod(np.where(read[some, :, None], known[some], waves), axis=1)
+        for k, waves in enumerate(unread.unread)
+    )
+    sums[some] = each
+    return np.asarray(sums * _LINKAGE)
 
 
 def _given_plunger(
@@ -357,8 +382,13 @@ def _weighed(
     worn: Array,
     levels: Array,
     u: Array,
+    if_restored: Array,
 ) -> Causes:
-    """Divide each gear between its joints, its rigging and everything else."""
+    """Divide each gear between its joints, its rigging and everything else.
+
+    Loads hold the pins of a fleet or they do not, and failures of the joints are as many for each
+    of another cause in either.
+    """
     margin = cases.margin_in[:, None]
     seen = np.isfinite(cases.mean_in)
     x = np.nan_to_num(cases.mean_in)
@@ -366,7 +396,7 @@ def _weighed(
     within = []
     for each in both:
         pins = each.unread.pins
-        waves = np.prod(each.waves, axis=1) * _LINKAGE
+        waves = each.sums
         shift = np.sum(each.unread.bend * mean_in**2, axis=1)
         reading = x - shift
         if pins is HELD:
@@ -385,17 +415,14 @@ def _weighed(
     by_rigging = HALF_IN / STEP_IN * np.sum(offset * fits, axis=1) / np.sum(offset, axis=1)
     looked = np.array([i.rigging_checked not in (None, RiggingCheck.NO) for i in cases.inspections])
     by_rigging *= np.where(looked, PRIORS.overlooked, 1.0) / PRIORS.joints_for_one_misrigged
-    loaded = cases.fleet.loaded
-    usually = (1.0 - loaded) * both[0].unread.exceeds + loaded * both[1].unread.exceeds
-    all_joints = (1.0 - loaded) * outside[0] + loaded * outside[1]
-    by_elsewhere = (1.0 - loaded) * within[0] + loaded * within[1]
-    parts = np.array(
-        [
-            all_joints,
-            usually * by_rigging,
-            usually * by_elsewhere / PRIORS.joints_for_one_elsewhere,
-        ]
+    by_rigging *= if_restored
+    shares = (1.0 - cases.fleet.loaded, cases.fleet.loaded)
+    random, held = (
+        share * np.array(each.of_failures(*densities))
+        for share, each, *densities in zip(shares, both, outside, within, strict=True)
     )
+    all_joints, by_elsewhere = random + held
+    parts = np.array([all_joints, by_rigging, by_elsewhere])
     before = np.array(
         [1.0, 1.0 / PRIORS.joints_for_one_misrigged, 1.0 / PRIORS.joints_for_one_elsewhere]
     )
@@ -403,6 +430,9 @@ def _weighed(
         seen,
         parts / np.maximum(parts.sum(axis=0), 1e-300),
         (before / before.sum())[:, None],
+    )
+    before_plunger = sum(
+        share * each.exceeds / each.usually for share, each in zip(shares, both, strict=True)
     )
     joints, rigging, elsewhere = chances
     return Causes(
@@ -413,9 +443,8 @@ def _weighed(
         worn=worn,
         levels=levels,
         exceeds=both[0].exceeds,
-        leaves=(1.0 - loaded) * both[0].exceeds + loaded * both[1].exceeds,
-        loaded=np.where(seen, loaded * outside[1] / np.maximum(all_joints, 1e-300), loaded),
-        usually=usually,
+        before_plunger=PRIORS.joints_for_one_elsewhere * before_plunger,
+        loaded=np.where(seen, held[0] / np.maximum(all_joints, 1e-300), cases.fleet.loaded),
         outside=tuple(outside),
         within=tuple(within),
         by_rigging=by_rigging,

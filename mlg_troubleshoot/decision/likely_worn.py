@@ -1,9 +1,10 @@
 """Which joints explain a measured plunger displacement, by the same densities as the plan.
 
 Wear before the plunger is read, and the chances that rigging moved it or that loads hold the pins,
-are those of `causes`. Measured joints have their reading with its uncertainty. The density of a sum
-of clearances is the product of their characteristic functions; that of one clearance, given the
-sum, follows from the product of all others.
+are those of `causes`. Measured joints have their reading with its uncertainty; readings over the
+limit are as doubtful as for the plan. The density of a sum of clearances is the product of their
+characteristic functions; that of one clearance, given the sum, follows from the product of all
+others.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.decision.waves import FREQUENCIES, HELD, RANDOM, blur
-from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, level_chances
+from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, Doubted, level_chances
 
 
 def explain(one: Cases, causes: Causes | None = None) -> Posterior:
@@ -92,7 +93,13 @@ def _clearances(one: Cases) -> _Clearances:
     allowed /= allowed.sum(axis=1, keepdims=True)
     at = np.where(read, np.maximum(near, 0.0), SHARES * limits)
     chances = np.where(read, allowed, DENSITIES[:, None, :])
-    return _Clearances(at, chances, at <= limits, level_chances(one)[0])
+    levels = level_chances(one)
+    doubted = Doubted.of(one, levels)
+    for joint, share in zip(doubted.joints, doubted.chances, strict=True):
+        if not one.own_gauge[0, joint]:
+            at[joint] = SHARES * limits[joint]
+            chances[:, joint] = share / share.sum()
+    return _Clearances(at, chances, at <= limits, levels[0])
 
 
 class _Given:

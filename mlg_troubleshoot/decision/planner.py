@@ -230,7 +230,7 @@ class _PlanBuilder:
         if not self.read_plunger or self._again():
             self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
         if not self.read_plunger:
-            if causes.leaves[i] < causes.expected_elsewhere:
+            if causes.before_plunger[i] < 1.0:
                 return self._restore_over_limit()._end(End.NOT_EXPLAINED)
             return self._to_repair(joints, rigging)
         if joints + rigging < _EXCLUDED:
@@ -267,9 +267,10 @@ class _PlanBuilder:
                 joints /= 1.0 - (1.0 - PRIORS.overlooked) * rigging
         if following:
             return self._read_and_restore(following)
-        if best is not None and (
-            joints >= PRIORS.usual or set(best.joints) <= set(self.over_limit)
-        ):
+        # A failure of the joints that is sent away stays outside its margin: against a rigging
+        # that was looked at, the likelier cause decides.
+        likely = joints >= 0.5 and float(f.causes.elsewhere[i]) <= 1.0 - PRIORS.usual
+        if best is not None and (likely or set(best.joints) <= set(self.over_limit)):
             return self._try(best.joints, best)
         if best is not None:
             return self._elsewhere()

@@ -20,7 +20,8 @@ class Priors:
     through the joints for each that was mis-rigged, and for each that failed through something that
     leaves the plunger within its margin.
     offset: how far a wrong rigging moves the plunger: evenly, up to about so many margins. [1]
-    overlooked: chance that a rigging that was looked at is wrong nevertheless. [1]
+    overlooked: chance that somebody overlooks what is wrong: a rigging that was looked at, or a
+    joint over its limit at the work that left the rigging wrong. [1]
     loaded, scatter_deg: chance that loads hold all pins near their worst directions, and the
     standard deviation of their angles then. [1, deg]
     linkage_u_in: standard deviation of what the linkage of this gear adds to a sum of random

@@ -21,6 +21,9 @@ HALF_IN = 0.18
 _TERMS = 104
 _PLACES = 145
 FREQUENCIES = np.pi * np.arange(1, _TERMS + 1) / HALF_IN
+# Lanczos factors: without them a series that ends rings far from a narrow peak, where all that is
+# left of a gear whose plunger is far out may stand. [1]
+SMOOTHED = np.sinc(np.arange(1, _TERMS + 1) / (_TERMS + 1))
 AT_IN = np.linspace(-HALF_IN, HALF_IN, _PLACES)
 STEP_IN = AT_IN[1] - AT_IN[0]
 _COSINES = np.cos(FREQUENCIES[:, None] * AT_IN)

@@ -89,6 +89,18 @@ class Doubted:
         weight = np.logaddexp(*logs) + np.log(others @ DENSITIES)
         return cls(rows, joints, np.exp(weight - weight.max(axis=1, keepdims=True)))
 
+    def if_restored(self, read: Mask, levels: Array) -> Array:
+        """How much likelier the readings of each gear are if what was over its limit was restored
+        when somebody last worked on it: a rigging goes wrong at such work. [1]
+        """
+        left = PRIORS.overlooked * (levels @ BEYOND.sum(axis=1))
+        sound = (1.0 - left) / (1.0 - levels @ BEYOND.sum(axis=1))
+        each = np.where(read, sound[:, None], 1.0)
+        beyond = (self.chances @ (SHARES > 1.0)) / self.chances.sum(axis=1)
+        at = self.rows
+        each[at, self.joints] = (1.0 - beyond) * sound[at] + beyond * PRIORS.overlooked
+        return np.asarray(np.prod(each, axis=1))
+
 
 class Unread:
     """What the unread joints of n gears may add to the worst case, level of wear by level of wear.

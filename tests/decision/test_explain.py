@@ -10,7 +10,7 @@ import pytest
 from mlg_troubleshoot.decision.assessment import Posterior
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import believed
-from mlg_troubleshoot.decision.inspection import RiggingCheck
+from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, level_chances
@@ -47,8 +47,8 @@ def test_no_displacement_does_not_call_any_joint_worn(gear: Gear) -> None:
 
 
 def test_only_joints_more_likely_worn_than_not_are_called_worn(gear: Gear) -> None:
-    found = explained(gear, {j: 0.0005 for j in range(1, 11) if j not in (2, 3, 5)}, 0.03)
-    assert {0.3 < group.probability < 0.5 for group in found.groups} == {True, False}
+    found = explained(gear, {j: 0.0005 for j in range(1, 11) if j not in (2, 3, 5)}, 0.028)
+    assert {0.25 < group.probability < 0.5 for group in found.groups} == {True, False}
     assert found.called_worn == ((3, 5),)
 
 
@@ -65,8 +65,22 @@ def test_a_joint_that_moves_the_plunger_more_explains_a_large_displacement_bette
     assert chance(found, 2) > chance(found, 8)
 
 
-def test_a_joint_read_beyond_its_limit_is_worn(gear: Gear) -> None:
-    assert chance(explained(gear, {3: 0.013}, 0.02), 3) > 0.999
+def test_a_joint_read_again_beyond_its_limit_is_worn(gear: Gear) -> None:
+    again = inspected({3: 0.013}, readings_in=(0.02,), measured_again=(3,))
+    assert chance(explain(Cases.of(gear, [again])), 3) > 0.999
+
+
+@pytest.mark.parametrize("reading_in", [0.01, 0.0335])
+@pytest.mark.parametrize("outcome", [None, Outcome.FAILED])
+def test_a_reading_over_the_limit_is_as_doubtful_as_for_the_plan(
+    gear: Gear, reading_in: float, outcome: Outcome | None
+) -> None:
+    read = {1: 0.003, 2: 0.0082, 3: 0.002, 4: 0.0025, 5: 0.003}
+    one = Cases.of(gear, [inspected(read, readings_in=(reading_in,), outcome=outcome)])
+    causes = believed(one)
+    worn = explain(one, causes).intervals[1].worn
+    assert 0.3 < worn < 0.8
+    assert worn == pytest.approx(causes.worn[0, 1], abs=0.02)
 
 
 def test_the_interval_of_a_measured_joint_is_its_reading_with_its_uncertainty(gear: Gear) -> None:

@@ -255,6 +255,6 @@ def test_the_expected_repair_says_which_joint_nobody_has_read(judge: Judge) -> N
 def test_joints_are_expected_to_be_the_cause_where_the_rigging_is_found_right(
     judge: Judge,
 ) -> None:
-    found = judge(every_joint(0.003), readings_in=(0.036,), outcome=Outcome.FAILED)
+    found = judge(every_joint(0.0045), readings_in=(0.036,), outcome=Outcome.FAILED)
     assert [step.action for step in found.plan.steps][:2] == [Action.CHECK_RIGGING, Action.RESTORE]
     assert found.end is End.DONE

@@ -11,8 +11,10 @@ import pytest
 from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import Causes, believed
+from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
 from mlg_troubleshoot.decision.priors import PRIORS
+from mlg_troubleshoot.decision.wear_levels import LEVELS
 from mlg_troubleshoot.gear.gear import Gear
 from tests.decision.conftest import every_joint, inspected
 
@@ -36,8 +38,8 @@ def test_the_joints_explain_a_reading_at_their_worst_directions_though_no_random
 ) -> None:
     worst_in = float(0.94 * gear.model.plunger_amplification() @ np.full(10, 0.004))
     found = causes_of(gear, WORN, readings_in=(worst_in,), rigging_checked=RiggingCheck.YES)
-    assert found.loaded[0] > 0.9
-    assert found.joints[0] > 0.9
+    assert found.loaded[0] > 0.8
+    assert found.joints[0] > 0.7
 
 
 def test_a_joint_that_was_read_twice_is_known_to_be_worn_or_not(gear: Gear) -> None:
@@ -59,13 +61,16 @@ def test_a_second_repair_is_no_surer_than_sure_where_nothing_is_restored(gear: G
     assert found.second_repair(0, np.zeros((1, 10), bool))[0] == pytest.approx(1.0, abs=0.01)
 
 
-def test_joints_are_the_likelier_cause_from_a_third_of_the_usual_chance_of_leaving_the_margin(
+def test_of_a_gear_of_which_nothing_was_read_the_joints_are_the_cause_as_often_as_usual(
     gear: Gear,
 ) -> None:
-    fresh = inspected({})
-    found = believed(Cases.of(gear, [fresh]))
-    # The chance of a gear of which nothing was read is about the usual one.
-    assert 0.2 < found.expected_elsewhere / float(found.exceeds[0]) < 0.5
+    found = believed(Cases.of(gear, [inspected({})]))
+    assert found.before_plunger[0] == pytest.approx(PRIORS.joints_for_one_elsewhere, rel=0.01)
+
+
+def test_the_joints_of_a_gear_read_as_new_are_rarely_the_cause(gear: Gear) -> None:
+    found = believed(Cases.of(gear, [inspected(every_joint(0.001))]))
+    assert found.before_plunger[0] < 0.1
 
 
 def test_a_gear_that_failed_before_its_repair_has_the_chance_of_a_second_one(gear: Gear) -> None:
@@ -77,6 +82,45 @@ def test_a_gear_that_failed_before_its_repair_has_the_chance_of_a_second_one(gea
         ((said,),) = found.with_chances([(asked,)])
         chances.append(said.second_repair_probability is not None)
     assert chances == [True, False]
+
+
+def test_the_same_plunger_reading_is_the_joints_rather_than_the_rigging_where_one_was_read_worn(
+    gear: Gear,
+) -> None:
+    at_rest = {"readings_in": (0.036,)}
+    worn = causes_of(gear, {2: 0.011, 9: 0.001}, **at_rest)
+    sound = causes_of(gear, {2: 0.001, 9: 0.001}, **at_rest)
+    assert worn.rigging[0] < 0.3 * sound.rigging[0]
+
+
+def test_a_worn_joint_that_hardly_moves_the_plunger_speaks_against_the_rigging_all_the_same(
+    gear: Gear,
+) -> None:
+    # A rigging goes wrong at work on the gear, at which what is over its limit is restored.
+    worn, sound = (
+        causes_of(gear, every_joint(0.0015, j6=worn), readings_in=(0.036,), measured_again=(6,))
+        for worn in (0.011, 0.0015)
+    )
+    assert worn.rigging[0] / worn.joints[0] < 0.1 * sound.rigging[0] / sound.joints[0]
+
+
+def test_the_joints_are_weighed_by_a_reading_once_only(gear: Gear) -> None:
+    """By gears drawn here: how many of those that leave the margin stand beyond 0.055 in."""
+    rng = np.random.default_rng(7)
+    n = 400_000
+    level = LEVELS[rng.integers(len(LEVELS), size=n)]
+    chance = np.geomspace(*PRIORS.worn_out, len(LEVELS))[np.searchsorted(LEVELS, level)]
+    moved = PRIORS.linkage_u_in * rng.normal(size=n)
+    for amplification in gear.model.plunger_amplification():
+        share = -level * np.log1p(-rng.random(n) * -np.expm1(-1.0 / level))
+        share = np.where(rng.random(n) < chance, rng.uniform(1.0, 2.0, n), share)
+        moved += amplification * 0.0075 * share * np.cos(rng.uniform(0.0, 2.0 * np.pi, n))
+    beyond = [np.mean(np.abs(np.abs(moved) - x) < 0.001) for x in (0.035, 0.055)]
+    odds = []
+    for x in (0.035, 0.055):
+        found = believed(Cases.of(gear, [inspected({}, readings_in=(x,))], fleet=Fleet(0.0)))
+        odds.append(float(found.joints[0] / found.rigging[0] * found.by_rigging[0]))
+    assert odds[1] / odds[0] == pytest.approx(beyond[1] / beyond[0], rel=0.1)
 
 
 def test_loaded_pins_scatter_by_their_angle() -> None:
