@@ -23,6 +23,7 @@ from tests.prompts.scripted import ENTERS, ScriptedTerminal
 GEAR = ("N1", "l")
 PLAY = ("8", "9", "18", "10", "11", "3", "3", "3", "3", "3")
 FIRST = (*GEAR, "t", "t", *PLAY, "f", *ENTERS, "")
+SOUND = (*GEAR, "t", "t", *["5"] * 10, "f", *ENTERS, "")
 
 Visit = Callable[..., ScriptedTerminal]
 
@@ -326,7 +327,7 @@ def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionS
 
 
 def test_next_of_an_earlier_visit_is_said_in_the_unit_of_its_readings(visit: Visit) -> None:
-    visit(*FIRST)
+    visit(*SOUND)
     visit(*GEAR, "y", "36")
     assert "The plunger stands +36.0 thou off." in visit(*GEAR).screen
 
@@ -334,8 +335,8 @@ def test_next_of_an_earlier_visit_is_said_in_the_unit_of_its_readings(visit: Vis
 def test_a_result_of_the_prompts_names_no_column_of_a_file(
     visit: Visit, capsys: pytest.CaptureFixture
 ) -> None:
-    visit(*FIRST)
-    screen = visit(*GEAR, "y", "36", "y", "yes", "y", "18", "y", "", "3", "3").screen
+    visit(*SOUND)
+    screen = visit(*GEAR, "y", "36", "n 3", "3").screen
     shown = screen + capsys.readouterr().out
     assert "Check rigging and lock roller" in shown
     assert "counts as older than the repair" in shown
@@ -353,3 +354,39 @@ def test_an_area_that_next_opened_stays_open_until_the_repair(
     assert life(store).inspections[-1].inspection.open_areas == ("sidestay",)
     visit(*GEAR, "n 3", "1")
     assert life(store).inspections[-1].inspection.open_areas == ()
+
+
+@pytest.mark.parametrize("did", [("y", "36"), ("p 36",)])
+def test_a_step_takes_its_minutes_from_those_of_the_day(
+    visit: Visit, store: SessionStore, did: tuple[str, ...]
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "t 180")
+    screen = visit(*GEAR, *did).screen
+    assert "168 of 180 min are left today; t sets another number." in screen
+    assert life(store).inspections[-1].inspection.minutes_available == 168.0
+
+
+def test_minutes_that_are_entered_with_a_finding_are_those_that_are_left(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "t 180")
+    visit(*GEAR, "p 36 t 100")
+    assert life(store).inspections[-1].inspection.minutes_available == 100.0
+
+
+def test_what_is_added_without_a_step_takes_no_minutes(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "t 180")
+    visit(*GEAR, "w 3")
+    assert life(store).inspections[-1].inspection.minutes_available == 180.0
+
+
+def test_a_step_that_no_longer_fits_in_the_day_is_not_next(visit: Visit) -> None:
+    visit(*SOUND)
+    visit(*GEAR, "t 42")
+    visit(*GEAR, "y", "36")
+    screen = visit(*GEAR, "y", "yes").screen
+    assert "0 of 30 min are left today" in screen
+    assert "Stop for today" in visit(*GEAR).screen

@@ -121,6 +121,10 @@ class Answers:
             self, more=MappingProxyType({name: text for name in MORE if (text := merged.get(name))})
         )
 
+    def changed_since(self, before: Answers) -> set[str]:
+        """Return the optional columns that are set anew."""
+        return {name for name, text in self.more.items() if text != before.more.get(name)}
+
     def beside(self, given: Answers) -> Answers:
         """Return the answers with what is missing filled from flags; only the record id is taken
         from these first.

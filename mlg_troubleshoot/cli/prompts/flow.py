@@ -244,13 +244,21 @@ class Flow:
         if word == "n":
             return self._go_on(state.answers)
         if word == "y" and visit.todo:
-            return self._go_on(visit.begun(self.today, self.gear))
+            begun = visit.begun(self.today, self.gear)
+            return self._go_on(begun, remarks=pages.minutes_left(visit.answers, begun))
         if word == "c":
             return Turn(State(Ask.REVIEW, visit.answers))
         if word == "u" and visit.before is not None:
             remarks = (line(("The last change is undone.", Tone.GOOD)),)
             return Turn(State(Ask.REVIEW, visit.before), remarks, Effect.COMPUTE)
-        return self._added(state, visit.answers, typed)
+        turn = self._added(state, visit.answers, typed)
+        given = turn.state.answers
+        changed = given.changed_since(visit.answers)
+        if DAY["t"] in changed or changed.isdisjoint(visit.todo):
+            return turn
+        spent = visit.spent(given, self.today)
+        said = pages.minutes_left(given, spent)
+        return replace(turn, state=replace(turn.state, answers=spent), lines=(*turn.lines, *said))
 
     def _added(self, state: State, kept: Answers, typed: str) -> Turn[State]:
         """Take an optional answer that is added to a kept inspection."""

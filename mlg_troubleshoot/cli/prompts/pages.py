@@ -223,6 +223,14 @@ def next_page(visit: Visit) -> Page:
     return Page(tuple(shown), " " + "y, " * bool(visit.todo) + "another letter, or Enter = done > ")
 
 
+def minutes_left(before: Answers, now: Answers) -> tuple[Line, ...]:
+    """What is left of the minutes of the day once a step is done."""
+    had, left = (each.more.get(DAY["t"]) for each in (before, now))
+    if had is None or left is None:
+        return ()
+    return (note(f"{left} of {float(had):.0f} min are left today; t sets another number."),)
+
+
 def step_page(answers: Answers, column: str, advised: str) -> Page:
     unit = "in" if answers.unit is None else answers.unit.value
     asked = _STEP_ASKS[column].format(unit=unit)
