@@ -443,7 +443,7 @@ def _weighed(
         worn=worn,
         levels=levels,
         exceeds=both[0].exceeds,
-        before_plunger=PRIORS.joints_for_one_elsewhere * before_plunger,
+        before_plunger=np.asarray(PRIORS.joints_for_one_elsewhere * before_plunger),
         loaded=np.where(seen, held[0] / np.maximum(all_joints, 1e-300), cases.fleet.loaded),
         outside=tuple(outside),
         within=tuple(within),

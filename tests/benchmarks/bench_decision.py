@@ -296,7 +296,7 @@ def measuring(n: int) -> None:
 
 
 def _by_hand(gear: Gear, joints: Sequence[int]) -> float:
-    minutes = {j.number: j.access.value for j in gear.joints}
+    minutes = {j.number: j.restore.value for j in gear.joints}
     area = {j.number: j.area for j in gear.joints}
     return sum(minutes[j] for j in joints) + sum(
         a.access.value for a in gear.areas if a.name in {area[j] for j in joints}
@@ -312,7 +312,7 @@ def _beaten(gear: Gear, read: Array, best: RepairSet | None) -> bool:
     if best is None:
         rival = every
     else:
-        key = (best.access_minutes, len(best.joints))
+        key = (best.minutes, len(best.joints))
         rival = [s for s in every if (_by_hand(gear, s), len(s)) < key]
     if not rival:
         return False

@@ -251,6 +251,10 @@ class Flow:
         if word == "u" and visit.before is not None:
             remarks = (line(("The last change is undone.", Tone.GOOD)),)
             return Turn(State(Ask.REVIEW, visit.before), remarks, Effect.COMPUTE)
+        return self._found(state, visit, typed)
+
+    def _found(self, state: State, visit: Visit, typed: str) -> Turn[State]:
+        """Take an optional answer; if it is what NEXT asked for, NEXT was done."""
         turn = self._added(state, visit.answers, typed)
         given = turn.state.answers
         changed = given.changed_since(visit.answers)

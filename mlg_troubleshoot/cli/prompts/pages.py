@@ -224,7 +224,7 @@ def next_page(visit: Visit) -> Page:
 
 
 def minutes_left(before: Answers, now: Answers) -> tuple[Line, ...]:
-    """What is left of the minutes of the day once a step is done."""
+    """Say how many minutes of the day remain once a step is done."""
     had, left = (each.more.get(DAY["t"]) for each in (before, now))
     if had is None or left is None:
         return ()
