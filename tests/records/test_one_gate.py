@@ -243,11 +243,11 @@ def test_a_joint_that_the_gear_lacks_is_refused_in_python(gear: Gear, joint: obj
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
-        ("tail_no", " ", "tail number"),
-        ("side", "UP", "LH or RH"),
+        ("tail_no", " ", "^tail_no: expected a tail number"),
+        ("side", "UP", "^side: 'UP': expected LH or RH"),
         ("margin_in", 0.3, "a margin above 0 and up to 0.2 in"),
         ("readings_in", (0.02, 0.6), "plunger displacement from -0.5 to 0.5 in"),
-        ("temperature_c", 61, "-60 to 60"),
+        ("temperature_c", 61, "^temperature_c: '61': expected a temperature from -60 to 60"),
         ("gauge_u_by_joint_in", {3: 0.0}, "a gauge u above 0"),
     ],
 )
