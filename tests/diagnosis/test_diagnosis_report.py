@@ -228,6 +228,12 @@ def test_residuals_are_drawn_against_the_named_column_before_and_after(named: Ma
     assert "against technician" in first
 
 
+def test_residuals_are_drawn_against_the_column_that_a_cause_needs(gear: Gear, make: Make) -> None:
+    warm = make(fleet(gear.model, lambda t, _: 3e-4 * (t.quantities["temperature_c"] - 20.0)))
+    assert [each.candidate.cause.name for each in warm.diagnosis.causes] == ["thermal_growth"]
+    assert "against temperature" in warm.html[: warm.html.index('id="columns"')]
+
+
 def test_residuals_are_drawn_against_the_prediction_where_nothing_is_named(nothing: Made) -> None:
     assert "against predicted displacement" in nothing.html
 
