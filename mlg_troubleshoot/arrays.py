@@ -27,8 +27,14 @@ def log_sum(terms: Array) -> Array:
     """Logarithm of the sum of exponentials, over the first axis; a fraction of the time that scipy
     takes to check what it is given. One term of each sum at least is finite.
     """
-    most = np.max(terms, axis=0)
-    return np.asarray(most + np.log(np.sum(np.exp(terms - most), axis=0)))
+    largest: Array = np.max(terms, axis=0)
+    total: Array = np.sum(np.exp(terms - largest), axis=0)
+    return largest + np.log(total)
+
+
+def count_failed(values: Array) -> int:
+    """Number of evaluations without a finite result."""
+    return int(np.count_nonzero(~np.isfinite(values)))
 
 
 def central_steps(n: int, step: float = STEP) -> Array:
@@ -39,4 +45,4 @@ def central_steps(n: int, step: float = STEP) -> Array:
 def central_slopes(values: Array, step: float = STEP, axis: int = 0) -> Array:
     """Derivatives from the values at `central_steps`, which stand along an axis."""
     up, down = np.split(values, 2, axis=axis)
-    return np.asarray((up - down) / (2.0 * step))
+    return (up - down) / (2.0 * step)

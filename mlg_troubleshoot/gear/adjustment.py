@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import STEP, Array, Places
+from mlg_troubleshoot.arrays import Array, Places, central_slopes, central_steps
 from mlg_troubleshoot.gear.directions import IN_CACHE, WorstCase, worst_case
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
@@ -95,14 +95,14 @@ def adjusted_slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCas
     joints = adjustment.clearance_in.shape[1]
     directions = worst.governing_directions
     changed = adjustment.numbers(model)
-    steps = STEP * np.concatenate([np.eye(joints), -np.eye(joints)])[:, None, :]
+    steps = central_steps(joints)[:, None, :]
     factors = 1.0 if adjustment.direction_factors is None else adjustment.direction_factors
     slopes = np.empty_like(clearance)
     at_once = max(IN_CACHE // len(steps), 1)
     for start in range(0, len(clearance), at_once):
         rows = slice(start, start + at_once)
         links = links_from((clearance[rows] + steps) * factors, directions[rows])
-        moved = model.displacement(links, {name: each[rows] for name, each in changed.items()})
-        slopes[rows] = (moved[:joints] - moved[joints:]).T / (2 * STEP)
+        numbers = {name: each[rows] for name, each in changed.items()}
+        slopes[rows] = central_slopes(model.displacement(links, numbers)).T
     rate = 1.0 if adjustment.rate_factor is None else adjustment.rate_factor[:, None]
-    return np.asarray(rate * slopes)
+    return rate * slopes

@@ -64,16 +64,15 @@ class DesignSpace:
         held = m.point(self.held.name)
         guide = m.point(self.guide.name)
         base = m.planes[0].name
-        turn = np.arctan2(self.guide.y - self.held.y, self.guide.x - self.held.x)
-        back = turn - np.arctan2(guide.y - held.y, guide.x - held.x)
+        back = _direction(self.held, self.guide) - _direction(held, guide)
+        is_elsewhere = back or (held.x, held.y) != (self.held.x, self.held.y)
+        place = complex(self.held.x, self.held.y)
         values: list[float] = [_distance(guide, held)]
         for point in map(m.point, self.points):
             x = point.x
             y = point.y
-            if point.plane == base and (back or (held.x, held.y) != (self.held.x, self.held.y)):
-                moved = complex(x - held.x, y - held.y) * np.exp(1j * back) + complex(
-                    self.held.x, self.held.y
-                )
+            if point.plane == base and is_elsewhere:
+                moved = complex(x - held.x, y - held.y) * np.exp(1j * back) + place
                 x = moved.real
                 y = moved.imag
             values += [x, y]
@@ -98,21 +97,19 @@ class DesignSpace:
 
         Every branch sign is as the coordinates have it.
         """
-        x = dict(zip(self.names, np.moveaxis(np.asarray(vectors, float), -1, 0), strict=True))
-        turn = np.arctan2(self.guide.y - self.held.y, self.guide.x - self.held.x)
+        columns = np.moveaxis(np.asarray(vectors, float), -1, 0)
+        x = dict(zip(self.names, columns, strict=True))
+        turn = _direction(self.held, self.guide)
         reach = x[f"{self.guide.name}.r"]
-        places = {p: (x[f"{p}.x"], x[f"{p}.y"]) for p in self.points}
-        places[self.guide.name] = (
-            self.held.x + reach * np.cos(turn),
-            self.held.y + reach * np.sin(turn),
-        )
+        places = {p: {"x": x[f"{p}.x"], "y": x[f"{p}.y"]} for p in self.points}
+        places[self.guide.name] = {
+            "x": self.held.x + reach * np.cos(turn),
+            "y": self.held.y + reach * np.sin(turn),
+        }
         m = self.mechanism
         mechanism = replace(
             m,
-            points=tuple(
-                replace(p, x=places[p.name][0], y=places[p.name][1]) if p.name in places else p
-                for p in m.points
-            ),
+            points=tuple(replace(p, **places.get(p.name, {})) for p in m.points),
             planes=tuple(
                 (
                     replace(
@@ -160,14 +157,19 @@ class DesignSpace:
 def _plain(part: Any) -> Any:
     """A part of a mechanism with a number in place of each array of one."""
     values = {field.name: getattr(part, field.name) for field in fields(part)}
-    return replace(
-        part,
-        **{name: v.item() for name, v in values.items() if isinstance(v, np.ndarray | np.generic)},
-    )
+    numbers = {
+        name: v.item() for name, v in values.items() if isinstance(v, np.ndarray | np.generic)
+    }
+    return replace(part, **numbers)
 
 
 def _distance(a: Point, b: Point) -> float:
     return float(np.hypot(a.x - b.x, a.y - b.y))
+
+
+def _direction(start: Point, end: Point) -> float:
+    """Angle of a line from the horizontal axis of its plane. [rad]"""
+    return float(np.arctan2(end.y - start.y, end.x - start.x))
 
 
 def member_values(linkage: Linkage) -> dict[str, Any]:

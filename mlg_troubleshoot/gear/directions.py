@@ -74,12 +74,12 @@ def worst_case(
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
     n = len(clearance)
     # Both senses at once: each step of the search solves the mechanism for all of them.
-    moved, directions = worst_of_sense(
-        model,
-        np.concatenate([clearance, clearance]),
-        np.repeat([1.0, -1.0], n),
-        {name: np.tile(np.broadcast_to(value, n), 2) for name, value in (changed or {}).items()},
-    )
+    both = np.concatenate([clearance, clearance])
+    senses = np.repeat([1.0, -1.0], n)
+    numbers = {
+        name: np.tile(np.broadcast_to(value, n), 2) for name, value in (changed or {}).items()
+    }
+    moved, directions = worst_of_sense(model, both, senses, numbers)
     return WorstCase(moved[:n], moved[n:], directions[:n], directions[n:])
 
 
@@ -171,7 +171,8 @@ def random_directions(n_joints: int, n: int) -> Array:
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (n_joints + 1))
     steps = root ** -np.arange(1.0, n_joints + 1)
-    return 2.0 * np.pi * np.mod(0.5 + np.outer(np.arange(1, n + 1), steps), 1.0)
+    lattice = 0.5 + np.outer(np.arange(1, n + 1), steps)
+    return 2.0 * np.pi * np.mod(lattice, 1.0)
 
 
 def chance_beyond(
@@ -207,17 +208,16 @@ def chance_beyond(
         wide = {name: np.asarray(value)[part, None] for name, value in (changed or {}).items()}
         links: list[Any] = []
         for j in range(c.shape[1]):
-            links += (
-                [c[:, j, None] * cosines[j], c[:, j, None] * sines[j]]
-                if np.any(c[:, j])
-                else [0.0, 0.0]
-            )
+            lengths = c[:, j, None]
+            is_worn = np.any(lengths)
+            links += [lengths * cosines[j], lengths * sines[j]] if is_worn else [0.0, 0.0]
         moved = np.atleast_2d(model.displacement(links, wide))
         if rate_factor is not None:
             moved = rate_factor[part, None] * moved
         if offset_in is not None:
             moved = moved + offset_in[part, None]
         within = np.abs(moved) <= margin[part, None]
-        held = np.count_nonzero(np.broadcast_to(within, (len(c), within.shape[1])), axis=1)
-        chance[part] = 1.0 - held / within.shape[1]
+        tried = within.shape[1]
+        held = np.count_nonzero(np.broadcast_to(within, (len(c), tried)), axis=1)
+        chance[part] = 1.0 - held / tried
     return chance

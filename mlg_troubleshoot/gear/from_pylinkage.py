@@ -140,7 +140,8 @@ class _Theirs:
             self._add_link(link)
         for index, joint in enumerate(m.joints):
             if joint.type == "prismatic":
-                self.guides[joint.id] = math.degrees(math.atan2(joint.axis[1], joint.axis[0]))
+                x, y = joint.axis
+                self.guides[joint.id] = math.degrees(math.atan2(y, x))
             if joint.type == "tracker":
                 self._add_tracker(joint, index)
 
@@ -199,7 +200,8 @@ class _Theirs:
         fixed = driver.id if driver.travel else None
         turning = [ends for link, ends in self.links.items() if link != fixed]
         on = {p: sum(p in ends for ends in turning) for p in self.places}
-        slides = dict.fromkeys(self.guides, 1) | {p: len(own) for p, own in self.lines.items()}
+        on_lines = {p: len(own) for p, own in self.lines.items()}
+        slides = dict.fromkeys(self.guides, 1) | on_lines
         arms = {self.links[arm][1] for arm in self.slots}
         return [
             p

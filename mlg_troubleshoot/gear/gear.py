@@ -287,7 +287,7 @@ class Gear(Result):
         """Which clearances are above their limits, shape (…, n_joints): as
         `JointSpec.is_over_limit`. [in]
         """
-        return np.asarray(clearance_in > self.limits_in + ROUNDING_IN)
+        return clearance_in > self.limits_in + ROUNDING_IN
 
     @cached_property
     def new_parts_in(self) -> Array:

@@ -44,10 +44,10 @@ class LinkageModel:
         self.stroke = stroke
         self.calibration = calibration
         self.joint_numbers = mechanism.virtual_links
-        self._down_lock, self.mid = (
-            float(self.kernel.output(s, self.kernel.no_clearance())) for s in (stroke[0], stroke[1])
-        )
-        curve = self.kernel.output(np.linspace(*stroke, 201), self.kernel.no_clearance())
+        tight = self.kernel.no_clearance()
+        self._down_lock = float(self.kernel.output(stroke[0], tight))
+        self.mid = float(self.kernel.output(stroke[1], tight))
+        curve = self.kernel.output(np.linspace(*stroke, 201), tight)
         if not np.all(np.isfinite(curve)):
             closed = 100.0 * float(np.mean(np.isfinite(curve)))
             raise MechanismError(
@@ -102,7 +102,7 @@ class LinkageModel:
         """
         at = self.stroke[1] if stroke is None else stroke
         zero = self.mid if stroke is None else self.kernel.output(at, self.kernel.no_clearance())
-        return np.asarray(self.rate * (self.kernel.output(at, links, self.numbers(changed)) - zero))
+        return self.rate * (self.kernel.output(at, links, self.numbers(changed)) - zero)
 
     def plunger(self, stroke: Any, links: Sequence[Any] | None = None) -> Array:
         """Plunger position (Fig. 12), P(s) = P(0) + k (p(s) − p(0)), by extension and links; NaN if
@@ -110,7 +110,7 @@ class LinkageModel:
         """
         links = self.kernel.no_clearance() if links is None else links
         moved = self.kernel.output(stroke, links) - self._down_lock
-        return np.asarray(self.calibration.down_lock_in + self.rate * moved)
+        return self.calibration.down_lock_in + self.rate * moved
 
     def plunger_amplification(self) -> Array:
         """Amplification index A_iP of each joint to the plunger at mid-position (Eq. 8), for small

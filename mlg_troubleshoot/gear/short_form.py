@@ -116,7 +116,9 @@ def read_short_form(file: Path) -> NewGear:
 def short_form(values: Mapping[str, Any], name: str = "short form") -> NewGear:
     """Return a short form that is given as values; `name` stands for the file in errors."""
     path = Path(name)
-    return _Builder(DataFile(path, dict(values), decode(path, dict(values), ShortForm))).gear()
+    raw = dict(values)
+    file = DataFile(path, raw, decode(path, raw, ShortForm))
+    return _Builder(file).gear()
 
 
 @dataclass(slots=True)
@@ -208,7 +210,8 @@ class _Builder:
     def _located(self, link: str, point: str) -> list[str]:
         """The other points of a link that are located, those on the ground first."""
         ground = self.form.ground
-        ends = [p for p in self.form.links[link] if p != point and (p in ground or p in self.steps)]
+        located = {*ground, *self.steps} - {point}
+        ends = [p for p in self.form.links[link] if p in located]
         return sorted(ends, key=lambda p: p not in ground)
 
     def _locate(self, point: str) -> bool:
@@ -255,7 +258,10 @@ class _Builder:
         """The guides of a point, one that stands still as a line from a point on the ground."""
         moving = self.form.guides.get(point, ())
         axis = self.form.guides_deg.get(point)
-        return [*moving] if axis is None else [(next(iter(self.form.ground)), axis), *moving]
+        if axis is None:
+            return [*moving]
+        ground = next(iter(self.form.ground))
+        return [(ground, axis), *moving]
 
     def _is_guided(self, point: str, reach: Mapping[str, list[str]]) -> bool:
         lines = self._lines(point)
@@ -279,10 +285,15 @@ class _Builder:
             self._add(point, "guide", words, upstream=end, line=list(lines[0]))
             return
         axis = self.form.guides_deg[point]
-        along = (self._at(point) - self._at(end)) * np.exp(-1j * np.radians(axis))
+        along = self._from(end, point, axis)
         words = f"dyad RRP: {link} from {end}, guide at {axis:g}°"
         sign = 1 if along.real >= 0.0 else -1
         self._add(point, "slider", words, upstream=end, axis_deg=axis, sign=sign)
+
+    def _from(self, start: str, end: str, axis_deg: float) -> complex:
+        """Vector between two points, its real part along an axis. [in]"""
+        arm = self._at(end) - self._at(start)
+        return complex(arm * np.exp(-1j * np.radians(axis_deg)))
 
     def _push(self, point: str, actuator: str, reach: Mapping[str, list[str]]) -> None:
         """Locate the end of an actuator that its guide keeps in line with its other end."""
@@ -291,7 +302,7 @@ class _Builder:
         if axis is None or point in self.form.guides or base not in self.form.ground:
             expected = f"one guide, in guides_deg, and {base} on the ground: {actuator} pushes it"
             raise self.file.fail(("moving", point), expected)
-        arm = (self._at(point) - self._at(base)) * np.exp(-1j * np.radians(axis))
+        arm = self._from(base, point, axis)
         if abs(arm - abs(arm)) > _IN_LINE:
             expected = f"the direction from {base} to {point}: {actuator} pushes along it"
             raise self.file.fail(("guides_deg", point), expected)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,7 @@ class Interval:
 
     @property
     def middle(self) -> Array:
-        return np.asarray(0.5 * (self.low + self.high))
+        return 0.5 * (self.low + self.high)
 
     @property
     def width(self) -> Array:
@@ -56,7 +57,9 @@ class Interval:
         return Interval(self.low[places], self.high[places])
 
     def rounded(self) -> Interval:
-        return Interval(np.nextafter(self.low, -np.inf), np.nextafter(self.high, np.inf))
+        low = np.nextafter(self.low, -np.inf)
+        high = np.nextafter(self.high, np.inf)
+        return Interval(low, high)
 
     def __neg__(self) -> Interval:
         return Interval(-self.high, -self.low)
@@ -69,26 +72,29 @@ class Interval:
 
     def __mul__(self, other: Interval) -> Interval:
         ends = [a * b for a in (self.low, self.high) for b in (other.low, other.high)]
-        low = np.minimum(np.minimum(ends[0], ends[1]), np.minimum(ends[2], ends[3]))
-        high = np.maximum(np.maximum(ends[0], ends[1]), np.maximum(ends[2], ends[3]))
-        return Interval(low, high).rounded()
+        return Interval(reduce(np.minimum, ends), reduce(np.maximum, ends)).rounded()
 
     def __and__(self, other: Interval) -> Interval:
         """Intersection; a bound that is not known gives way to one that is."""
-        return Interval(np.fmax(self.low, other.low), np.fmin(self.high, other.high))
+        low = np.fmax(self.low, other.low)
+        high = np.fmin(self.high, other.high)
+        return Interval(low, high)
 
     def inverse(self) -> Interval:
         """NaN where it may be zero."""
-        unknown = ~((self.low > 0.0) | (self.high < 0.0))
-        ends = (np.where(unknown, np.nan, 1.0 / end) for end in (self.high, self.low))
-        return Interval(*ends).rounded()
+        without_zero = (self.low > 0.0) | (self.high < 0.0)
+        low = np.where(without_zero, 1.0 / self.high, np.nan)
+        high = np.where(without_zero, 1.0 / self.low, np.nan)
+        return Interval(low, high).rounded()
 
     def along(self, offsets: Interval) -> Interval:
         """Sum of slope times offset over the variables, the last axis but one."""
         parts = self * offsets
         # Twenty additions round by no more than this.
         slack = 1e-14 * parts.magnitude.sum(axis=-2)
-        return Interval(parts.low.sum(axis=-2) - slack, parts.high.sum(axis=-2) + slack)
+        low = parts.low.sum(axis=-2) - slack
+        high = parts.high.sum(axis=-2) + slack
+        return Interval(low, high)
 
 
 def variables(box: Interval) -> list[Range]:
@@ -101,7 +107,8 @@ def variables(box: Interval) -> list[Range]:
     for i in range(count):
         own = Interval.exactly(np.zeros((count, boxes)))
         own.low[i] = 1.0
-        found.append(Range(box[i], own, flat, Interval.exactly(middle[i]), own, offsets))
+        at_middle = Interval.exactly(middle[i])
+        found.append(Range(box[i], own, flat, at_middle, own, offsets))
     return found
 
 
@@ -127,9 +134,8 @@ class Range:
 
     def _each(self, function: Callable[..., Interval], *others: Range) -> Range:
         parts = (self, *others)
-        return replace(
-            self, **{name: function(*(getattr(part, name) for part in parts)) for name in _ENCLOSED}
-        )
+        enclosed = {name: function(*(getattr(part, name) for part in parts)) for name in _ENCLOSED}
+        return replace(self, **enclosed)
 
     def _narrowed(self) -> Range:
         slope = self.slope & self.slope_at_middle + self.bend.along(self.offsets)
@@ -220,24 +226,31 @@ def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area:
     if not all(isinstance(part, Range) for part in joint):
         return joint
     c: Place = joint
-    a, b = ([_as_range(p, c[0]) for p in place] for place in (start, end))
+    a = [_as_range(p, c[0]) for p in start]
+    b = [_as_range(p, c[0]) for p in end]
     grown = _as_range(square, c[0]) * 0.5
     cross = _as_range(area, c[0]).value
     c = _first_guess(c, a, b, grown, cross)
     for _ in range(_ROUNDS):
-        links = [[p - q for p, q in zip(c, far, strict=True)] for far in (a, b)]
-        (ux, uy), (vx, vy) = links
-        u, v = ([p.value for p in link] for link in links)
+        ux, uy = (p - q for p, q in zip(c, a, strict=True))
+        vx, vy = (p - q for p, q in zip(c, b, strict=True))
+        u = ux.value, uy.value
+        v = vx.value, vy.value
         inverse = (cross & (ux * vy - uy * vx).value).inverse()
         slopes = _implicit_slopes(u, v, inverse, a, b, grown)
         c = [replace(p, slope=p.slope & slope) for p, slope in zip(c, slopes, strict=True)]
-        turned = [[p.slope - q.slope for p, q in zip(c, far, strict=True)] for far in (a, b)]
-        bent = [x[:, None] * x[None] + y[:, None] * y[None] for x, y in turned]
-        first = _dot(u, [p.bend for p in a]) + grown.bend - bent[0]
-        second = _dot(v, [p.bend for p in b]) - bent[1]
+        first = _dot(u, [p.bend for p in a]) + grown.bend - _link_rotation(c, a)
+        second = _dot(v, [p.bend for p in b]) - _link_rotation(c, b)
         bends = _solved(u, v, inverse, first, second)
-        c = [replace(p, bend=p.bend & bend)._narrowed() for p, bend in zip(c, bends, strict=True)]
+        c = [replace(p, bend=p.bend & bend) for p, bend in zip(c, bends, strict=True)]
+        c = [p._narrowed() for p in c]
     return c[0], c[1]
+
+
+def _link_rotation(c: Place, far: Place) -> Interval:
+    """Outer product of the gradient of a link with itself, over both coordinates."""
+    x, y = (p.slope - q.slope for p, q in zip(c, far, strict=True))
+    return x[:, None] * x[None] + y[:, None] * y[None]
 
 
 def _first_guess(c: Place, a: Place, b: Place, grown: Range, cross: Interval) -> Place:
@@ -253,8 +266,11 @@ def _first_guess(c: Place, a: Place, b: Place, grown: Range, cross: Interval) ->
         guess = []
         for p, w in zip(c, swing, strict=True):
             room = factor * (w + widest)
-            guess.append(Interval(p.at_middle.low - room - 1e-12, p.at_middle.high + room + 1e-12))
-        u, v = ([g - p.value for g, p in zip(guess, far, strict=True)] for far in (a, b))
+            low = p.at_middle.low - room - 1e-12
+            high = p.at_middle.high + room + 1e-12
+            guess.append(Interval(low, high))
+        u = [g - p.value for g, p in zip(guess, a, strict=True)]
+        v = [g - p.value for g, p in zip(guess, b, strict=True)]
         across = cross & u[0] * v[1] - u[1] * v[0]
         slopes = _implicit_slopes(u, v, across.inverse(), a, b, grown)
         inside = np.ones(len(widest), dtype=bool)
@@ -286,7 +302,8 @@ def _as_range(part: Any, like: Range) -> Range:
     if isinstance(part, Range):
         return part
     level = Interval.exactly(np.full_like(like.value.low, float(part)))
-    flat, bend = (Interval.exactly(np.zeros_like(x.low)) for x in (like.slope, like.bend))
+    flat = Interval.exactly(np.zeros_like(like.slope.low))
+    bend = Interval.exactly(np.zeros_like(like.bend.low))
     return Range(level, flat, bend, level, flat, like.offsets)
 
 
@@ -302,7 +319,8 @@ def _solved(u: Bounds, v: Bounds, inverse: Interval, first: Interval, second: In
 
 def _squared(x: Interval) -> tuple[Interval, ...]:
     ends = x.low * x.low, x.high * x.high
-    least = np.where((x.low <= 0.0) & (x.high >= 0.0), 0.0, np.minimum(*ends))
+    holds_zero = (x.low <= 0.0) & (x.high >= 0.0)
+    least = np.where(holds_zero, 0.0, np.minimum(*ends))
     square = Interval(least, np.maximum(*ends)).rounded()
     two = np.full_like(x.low, 2.0)
     return _not_negative(square), _doubled(x), Interval(two, two)
@@ -323,8 +341,10 @@ def _inverse(x: Interval) -> tuple[Interval, ...]:
 
 
 def _root(x: Interval) -> tuple[Interval, ...]:
-    ends = (np.sqrt(np.where(x.low > 0.0, end, np.nan)) for end in (x.low, x.high))
-    root = Interval(*ends).rounded()
+    positive = x.low > 0.0
+    low = np.sqrt(np.where(positive, x.low, np.nan))
+    high = np.sqrt(np.where(positive, x.high, np.nan))
+    root = Interval(low, high).rounded()
     rate = Interval(0.5 / root.high, 0.5 / root.low).rounded()
     curvature = rate * rate * Interval(1.0 / root.high, 1.0 / root.low)
     return root, rate, -curvature.rounded()

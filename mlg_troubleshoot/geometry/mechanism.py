@@ -292,16 +292,17 @@ class Mechanism:
         new = np.broadcast_arrays(
             first, turned * flat + tilted * normal, turned * normal - tilted * flat
         )
-        return origin + _column(hinge.x) * x + _column(hinge.y) * y, np.stack(new, axis=-2)
+        hinge_in_space = origin + _column(hinge.x) * x + _column(hinge.y) * y
+        return hinge_in_space, np.stack(new, axis=-2)
 
     def reference_in_space(self, name: str) -> Array:
         """Reference position of a point in the frame of the base plane, shape (..., 3). [in]"""
         if name not in self._places:
             point = self.point(name)
             origin, axes = self.frame(point.plane)
-            self._places[name] = (
-                origin + _column(point.x) * axes[..., 0, :] + _column(point.y) * axes[..., 1, :]
-            )
+            along_x = _column(point.x) * axes[..., 0, :]
+            along_y = _column(point.y) * axes[..., 1, :]
+            self._places[name] = origin + along_x + along_y
         return self._places[name]
 
     def seen_in_plane(self, plane: str, start: str, end: str) -> tuple[Any, Any]:

@@ -21,6 +21,7 @@ from mlg_troubleshoot.geometry.mechanism import (
     Guided,
     Lever,
     Mechanism,
+    Point,
     Slider,
     Slot,
     Step,
@@ -144,12 +145,10 @@ class _Writer:
         slopes = np.einsum("...ij,...kj->...ik", axes, from_axes[..., :2, :])
         seen = []
         for i, axis in enumerate("uvh"):
-            c0, cx, cy = (
-                self.parameter(f"transfer.{point.plane}.{plane}.{axis}{part}", value)
-                for part, value in zip(
-                    "0xy", (constant[..., i], slopes[..., i, 0], slopes[..., i, 1]), strict=True
-                )
-            )
+            name = f"transfer.{point.plane}.{plane}.{axis}"
+            c0 = self.parameter(f"{name}0", constant[..., i])
+            cx = self.parameter(f"{name}x", slopes[..., i, 0])
+            cy = self.parameter(f"{name}y", slopes[..., i, 1])
             seen.append(self.let(f"{c0} + {cx} * {x} + {cy} * {y}"))
         return (seen[0], seen[1]), seen[2]
 
@@ -262,23 +261,30 @@ def _dyad(w: _Writer, step: Dyad) -> None:
         factors = w.let(f"4.0 * {second} * {second} * {square} - {excess} * {excess}")
     area = w.let(f"0.5 * {sign} * sqrt({factors})")
     across = w.let(f"{area} * {inverse}")
-    w.joints[step.joint] = (
+    place = (
         w.let(f"{ax} + {along} * {dx} - {across} * {dy}"),
         w.let(f"{ay} + {along} * {dy} + {across} * {dx}"),
     )
-    w.closures.append(Closure(w.joints[step.joint], (ax, ay), (bx, by), square, area))
+    w.joints[step.joint] = place
+    w.closures.append(Closure(place, (ax, ay), (bx, by), square, area))
+
+
+def _arm(pivot: Point, end: Point) -> Any:
+    """Vector from a pivot to another point in its plane, as a complex number. [in]"""
+    return (end.x - pivot.x) + 1j * (end.y - pivot.y)
 
 
 def _lever(w: _Writer, step: Lever) -> None:
     w.same_plane(step, step.pivot, step.follows)
-    joint, pivot, led = (w.mechanism.point(n) for n in (step.joint, step.pivot, step.follows))
+    pivot = w.mechanism.point(step.pivot)
+    to_joint = _arm(pivot, w.mechanism.point(step.joint))
+    to_led = _arm(pivot, w.mechanism.point(step.follows))
     w.distance(step.pivot, step.follows)
-    ratio = ((joint.x - pivot.x) + 1j * (joint.y - pivot.y)) / (
-        (led.x - pivot.x) + 1j * (led.y - pivot.y)
-    )
+    ratio = to_joint / to_led
     along = w.parameter(f"lever.{step.joint}.along", ratio.real)
     across = w.parameter(f"lever.{step.joint}.across", ratio.imag)
-    (px, py), (fx, fy) = w.joints[step.pivot], w.joints[step.follows]
+    px, py = w.joints[step.pivot]
+    fx, fy = w.joints[step.follows]
     dx = w.let(f"{fx} - {px}")
     dy = w.let(f"{fy} - {py}")
     place = (
@@ -290,10 +296,11 @@ def _lever(w: _Writer, step: Lever) -> None:
 
 def _slot(w: _Writer, step: Slot) -> None:
     w.same_plane(step, step.pivot, step.pin)
-    joint, pivot, pin = (w.mechanism.point(n) for n in (step.joint, step.pivot, step.pin))
+    pivot = w.mechanism.point(step.pivot)
+    to_joint = _arm(pivot, w.mechanism.point(step.joint))
+    to_pin = _arm(pivot, w.mechanism.point(step.pin))
     w.distance(step.pivot, step.pin)
-    to_pin = (pin.x - pivot.x) + 1j * (pin.y - pivot.y)
-    arm = ((joint.x - pivot.x) + 1j * (joint.y - pivot.y)) / (to_pin / abs(to_pin))
+    arm = to_joint / (to_pin / abs(to_pin))
     along = w.parameter(f"arm.{step.joint}.along", arm.real)
     across = w.parameter(f"arm.{step.joint}.across", arm.imag)
     px, py = w.joints[step.pivot]

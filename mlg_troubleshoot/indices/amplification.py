@@ -64,22 +64,23 @@ class Amplification:
     @property
     def local_stage(self) -> Array:
         """Stage-wise index at mid-position, shape (n_joints,). [1]"""
-        return np.asarray(self.stage[:, -1])
+        return self.stage[:, -1]
 
     @property
     def max_stage(self) -> Array:
         """Largest stage-wise index over the release, shape (n_joints,). [1]"""
-        return np.asarray(self.stage.max(axis=1))
+        largest: Array = self.stage.max(axis=1)
+        return largest
 
     @property
     def local_plunger(self) -> Array:
         """A_iP by the product of Eq. 9 at mid-position, shape (n_joints,). [1]"""
-        return np.asarray(self.beta * self.stage[:, -1] * self.handed_on[:, -1])
+        return self.beta * self.stage[:, -1] * self.handed_on[:, -1]
 
     @property
     def max_plunger(self) -> Array:
         """A_iP by Eq. 9 with every index at its maximum over the release, shape (n_joints,). [1]"""
-        return np.asarray(self.beta * self.max_stage * self.onward_of_maxima)
+        return self.beta * self.max_stage * self.onward_of_maxima
 
     def shares(self, plunger: Array, limits_in: Array) -> Array:
         """Share of each joint in the variance of the linearised displacement: Fig. 13b's index.
@@ -89,7 +90,8 @@ class Amplification:
         from 0. [in] Returns, shape (n_joints,): shares, 1 in total. [1]
         """
         squares = (plunger * limits_in) ** 2
-        return np.asarray(squares / squares.sum())
+        shares: Array = squares / squares.sum()
+        return shares
 
 
 def amplification(
@@ -122,9 +124,9 @@ def amplification(
 
 def csc(first: Array, second: Array) -> Array:
     """Cosecant of the angle between two links, at least 1, shape (...). [1]"""
-    lengths = np.linalg.norm(first, axis=-1) * np.linalg.norm(second, axis=-1)
-    cosine = np.sum(first * second, axis=-1) / lengths
-    return np.asarray(1.0 / np.sqrt(1.0 - cosine**2))
+    cosine = np.sum(first * second, axis=-1) / (_lengths(first) * _lengths(second))
+    sine: Array = np.sqrt(1.0 - cosine**2)
+    return 1.0 / sine
 
 
 class _Chain:
@@ -169,7 +171,7 @@ class _Chain:
         output = self.mechanism.output
         if output.kind == "position":
             return 1.0
-        arm = self.place[output.joint][-1] - self.place[output.pivot][-1]
+        arm = (self.place[output.joint] - self.place[output.pivot])[-1]
         return float(1.0 / np.linalg.norm(arm))
 
     def _entry(self, number: int) -> Step:
@@ -202,10 +204,10 @@ class _Chain:
         axes = self._axes(step)
         place = self.place[step.joint]
         if isinstance(step, Slider):
-            return np.broadcast_to(
-                np.cos(step.axis) * axes[0] + np.sin(step.axis) * axes[1], place.shape
-            )
-        return _unit(np.cross(axes[2], place - self.place[needs(step)[-1]]))
+            direction = np.cos(step.axis) * axes[0] + np.sin(step.axis) * axes[1]
+            return np.broadcast_to(direction, place.shape)
+        from_centre = place - self.place[needs(step)[-1]]
+        return _unit(np.cross(axes[2], from_centre))
 
     def _axes(self, step: Step) -> Array:
         return self.mechanism.frame(self.mechanism.point(step.joint).plane)[1]
@@ -224,7 +226,8 @@ class _Chain:
                 tangent = self._tangent(step) @ axes[:2].T
                 # The joint moves across its second link: the sine of θ is the cosine between link
                 # and path.
-                return csc(in_plane, np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1))
+                normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
+                return csc(in_plane, normal)
             case Slot():
                 return self._arms(step, step.pin)
             case Crank() | Lever() | Guided():
@@ -239,14 +242,16 @@ class _Chain:
                 if handed is None:
                     return np.ones(len(self.stroke))
                 cosine = np.sum(link * self._tangent(handed), axis=-1)
-                return np.asarray(np.abs(cosine / np.sum(link * self._tangent(step), axis=-1)))
+                sine = np.sum(link * self._tangent(step), axis=-1)
+                index: Array = np.abs(cosine / sine)
+                return index
             case Slot():
                 handed = self.mechanism.step(step.pin)
                 arm = _unit(self.place[step.pin] - self.place[step.pivot])
                 if handed is None:
                     return self._arms(step, step.pin)
-                sine = np.linalg.norm(np.cross(arm, self._tangent(handed)), axis=-1)
-                return np.asarray(sine * self._arms(step, step.pin))
+                across: Array = np.cross(arm, self._tangent(handed))
+                return _lengths(across) * self._arms(step, step.pin)
             case Lever():
                 return self._arms(step, step.follows)
             case Crank() | Guided():
@@ -254,21 +259,22 @@ class _Chain:
 
     def _arms(self, step: Lever | Slot, other: str) -> Array:
         pivot = self.place[step.pivot]
-        long = np.linalg.norm(self.place[step.joint] - pivot, axis=-1)
-        return np.asarray(long / np.linalg.norm(self.place[other] - pivot, axis=-1))
+        return _lengths(self.place[step.joint] - pivot) / _lengths(self.place[other] - pivot)
 
     def _derivative(self, number: int, joint: str) -> Array:
         """Largest movement of a joint per unit of one clearance over all directions."""
-        kernel = self.model.kernel
-        return self._largest(
-            number, lambda links: np.stack(kernel.positions(self.stroke, links)[joint], axis=-1)
-        )
+
+        def place(links: list[float]) -> Array:
+            positions = self.model.kernel.positions(self.stroke, links)
+            return np.stack(positions[joint], axis=-1)
+
+        return self._largest(number, place)
 
     def _of_output(self, number: int) -> Array:
         """The same of the output, as a movement of its joint."""
         kernel = self.model.kernel
         moved = self._largest(number, lambda links: kernel.output(self.stroke, links)[:, None])
-        return np.asarray(moved / self.output_factor())
+        return moved / self.output_factor()
 
     def _largest(self, number: int, place: Callable[[list[float]], Array]) -> Array:
         at = 2 * self.model.joint_numbers.index(number)
@@ -278,9 +284,18 @@ class _Chain:
             links[at + axis] = step
             return place(links)
 
-        moved = [(moved_by(axis, STEP) - moved_by(axis, -STEP)) / (2 * STEP) for axis in (0, 1)]
-        return np.linalg.svd(np.stack(moved, axis=-1), compute_uv=False)[..., 0]
+        def slope(axis: int) -> Array:
+            return (moved_by(axis, STEP) - moved_by(axis, -STEP)) / (2 * STEP)
+
+        jacobian = np.stack([slope(0), slope(1)], axis=-1)
+        largest: Array = np.linalg.norm(jacobian, 2, axis=(-2, -1))
+        return largest
+
+
+def _lengths(vectors: Array) -> Array:
+    lengths: Array = np.linalg.norm(vectors, axis=-1)
+    return lengths
 
 
 def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+    return vectors / _lengths(vectors)[..., None]

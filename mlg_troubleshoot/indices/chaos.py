@@ -16,7 +16,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.random import Generator
 
-from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.arrays import Array, Wholes, count_failed
 from mlg_troubleshoot.indices.estimators import Indices, without_numbers
 from mlg_troubleshoot.indices.inputs import Response
 
@@ -65,16 +65,15 @@ class ChaosFit:
         """
         level = np.clip(accuracy_of, self.residual, 1.0)
         free = max(self.trained_on - len(self.coefficients), 1)
-        return np.asarray(self.residual + 4.0 * np.sqrt(level * self.residual / free))
+        return self.residual + 4.0 * np.sqrt(level * self.residual / free)
 
 
 def chaos_indices(
     response: Response, n: int, rng: Generator, seed: int, accuracy: float = 1e-3, most: int = 2048
 ) -> tuple[Indices, ChaosFit | None]:
     """Compute indices by polynomial chaos, with as few evaluations as the accuracy needs."""
-    corners = np.concatenate(
-        [np.zeros((1, n)), np.ones((1, n)), rng.integers(0, 2, (_CORNERS - 2, n))]
-    )
+    some_corners = rng.integers(0, 2, (_CORNERS - 2, n))
+    corners = np.concatenate([np.zeros((1, n)), np.ones((1, n)), some_corners])
     held = _latin(rng, _HELD_OUT, n)
     checks = np.concatenate([held, corners])
     # Points of the first fit: enough for the second degree, or for a good one where variables are
@@ -86,9 +85,7 @@ def chaos_indices(
     best: ChaosFit | None = None
     while True:
         used = len(check_values) + len(values)
-        failed = int(
-            np.count_nonzero(~np.isfinite(check_values)) + np.count_nonzero(~np.isfinite(values))
-        )
+        failed = count_failed(check_values) + count_failed(values)
         design = (
             f"polynomial chaos, {len(values)} points for the fit and {len(checks)} for its check"
         )
@@ -112,8 +109,9 @@ def chaos_indices(
 
 
 def _latin(rng: Generator, count: int, n: int) -> Array:
-    places = rng.permuted(np.tile(np.arange(count), (n, 1)), axis=1).T
-    return np.asarray((places + rng.random((count, n))) / count)
+    strata = np.tile(np.arange(count), (n, 1))
+    places = rng.permuted(strata, axis=1).T
+    return (places + rng.random((count, n))) / count
 
 
 def _best_fit(
@@ -139,7 +137,8 @@ def _best_fit(
         misses = check_values - legendre_terms(checks, exponents) @ coefficients
         residual = float(np.mean(misses[:_HELD_OUT] ** 2)) / spread
         if residual < last:
-            corner = float(np.abs(misses[_HELD_OUT:]).max()) / np.sqrt(spread)
+            at_corners = np.abs(misses[_HELD_OUT:])
+            corner = float(at_corners.max()) / np.sqrt(spread)
             found = ChaosFit(
                 exponents, np.asarray(coefficients, float), residual, corner, len(points)
             )
@@ -173,9 +172,8 @@ def total_degree(n: int, degree: int) -> Wholes:
     chosen = (
         c for total in range(degree + 1) for c in combinations_with_replacement(range(n), total)
     )
-    exponents = np.array(
-        [np.bincount(np.array(c, int), minlength=n) for c in chosen], dtype=np.int64
-    )
+    counts = [np.bincount(np.array(c, int), minlength=n) for c in chosen]
+    exponents = np.array(counts, np.int64)
     exponents.flags.writeable = False
     return exponents
 

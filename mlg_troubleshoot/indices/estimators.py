@@ -44,7 +44,9 @@ class Indices:
         cls, design: str, seed: int, first: Estimate, total: Estimate, *rest: Any
     ) -> Indices:
         """Indices from values with the half widths of their intervals, both of shape (n,). [1]"""
-        return cls(design, seed, first[0], _interval(*first), total[0], _interval(*total), *rest)
+        first_interval = _interval(*first)
+        total_interval = _interval(*total)
+        return cls(design, seed, first[0], first_interval, total[0], total_interval, *rest)
 
     @property
     def half_width(self) -> float:
@@ -78,9 +80,8 @@ def group_indices(
     found = []
     for group in gear.link_groups:
         others = tuple(i for number, i in places.items() if number not in group)
-        found.append(
-            GroupIndices(group, closed(tuple(places[n] for n in group)), 1.0 - closed(others))
-        )
+        alone = closed(tuple(places[n] for n in group))
+        found.append(GroupIndices(group, alone, 1.0 - closed(others)))
     return tuple(found)
 
 
@@ -98,7 +99,8 @@ def student_half(scatter: Array, count: int) -> Array:
 
     if count < 2:
         return np.full_like(scatter, np.nan)
-    return np.asarray(float(stdtrit(count - 1, 0.975)) * scatter / np.sqrt(count))
+    half: Array = float(stdtrit(count - 1, 0.975)) * scatter / np.sqrt(count)
+    return half
 
 
 def without_numbers(

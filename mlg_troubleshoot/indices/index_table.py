@@ -123,10 +123,9 @@ def rank_ranges(ensemble_first_order: Array) -> list[tuple[int, int]]:
     (n_linkages, n_joints).
     """
     places = np.array([ranks(row) for row in ensemble_first_order])
-    return [
-        (int(low), int(high))
-        for low, high in zip(places.min(axis=0), places.max(axis=0), strict=True)
-    ]
+    least = places.min(axis=0).tolist()
+    greatest = places.max(axis=0).tolist()
+    return list(zip(least, greatest, strict=True))
 
 
 def read_index_table(gear: Gear) -> IndexTable:

@@ -70,7 +70,8 @@ def worst_directions(model: LinkageModel, limits_in: Array) -> HeldDirections:
 
 def worst_sense(model: LinkageModel, limits_in: Array, sense: float) -> HeldDirections:
     """Worst directions of one sense at the limits, then held."""
-    return HeldDirections(model, worst_of_sense(model, limits_in[None, :], sense)[1][0], sense)
+    _, directions = worst_of_sense(model, limits_in[None, :], sense)
+    return HeldDirections(model, directions[0], sense)
 
 
 def _half_normal(u: Array) -> Array:
@@ -78,7 +79,8 @@ def _half_normal(u: Array) -> Array:
     from scipy.special import erf, erfinv
 
     cut = 2.5 / np.sqrt(2.0)
-    return np.asarray(erfinv(u * erf(cut)) / cut)
+    quantiles: Array = erfinv(u * erf(cut)) / cut
+    return quantiles
 
 
 _QUANTILES: dict[str, Callable[[Array], Array]] = {
@@ -116,7 +118,7 @@ class Inputs:
 
     def at(self, unit: Array) -> Array:
         """Clearances at probabilities, points of the unit cube, shape (n, n_joints). [in]"""
-        return np.asarray(_QUANTILES[self.distribution](unit) * self.limits_in)
+        return _QUANTILES[self.distribution](unit) * self.limits_in
 
     def on_unit_cube(self, response: Response) -> Response:
         return lambda unit: response(self.at(unit))
@@ -125,9 +127,13 @@ class Inputs:
 def with_random_directions(model: LinkageModel, inputs: Inputs) -> Response:
     """Displacement when every clearance takes a uniformly random direction (as Zhu and Ting do)."""
     n = len(inputs.limits_in)
-    return lambda unit: model.displacement(
-        links_from(inputs.at(unit[:, :n]), 2.0 * np.pi * unit[:, n:])
-    )
+
+    def response(unit: Array) -> Array:
+        clearance_in = inputs.at(unit[:, :n])
+        directions = 2.0 * np.pi * unit[:, n:]
+        return model.displacement(links_from(clearance_in, directions))
+
+    return response
 
 
 def joint_groups(n_joints: int) -> tuple[tuple[int, ...], ...]:

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, count_failed
 from mlg_troubleshoot.indices.chaos import ChaosFit, chaos_indices
-from mlg_troubleshoot.indices.estimators import Indices, student_half, without_numbers
+from mlg_troubleshoot.indices.estimators import Estimate, Indices, student_half, without_numbers
 from mlg_troubleshoot.indices.inputs import Response
 
 # Independent scrambles of the Sobol points: their spread gives the interval. [1]
@@ -74,10 +74,10 @@ def saltelli_indices(  # noqa: PLR0913 - what is asked, where it stops, what a f
 
 def _continued(stream: Any, power: int) -> Iterator[tuple[Array, Array]]:
     """Further Sobol points of a scramble, in both halves of the variables."""
-    while stream.num_generated < 1 << power:
-        first, second = np.split(
-            stream.random(min(_ROWS, (1 << power) - stream.num_generated)), 2, axis=1
-        )
+    wanted = 1 << power
+    while stream.num_generated < wanted:
+        points = stream.random(min(_ROWS, wanted - stream.num_generated))
+        first, second = np.split(points, 2, axis=1)
         yield first, second
 
 
@@ -97,7 +97,7 @@ class _Sums:
         count = len(a)
         ya = response(a)
         yb = response(b)
-        self.failed += int(np.count_nonzero(~np.isfinite(ya)) + np.count_nonzero(~np.isfinite(yb)))
+        self.failed += count_failed(ya) + count_failed(yb)
         if self.shift is None:
             # Moments about a value near the mean lose no digits.
             self.shift = float(np.mean(np.concatenate([ya, yb])))
@@ -109,7 +109,7 @@ class _Sums:
             mixed = a.copy()
             mixed[:, list(group)] = b[:, list(group)]
             ym = response(mixed)
-            self.failed += int(np.count_nonzero(~np.isfinite(ym)))
+            self.failed += count_failed(ym)
             ym = ym - self.shift
             self.partial[i] += float((yb * (ym - ya)).sum())
             self.total_partial[i] += float(((ya - ym) ** 2).sum()) / 2.0
@@ -117,8 +117,10 @@ class _Sums:
         return count * (2 + len(groups))
 
     def moments(self) -> tuple[float, float]:
-        mean = self.total / (2 * self.count)
-        return mean + (self.shift or 0.0), self.squares / (2 * self.count) - mean**2
+        values = 2 * self.count
+        mean = self.total / values
+        variance = self.squares / values - mean**2
+        return mean + (self.shift or 0.0), variance
 
 
 def _pooled(sums: list[_Sums], design: str, seed: int, used: int, note: str) -> Indices:
@@ -129,19 +131,18 @@ def _pooled(sums: list[_Sums], design: str, seed: int, used: int, note: str) -> 
         n = len(sums[0].partial)
         mean = moments[0, 0]
         return without_numbers(design, seed, n, used, note, mean=mean, variance=0.0)
-    first = np.array(
-        [each.partial / each.count / v for each, v in zip(sums, variance, strict=True)]
-    )
-    total = np.array(
-        [each.total_partial / each.count / v for each, v in zip(sums, variance, strict=True)]
-    )
-    estimates = [
-        (x.mean(axis=0), student_half(x.std(axis=0, ddof=1), len(sums))) for x in (first, total)
-    ]
+    counts = np.array([[each.count] for each in sums])
+
+    def estimate(partial_variances: list[Array]) -> Estimate:
+        indices = np.array(partial_variances) / counts / variance[:, None]
+        scatter = indices.std(axis=0, ddof=1)
+        return indices.mean(axis=0), student_half(scatter, len(sums))
+
+    first = estimate([each.partial for each in sums])
+    total = estimate([each.total_partial for each in sums])
     mean = float(moments[:, 0].mean())
-    return Indices.around(
-        design, seed, estimates[0], estimates[1], mean, float(variance.mean()), used, 0, note
-    )
+    mean_variance = float(variance.mean())
+    return Indices.around(design, seed, first, total, mean, mean_variance, used, 0, note)
 
 
 def fast_indices(

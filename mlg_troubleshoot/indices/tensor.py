@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, count_failed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.indices.inputs import Response
 
@@ -70,23 +70,24 @@ def tensor_indices(
         flat = np.arange(start, min(start + _ROWS, m**n))
         places = np.stack(np.unravel_index(flat, (m,) * n), axis=-1)
         values[flat] = response(points[places] * limits)
-    failed = int(np.count_nonzero(~np.isfinite(values)))
     tensor = values.reshape((m,) * n)
     mean = float(_averaged(tensor, weights, set()))
     tensor = tensor - mean
     variance = float(_variance(tensor, weights))
-    first = [_variance(_averaged(tensor, weights, {i}), weights) / variance for i in range(n)]
-    others = [
-        _variance(_averaged(tensor, weights, set(range(n)) - {i}), weights) / variance
-        for i in range(n)
-    ]
+    variables = set(range(n))
+
+    def explained(group: set[int]) -> float:
+        return float(_variance(_averaged(tensor, weights, group), weights)) / variance
+
+    first = [explained({i}) for i in variables]
+    others = [explained(variables - {i}) for i in variables]
     return TensorIndices(
         np.array(first),
         1.0 - np.array(others),
         mean,
         variance,
         m**n,
-        failed,
+        count_failed(values),
         tensor,
         np.asarray(weights),
     )

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.arrays import Array, Wholes, count_failed
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.geometry.kernel import numba_is_installed
 from mlg_troubleshoot.indices.estimators import failed_note
@@ -143,7 +143,7 @@ def compute_block(study: BlockStudy, block: StudyBlock) -> BlockSums:
         base = response(clearance)
         total += float(base.sum())
         squares += float((base * base).sum())
-        failed += int(np.count_nonzero(~np.isfinite(base)))
+        failed += count_failed(base)
         columns = clearance.T
         wide[:] = columns[:, :, None]
         for i in range(n):
@@ -154,9 +154,10 @@ def compute_block(study: BlockStudy, block: StudyBlock) -> BlockSums:
             variance = float(np.einsum("ij,ij->", spread, spread)) / (n1 - 1)
             within[i] += variance
             if not np.isfinite(variance):
-                failed += int(np.count_nonzero(~np.isfinite(values)))
+                failed += count_failed(values)
     count = (block.stop - block.start) * n1
-    return BlockSums(tuple(within.tolist()), total, squares, count, count * (n1 * n + 1), failed)
+    evaluations = count * (n1 * n + 1)
+    return BlockSums(tuple(within.tolist()), total, squares, count, evaluations, failed)
 
 
 @lru_cache(maxsize=2)
@@ -203,13 +204,16 @@ def _summed(study: BlockStudy, done: dict[StudyBlock, BlockSums]) -> TotalOrder:
             continue
         within = np.sum([done[block].within for block in blocks], axis=0)
         total, squares, samples = np.sum([done[block][1:4] for block in blocks], axis=0)
-        indices.append(within / samples / (squares / samples - (total / samples) ** 2))
+        variance = squares / samples - (total / samples) ** 2
+        indices.append(within / samples / variance)
     failed = sum(sums.failed for sums in done.values())
     evaluations = sum(sums.evaluations for sums in done.values())
-    found = np.array(indices) if indices else np.full((1, study.n), np.nan)
+    unknown = np.full(study.n, np.nan)
+    found = np.array(indices or [unknown])
+    scatter = found.std(axis=0, ddof=1) if len(indices) > 1 else unknown
     return TotalOrder(
         found.mean(axis=0),
-        found.std(axis=0, ddof=1) if len(indices) > 1 else np.full(study.n, np.nan),
+        scatter,
         len(indices),
         evaluations,
         failed,

@@ -16,7 +16,7 @@ from time import monotonic
 import numpy as np
 from numpy.random import Generator
 
-from mlg_troubleshoot.arrays import STEP, Array
+from mlg_troubleshoot.arrays import STEP, Array, central_slopes, central_steps
 from mlg_troubleshoot.errors import InconclusiveDataError, MechanismError, UsageError
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
@@ -146,12 +146,11 @@ class _Search:
                 misses = [_miss(target, facts.measure(target)) for target in self.targets]
         except (MechanismError, ValueError, np.linalg.LinAlgError):
             misses = [_FAR] * len(self.targets)
-        return np.concatenate(
-            [np.nan_to_num(np.array(misses), nan=_FAR, posinf=_FAR, neginf=-_FAR), sense]
-        )
+        finite = np.nan_to_num(np.array(misses), nan=_FAR, posinf=_FAR, neginf=-_FAR)
+        return np.concatenate([finite, sense])
 
     def loss(self, vector: Array) -> float:
-        return float(np.sum(np.log1p(self.residuals(vector) ** 2)))
+        return _loss(self.residuals(vector))
 
     def _sense(self, vector: Array) -> Array:
         """No link so short or so long that nobody would build it."""
@@ -188,10 +187,11 @@ class _Search:
             improved = False
             for _ in range(_DAMPINGS):
                 gram = slopes.T @ slopes
-                step = -np.linalg.solve(gram + damping * np.eye(len(vector)), slopes.T @ value)
+                damped = gram + damping * np.eye(len(vector))
+                step = -np.linalg.solve(damped, slopes.T @ value)
                 step *= min(1.0, 1.5 / float(np.abs(step).max()))
                 trial = self.residuals(vector + step)
-                if np.sum(np.log1p(trial**2)) < np.sum(np.log1p(value**2)):
+                if _loss(trial) < _loss(value):
                     vector = vector + step
                     value = trial
                     improved = True
@@ -203,9 +203,8 @@ class _Search:
         return vector
 
     def _slopes(self, vector: Array, value: Array) -> Array:
-        columns = [
-            (self.residuals(vector + moved) - value) / STEP for moved in STEP * np.eye(len(vector))
-        ]
+        moves = STEP * np.eye(len(vector))
+        columns = [(self.residuals(vector + moved) - value) / STEP for moved in moves]
         return np.clip(np.array(columns).T, -1e6, 1e6)
 
     def report(self, vector: Array, seed: int) -> Reconstruction:
@@ -217,11 +216,12 @@ class _Search:
         determined = 0
         loosest = tuple((name, 1.0) for name in self.space.names[:5])
         if len(rows):
-            _, sizes, turned = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+            normalised = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+            _, sizes, turned = np.linalg.svd(normalised)
             determined = int(np.count_nonzero(sizes > 1e-6))
             free = np.linalg.norm(turned[determined:], axis=0)
-            order = np.argsort(-free)[:5]
-            loosest = tuple((self.space.names[int(i)], float(free[int(i)])) for i in order)
+            order = np.argsort(-free)[:5].tolist()
+            loosest = tuple((self.space.names[i], float(free[i])) for i in order)
         return Reconstruction(linkage, met, len(vector), determined, loosest, self.tried, seed)
 
     def _binding_slopes(self, vector: Array, met: tuple[Computed, ...]) -> Array:
@@ -231,13 +231,19 @@ class _Search:
         binding = [each.target for each in met if each.binds]
 
         def measured(place: Array) -> Array:
-            facts = Facts(self.gear, self.gear.model_of(self.space.linkage(place)), quick=True)
+            model = self.gear.model_of(self.space.linkage(place))
+            facts = Facts(self.gear, model, quick=True)
             return np.array([facts.measure(target) for target in binding])
 
-        steps = 1e-4 * np.eye(len(vector))
-        columns = [(measured(vector + step) - measured(vector - step)) / 2e-4 for step in steps]
-        rows: Array = np.array(columns).T
-        return rows[np.isfinite(rows).all(axis=1) & rows.any(axis=1)]
+        step = 1e-4
+        values = [measured(vector + moved) for moved in central_steps(len(vector), step)]
+        rows = central_slopes(np.array(values), step).T
+        determines = np.isfinite(rows).all(axis=1) & rows.any(axis=1)
+        return rows[determines]
+
+
+def _loss(residuals: Array) -> float:
+    return float(np.sum(np.log1p(residuals**2)))
 
 
 def _miss(target: Target, computed: float) -> float:
@@ -246,6 +252,8 @@ def _miss(target: Target, computed: float) -> float:
         middle = (target.low + target.high) / 2.0
         half = (target.high - target.low) / 2.0
         return (computed - middle) / half
-    sense, bound = (1.0, target.low) if np.isfinite(target.low) else (-1.0, target.high)
+    is_least = np.isfinite(target.low)
+    sense = 1.0 if is_least else -1.0
+    bound = target.low if is_least else target.high
     spare = INSIDE * max(abs(bound), 0.05)
     return max(0.0, sense * (bound + sense * spare - computed)) / spare

@@ -20,7 +20,7 @@ from itertools import product
 import numpy as np
 from numpy.random import Generator
 
-from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.arrays import Array, Wholes, count_failed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.indices.inputs import Response
 
@@ -66,9 +66,10 @@ def central_composite(n: int) -> Array:
         )
     base, words = (n, ()) if n <= _FULL else _FRACTIONS[n]
     signs = np.array(list(product((-1, 1), repeat=base)))
-    columns = [signs, *(np.prod(signs[:, list(word)], axis=1)[:, None] for word in words)]
-    corners = (np.concatenate(columns, axis=1) + 1) / 2.0
-    axial = np.where(np.eye(n, dtype=bool), np.arange(1, n + 1) % 2, 0.5)
+    generated = [np.prod(signs[:, list(word)], axis=1) for word in words]
+    corners = (np.column_stack([signs, *generated]) + 1) / 2.0
+    face = np.arange(1, n + 1) % 2
+    axial = np.where(np.eye(n, dtype=bool), face, 0.5)
     return np.concatenate([corners, axial])
 
 
@@ -83,7 +84,7 @@ def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> Wholes:
 
 def middle_of_level(levels: Wholes, n2: int) -> Array:
     """Point of the unit interval in the middle of a level. [1]"""
-    return np.asarray((levels + 0.5) / n2)
+    return (levels + 0.5) / n2
 
 
 def first_order_design(n: int, n1: int, n2: int, ccd: Array | None, rng: Generator) -> Replicated:
@@ -100,10 +101,12 @@ def first_order_design(n: int, n1: int, n2: int, ccd: Array | None, rng: Generat
     places = levels
     if ccd is not None:
         tie = rng.random((n1, len(ccd), n))
-        order = np.lexsort((tie, np.broadcast_to(ccd, tie.shape)), axis=1)
+        composite = np.broadcast_to(ccd, tie.shape)
+        order = np.lexsort((tie, composite), axis=1)
         groups = np.empty_like(order)
-        np.put_along_axis(groups, order, np.arange(len(ccd))[None, :, None], axis=1)
-        points = np.concatenate([points, np.broadcast_to(ccd, (n1, *ccd.shape))], axis=1)
+        ranks = np.arange(len(ccd))[None, :, None]
+        np.put_along_axis(groups, order, ranks, axis=1)
+        points = np.concatenate([points, composite], axis=1)
         places = np.concatenate([places, groups + n2], axis=1)
     return Replicated(points, places)
 
@@ -152,7 +155,8 @@ class ReplicatedIndices:
     @property
     def shares(self) -> Array:
         """Plain indices normalised to 1 in total, as Fig. 13c shows them, shape (n,). [1]"""
-        return np.asarray(self.plain / self.plain.sum())
+        shares: Array = self.plain / self.plain.sum()
+        return shares
 
 
 def bias_corrected(plain: Array, n1: int) -> Array:
@@ -160,7 +164,7 @@ def bias_corrected(plain: Array, n1: int) -> Array:
 
     n1: samples in a group.
     """
-    return np.asarray((plain - 1.0 / n1) / (1.0 - 1.0 / n1))
+    return (plain - 1.0 / n1) / (1.0 - 1.0 / n1)
 
 
 def replicated_first_order(
@@ -191,20 +195,22 @@ def replicated_first_order(
             rows = first_order_design(n, design.n1, design.n2, ccd, np.random.default_rng(stream))
             values = response(rows.points.reshape(-1, n)).reshape(design.n1, -1)
             evaluations += values.size
-            failed += int(np.count_nonzero(~np.isfinite(values)))
+            failed += count_failed(values)
             found.append(_group_shares(values, rows.places))
             if progress is not None:
                 progress(len(found), iterations)
         except KeyboardInterrupt:
             break
-    plain = np.array(found) if found else np.full((1, n), np.nan)
+    unknown = np.full(n, np.nan)
+    plain = np.array(found or [unknown])
     mean = plain.mean(axis=0)
+    scatter = plain.std(axis=0, ddof=1) if len(found) > 1 else unknown
     return ReplicatedIndices(
         design,
         seed,
         mean,
         bias_corrected(mean, design.n1),
-        plain.std(axis=0, ddof=1) if len(found) > 1 else np.full(n, np.nan),
+        scatter,
         len(found),
         evaluations,
         failed,
@@ -218,6 +224,6 @@ def _group_shares(values: Array, places: Wholes) -> Array:
     variance = float((centred**2).mean())
     shares = np.empty(n)
     for i in range(n):
-        means = np.bincount(places[:, :, i].ravel(), centred.ravel(), rows) / n1
-        shares[i] = means.var() / variance
+        sums = np.bincount(places[:, :, i].ravel(), centred.ravel(), rows)
+        shares[i] = (sums / n1).var() / variance
     return shares

@@ -89,13 +89,16 @@ def check_statements(
         evidence = tuple(
             _evidence(entries[i], tuple(column[i] for column in columns)) for i in places
         )
-        outcome = _outcome(evidence, by_reading=len({entries[i].reading for i in places}) > 1)
-        found.append(Statement(claim, entries[places[0]].section, outcome, names, evidence))
+        readings = {entries[i].reading for i in places}
+        outcome = _outcome(evidence, by_reading=len(readings) > 1)
+        section = entries[places[0]].section
+        found.append(Statement(claim, section, outcome, names, evidence))
     return tuple(found)
 
 
 def _evidence(t: Target, values: tuple[float, ...]) -> ClaimEvidence:
-    return ClaimEvidence(t.quantity, t.accepted, t.unit, values, tuple(map(t.holds, values)), t.why)
+    holds = tuple(map(t.holds, values))
+    return ClaimEvidence(t.quantity, t.accepted, t.unit, values, holds, t.why)
 
 
 def _outcome(evidence: tuple[ClaimEvidence, ...], *, by_reading: bool) -> ClaimOutcome:

@@ -88,7 +88,7 @@ class Facts:
     def of(self, values: Array, joints: tuple[int, ...]) -> Array:
         """Pick the values of some joints; of all if none is named."""
         numbers = self.gear.joint_numbers
-        return np.asarray(values[[numbers.index(j) for j in joints or numbers]])
+        return values[[numbers.index(j) for j in joints or numbers]]
 
     def others(self, joints: tuple[int, ...]) -> tuple[int, ...]:
         return tuple(j for j in self.gear.joint_numbers if j not in joints)
@@ -98,8 +98,9 @@ _REDUCE: dict[str, Callable[[Array], float]] = {"min": np.min, "max": np.max, "s
 
 
 def _worst_displacement(facts: Facts, target: Target) -> float:
-    clearance = np.array([[target.clearance_in.get(j, 0.0) for j in facts.gear.joint_numbers]])
-    return float(worst_case(facts.model, clearance).magnitude_in[0])
+    clearance_in = [target.clearance_in.get(j, 0.0) for j in facts.gear.joint_numbers]
+    worst = worst_case(facts.model, np.array([clearance_in]))
+    return float(worst.magnitude_in[0])
 
 
 def _travel(facts: Facts, _: Target) -> float:
@@ -113,7 +114,8 @@ def _travel(facts: Facts, _: Target) -> float:
 
 def _least_curvature(facts: Facts, _: Target) -> float:
     stroke, position = facts.curve
-    return float(np.min(np.diff(position, 2)) / (stroke[1] - stroke[0]) ** 2)
+    step = stroke[1] - stroke[0]
+    return float(np.min(np.diff(position, 2)) / step**2)
 
 
 def _end_rate(facts: Facts, _: Target) -> float:
@@ -160,11 +162,10 @@ def _interaction(facts: Facts) -> Array:
 
 
 def _interaction_order(facts: Facts, target: Target) -> float:
-    near = target.joints
-    far = facts.others(target.joints)
-    return float(
-        facts.of(_interaction(facts), near).min() - facts.of(_interaction(facts), far).max()
-    )
+    interaction = _interaction(facts)
+    near = facts.of(interaction, target.joints)
+    far = facts.of(interaction, facts.others(target.joints))
+    return float(near.min() - far.max())
 
 
 _MEASURES: dict[str, Callable[[Facts, Target], float]] = {

@@ -85,7 +85,9 @@ def _halves(boxes: Interval, smear: Array) -> tuple[Interval, Interval]:
     """Halve each box in the variable that widens its bound the most."""
     known = np.where(np.isfinite(smear), smear, -1.0)
     blind = ~np.any(known > 0.0, axis=0)
-    widest = np.where(blind, np.argmax(boxes.width, axis=0), np.argmax(known, axis=0))
+    by_width = np.argmax(boxes.width, axis=0)
+    by_smear = np.argmax(known, axis=0)
+    widest = np.where(blind, by_width, by_smear)
     place = widest, np.arange(boxes.low.shape[1])
     low = boxes.low.copy()
     high = boxes.high.copy()
@@ -119,9 +121,12 @@ class _Search:
     def start(self) -> Interval:
         """All directions, and the stroke in some parts."""
         reach = np.repeat(self.reach, 2)[:, None]
-        edges = np.linspace(min(self.model.stroke), max(self.model.stroke), _STROKES + 1)
+        first, last = sorted(self.model.stroke)
+        edges = np.linspace(first, last, _STROKES + 1)
         all_ = np.tile(reach, _STROKES)
-        return Interval(np.vstack([-all_, edges[:-1]]), np.vstack([all_, edges[1:]]))
+        low = np.vstack([-all_, edges[:-1]])
+        high = np.vstack([all_, edges[1:]])
+        return Interval(low, high)
 
     def contract(self, boxes: Interval) -> tuple[Interval, Array, Array]:
         """Narrow boxes until they no longer shrink.
@@ -146,7 +151,9 @@ class _Search:
             width, smear = (each[:, possible][:, promising] for each in (width, smear))
             shrunk = boxes.width.sum(axis=0)
             before = width.sum(axis=0)
-            if not shrunk.size or np.all((shrunk > 0.7 * before) | (bounds <= self.best + 1e-12)):
+            hardly_shrunk = shrunk > 0.7 * before
+            settled = bounds <= self.best + 1e-12
+            if np.all(hardly_shrunk | settled):
                 return boxes, np.where(np.isnan(bounds), np.inf, bounds), smear
 
     def _narrowed(self, boxes: Interval, slope: Interval) -> Interval:
@@ -164,8 +171,9 @@ class _Search:
         high[-1] = np.where(falls, boxes.low[-1], high[-1])
         # A part of the stroke that is not its end hands its own end to the next part.
         first, last = sorted(self.model.stroke)
-        inner = (grows & (boxes.high[-1] < last)) | (falls & (boxes.low[-1] > first))
-        low[0] = np.where(inner, np.inf, low[0])
+        goes_on_above = grows & (boxes.high[-1] < last)
+        goes_on_below = falls & (boxes.low[-1] > first)
+        low[0] = np.where(goes_on_above | goes_on_below, np.inf, low[0])
         return Interval(low, high)
 
     def _displacement(self, boxes: Interval) -> Range:
@@ -190,7 +198,8 @@ class _Search:
         middle = boxes.middle
         directions = np.zeros((middle.shape[1], len(self.clearance)))
         for k, group in enumerate(self.groups):
-            directions[:, list(group)] = np.arctan2(middle[2 * k + 1], middle[2 * k])[:, None]
+            angle = np.arctan2(middle[2 * k + 1], middle[2 * k])
+            directions[:, list(group)] = angle[:, None]
         links = links_from(np.broadcast_to(self.clearance, directions.shape), directions)
         reached = self.sense * self.model.displacement(links, None, middle[-1])
         if np.any(np.isfinite(reached)):
@@ -211,7 +220,8 @@ def _arc(slope: Interval, length: float) -> Interval:
     for x in (slope.low[0], slope.high[0]):
         for y in (slope.low[1], slope.high[1]):
             off = np.arctan2(y, x) - centre
-            half = np.maximum(half, np.abs(np.remainder(off + np.pi, 2 * np.pi) - np.pi))
+            wrapped = np.remainder(off + np.pi, 2 * np.pi) - np.pi
+            half = np.maximum(half, np.abs(wrapped))
     usable &= np.isfinite(half)
     centre = np.where(usable, centre, 0.0)
     half = np.where(usable, half, np.pi) * (1.0 + 1e-12) + 1e-14
@@ -264,7 +274,7 @@ def _evolved(
     from scipy.optimize import differential_evolution
 
     worn = np.flatnonzero(clearance > 0.0)
-    bounds: Any = [(-np.pi, np.pi)] * len(worn) + [(min(model.stroke), max(model.stroke))]
+    bounds: Any = [[-np.pi, np.pi]] * len(worn) + [sorted(model.stroke)]
     count = 0
 
     def lost(points: Array) -> Any:

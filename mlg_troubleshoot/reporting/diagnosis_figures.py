@@ -74,10 +74,9 @@ class Residuals:
     @property
     def effect_in(self) -> Array:
         """What the named causes add to the prediction, shape (n,); zero if none is named. [in]"""
-        none = np.zeros(len(self.before_in))
-        return np.asarray(
-            np.sum([none, *(cause.effect_in for cause in self.diagnosis.causes)], axis=0)
-        )
+        effects = [cause.effect_in for cause in self.diagnosis.causes]
+        total: Array = np.sum([np.zeros_like(self.before_in), *effects], axis=0)
+        return total
 
     @property
     def after_in(self) -> Array:

@@ -571,7 +571,9 @@ def _overlap(tried: Array, boxes: Array) -> Array:
     """Area that each tried box shares with all others. [canvas units squared]"""
     low = np.maximum(tried[:, None, :2], boxes[None, :, :2])
     high = np.minimum(tried[:, None, 2:], boxes[None, :, 2:])
-    return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2).sum(axis=1))
+    sides = np.clip(high - low, 0.0, None)
+    area: Array = sides.prod(axis=2).sum(axis=1)
+    return area
 
 
 def _covered(tried: Array, segments: list[Segment]) -> Array:
@@ -588,4 +590,5 @@ def _covered(tried: Array, segments: list[Segment]) -> Array:
     enter = np.maximum(np.minimum(first, last).max(axis=2), 0.0)
     leave = np.minimum(np.maximum(first, last).min(axis=2), 1.0)
     length = np.clip(leave - enter, 0.0, None) * np.hypot(run[:, 0], run[:, 1])
-    return np.asarray(6.0 * length.sum(axis=1))
+    total: Array = length.sum(axis=1)
+    return 6.0 * total

@@ -112,7 +112,8 @@ def assemblies(found: Survey) -> tuple[str, ...]:
             if len({m.sides[i] for m in modes}) > 1
         ]
         if len({m.sides for m in modes}) == 1:
-            moved = np.where(found.linkage.angles, 0.0, np.abs(mode.vector - modes[0].vector))
+            moved = np.abs(mode.vector - modes[0].vector)
+            moved[found.linkage.angles] = 0.0
             name = found.linkage.names[int(np.argmax(moved))].split(".")[0]
             parts = [
                 (

@@ -42,12 +42,15 @@ def planned(gear: Gear, distances: int = 24) -> tuple[tuple[SurveyReading, bool]
     """
     design = _Design(SurveyedLinkage(gear))
     count = min(distances, len(design.free))
+    first = design.free[: min(count, len(design.linkage.rigid))]
     rows = [
         *design.given,
-        *sorted(design.exchanged(design.free[: min(count, len(design.linkage.rigid))], count)),
+        *sorted(design.exchanged(first, count)),
     ]
     held = np.median(design.held(rows), axis=0)
-    return tuple((design.pool[i], bool(h > tuned.CHECKED)) for i, h in zip(rows, held, strict=True))
+    is_checked = (held > tuned.CHECKED).tolist()
+    chosen = [design.pool[i] for i in rows]
+    return tuple(zip(chosen, is_checked, strict=True))
 
 
 class _Design:
@@ -89,14 +92,15 @@ class _Design:
     def covariance(self, rows: list[int]) -> Array:
         """Covariance of each linkage's variables after these readings."""
         g = self.slopes[:, rows]
-        return np.asarray(np.linalg.inv(self.known + np.swapaxes(g, 1, 2) @ g))
+        return np.linalg.inv(self.known + np.swapaxes(g, 1, 2) @ g)
 
     def held(self, rows: list[int]) -> Array:
         """How much of each reading the others check, shape (n_linkages, n_rows): 1 if they tell it
         exactly. [1]
         """
         g = self.slopes[:, rows]
-        return np.asarray(1.0 - (g @ self.covariance(rows) * g).sum(axis=2))
+        left: Array = (g @ self.covariance(rows) * g).sum(axis=2)
+        return 1.0 - left
 
     def after(self, rows: list[int], others: list[int]) -> tuple[Array, Array, Array, Array]:
         """Variances of the wanted logarithms after these readings and one of the others.
@@ -108,7 +112,8 @@ class _Design:
         covariance = self.covariance(rows)
         g = self.slopes[:, others]
         moved = np.swapaxes(g @ covariance, 1, 2)
-        size = 1.0 + (np.swapaxes(g, 1, 2) * moved).sum(axis=1)[:, None, :]
+        known = (np.swapaxes(g, 1, 2) * moved).sum(axis=1)
+        size = 1.0 + known[:, None, :]
         before = (self.wanted @ covariance * self.wanted).sum(axis=2)[:, :, None]
         wanted = before - (self.wanted @ moved) ** 2 / size
         return wanted, covariance, moved, size
@@ -156,7 +161,8 @@ def suggested_early(
     rows = list(range(first, len(design.pool)))
     if not others or not len(design.slopes):
         return None
-    before = (design.wanted @ design.covariance(rows) * design.wanted).sum(axis=(1, 2))[:, None]
+    variances = design.wanted @ design.covariance(rows) * design.wanted
+    before = variances.sum(axis=(1, 2))[:, None]
     after = np.maximum(design.after(rows, others)[0].sum(axis=1), 0.0)
     left = np.divide(after, before, out=np.ones_like(after), where=before > 0.0)
     narrowing = 1.0 - np.sqrt(left).mean(axis=0)
@@ -165,7 +171,8 @@ def suggested_early(
 
 def _worth_most(candidates: Readings, narrowing: Array) -> Suggested | None:
     """The reading that narrows most per minute, None if it hardly does."""
-    best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
+    minutes = np.array([MINUTES[c.kind] for c in candidates])
+    best = int(np.argmax(narrowing / minutes))
     return (
         Suggested(candidates[best], float(narrowing[best]))
         if narrowing[best] >= tuned.LEAST_NARROWING
@@ -191,7 +198,7 @@ def suggested(
     reached = np.isfinite(y).mean(axis=0) >= 1.0 - tuned.MOST_OPEN
     candidates = tuple(c for c, r in zip(candidates, reached, strict=True) if r)
     y = y[:, reached]
-    sound = np.isfinite(y).all(axis=1) & np.isfinite(wanted).all(axis=1)
+    sound = np.isfinite(np.hstack([y, wanted])).all(axis=1)
     y = y[sound] - y[sound].mean(axis=0)
     q = wanted[sound] - wanted[sound].mean(axis=0)
     total = float((q * q).sum())
@@ -199,7 +206,9 @@ def suggested(
         return None
     u = np.array([c.u for c in candidates])
     shared = ((q.T @ y) ** 2).sum(axis=0)
-    explained = shared / ((y * y).sum(axis=0) + len(y) * u * u) / total
+    squares = (y * y).sum(axis=0) + len(y) * u * u
+    explained = shared / squares / total
     # What chance alone would explain with so many draws.
-    narrowing = 1.0 - np.sqrt(1.0 - np.clip(explained - 1.0 / len(y), 0.0, 1.0))
+    beyond_chance = np.clip(explained - 1.0 / len(y), 0.0, 1.0)
+    narrowing = 1.0 - np.sqrt(1.0 - beyond_chance)
     return _worth_most(candidates, narrowing)

@@ -143,7 +143,8 @@ class SurveyedLinkage:
         self.space = DesignSpace(gear.reference)
         self.kernel = Kernel(gear.reference.mechanism)
         self.travel = gear.calibration.travel_in
-        self.names = (*self.space.names, *(("travel",) if self.travel is not None else ()))
+        travel = () if self.travel is None else ("travel",)
+        self.names = (*self.space.names, *travel)
         self.angles = np.array(
             [n.endswith((".direction", ".dihedral", ".axis")) for n in self.names]
         )
@@ -159,7 +160,8 @@ class SurveyedLinkage:
 
     def vector(self, linkage: Linkage) -> Array:
         """The variables of one of the gear's linkages."""
-        return np.append(self.space.vector(linkage), [] if self.travel is None else [self.travel])
+        travel = [] if self.travel is None else [self.travel]
+        return np.append(self.space.vector(linkage), travel)
 
     def linkage(self, vector: Array, name: str) -> Linkage:
         """The linkage of one vector."""
@@ -183,7 +185,7 @@ class SurveyedLinkage:
         """
         if self.travel is None:
             return 1.0
-        at = self.low + (reference + self._beyond - self.low) * np.linspace(0.0, 1.0, _POSITIONS)
+        at = self._positions(reference)
         raw = self.kernel.output(at, self.kernel.no_clearance(), numbers)
         direction = np.sign(raw[:, -1:] - raw[:, :1])
         along = direction * raw
@@ -194,7 +196,8 @@ class SurveyedLinkage:
         bend = after - 2.0 * least + before
         step = np.clip(-slope / np.maximum(bend, 1e-12), -1.0, 1.0)
         least = least + step * (slope + step * bend / 2.0)
-        return direction * vectors[:, -1:] / (along[:, -1:] - least[:, None])
+        travelled = along[:, -1:] - least[:, None]
+        return direction * vectors[:, -1:] / travelled
 
     def predicted(self, readings: Readings, vectors: Array) -> Array:
         """What each vector predicts for each reading, shape (n_vectors, n_readings); NaN where it
@@ -223,9 +226,9 @@ class SurveyedLinkage:
                 }:
                     origin, axes = mechanism.frame(mechanism.point(name).plane)
                     x, y = (np.broadcast_to(c, inputs.shape)[..., None] for c in positions[name])
-                    moved[name] = (
-                        origin[..., None, :] + x * axes[..., None, 0, :] + y * axes[..., None, 1, :]
-                    )
+                    along_x = x * axes[..., None, 0, :]
+                    along_y = y * axes[..., None, 1, :]
+                    moved[name] = origin[..., None, :] + along_x + along_y
             if any(r.kind is ReadingKind.PLUNGER for r in moves):
                 curve = self.kernel.output(inputs, nothing, numbers) - self.kernel.output(
                     reference, nothing, numbers
@@ -269,10 +272,10 @@ class SurveyedLinkage:
         """
         count, n = vectors.shape
         steps = np.vstack([np.zeros((1, n)), central_steps(n)])
-        found = self.predicted(readings, (vectors[:, None, :] + steps).reshape(-1, n)).reshape(
-            count, 2 * n + 1, -1
-        )
-        return found[:, 0], central_slopes(found[:, 1:], axis=1).swapaxes(1, 2)
+        tried = (vectors[:, None, :] + steps).reshape(-1, n)
+        found = self.predicted(readings, tried).reshape(count, 2 * n + 1, -1)
+        slopes = central_slopes(found[:, 1:], axis=1)
+        return found[:, 0], slopes.swapaxes(1, 2)
 
     def _gradient(self, vectors: Array) -> tuple[Array, Array, list[Any], Any]:
         """Derivatives of the displacement by the virtual links, with what a further solution
@@ -291,7 +294,7 @@ class SurveyedLinkage:
         n_joints). [1]
         """
         gradient = self._gradient(vectors)[0]
-        return np.asarray(np.hypot(gradient[:, 0::2], gradient[:, 1::2]))
+        return np.hypot(gradient[:, 0::2], gradient[:, 1::2])
 
     def displacement(self, vectors: Array, clearance_in: Array) -> Array:
         """Displacement of the plunger, the larger of both senses, every clearance along its own
@@ -301,9 +304,10 @@ class SurveyedLinkage:
         n_cases): displacement; NaN where the linkage does not close. [in]
         """
         gradient, reference, numbers, rate = self._gradient(vectors)
-        length = np.maximum(np.hypot(gradient[:, 0::2], gradient[:, 1::2]), 1e-12)
-        length = np.repeat(length, 2, axis=1)
-        link = np.repeat(clearance_in, 2, axis=1)[None] * (gradient / length)[:, None]
+        length = np.hypot(gradient[:, 0::2], gradient[:, 1::2])
+        length = np.repeat(np.maximum(length, 1e-12), 2, axis=1)
+        unit = gradient / length
+        link = np.repeat(clearance_in, 2, axis=1)[None] * unit[:, None]
         at = reference + self._beyond
         none = self.kernel.no_clearance()
         zero = self.kernel.output(at, none, numbers)
@@ -311,7 +315,8 @@ class SurveyedLinkage:
             self.kernel.output(at, [*np.moveaxis(sense * link, -1, 0)], numbers) - zero
             for sense in (1.0, -1.0)
         ]
-        return np.asarray(np.max(np.abs(ends), axis=0) * np.abs(rate))
+        moved: Array = np.max(np.abs(ends), axis=0) * np.abs(rate)
+        return moved
 
     def log_slopes(self, vectors: Array, quantity: Quantity | None = None) -> Array:
         """Derivatives of the logarithms of quantities, as a rule the amplification indices.
@@ -322,7 +327,8 @@ class SurveyedLinkage:
         # A quantity may itself be a derivative: a longer step.
         step = 10.0 * STEP
         steps = central_steps(n, step)
-        values = (quantity or self.amplification)((vectors[:, None, :] + steps).reshape(-1, n))
+        tried = (vectors[:, None, :] + steps).reshape(-1, n)
+        values = (quantity or self.amplification)(tried)
         found = np.log(np.maximum(values, 1e-9)).reshape(count, 2 * n, -1)
         return central_slopes(found, step, axis=1).swapaxes(1, 2)
 
@@ -331,13 +337,16 @@ class SurveyedLinkage:
         prescribed.
         """
         mechanism, reference = self._assembled(vectors)
-        at = self.low + (reference + self._beyond - self.low) * np.linspace(0.0, 1.0, _POSITIONS)
-        curve = self.kernel.output(
-            at, self.kernel.no_clearance(), self._numbers(mechanism, len(vectors))
-        )
-        return np.asarray(
-            np.isfinite(curve).all(axis=1) & np.isfinite(self.amplification(vectors)).all(axis=1)
-        )
+        at = self._positions(reference)
+        numbers = self._numbers(mechanism, len(vectors))
+        curve = self.kernel.output(at, self.kernel.no_clearance(), numbers)
+        closes: Mask = np.isfinite(np.hstack([curve, self.amplification(vectors)])).all(axis=1)
+        return closes
+
+    def _positions(self, reference: Array) -> Array:
+        """Inputs over the stroke and a little beyond its reference, one row per linkage."""
+        share = np.linspace(0.0, 1.0, _POSITIONS)
+        return self.low + (reference + self._beyond - self.low) * share
 
     def candidates(self) -> Readings:
         """Everything that can be read: the extension, the plunger over the stroke, every angle,
@@ -364,7 +373,7 @@ class SurveyedLinkage:
         names = [p.name for p in m.points]
         pairs = [*map(tuple, self.rigid), *combinations(names, 2)]
         ends = (sorted(p, key=names.index) for p in pairs)
-        distances = {frozenset(p): SurveyReading(ReadingKind.DISTANCE, p[0], p[1]) for p in ends}
+        distances = {frozenset((a, b)): SurveyReading(ReadingKind.DISTANCE, a, b) for a, b in ends}
         return tuple(
             replace(r, u=default_u(r.kind, is_angle=r.is_angle), driven_in=self.driven_in)
             for r in (*found, *distances.values())

@@ -156,7 +156,9 @@ class Prior:
 
     def drawn(self, n: int, rng: Generator) -> Array:
         """Draws of it, whether they close or not."""
-        return np.asarray(self.mean + rng.standard_normal((n, len(self.mean))) @ self.root.T)
+        z = rng.standard_normal((n, len(self.mean)))
+        draws: Array = self.mean + z @ self.root.T
+        return draws
 
     def closing(self, n: int, rng: Generator, readings: Readings = ()) -> Array:
         """About n draws of it that close, given the readings of one variable each."""
@@ -204,7 +206,8 @@ class Fits:
 
     @classmethod
     def joined(cls, *fits: Fits) -> Fits:
-        return cls(*(np.concatenate([getattr(f, p.name) for f in fits]) for p in fields(cls)))
+        columns = ([getattr(f, p.name) for f in fits] for p in fields(cls))
+        return cls(*map(np.concatenate, columns))
 
 
 class Fitting:
@@ -239,7 +242,9 @@ class Fitting:
 
     def residuals(self, points: Array) -> Array:
         with np.errstate(all="ignore"):
-            return np.asarray((self.linkage.predicted(self.readings, points) - self.value) / self.u)
+            found = self.linkage.predicted(self.readings, points)
+            residuals: Array = (found - self.value) / self.u
+        return residuals
 
     def linear(self, points: Array, widened: float = 1.0) -> tuple[Array, Array]:
         """Residuals in the uncertainties of the readings, and their slopes in widened ones."""
@@ -248,12 +253,14 @@ class Fitting:
             return (found - self.value) / self.u, slopes / (self.u * widened)[:, None]
 
     def loss(self, fits: Fits, widened: float, robust: bool) -> Array:
-        r = np.where(fits.kept, (self.residuals(fits.points) - fits.noise) / widened, 0.0)
+        r = (self.residuals(fits.points) - fits.noise) / widened
+        r = np.where(fits.kept, r, 0.0)
         open_ = ~np.isfinite(r)
         r = np.where(open_, 0.0, r)
         data = np.where(open_, tuned.OPEN_LOSS, _robust(r)[0] if robust else r * r)
         z = (fits.points - fits.means) @ self.prior.whiten.T
-        return np.asarray(data.sum(axis=1) + (z * z).sum(axis=1))
+        loss: Array = data.sum(axis=1) + (z * z).sum(axis=1)
+        return loss
 
     def descend(self, fits: Fits, widened: float, steps: int, robust: bool) -> Fits:
         """Damped least squares of all fits at once, in variables in which the prior is the unit
@@ -348,7 +355,8 @@ class Fitting:
         lengths = [i for i, r in enumerate(part.readings) if r.kind is ReadingKind.DISTANCE]
         pairs = list(combinations(lengths, 2))
         all_but_one = ~np.eye(len(still), dtype=bool)
-        kept = np.concatenate([all_but_one, np.ones((len(pairs), len(still)), dtype=bool)])
+        all_kept = np.ones((len(pairs), len(still)), dtype=bool)
+        kept = np.concatenate([all_but_one, all_kept])
         noise = np.zeros(kept.shape)
         starts = starts[: max(1, tuned.MOST_RESIDUALS // kept.size)]
         for row, (i, j) in zip(noise[len(still) :], pairs, strict=True):
@@ -381,9 +389,11 @@ class Fitting:
         readings close. All of the readings judge in the end.
         """
         r, slopes = self.linear(fits.points)
-        weight = np.where(fits.kept, np.nan_to_num(_robust(r - fits.noise)[1]), 0.0)
+        _, weight = _robust(r - fits.noise)
+        weight = np.where(fits.kept, np.nan_to_num(weight), 0.0)
         g = np.nan_to_num(slopes, posinf=0.0, neginf=0.0) @ self.prior.root
-        values, turned = np.linalg.eigh(np.swapaxes(g, 1, 2) @ (weight[..., None] * g))
+        gram = np.swapaxes(g, 1, 2) @ (weight[..., None] * g)
+        values, turned = np.linalg.eigh(gram)
         is_plain = (fits.kept & (fits.noise == 0.0)).all()
         tried = tuned.FITTED_AGAIN if is_plain else tuned.TRIED_AROUND
         count, n = fits.points.shape
@@ -392,11 +402,13 @@ class Fitting:
         for widened in tuned.REHEATED:
             z = rng.standard_normal((count, tried, n))
             z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
-            trial = fits.points[:, None] + np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
+            step = np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
+            trial = fits.points[:, None] + step
             near = replace(near, points=trial.reshape(-1, n))
             # Of many around a fit of what stands still, those that also move are the ones to go on
             # with.
-            order = np.argsort(self.loss(near, widened, True).reshape(count, -1), axis=1)
+            loss = self.loss(near, widened, True)
+            order = np.argsort(loss.reshape(count, -1), axis=1)
             best = order[:, : tuned.FITTED_AGAIN] + tried * np.arange(count)[:, None]
             around.append(self.descend(near[best.ravel()], widened, tuned.REHEAT_STEPS, True))
         fits = Fits.joined(*around)
@@ -475,7 +487,8 @@ class Fitting:
                 for p in m.points
                 if p.plane == plane and p.name not in (crank.joint, crank.pivot)
             )
-            arm, away = (m.seen_in_plane(plane, crank.pivot, name) for name in (crank.joint, other))
+            arm = m.seen_in_plane(plane, crank.pivot, crank.joint)
+            away = m.seen_in_plane(plane, crank.pivot, other)
             signs.append(1 if arm[0] * away[1] >= arm[1] * away[0] else -1)
         return tuple(signs)
 
@@ -526,7 +539,8 @@ class Fitting:
         """
         kept, back = kept.copy(), np.zeros_like(kept)
         for _ in range(len(self.readings)):
-            mode = (self.modes(mode.vector[None], mode.mean[None], kept) or (mode,))[0]
+            modes = self.modes(mode.vector[None], mode.mean[None], kept)
+            mode = modes[0] if modes else mode
             gap, spread = self._left_out(mode, kept)
             size = np.nan_to_num(np.abs(gap) / spread, nan=np.inf)
             again = ~kept & (size < tuned.MISFIT)
@@ -543,10 +557,10 @@ class Fitting:
         found: dict[int | None, Misfit] = {}
         for i in map(int, np.flatnonzero(~kept)):
             words, sure = self._suggestion(mode, i, gap, spread, ~kept)
-            group = (i,) if sure else self._alike(mode, kept, i, float(gap[i] / spread[i]))
-            rows = tuple(
-                sorted(r.row for r in (self.readings[j] for j in group) if r.row is not None)
-            )
+            deviation = float(gap[i] / spread[i])
+            group = (i,) if sure else self._alike(mode, kept, i, deviation)
+            lines = (self.readings[j].row for j in group)
+            rows = tuple(sorted(row for row in lines if row is not None))
             own = self.readings[i]
             found[own.row] = Misfit(
                 own, float(self.value[i] - gap[i]), float(spread[i]), words, rows
@@ -583,10 +597,10 @@ class Fitting:
         rows = np.flatnonzero(kept | (np.arange(len(kept)) == i))
         residual = np.eye(len(rows)) - slopes[rows] @ covariance @ slopes[rows].T
         at = int(np.flatnonzero(rows == i)[0])
-        alike = residual[at] ** 2 / np.clip(residual[at, at] * np.diag(residual), 1e-12, None)
-        return tuple(
-            int(j) for j in rows[(1.0 - np.minimum(alike, 1.0)) * size**2 < tuned.ALIKE_LOSS]
-        )
+        variances = residual[at, at] * np.diag(residual)
+        alike = residual[at] ** 2 / np.clip(variances, 1e-12, None)
+        loss = (1.0 - np.minimum(alike, 1.0)) * size**2
+        return tuple(rows[loss < tuned.ALIKE_LOSS].tolist())
 
     def _suggestion(
         self, mode: Mode, i: int, gap: Array, spread: Array, out: Mask
@@ -624,9 +638,10 @@ class Fitting:
                         return said, True
         if reading.kind is ReadingKind.DISTANCE:
             names = [p.name for p in self.linkage.space.mechanism.points]
+            pairs = [(reading.start, n) for n in names] + [(n, reading.end) for n in names]
             others = [
                 SurveyReading(ReadingKind.DISTANCE, a, b, extension=reading.extension)
-                for a, b in [(reading.start, n) for n in names] + [(n, reading.end) for n in names]
+                for a, b in pairs
                 if a != b and {a, b} != {reading.start, reading.end}
             ]
             guess = self.linkage.predicted(tuple(others), mode.vector[None])[0]
@@ -664,14 +679,16 @@ class Fitting:
             count = max(1, round(tuned.DRAWS * mode.weight))
             means = mode.mean + rng.standard_normal((count, n)) @ prior.root.T
             noise = rng.standard_normal((count, len(self.readings)))
-            g = np.where(kept[:, None], self.linear(mode.vector[None])[1][0], 0.0)
+            _, slopes = self.linear(mode.vector[None])
+            g = np.where(kept[:, None], slopes[0], 0.0)
             pulled = (means - mode.mean) @ prior.whiten.T @ prior.whiten + noise @ g
             # A valley is curved: each draw begins as far along its linear step as that helps.
             steps = [mode.vector + t * pulled @ mode.covariance for t in tuned.ALONG_PULL]
             if mode.parameters < tuned.FEW * n:
                 # So little is known that the modes say little: each draw begins at its own draw of
                 # the prior.
-                means = steps[0] = np.concatenate([prior.closing(count, rng), means])[:count]
+                drawn = np.concatenate([prior.closing(count, rng), means])
+                means = steps[0] = drawn[:count]
                 del steps[1:]
             fits = self.begun(means, means, kept, noise)
             losses = [self.loss(replace(fits, points=x), 1.0, False) for x in steps]
@@ -703,7 +720,7 @@ class Fitting:
                 "no linkage near the fitted one moves over its whole stroke",
                 "Check the extensions and their unit.",
             )
-        return np.asarray(rng.permutation(arrived))
+        return rng.permutation(arrived)
 
 
 def _robust(r: Array) -> tuple[Array, Array]:
@@ -712,7 +729,8 @@ def _robust(r: Array) -> tuple[Array, Array]:
     """
     loss = (tuned.FREEDOM + 1.0) * np.log1p(r * r / tuned.FREEDOM)
     sound = 1.0 / (1.0 + np.exp((loss - tuned.SLIP_LOSS) / 2.0))
-    return loss + 2.0 * np.log(sound), sound * (tuned.FREEDOM + 1.0) / (tuned.FREEDOM + r * r)
+    weight = sound * (tuned.FREEDOM + 1.0) / (tuned.FREEDOM + r * r)
+    return loss + 2.0 * np.log(sound), weight
 
 
 def fit(
@@ -762,7 +780,8 @@ def fit(
         )
     progress(tuned.STAGES - 2, tuned.STAGES)
     misfits, kept = fitting.misfits(modes[0], kept)
-    vectors, means = (np.array([getattr(m, part) for m in modes]) for part in ("vector", "mean"))
+    vectors = np.array([m.vector for m in modes])
+    means = np.array([m.mean for m in modes])
     modes = fitting.modes(vectors, means, kept) or modes
     modes = fitting.with_mirrored(modes, kept)
     progress(tuned.STAGES - 1, tuned.STAGES)

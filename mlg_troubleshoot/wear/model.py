@@ -57,10 +57,13 @@ class Samples(Result):
         """
         ordered = np.sort(self.samples, axis=-1)
         at = np.asarray(probability, float) * (ordered.shape[-1] - 1)
-        low, high = (ordered[..., f(at).astype(int)] for f in (np.floor, np.ceil))
-        share = at - np.floor(at)
+        below = np.floor(at)
+        low = ordered[..., below.astype(int)]
+        high = ordered[..., np.ceil(at).astype(int)]
+        share = at - below
+        is_low = (share == 0.0) | (low == high)
         with np.errstate(invalid="ignore"):
-            return np.where((share == 0.0) | (low == high), low, low + share * (high - low))
+            return np.where(is_low, low, low + share * (high - low))
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -112,7 +115,8 @@ class WearModel(Result):
     def from_learnt(cls, learnt: Mapping[str, Any], paths: Iterable[WearPath]) -> WearModel:
         """The model that `learnt` described, asked about these paths."""
         scale = Scale(**learnt["scale"])
-        draws = Draws(**{name: np.array(of)[:, None] for name, of in learnt["draws"].items()})
+        columns = {name: np.array(of)[:, None] for name, of in learnt["draws"].items()}
+        draws = Draws(**columns)
         return cls(
             _by_unit(paths), learnt["kinds"], scale, draws, learnt["seed"], learnt["simulated"]
         )
@@ -139,7 +143,8 @@ class WearModel(Result):
         asked = np.asarray(usage, float)
         if not np.isfinite(asked).all() or (asked < 0.0).any():
             raise UsageError("a usage to forecast is negative or not finite", "Give usages from 0.")
-        wanted = np.broadcast_to(np.atleast_1d(asked), (len(units), np.atleast_1d(asked).shape[-1]))
+        wanted = np.atleast_1d(asked)
+        wanted = np.broadcast_to(wanted, (len(units), wanted.shape[-1]))
         rng = _Streams(self.seed)
         parts = []
         for chosen in self._chunks(len(units), together or 1):
@@ -154,8 +159,9 @@ class WearModel(Result):
             found = np.concatenate(
                 [end.follow(ascending, last, known, rng, reading=reading) for end in ends]
             )
-            samples = np.moveaxis(found, (0, 1, 2, 3), (2, 0, 3, 1)).reshape(*ascending.shape, -1)
-            back = np.take_along_axis(samples, np.argsort(order, axis=1)[:, :, None], axis=1)
+            samples = found.transpose(1, 3, 0, 2).reshape(*ascending.shape, -1)
+            places = np.argsort(order, axis=1)
+            back = np.take_along_axis(samples, places[:, :, None], axis=1)
             parts.append(self.scale.start + self.scale.value * back)
         return Samples(parts[0][0] if isinstance(unit, str) else np.concatenate(parts))
 
@@ -187,13 +193,11 @@ class WearModel(Result):
             yield np.arange(first, min(first + size, units))
 
     def _paths(self, unit: str) -> tuple[WearPath, ...]:
-        return self.paths[unit] if unit in self.paths else (WearPath(unit, (), ()),)
+        return self.paths.get(unit) or (WearPath(unit, (), ()),)
 
     def _last(self, units: Sequence[str]) -> Array:
-        return (
-            np.array([np.max(self._paths(u)[-1].usage, initial=0.0) for u in units])
-            / self.scale.usage
-        )
+        last = [np.max(self._paths(u)[-1].usage, initial=0.0) for u in units]
+        return np.array(last) / self.scale.usage
 
     def _known_reading(self, units: Sequence[str]) -> Array:
         """Variance of the next reading, NaN where it is estimated: a new reading is like the last
@@ -296,12 +300,14 @@ class _Ends:
         out = np.empty((*x.shape, usage.shape[1]))
         for j in range(usage.shape[1]):
             at = clock(usage[None, :, j, None], power)
-            now = np.minimum(at, bend) - start + self.pace * np.maximum(at - bend, 0.0)
+            beyond = np.maximum(at - bend, 0.0)
+            now = np.minimum(at, bend) - start + self.pace * beyond
             d = now - before
             before = now
             if self.draws.gamma.any():
                 shape = np.maximum(d, 0.0) / s**2
-                x = x + np.where(d > 0.0, b * s**2 * rng.gamma(shape), b * d)
+                increment = b * s**2 * rng.gamma(shape)
+                x = x + np.where(d > 0.0, increment, b * d)
             else:
                 span = np.abs(d)
                 one, two = rng.normal(2, x.shape)
@@ -341,7 +347,8 @@ def first_passage(at: Array, paths: Array, limit: float) -> Array:
         rise = np.where(high > low, high - low, 1.0)
         share = np.where(np.isfinite(high), (limit - low) / rise, 1.0)
     passed = at[before] + share * (at[k] - at[before])
-    return np.where(over.any(axis=0), np.where(k == 0, 0.0, passed), np.inf)
+    passed = np.where(k == 0, 0.0, passed)
+    return np.where(over.any(axis=0), passed, np.inf)
 
 
 def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
@@ -378,9 +385,7 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
     by_unit = _by_unit(paths)
     rng = np.random.default_rng(seed)
     scale = scale_of(paths)
-    readings = {
-        unit: max(len(np.asarray(path.usage)) for path in own) for unit, own in by_unit.items()
-    }
+    readings = {unit: max(path.n_readings for path in own) for unit, own in by_unit.items()}
     learn: list[str] = []
     for most, pool in (
         (WearModel.learns_from, [u for u, n in readings.items() if n > 1]),

@@ -45,8 +45,14 @@ class WearPath(Result):
     value: ArrayLike
     reading_u: float | None = None
 
+    @property
+    def n_readings(self) -> int:
+        """Number of readings; 0 for a part restored and not read since."""
+        return len(np.asarray(self.usage))
+
     def __post_init__(self) -> None:
-        usage, value = (np.array(numbers, float).ravel() for numbers in (self.usage, self.value))
+        usage = np.array(self.usage, float).ravel()
+        value = np.array(self.value, float).ravel()
         if len(usage) != len(value):
             raise UsageError(
                 f"path of {self.unit}: {len(usage)} usages and {len(value)} values",
@@ -121,7 +127,8 @@ def scale_of(paths: Sequence[WearPath]) -> Scale:
     everything = np.concatenate([*(value for _usage, value in read), np.empty(0)])
     reach = max((float(usage[-1]) for usage, _value in read), default=0.0) or 1.0
     start = float(np.median([value[0] for _usage, value in read])) if read else 0.0
-    rates = np.array([(v[-1] - v[0]) / (u[-1] - u[0]) for u, v in read if u[-1] > u[0]])
+    changes = [(usage[-1] - usage[0], value[-1] - value[0]) for usage, value in read]
+    rates = np.array([rise / run for run, rise in changes if run > 0.0])
     rise = float(np.median(rates)) * reach if len(rates) else 0.0
     if not rise and read:
         rise = float(np.std(everything))
@@ -139,7 +146,7 @@ def lay_out(groups: Sequence[Sequence[WearPath]], scale: Scale) -> Steps:
     """Lay the paths of each unit behind each other; shorter units are padded in front, so that all
     end together.
     """
-    lengths = [sum(max(len(np.asarray(path.usage)), 1) for path in group) for group in groups]
+    lengths = [sum(max(path.n_readings, 1) for path in group) for group in groups]
     shape = (max(lengths, default=0), len(groups))
     steps = Steps(
         begins=np.zeros(shape, bool),
@@ -151,7 +158,7 @@ def lay_out(groups: Sequence[Sequence[WearPath]], scale: Scale) -> Steps:
     for column, (group, length) in enumerate(zip(groups, lengths, strict=True)):
         row = shape[0] - length
         for path in group:
-            count = len(np.asarray(path.usage))
+            count = path.n_readings
             steps.begins[row, column] = True
             rows = slice(row, row + count)
             steps.seen[rows, column] = True

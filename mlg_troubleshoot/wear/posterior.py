@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import gammaln, logsumexp
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, central_slopes, central_steps
 from mlg_troubleshoot.wear.filtering import Draws, follow
 from mlg_troubleshoot.wear.paths import Scale, Steps
 
@@ -95,14 +95,15 @@ def _log_posterior(member: Member, steps: Steps, resolution: float) -> Callable[
     size = max(1, _CHUNK // max(steps.seen.shape[1], 1))
 
     def value(theta: Array) -> Array:
-        likely = [
-            follow(steps, member.draws(theta[i : i + size], resolution))[0].sum(axis=1)
-            for i in range(0, len(theta), size)
-        ]
-        prior = -0.5 * ((theta - mean) / sd) ** 2 - np.log(sd) - 0.5 * np.log(2.0 * np.pi)
-        return np.asarray(
-            np.nan_to_num(np.concatenate(likely), nan=-1e12, neginf=-1e12) + prior.sum(axis=1)
-        )
+        parts = []
+        for i in range(0, len(theta), size):
+            draws = member.draws(theta[i : i + size], resolution)
+            parts.append(follow(steps, draws)[0].sum(axis=1))
+        likelihood = np.nan_to_num(np.concatenate(parts), nan=-1e12, neginf=-1e12)
+        z = (theta - mean) / sd
+        prior = -0.5 * z**2 - np.log(sd) - 0.5 * np.log(2.0 * np.pi)
+        posterior: Array = likelihood + prior.sum(axis=1)
+        return posterior
 
     return value
 
@@ -112,11 +113,11 @@ def _mode(value: Callable[[Array], Array], start: Array) -> tuple[Array, Array]:
     batch.
     """
     n = len(start)
-    step = 1e-4 * np.eye(n)
+    step = 1e-4
 
     def descent(theta: Array) -> tuple[float, Array]:
-        found = value(np.vstack([theta, theta + step, theta - step]))
-        return -float(found[0]), -(found[1 : n + 1] - found[n + 1 :]) / 2e-4
+        found = value(np.vstack([theta, theta + central_steps(n, step)]))
+        return -float(found[0]), -central_slopes(found[1:], step)
 
     mode = np.asarray(
         minimize(descent, start, jac=True, method="L-BFGS-B", options={"maxiter": 80}).x
@@ -131,8 +132,9 @@ def _mode(value: Callable[[Array], Array], start: Array) -> tuple[Array, Array]:
         for b in (1, -1)
     ]
     found = value(mode + np.array(pairs)).reshape(n, n, 4)
-    hessian = -(found[..., 0] - found[..., 1] - found[..., 2] + found[..., 3]) / (4.0 * h * h)
-    return mode, hessian
+    both_up, first_up, second_up, both_down = np.moveaxis(found, -1, 0)
+    mixed = both_up - first_up - second_up + both_down
+    return mode, -mixed / (4.0 * h * h)
 
 
 def _student(centre: Array, root: Array, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -147,13 +149,12 @@ def _student(centre: Array, root: Array, n: int, rng: np.random.Generator) -> tu
 def _student_density(theta: Array, centre: Array, root: Array) -> Array:
     p = len(centre)
     off = np.linalg.solve(root, (theta - centre).T)
-    constant = (
-        gammaln((_FREEDOM + p) / 2.0) - gammaln(_FREEDOM / 2.0) - 0.5 * p * np.log(_FREEDOM * np.pi)
-    )
+    half = (_FREEDOM + p) / 2.0
+    constant = gammaln(half) - gammaln(_FREEDOM / 2.0) - 0.5 * p * np.log(_FREEDOM * np.pi)
     log_det = np.log(np.abs(np.diag(root))).sum()
-    return np.asarray(
-        constant - log_det - 0.5 * (_FREEDOM + p) * np.log1p((off**2).sum(axis=0) / _FREEDOM)
-    )
+    squares = (off**2).sum(axis=0)
+    density: Array = constant - log_det - half * np.log1p(squares / _FREEDOM)
+    return density
 
 
 def _sample(
@@ -167,9 +168,8 @@ def _sample(
     # No direction is taken for wider than its prior, nor for exactly known.
     per_prior = np.outer(sd, sd)
     size, vectors = np.linalg.eigh(per_prior * (hessian + hessian.T) / 2.0)
-    root = np.asarray(
-        np.linalg.cholesky(per_prior * ((vectors / np.clip(size, 0.5, 1e8)) @ vectors.T)), float
-    )
+    covariance = per_prior * ((vectors / np.clip(size, 0.5, 1e8)) @ vectors.T)
+    root = np.asarray(np.linalg.cholesky(covariance), float)
     theta, density = _student(mode, root, _SAMPLES, rng)
     first = value(theta)
     weight = first - density
@@ -177,7 +177,8 @@ def _sample(
     share = np.exp(weight - logsumexp(weight))
     centre = share @ theta
     spread = (share * (theta - centre).T) @ (theta - centre)
-    second = np.asarray(np.linalg.cholesky(0.9 * spread + 0.1 * root @ root.T), float)
+    widened = 0.9 * spread + 0.1 * root @ root.T
+    second = np.asarray(np.linalg.cholesky(widened), float)
     again, _density = _student(centre, second, _SAMPLES, rng)
     both = np.vstack([theta, again])
     mixture = np.logaddexp(
@@ -194,17 +195,19 @@ def posterior(
     found = [_sample(member, _log_posterior(member, steps, resolution), rng) for member in kinds]
     weights = np.concatenate([weight for _theta, weight in found])
     share = np.exp(weights - logsumexp(weights))
-    owner = np.repeat(np.arange(len(kinds)), [len(weight) for _theta, weight in found])
-    chosen = np.searchsorted(np.cumsum(share), (np.arange(count) + rng.uniform()) / count).clip(
-        max=len(share) - 1
-    )
-    first = np.cumsum([0, *(len(weight) for _theta, weight in found)])
-    parts = [
-        member.draws(found[k][0][chosen[owner[chosen] == k] - first[k]], resolution)
-        for k, member in enumerate(kinds)
-    ]
+    counts = [len(weight) for _theta, weight in found]
+    owner = np.repeat(np.arange(len(kinds)), counts)
+    # Systematic resampling.
+    quantiles = (np.arange(count) + rng.uniform()) / count
+    chosen = np.searchsorted(np.cumsum(share), quantiles).clip(max=len(share) - 1)
+    first = np.cumsum([0, *counts])
+    parts = []
+    for k, member in enumerate(kinds):
+        rows = chosen[owner[chosen] == k] - first[k]
+        parts.append(member.draws(found[k][0][rows], resolution))
     draws = Draws(
         *(np.concatenate([getattr(p, name) for p in parts]) for name in Draws.__dataclass_fields__)
     )
     names = [f"{member.kind}{' power' if 'power' in member.names else ''}" for member in kinds]
-    return draws, {name: float(share[owner == k].sum()) for k, name in enumerate(names)}
+    probability = {name: float(share[owner == k].sum()) for k, name in enumerate(names)}
+    return draws, probability
