@@ -11,15 +11,17 @@ from mlg_troubleshoot.decision.columns import (
     CONVENTION,
     IDENTITY,
     RECORD_ID,
+    SIDE,
     UNIT,
     Column,
 )
+from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.records.cells import Cell, column_letters
 from mlg_troubleshoot.records.headers import UNKNOWN, recognise
 from mlg_troubleshoot.records.layout import ColumnReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
-from mlg_troubleshoot.records.source import NumberedRow
+from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow
 from mlg_troubleshoot.records.tables import Collected
 
 FORM_TITLE = "MLG inspection form"
@@ -29,9 +31,15 @@ _DECLARATIONS = (UNIT, CONVENTION)
 
 @dataclass(frozen=True, slots=True)
 class Form:
+    """A form as found.
+
+    lines: row, label and value. gears: the columns that hold the values of a gear, if several do.
+    """
+
     lines: Sequence[tuple[int, str, Cell]]
     label_column: int
     value_column: int
+    gears: Sequence[int] = ()
 
     def is_untouched(self, options: ReadOptions) -> bool:
         filled = [label for _, label, value in self.lines if value is not None]
@@ -71,7 +79,26 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
             lines.append(
                 (number, label, cells[value_column] if value_column < len(cells) else None)
             )
-    return Form(lines, column, value_column)
+    gears = [
+        i
+        for i in range(column + 1, max(len(c) for _, c in rows))
+        if _is_gear(rows, column, i, options)
+    ]
+    return Form(lines, column, value_column, gears if len(gears) > 1 else ())
+
+
+def _is_gear(rows: Sequence[NumberedRow], labels: int, values: int, options: ReadOptions) -> bool:
+    """Whether a column holds the side and a clearance of a gear."""
+    held: set[Column] = set()
+    for _, cells in rows:
+        label = cells[labels] if max(labels, values) < len(cells) else None
+        value = cells[values] if isinstance(label, str) else None
+        field = recognise(label, options.joints).field if isinstance(label, str) else None
+        if field is None or value is None:
+            continue
+        if field.column is not SIDE or (isinstance(value, str) and Side.spelt(value)):
+            held.add(field.column)
+    return {SIDE, CLEARANCE} <= held
 
 
 def _is_line(label: str, options: ReadOptions) -> bool:
@@ -84,6 +111,15 @@ def read_form(
     form: Form, options: ReadOptions, *, file: str | None, sheet: str | None
 ) -> Collected:
     out = Collected()
+    if form.gears:
+        raise FileRefusedError(
+            "form_several",
+            f"it holds several gears, in columns {', '.join(map(column_letters, form.gears))}",
+            "one gear on a form, or a table with one gear in each row",
+            "Swap rows and columns (copy, then paste special: transpose), or give each gear a"
+            " sheet of its own.",
+            sheet=sheet,
+        )
     letters = column_letters(form.label_column)
     values = column_letters(form.value_column)
     labels = [label for _, label, _ in form.lines]

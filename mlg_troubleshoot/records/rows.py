@@ -62,6 +62,7 @@ from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
     AmbiguousDateError,
     CellFaultError,
+    convention_word,
     plain_text,
     read_areas,
     read_date,
@@ -180,11 +181,12 @@ class RowReader:
         # The readings of a fleet repeat: what was understood once is not taken apart again.
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)
         self._unread = self._names_of_unread(placed)
-        # What was not understood, and may still say that the gear failed.
-        self._unknown = [
+        # What is only carried, and may still say that the gear failed or how it was read.
+        self._unread_words = [
             p
             for p in placed
-            if p.field is None and not (p.refused or p.is_mapped or re.search(r"\d", p.header))
+            if (p.field is None or p.field.column.carried)
+            and not (p.refused or p.is_mapped or re.search(r"\d", p.header))
         ]
         # What a number format adds counts where a unit does.
         self._plain = [
@@ -309,8 +311,7 @@ class RowReader:
             cell = self._cells[index]
             if cell is not None:
                 found.carried[name] = writable(show(cell))
-        if OUTCOME not in found.values:
-            self._look_for_failure()
+        self._look_for_words(convention, has_outcome=OUTCOME in found.values)
         return found
 
     def _read_lengths(
@@ -444,17 +445,31 @@ class RowReader:
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
 
-    def _look_for_failure(self) -> None:
-        """Stop a row in which a column that was not understood says that the gear failed."""
-        for placed in self._unknown:
+    def _look_for_words(self, convention: ClearanceConvention | None, *, has_outcome: bool) -> None:
+        """Stop a row in which a column that is only carried says that the gear failed, or that the
+        clearances were read in another way.
+        """
+        for placed in self._unread_words:
             cell = self._cells[placed.index]
-            if isinstance(cell, str) and says_failed(cell):
-                remedy = (
-                    f'If it is the outcome, pass --map "{placed.header}=outcome"; else'
-                    f' "{placed.header}=carry".'
-                )
-                expected = "the outcome in a column outcome"
-                self._fault(placed.index, CellFaultError("outcome_elsewhere", expected, remedy))
+            if not isinstance(cell, str):
+                continue
+            said = convention_word(cell)
+            if not has_outcome and says_failed(cell):
+                self._elsewhere(placed, OUTCOME)
+            elif said is not None and (
+                convention is None or said.per_radial != convention.per_radial
+            ):
+                self._elsewhere(placed, CONVENTION)
+
+    def _elsewhere(self, placed: PlacedField, column: Column) -> None:
+        what = column.filled
+        remedy = (
+            f'If it is the {what}, pass --map "{placed.header}={column.name}"; else'
+            f' "{placed.header}=carry".'
+        )
+        expected = f"the {what} in a column {column.name}"
+        self._fault(placed.index, CellFaultError(f"{what}_elsewhere", expected, remedy))
+        self._bad.add(placed.index)
 
     def _made_id(self) -> str:
         cells = [show(cell) for cell in self._cells]

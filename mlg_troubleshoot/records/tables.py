@@ -8,16 +8,16 @@ from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from pathlib import PurePath
 
-from mlg_troubleshoot.decision.columns import CLEARANCE, SIDE, TAIL_NO
+from mlg_troubleshoot.decision.columns import CLEARANCE, IDENTITY, SIDE, TAIL_NO
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cells, column_letters, quote
-from mlg_troubleshoot.records.headers import recognise, tidy
-from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header
+from mlg_troubleshoot.records.headers import UNKNOWN, recognise, tidy
+from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header, header_score
 from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
-from mlg_troubleshoot.records.source import NumberedRow, Sheet
+from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet
 
 _PROGRESS_ROWS = 500
 # Rows by which a column is known that holds sides, whatever its header says.
@@ -149,6 +149,8 @@ class _Table:
         self._repeated = 0
         self._aside: list[str] = []
         self._dates = ""
+        self._options = table.options
+        self._second: FileRefusedError | None = None
         self._telling = [
             [p.index for p in columns.placed if p.field is not None and p.field.column is column]
             for column in (TAIL_NO, SIDE, CLEARANCE)
@@ -161,9 +163,14 @@ class _Table:
             return
         if self._stands_aside(number, cells):
             return
+        self._second = self._second or self._begins_again(number, cells)
         width = self._width
         collect = self._out.rows.append
-        if width is not None and len(cells) != width and (len(cells) < width or any(cells[width:])):
+        if self._second is not None:
+            collect(self._reader.faulty(number, cells, self._second))
+        elif (
+            width is not None and len(cells) != width and (len(cells) < width or any(cells[width:]))
+        ):
             collect(self._reader.ragged(number, cells, width))
         elif number in self._faulty:
             collect(self._reader.faulty(number, cells, self._faulty[number]))
@@ -174,6 +181,24 @@ class _Table:
             collect(read)
             if read.__class__ is InvalidRow:
                 self._out.invalid_content[read.source] = hash(tuple(cells))
+
+    def _begins_again(self, number: int, cells: Cells) -> FileRefusedError | None:
+        """Refuse what stands below the header of another table: its columns may be others."""
+        joints = self._options.joints
+        telling = [cells[i] for kind in self._telling for i in kind if i < len(cells)]
+        words = [cell for cell in telling if isinstance(cell, str) and not cell.isdecimal()]
+        if all(recognise(word, joints) is UNKNOWN for word in words):
+            return None
+        fields = [recognise(cell, joints).field for cell in cells if isinstance(cell, str)]
+        names = any(field is not None and field.column in IDENTITY for field in fields)
+        if not names or not header_score(cells, self._options):
+            return None
+        return FileRefusedError(
+            "table_second",
+            f"below the header of another table in row {number}",
+            "one table with one header on each sheet",
+            "Put each table on a sheet or into a file of its own.",
+        )
 
     def _stands_aside(self, number: int, cells: Cells) -> bool:
         """Tell a row of totals, signatures and the like: it says so first, and lacks what makes an

@@ -6,7 +6,7 @@ non-zero readings. What each number costs and catches: `python -m tests.records.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -45,9 +45,14 @@ class UnitFit(StrEnum):
     """How the readings of a row fit the unit that is stated."""
 
     FITS = "fits"
+    LARGE = "large"
     DOUBTFUL = "doubtful"
     TOO_SMALL = "too small"
-    LARGE = "large"
+
+    @property
+    def severity(self) -> int:
+        """How much it matters: the order of the names."""
+        return list(UnitFit).index(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,11 +78,35 @@ def judge_unit(
         for joint, value in radial_in.items()
         if value > 0.0 and options.new_part_in.get(joint, 0.0) > 0.0
     }
-    if not read:
-        return RowUnit()
+    units = {joint: entered[joint].unit for joint in read}
+    fits = [
+        _judge_stated(
+            {joint: value for joint, value in read.items() if units[joint] is unit},
+            unit,
+            [other for other in units.values() if other.per_inch < unit.per_inch],
+            convention,
+            options,
+            several=len(radial_in) >= _FEWEST,
+        )
+        for unit in dict.fromkeys(units.values())
+    ]
+    return max(fits, key=lambda fit: (fit.scale.severity, len(fit.joints)), default=RowUnit())
+
+
+def _judge_stated(
+    read: Mapping[int, float],
+    stated: LengthUnit,
+    larger: Sequence[LengthUnit],
+    convention: ClearanceConvention,
+    options: ReadOptions,
+    *,
+    several: bool,
+) -> RowUnit:
+    """Judge the readings of a row that state one unit; others of the row state larger ones. [in]
+
+    several: True if the row has enough readings, zeros included, to be asked about as a whole.
+    """
     ratios = {joint: value / options.new_part_in[joint] for joint, value in read.items()}
-    units = [entered[joint].unit for joint in read]
-    stated = max(LengthUnit, key=units.count)
     mean = sum(ratios.values()) / len(ratios)
     enough = len(read) >= _FEWEST
     small = tuple(joint for joint, ratio in ratios.items() if ratio < _TOO_SMALL)
@@ -88,7 +117,10 @@ def judge_unit(
         small = small if enough and mean < _TOO_SMALL else ()
     elif mean < _TOO_SMALL:
         scale = UnitFit.TOO_SMALL if enough else UnitFit.DOUBTFUL
-    elif enough and mean < 1.0 - ROUNDING_IN:
+    elif any(_plausible(tuple(read), read, stated, unit, options) for unit in larger):
+        scale = UnitFit.DOUBTFUL
+        small = tuple(read)
+    elif several and mean < 1.0 - ROUNDING_IN:
         scale = UnitFit.DOUBTFUL
         small = tuple(joint for joint, ratio in ratios.items() if ratio < 1.0)
     if small:
@@ -135,8 +167,9 @@ def _small_question(
     options: ReadOptions,
 ) -> str:
     new_in = options.new_part_in[joints[0]] * convention.per_radial
+    below = all(read[joint] < options.new_part_in[joint] for joint in joints)
     said = (
-        f"{_readings(joints, read)} below the play of new parts "
+        f"{_readings(joints, read)} {'below' if below else 'near'} the play of new parts "
         f"({stated.from_inches(new_in):.4g} {stated}{_kind(convention)})"
     )
     larger = [unit for unit in LengthUnit if unit.per_inch < stated.per_inch]

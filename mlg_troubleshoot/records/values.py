@@ -16,7 +16,7 @@ from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.records.cells import UNWRITABLE, Filled, OddCell, OddKind, show, show_number
 from mlg_troubleshoot.records.dates import DateOrder, readings, written_day
-from mlg_troubleshoot.units import MINUS, LengthUnit, parse_length
+from mlg_troubleshoot.units import MINUS, ClearanceConvention, LengthUnit, parse_length
 
 
 class CellFaultError(Exception):
@@ -390,6 +390,14 @@ def _outcome_word(text: str) -> Outcome | None:
 def says_failed(text: str) -> bool:
     """Whether a text says that the gear failed, wherever it stands."""
     return _outcome_word(text) is Outcome.FAILED
+
+
+def convention_word(text: str) -> ClearanceConvention | None:
+    """The convention that a text names, wherever it stands."""
+    try:
+        return ClearanceConvention.parse(plain_text(text))
+    except UsageError:
+        return None
 
 
 def _read_outcome(cell: Filled, header: str) -> Outcome:

@@ -139,6 +139,23 @@ def test_a_failure_in_a_column_that_was_not_understood_stops_the_row(tmp_path, g
     assert (problem.code, problem.column) == ("outcome_elsewhere", header)
 
 
+def test_remarks_that_say_only_that_the_gear_failed_stop_the_row(tmp_path, gear):
+    (problem,) = read_many([table(tmp_path, remarks="FAILED")], ReadOptions.of(gear)).problems
+    assert problem.code == "outcome_elsewhere"
+
+
+@pytest.mark.parametrize("word", ["diametral", "total play"])
+def test_a_column_that_contradicts_the_convention_stops_the_row(tmp_path, gear, word):
+    file = table(tmp_path, Reading=word)
+    (problem,) = read_many([file], ReadOptions.of(gear)).problems
+    assert (problem.code, problem.column) == ("convention_elsewhere", "Reading")
+    assert "Reading=clearance_convention" in problem.remedy
+
+
+def test_a_column_that_agrees_with_the_convention_is_only_carried(tmp_path, gear):
+    assert one(tmp_path, gear, Reading="Radial").carried["Reading"] == "Radial"
+
+
 def test_a_column_that_the_user_leaves_unread_may_hold_any_word(tmp_path, gear):
     file = table(tmp_path, Status="failed")
     assert not read_many([file], ReadOptions.of(gear, column_map={"Status": "carry"})).problems

@@ -210,6 +210,13 @@ def test_a_form_of_another_maker_is_read_and_its_labels_shown(read):
     assert any('"Joint 3 (in):" clearance_3_in' in note for note in result.notes)
 
 
+def test_a_form_with_two_gears_side_by_side_is_refused(read, xlsx):
+    lines = [("Tail", "N1", "N2"), ("Side", "LH", "RH"), ("J3 (in)", 0.001, 0.013)]
+    result = read(xlsx(lines), "f.xlsx", convention="RADIAL")
+    assert not result.rows
+    assert [problem.code for problem in result.problems] == ["form_several"]
+
+
 def test_the_template_has_lists_of_choices_and_explains_each_column(template):
     sheet = openpyxl.load_workbook(template)["Inspections"]
     choices = {

@@ -236,6 +236,15 @@ def test_12_an_unknown_header_of_two_rows_is_an_error_and_its_second_row_no_insp
     assert not result.rows
 
 
+def test_12_nothing_below_the_header_of_a_second_table_is_read_by_the_first(read, table):
+    other = [*HEADER[:4], "clearance_5_in", "clearance_3_in"]
+    rows = [GOOD, other, ["R2", *GOOD[1:]], ["R3", *GOOD[1:]]]
+    result = read(table(rows=rows))
+    assert [row.record_id for row in result.inspections] == ["R1"]
+    assert len(result.rows) == 4
+    assert {problem.code for problem in result.problems} == {"table_second"}
+
+
 def test_12_a_row_of_units_below_the_header_is_read(read, xlsx):
     rows = [
         ["record_id", "tail_no", "side", "clearance_convention", "Joint 3", "Joint 5"],

@@ -191,6 +191,31 @@ def test_two_readings_are_too_few_to_refuse_a_row_but_do_not_clear_it(gear):
     assert check(row, gear).verdict is Verdict.INCOMPLETE
 
 
+def test_two_small_readings_in_millimetres_do_not_clear_a_row(gear):
+    few = (0.013, 0.004, *[0.0] * 8)
+    row, _ = judged(gear, few, LengthUnit.INCH, LengthUnit.MILLIMETRE)
+    assert check(row, gear).verdict is Verdict.INCOMPLETE
+
+
+def in_two_units(gear: Gear, third: str, value: float):
+    """Judge ten readings in inches, but the third under a header in another unit."""
+    values = {f"clearance_{n}_in": 0.001 for n in range(1, 11) if n != 3}
+    named = {"record_id": "R", "tail_no": "N", "side": "LH", "clearance_convention": "RADIAL"}
+    return judge_row({**named, **values, third: value}, ReadOptions.of(gear))[0]
+
+
+@pytest.mark.parametrize("third", ["clearance_3_mm", "clearance_3_thou"])
+def test_inches_under_the_one_header_in_a_smaller_unit_do_not_clear_the_gear(gear, third):
+    row = in_two_units(gear, third, 0.013)
+    assert check(row, gear).verdict is Verdict.INCOMPLETE
+    assert any("read in inches" in text for text in row.warnings)
+
+
+def test_a_reading_in_its_own_unit_among_others_in_inches_is_judged(gear):
+    row = in_two_units(gear, "clearance_3_mm", 0.033)
+    assert check(row, gear).verdict is Verdict.WITHIN_MARGIN
+
+
 def test_a_gear_file_without_the_play_of_new_parts_asks_nothing(gear):
     options = ReadOptions.of(gear)
     values = {f"clearance_{n}_mm": value for n, value in enumerate(WORN_IN, 1)}
