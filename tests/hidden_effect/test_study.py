@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tests.hidden_effect import calibration, ceiling
+from tests.hidden_effect import calibration, ceiling, simulator
 from tests.hidden_effect.study import study, tasks
 
 OTHER_SEEDS = 7_000_000
@@ -27,6 +28,21 @@ def test_the_program_is_nowhere_better_than_the_best_test_could_be() -> None:
             committed["rates"][f"unique and right, S = {strength}"]["low"]
             <= best[f"single:{strength}"]
         )
+
+
+def test_the_best_test_knows_what_the_readings_of_one_tail_share() -> None:
+    (task,) = tasks({"single:10": 1}, OTHER_SEEDS)
+    fleet = simulator.draw_fleet(task["seed"], faults=False, **task["arguments"])
+    n = len(fleet.label.truth_term)
+    other = np.arange(n) % 7.0
+    found = ceiling.whitened(fleet, np.ones(n, bool), other[:, None])
+    both = np.column_stack([fleet.label.truth_term, other])
+    tail = np.asarray(fleet.table["tail_no"])
+    shared = (fleet.spec.tail_share * fleet.label.repeatability_in) ** 2
+    noise = shared * (tail[:, None] == tail) + np.diag(
+        np.full(n, fleet.label.noise_rms_in**2 - shared)
+    )
+    assert found.T @ found == pytest.approx(both.T @ np.linalg.solve(noise, both))
 
 
 @pytest.mark.slow
