@@ -17,7 +17,7 @@ STEP = 1e-5
 
 
 def frozen(values: ArrayLike) -> Array:
-    """A copy that nobody can change, as results hold it."""
+    """A read-only copy, as results contain it."""
     fixed = np.array(values, float)
     fixed.flags.writeable = False
     return fixed

@@ -610,7 +610,7 @@ class GearOutput(TypedDict):
 
 
 class VerifiedNumber(TypedDict):
-    """A number that the paper prints beside what the model gives."""
+    """A number that the paper prints, and that of the model."""
 
     quantity: str
     section: str

@@ -129,7 +129,7 @@ def _on_this_machine(
         yield from _in_order(asked, _AHEAD * workers, waiting)
     finally:
         for child in active_children() if waiting and not threads else ():
-            # Interrupted: nobody waits for the parts that are being computed.
+            # Interrupted: the parts that are being computed are not needed.
             child.terminate()
         pool.shutdown(cancel_futures=True)
 

@@ -88,8 +88,8 @@ def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
 
     typed = flags.typed
     unit = declared.unit or LengthUnit.INCH
-    nobody = {RECORD_ID.name: "-", TAIL_NO.name: "-", CONVENTION.name: "RADIAL"}
-    judged = _judged({SIDE.name: "LH", **typed, **nobody}, {}, flags, declared)
+    placeholders = {RECORD_ID.name: "-", TAIL_NO.name: "-", CONVENTION.name: "RADIAL"}
+    judged = _judged({SIDE.name: "LH", **typed, **placeholders}, {}, flags, declared)
     with_unit = {
         name: text if text[-1:].isalpha() else f"{text} {unit}"
         for name, text in typed.items()

@@ -90,8 +90,12 @@ def fleet(
         output.say(f"Note: {line}")
     if shown.as_json:
         output.write_json(fleet_as_json(found.lives, found.forecasts, order))
-    else:
+    elif found.lives:
         _show(found)
+    elif everything.lives:
+        output.console().print("No gear in the store has such a verdict.")
+    else:
+        output.console().print(history.no_records(records.kept.place))
     if csv is not None:
         found.write_csv(csv)
     if xlsx is not None:

@@ -53,7 +53,7 @@ def _show(gear: Gear) -> None:
         f"Margin {gear.margin.value:g} in ({gear.margin.kind}) · release stroke"
         f" {gear.reference.stroke[1]:g} in · calibration rate {gear.model.rate:.5f}"
     )
-    headings = ("#", "joint", "where", "limit in", "acts like", "mid-position x, y in")
+    headings = ("#", "joint", "where", "limit in", "acts like", "x, y in at mid-position")
     joints = output.plain_table(None, *headings, right=("#", "limit in"))
     for joint in gear.joints:
         point = gear.reference.mechanism.point(joint.point)

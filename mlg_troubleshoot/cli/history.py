@@ -124,12 +124,16 @@ def write_pages(
     output.say_written(written, quiet=shown.quiet)
 
 
+def no_records(place: str) -> str:
+    return f"No records in {place}. Keep inspections with: mlg check FILE --keep"
+
+
 def _show_gears(found: Sequence[GearLife], place: str) -> None:
     from mlg_troubleshoot.life.looking_back import Advice
 
     console = output.console()
     if not found:
-        console.print(f"No records in {place}. Keep inspections with: mlg check FILE --keep")
+        console.print(no_records(place))
         return
     headings = (
         "tail",

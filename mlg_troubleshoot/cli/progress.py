@@ -1,4 +1,4 @@
-"""A progress bar on stderr for long work; silent where nobody looks."""
+"""A progress bar on stderr for long work; silent without a terminal."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 A point is located by what it stands on, in this order: a driven crank; an actuator along a
 guide; two guides (dyad RPP); a guide and a link (RRP); a rigid link of which two points are
-located; a slot; two links (RRR). So nobody writes an order.
+located; a slot; two links (RRR). So the order is not stated.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _PLANE = "base"
 # A reading above twice the largest limit is asked again, one above five times is refused. [1]
 _CONFIRM_ABOVE = 2
 _HARD_LIMIT = 5
-# How far the end of an actuator may be drawn beside its guide. [in]
+# How far the end of an actuator may be drawn off its guide. [in]
 _IN_LINE = 1e-6
 
 

@@ -1,7 +1,7 @@
 """Runs a mechanism's program on arrays: numpy always, numba where it is installed.
 
 Both run the same formulas of :mod:`~mlg_troubleshoot.geometry.program`. A position that does not
-close is NaN; nobody drops it.
+close is NaN and is not dropped.
 """
 
 from __future__ import annotations

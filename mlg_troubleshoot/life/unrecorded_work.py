@@ -30,7 +30,7 @@ _NO_FIT = 0.001
 
 
 def suggestions(lives: Sequence[GearLife], model: WearModel | None, gear: Gear) -> list[str]:
-    """Name last inspections that look like a restoration nobody recorded, or like two gears
+    """Name last inspections that look like an unrecorded restoration, or like two gears
     exchanged.
     """
     if model is None:

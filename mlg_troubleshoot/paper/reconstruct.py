@@ -100,7 +100,7 @@ def reconstruct(
 
 
 def random_vector(space: DesignSpace, rng: Generator) -> Array:
-    """A linkage as nobody would build it, to start a search from: its driven link's far end is
+    """An implausible linkage, to start a search from: its driven link's far end is
     remote.
     """
     vector = rng.uniform(-7.0, 7.0, len(space.names))
@@ -153,7 +153,7 @@ class _Search:
         return _loss(self.residuals(vector))
 
     def _sense(self, vector: Array) -> Array:
-        """No link so short or so long that nobody would build it."""
+        """No link is implausibly short or long."""
         mechanism = self.space.linkage(vector).mechanism
         lengths = []
         for step in mechanism.steps:

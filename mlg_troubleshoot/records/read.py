@@ -207,7 +207,7 @@ def load_bytes(source: File) -> bytes:
 
 def _regular_file(source: str | Path) -> bytes:
     """Read a file, never a pipe or a device that may not end."""
-    # Opened without waiting: a pipe that nobody writes to would hang before it can be told.
+    # Opened without waiting: a pipe without a writer would hang before it can be reported.
     handle = os.open(
         source, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     )

@@ -210,7 +210,7 @@ class RowReader:
         self._waiting: dict[RowSource, _WaitingDate] = {}
 
     def _names_of_unread(self, placed: Sequence[PlacedField]) -> list[tuple[int, str]]:
-        """The columns that are only carried because nobody knows them, each under its own name."""
+        """The columns that are only carried because they are unknown, each under its own name."""
         named: list[tuple[int, str]] = []
         taken = {column.name for column in self._at if column.carried}
         for p in placed:

@@ -63,7 +63,7 @@ class Residuals:
 
     @property
     def covariates(self) -> tuple[str, ...]:
-        """Columns beside the prediction, but for the aircraft."""
+        """Columns other than the prediction and the aircraft."""
         return tuple(name for name in self.columns[1:] if name != TAIL_NO.variable)
 
     @property

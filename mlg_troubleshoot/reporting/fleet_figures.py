@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
     from mlg_troubleshoot.life.wear_paths import Stretch
 
-# The colours and shapes of the signs that stand beside the verdicts in templates/signs.html.j2.
+# The colours and shapes of the signs of the verdicts in templates/signs.html.j2.
 _RED = "#a3131a"
 _MARKS: dict[str, tuple[Marker, str]] = {
     "OUTSIDE_MARGIN": ("square", _RED),

@@ -265,7 +265,7 @@ class Store:
         patience_s: int = _PATIENCE_S,
         judge: Judge | None = None,
     ) -> None:
-        # Where nobody says: ``MLG_STORE``, or the user's own file.
+        # Where none is given: ``MLG_STORE``, or the user's own file.
         self._at = Place(
             str(place) if place is not None else os.environ.get("MLG_STORE") or own_file()
         )

@@ -63,8 +63,8 @@ class Place:
 
 
 def _url(given: str) -> sql.URL:
-    """A URL; one that cannot be read is not shown, since nobody knows where in it the password
-    stands.
+    """A URL; one that cannot be read is not shown, since the place of the password in it is
+    unknown.
     """
     scheme, _, rest = given.partition("://")
     shown = f"--store {scheme}://{_HIDDEN}"

@@ -111,7 +111,7 @@ class Survey:
 
     @property
     def contradicts(self) -> bool:
-        """True if readings contradict each other so that nobody can tell which of them is wrong, or
+        """True if readings contradict each other so that the wrong one cannot be identified, or
         too many do.
         """
         most = max(2, tuned.MOST_MISFITS * len(self.read))

@@ -135,7 +135,7 @@ class WearModel(Result):
         m): usage since the last restoration, the same for all or one row per unit; before
           the last reading the path is followed back along its drift. [usage]
         reading: of a new reading, with its error; otherwise of the wear itself.
-        together: units that stand behind each other and are forecast as if nobody else was asked
+        together: consecutive units that are forecast as if no others were asked
           for. Along the usages a sample is one path. Returns samples of shape (m, n_samples) or (n,
         m, n_samples). [value]
         """

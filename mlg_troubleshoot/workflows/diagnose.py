@@ -242,7 +242,7 @@ def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
 
 
 def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:
-    """What a diagnosis cannot use: inspections that stand twice, joints that nobody measured."""
+    """What a diagnosis cannot use: duplicate inspections, unmeasured joints."""
     if again:
         yield f"duplicate inspections count once; rows left out: {again}"
     unread = [

@@ -115,7 +115,7 @@ def show_fleet(
     progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
     problems: tuple[Problem, ...] = (),
 ) -> Lives:
-    """Every gear's life, with its forecast unless nobody wants to look ahead."""
+    """The life of every gear, with its forecast if asked for."""
     from mlg_troubleshoot.life.remembered import Remembered
 
     keys = store.gears()
@@ -278,7 +278,7 @@ def import_file(store: Store, file: Path) -> Added:
     """Add an exported chain from a regular file of sane size."""
     remedy = "Give a file written by: mlg history export"
     try:
-        # A pipe that nobody writes to would be waited for.
+        # Reading a pipe without a writer would wait for ever.
         with os.fdopen(
             os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), encoding="utf-8"
         ) as chain:

@@ -98,7 +98,7 @@ def separable(
     here = _Plan(model, recorded, joints)
 
     @cache
-    def beside_it(column: str) -> _Plan:
+    def with_column(column: str) -> _Plan:
         number = _JOINT.fullmatch(column)
         return (
             _Plan(model, recorded, joints | {int(number[1])})
@@ -113,7 +113,7 @@ def separable(
     )
     with threadpool_limits(1, "blas"):
         keys = [*(key for key in here.keys if key not in here.stand_ins), *here.blocks]
-        judged = tuple(_judged(here, beside_it, further, key) for key in keys)
+        judged = tuple(_judged(here, with_column, further, key) for key in keys)
     return judged + tuple(
         CausePlanned(c.name, None, None, FURTHER[lacks].name, None, None, None, c.separates)
         for c in CATALOGUE
@@ -291,7 +291,7 @@ def _speaks_for_all(candidate: Candidate, table: DiagnosisTable) -> bool:
 
 
 def _judged(
-    here: _Plan, beside_it: Callable[[str], _Plan], further: Sequence[str], key: Key
+    here: _Plan, with_column: Callable[[str], _Plan], further: Sequence[str], key: Key
 ) -> CausePlanned:
     name, apart = here.nearest(key)
     split = None
@@ -299,12 +299,14 @@ def _judged(
         better = (
             c
             for c in further
-            if beside_it(c).tests(key) and beside_it(c).nearest(key)[1] < 0.5 * apart
+            if with_column(c).tests(key) and with_column(c).nearest(key)[1] < 0.5 * apart
         )
         found = next(better, None)
         split = FURTHER[found].name if found in FURTHER else found
-    told = max(apart, here.found_from(key)) if np.isfinite(apart) else None
-    return CausePlanned(*key, here.found_from(key), None, name, told, split, here.separates(key))
+    distinguished = max(apart, here.found_from(key)) if np.isfinite(apart) else None
+    return CausePlanned(
+        *key, here.found_from(key), None, name, distinguished, split, here.separates(key)
+    )
 
 
 def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:

@@ -54,6 +54,17 @@ def test_only_gears_with_a_verdict_are_shown(store: Path) -> None:
     assert names(gears(store, "--only", "OUTSIDE_MARGIN", "--no-forecast")) == ["N123 RH"]
 
 
+def test_a_verdict_that_no_gear_has_is_said(store: Path) -> None:
+    found = mlg("fleet", "--store", store, "--only", "INVALID", "--no-forecast")
+    assert found.out == "No gear in the store has such a verdict.\n"
+
+
+def test_an_empty_store_says_how_to_keep_inspections(tmp_path: Path) -> None:
+    found = mlg("fleet", "--store", tmp_path / "none.sqlite")
+    assert found.out.startswith("No records in ")
+    assert " ".join(found.out.split()).endswith("Keep inspections with: mlg check FILE --keep")
+
+
 def test_what_is_due_first_stands_first(store: Path) -> None:
     due = [gear["next_inspection_landings"] for gear in gears(store, "--sort", "due")]
     known = [each for each in due if each is not None]

@@ -125,7 +125,7 @@ class Answers:
         """Return the optional columns that are set anew."""
         return {name for name, text in self.more.items() if text != before.more.get(name)}
 
-    def beside(self, given: Answers) -> Answers:
+    def completed_from(self, given: Answers) -> Answers:
         """Return the answers with what is missing filled from flags; only the record id is taken
         from these first.
         """

@@ -142,7 +142,7 @@ class Flow:
                 f"the saved inspection has {against}",
                 "Resume without that flag, or begin a new inspection.",
             )
-        answers = answers.beside(given)
+        answers = answers.completed_from(given)
         return self._read_anew(answers, remarks=self._resumed(answers))
 
     def page(self, state: State, width: int) -> Page:
@@ -231,7 +231,7 @@ class Flow:
         return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.PUT_AWAY)
 
     def _on_with(self, saved: Session, given: Answers) -> Turn[State]:
-        answers = saved.answers.beside(given)
+        answers = saved.answers.completed_from(given)
         turn = self._read_anew(answers, remarks=self._resumed(saved.answers))
         return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.RESUME)
 

@@ -30,7 +30,7 @@ _HOW = {
         "pin with a micrometer; type hole minus pin."
     ),
     ClearanceConvention.TOTAL_PLAY: (
-        "set a dial indicator on the part beside the pin, move the joint "
+        "set a dial indicator on the part next to the pin, move the joint "
         "by hand from one stop to the other, across the pin; type the whole reading."
     ),
 }

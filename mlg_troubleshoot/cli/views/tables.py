@@ -18,7 +18,7 @@ STYLES = {
     Verdict.WITHIN_MARGIN: "bold green",
     Verdict.INCONCLUSIVE: "bold yellow",
 }
-# A shape beside each verdict: it must be readable without colour.
+# A shape for each verdict: it must be readable without colour.
 MARKS = {
     Verdict.INVALID: "X",
     Verdict.OUTSIDE_MARGIN: "!",
