@@ -10,12 +10,12 @@ from typing import Any
 import tomli_w
 
 from mlg_troubleshoot.cli.prompts.conversation import (
-    Conversation,
     Effect,
     Page,
     Terminal,
     Turn,
     again,
+    ask_all,
 )
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line, note
 from mlg_troubleshoot.datafile import read_toml
@@ -88,11 +88,7 @@ def ask_gear(file: Path, terminal: Terminal) -> bool:
     """Ask for a short form and keep each answer in a file; False if the user stopped."""
     course = _Course(file)
     terminal.say([_KEYS])
-    turn = Turn(course.first_open)
-    conversation = Conversation(course, terminal)
-    while turn.effect is Effect.NONE:
-        turn = conversation.next(turn)
-    return turn.effect is not Effect.STOP
+    return ask_all(course, terminal, course.first_open, len(_QUESTIONS))
 
 
 @dataclass(slots=True)

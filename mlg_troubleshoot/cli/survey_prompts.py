@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mlg_troubleshoot.cli.prompts.conversation import (
-    Conversation,
     Effect,
     Page,
     Terminal,
     Turn,
     again,
+    ask_all,
 )
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line, note
 from mlg_troubleshoot.errors import UsageError
@@ -48,11 +48,7 @@ def ask_survey(file: Path, gear: Gear, terminal: Terminal) -> bool:
         )
     sheet = _Sheet(file, gear)
     terminal.say([_KEYS])
-    turn = Turn(sheet.first_open)
-    conversation = Conversation(sheet, terminal)
-    while turn.effect is Effect.NONE and turn.state < len(sheet.rows):
-        turn = conversation.next(turn)
-    return turn.effect is not Effect.STOP
+    return ask_all(sheet, terminal, sheet.first_open, len(sheet.rows))
 
 
 @dataclass(slots=True)

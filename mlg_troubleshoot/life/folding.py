@@ -130,7 +130,9 @@ def life_of(store: Store, tail: str, side: str) -> GearLife:
         near = [f"{t} {s}" for t, s in store.gears() if without_dashes(t) == without_dashes(tail)]
         raise UsageError(
             f"no records of {tail} {side} in {store.place}",
-            f"There is {', '.join(near)}." if near else "See which gears are kept: mlg history",
+            f"The store has {', '.join(near)}."
+            if near
+            else "See which gears are kept: mlg history",
         )
     for kept in life.inspections:
         # What stands there and cannot be read is named before anything is added to it.

@@ -124,7 +124,7 @@ def _life(result: Lives, *, tail: str = "", side: str = "", unit: str = "in") ->
     ]
     if not wanted:
         known = ", ".join(life.name for life in result.lives[:5])
-        raise UsageError(f"there is no gear {tail} {side}".rstrip(), f"There is {known}.")
+        raise UsageError(f"there is no gear {tail} {side}".rstrip(), f"Give one of: {known}.")
     life = wanted[0]
     lengths = Lengths(LengthUnit.parse(unit))
     return [fleet_figures.wear_figure(life, result.forecasts[life.key], result.gear, lengths)]

@@ -42,7 +42,9 @@ def load_beliefs(
     """Read what is believed; a name that is not of a cause is refused, and the size of one that has
     no single parameter, or one value of it only.
     """
-    remedy = "Give a TOML file with schema = 1. Its keys stand in docs/explanation/diagnosis.md."
+    remedy = (
+        "Give a TOML file with schema = 1. Its keys are listed in docs/explanation/diagnosis.md."
+    )
     file = read_toml(path, BeliefsFile, remedy)
     for key, known in (("rarer", causes), ("plausible", sized)):
         for name in getattr(file.content, key):

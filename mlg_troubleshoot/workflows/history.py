@@ -231,9 +231,7 @@ def work(
     row = admit({**_ANY_ROW, **given}, ReadOptions(), labels)
     done = row.inspection_date
     if done is None:
-        raise UsageError(
-            f"{labels['inspection_date']} says no day", "Give the day on which it was done."
-        )
+        raise UsageError(f"{labels['inspection_date']} is not a date", "Give the date of the work.")
     life_of(store, *key)
     body: dict[str, Any] = {"landings": row.gear_landings, "work_order": work_order}
     if joints is not None:
@@ -243,7 +241,7 @@ def work(
 
 def void(store: Store, record_id: str, why: str) -> Record:
     """Void a record: it stays in the chain but does not count."""
-    judge_text("--why", why, "Say why the record does not count.")
+    judge_text("--why", why, "State why the record does not count.")
     wrong = _unreadable(store, record_id) or find(store, record_id)
     body = {"voids": wrong.digest, "why": why}
     return _added(store, replace(wrong, kind=RecordKind.VOID, packed=packed(body), identity=()))
@@ -259,7 +257,7 @@ def _unreadable(store: Store, digest: str) -> Record | None:
 
 def outcome(store: Store, record_id: str, found: str, joint: int | None) -> Record:
     """Record what was found after the advice."""
-    judge_text("--found", found, "Say what was found.")
+    judge_text("--found", found, "State what was found.")
     of = find(store, record_id)
     if of.kind not in (RecordKind.INSPECTION, RecordKind.CORRECTION):
         raise UsageError(

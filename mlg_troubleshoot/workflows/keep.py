@@ -157,9 +157,9 @@ def correct(store: Store, record_id: str, result: CheckResult, options: CheckOpt
     judged = [j for j in result.judgements if isinstance(j, Assessment)]
     if len(judged) != 1 or len(result.judgements) != 1:
         raise UsageError(
-            f"a correction is one inspection, and the file holds {len(result.judgements)}"
-            f" ({len(judged)} sound)",
-            "Give a file with the one right row.",
+            f"a correction needs exactly one inspection, and the file has {len(result.judgements)}"
+            f" ({len(judged)} valid)",
+            "Give a file with the corrected row alone.",
         )
     return supersede(store, wrong, result, options)
 
@@ -180,9 +180,9 @@ def supersede(store: Store, wrong: Record, result: CheckResult, options: CheckOp
     right = judged.inspection
     if (right.tail_no, right.side.value) != (wrong.tail_no, wrong.side):
         raise UsageError(
-            f"the correction is of {right.tail_no} {right.side}, the record of {wrong.tail_no}"
+            f"the correction is for {right.tail_no} {right.side}, the record for {wrong.tail_no}"
             f" {wrong.side}",
-            "Void the record (mlg history void) and keep the right one: mlg check FILE --keep",
+            "Void the record (mlg history void) and keep the corrected one: mlg check FILE --keep",
         )
     record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.digest)
     repairs = [*_repairs_taken_back(store, wrong, right), *_repairs_of(right, store)]
@@ -290,7 +290,7 @@ def _settled_tails(
             raise StoreError(
                 f"tail {tail!r} differs from {other!r} only in case, blanks or dashes; nothing was"
                 " kept",
-                "Correct it, or say --tails same (one aircraft) or --tails apart (two).",
+                "Correct it, or pass --tails same (one aircraft) or --tails apart (two).",
             )
         if same_tail(tail, other):
             settled[tail] = other

@@ -87,6 +87,15 @@ class Conversation(Generic[S]):
         return answer(self.course, turn.state, self.terminal.ask(page.prompt))
 
 
+def ask_all(course: Course[int], terminal: Terminal, first: int, end: int) -> bool:
+    """Ask question after question from a place to the end; False if the user stopped."""
+    conversation = Conversation(course, terminal)
+    turn = Turn(first)
+    while turn.effect is Effect.NONE and turn.state < end:
+        turn = conversation.next(turn)
+    return turn.effect is not Effect.STOP
+
+
 def answer(course: Course[S], state: S, text: str) -> Turn[S]:
     """What a typed line leads to; the words for back, help and stop are the same everywhere."""
     typed = text.strip()
