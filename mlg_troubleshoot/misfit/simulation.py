@@ -197,7 +197,8 @@ def _causes(study: Study, at: JudgedPoint) -> list[int]:
     while at.follows.verdict is Verdict.UNLISTED:
         shares = {k: _share(at, causes, k) for k in first if k not in causes}
         most = max(shares, key=shares.__getitem__, default=-1)
-        if 2.0 * shares.get(most, 0.0) <= 1.0:
+        # A cause is added that takes away most of the squared misfit that is left.
+        if shares.get(most, 0.0) <= 0.5:
             break
         causes.append(most)
     for k in causes[::-1]:

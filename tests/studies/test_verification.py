@@ -10,6 +10,7 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.paper.targets import Computed, load_targets, targets_file
 from mlg_troubleshoot.paper.verification import verify
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +44,16 @@ def test_the_size_of_the_interactions_is_reported_as_not_reproduced(
 ) -> None:
     assert rows[-1].status == "not reproduced"
     assert rows[-1].computed < 1e-3
+
+
+def test_interaction_near_the_input_exceeds_the_largest_of_the_others_by_what_is_said(
+    gear: Gear, rows: tuple[Computed, ...]
+) -> None:
+    row = next(row for row in rows if row.target.measure == "interaction_order")
+    table = load_index_table(gear)
+    interaction = {j.joint: j.total_order - j.first_order for j in table.joints}
+    near = [interaction.pop(number) for number in row.target.joints]
+    assert row.computed == pytest.approx(min(near) - max(interaction.values()), rel=1e-9)
 
 
 def test_a_number_that_is_off_is_said_not_to_hold(gear: Gear, tmp_path: Path) -> None:
