@@ -85,6 +85,14 @@ INSTEAD = {
     r"\blast change is taken back\b": "undone",
     r"\bone of its own\b": "a new …",
     r"\bkept before is untouched\b": "existing records are unchanged",
+    r"\bThen, as expected\b": "Expected after that: …",
+    r"\b[Aa]nything else as well\b": "a further effect",
+    r"\bis not taken: ": "is not accepted: …",
+    r"\benters nothing\b": "is not an answer",
+    r"\bsays no day\b": "is not a date",
+    r"\bmay wear further\b|\bMay wear<br>": "wear allowance",
+    r"\bsplits them\b": "distinguishes them",
+    r"\bstands? in row\b": "is in row …",
 }
 
 
