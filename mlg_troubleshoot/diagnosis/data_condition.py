@@ -10,34 +10,24 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri, pdtrc
+from scipy.special import pdtrc
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import gears_of, visits
+from mlg_troubleshoot.diagnosis.written import piles, step_of, steps_of
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import MM_PER_IN
 
-# Steps to which people round, inches and millimetres. [in]
-_STEPS_IN = tuple(
-    sorted((*(n / 2000 for n in (2, 4, 5, 10, 20)), *(n / 20 / MM_PER_IN for n in (1, 2, 4))))
-)
-# Share of values on a step, or of rows that show a habit, that may be exceptions. [1]
+# Share of rows that show a habit, that may be exceptions. [1]
 _EXCEPTIONS = 0.05
-# With fewer values, or rows, nothing is said of them; a value is a multiple within this. [1]
-_LEAST_VALUES = 20
+# With fewer rows, or joints, nothing is said of them. [1]
 _LEAST_ROWS = 5
 _LEAST_JOINTS = 5
-_ON_STEP = 0.02
 # Share of clearances that are known to be cut off, from which their effects are. [1]
 _MANY_CUT = 0.1
-# Values before the last one that lead to it, and the chance that it is more frequent by so much;
-# it is twenty times there at all in few sound tables. [1]
-_LED_BY = 3
-_PILED_BY_CHANCE = 0.01
 # Chance of a false statement about the data of a table. [1]
 BY_CHANCE = 0.001
 
@@ -222,20 +212,6 @@ def _at_limits(table: DiagnosisTable, gear: Gear) -> Mask:
     return np.asarray(~(away & np.isfinite(table.clearance_in)).any(axis=1))
 
 
-def _step(values: Array, least: float) -> float:
-    """The coarsest step that nearly all values lie on, 0 if none is coarse. [in]"""
-    values = values[np.isfinite(values) & (values != 0.0)]
-    if len(values) < _LEAST_VALUES:
-        return 0.0
-    on = [
-        step
-        for step in _STEPS_IN
-        if step >= least * (1.0 - 1e-9)
-        and np.mean(np.abs(values / step - np.rint(values / step)) > _ON_STEP) <= _EXCEPTIONS
-    ]
-    return max(on, default=0.0)
-
-
 def _too_coarse(values: Array, step: float) -> bool:
     """Tell whether what rounding takes away depends on the values: it does where the step is larger
     than twice their standard deviation (Sheppard's corrections), that of the rounding taken out.
@@ -249,11 +225,13 @@ def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     use = rows & _at_mid(table)
     people = table.factors.get(TECHNICIAN_ID.variable, np.full(len(table), ""))
     least = 2.0 * float(np.median(table.gauge_u_in))
-    steps = {p: _step(table.clearance_in[use & (people == p)].ravel(), least) for p in set(people)}
-    for step in sorted({s for s in steps.values() if s > 0.0}):
+    each = steps_of(table.take(rows))
+    steps = {str(p): float(s) for p, s in zip(people[rows], each, strict=True) if s >= least}
+    people_read = set(people[use].tolist())
+    for step in sorted(set(steps.values())):
         own = sorted(p for p, s in steps.items() if s == step)
         where = f"clearances, to {step:.4g} in"
-        if len(own) < len(steps):
+        if len(own) < len(people_read):
             where += f", technician {', '.join(own)}"
         rounded = np.isin(people, own) & use
         share = float(np.mean(rounded[use]))
@@ -268,7 +246,7 @@ def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     plunger = table.readings_in[use]
     known = table.plunger_gauge_u_in
     least = 2.0 * (DEFAULT_PLUNGER_U_IN if known is None else float(np.nanmedian(known)))
-    if (step := _step(plunger.ravel(), least)) > 0.0:
+    if (step := step_of(plunger)) >= least:
         yield DataCondition(
             "rounded",
             f"plunger readings, to {step:.4g} in",
@@ -289,43 +267,24 @@ def _piled(table: DiagnosisTable) -> Iterator[DataCondition]:
             "the value, with a gauge that reaches further",
             share > _MANY_CUT,
         )
-    values = table.clearance_in[_at_mid(table) & ~_identical(table)]
-    if table.below is not None:
-        values = values[~table.below[_at_mid(table) & ~_identical(table)]]
-    found, counts = np.unique(np.round(values[np.isfinite(values)], 7), return_counts=True)
-    if len(found) < _LEAST_JOINTS:
-        return
-    small = found[0] < 2.0 * float(np.median(table.gauge_u_in))
-    for end, sign, side, way in ((0, "<", "less", -1), (-1, ">", "more", 1)):
-        if not (end == 0 and small) and _more_than_led_to(counts[::way].astype(float)):
-            yield DataCondition(
-                "censored",
-                f"clearances of {found[end]:.4g} in",
-                share := float(counts[end] / counts.sum()),
-                f"some of them are {side} than this: it is where the gauge or the sheet ends",
-                f"{sign}{found[end]:.4g} where no value was read",
-                share > _MANY_CUT,
+    share_of = {-1: "some of them are less", 1: "some of them are more"}
+    for pile in piles(table.take(~_identical(table))):
+        value = f"{pile.value:.4g}"
+        if pile.end:
+            effect = f"{share_of[pile.end]} than this: it is where the gauge or the sheet ends"
+        else:
+            effect = (
+                f"{pile.lower:.0%} of what is less is written so, as with a limit gauge: each may"
+                " be anything up to it"
             )
-
-
-def _more_than_led_to(counts: Array) -> bool:
-    """Tell whether the last of successive values is more frequent than those before it lead to.
-
-    The logarithm of the counts of a unimodal distribution bends downwards, so the line through the
-    three before lies above the last one. Where people prefer some values (heaping), others lie
-    above their line as far, and nothing is said.
-    """
-    if counts[-1] < _LEAST_VALUES:
-        return False
-    surely = np.zeros(len(counts))
-    for place in range(_LED_BY, len(counts)):
-        before = counts[place - _LED_BY : place]
-        line, covariance = np.polyfit(
-            np.arange(-_LED_BY, 0), np.log(before), 1, w=np.sqrt(before), cov="unscaled"
+        yield DataCondition(
+            "censored",
+            f"clearances of {value} in",
+            pile.share,
+            effect,
+            f"{'>' if pile.end > 0 else '<'}{value} where no value was read",
+            pile.share > _MANY_CUT,
         )
-        error = np.sqrt(1.0 / counts[place] + covariance[1, 1])
-        surely[place] = np.log(counts[place]) - line[1] + ndtri(_PILED_BY_CHANCE) * error
-    return bool(surely[-1] > max(0.0, float(surely[:-1].max())))
 
 
 def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:

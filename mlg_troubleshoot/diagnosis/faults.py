@@ -23,6 +23,7 @@ from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import fleet_history, inspection_of
+from mlg_troubleshoot.diagnosis.written import steps_of
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.units import SLIPS
@@ -495,7 +496,8 @@ def _usual(table: DiagnosisTable, trusted: Mask) -> _Usual:
     """
     known = replace(table, clearance_in=np.where(trusted[:, None], table.clearance_in, np.nan))
     history = fleet_history(known)[0]
-    variance = history.unsure_in2 + history.scatter_in2 + history.reading_in2
+    rounding = steps_of(table)[:, None] ** 2 / 12.0
+    variance = history.unsure_in2 + history.scatter_in2 + history.reading_in2 + rounding
     return _Usual(history.expected_in, np.sqrt(variance + _LEAST_SPREAD_IN**2))
 
 

@@ -193,7 +193,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
             centred[own] -= np.median(alone[own])
     least = max(LEAST_SCATTER * float(np.sqrt(np.mean(predicted**2))), 1e-9)
     scale = max(robust_scale(centred), least)
-    relative = _growth(centred, predicted)
+    relative = growth(centred, predicted)
     scale = max(robust_scale(centred / relative), least)
     gears = tail_numbers(rows.gears)
     shared, own = _shared(rows.u_shared_in / scale, gears)
@@ -327,7 +327,7 @@ def _companion(values: Array, tails: Wholes) -> Array:
     return nearest
 
 
-def _growth(centred: Array, predicted: Array) -> Array:
+def growth(centred: Array, predicted: Array) -> Array:
     """Relative standard deviation of each row where noise grows with displacement, median 1."""
     size = np.abs(centred)
     size = np.minimum(size, 4.0 * np.median(size) + 1e-12)

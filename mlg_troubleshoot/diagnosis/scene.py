@@ -62,7 +62,7 @@ def _scene(
     model: LinkageModel, table: DiagnosisTable, where: Discrepancies, worn: LikelyClearances
 ) -> tuple[Scene, Rows]:
     likely = worn.likely_in
-    as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, likely)
+    as_read = np.where(np.isfinite(table.clearance_in), worn.shown_in, likely)
     read = predicted(model, table, as_read)[0]
     drawn = predicted(model, table, likely)[0] - read
     share = _share_of_declared(table.measured_in - read, drawn)

@@ -9,13 +9,14 @@ together by expectation maximisation (Laird and Ware 1982).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.written import Written, written
 from mlg_troubleshoot.misfit.covariance import FAR
 
 # Set in 2026 on simulated wear (tests/diagnosis/test_wear.py and the study's tuning seeds); not
@@ -24,6 +25,8 @@ _ROUNDS = 25
 # The split between errors of reading and scatter of wear is left alone until the lines have
 # settled.
 _SETTLED = 3
+# What an interval tells of its place, over what a point would, at least: computing only. [1]
+_LEAST_TOLD = 0.02
 # A gear's joint scatters as if it were worn at least this share of the fleet's mean. [1]
 _LEAST_LEVEL = 0.25
 # No joint is tighter, and no reading surer, than this for the purpose. [in]
@@ -70,12 +73,16 @@ class WearHistory:
     unsure_in2, shape (n, ...): variance of the expectation. [in²]
     scatter_in2, shape (n, ...): variance of the true clearance about it. [in²]
     reading_in2, shape (n, ...): variance of a reading about the true clearance. [in²]
+    shown_in, shape (n, ...): what the gauge most likely showed, by what was written. [in]
+    written_in2, shape (n, ...): variance of that. [in²]
     """
 
     expected_in: Array
     unsure_in2: Array
     scatter_in2: Array
     reading_in2: Array
+    shown_in: Array
+    written_in2: Array
 
 
 @dataclass(frozen=True)
@@ -88,6 +95,7 @@ class LikelyClearances:
         to a gear's rows, common to all rows; where no wear was read, that of the gear is all that
         is supposed. [in]
     u_read_in, shape (n, n_joints): standard uncertainty of what was read. [in]
+    shown_in, shape (n, n_joints): what the gauge most likely showed. [in]
     together, shape (n, k): further changes of u_fleet_in, of all joints that nobody read alike. [1]
     """
 
@@ -96,6 +104,7 @@ class LikelyClearances:
     u_gear_in: Array
     u_fleet_in: Array
     u_read_in: Array
+    shown_in: Array
     together: Array
 
 
@@ -115,7 +124,7 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
         none = np.zeros_like(readings)
         unread = np.where(np.isfinite(readings), 0.0, unread_in)
         return LikelyClearances(
-            landed_share(table)[:, None] * unread, none, unread, none, none, none[:, :0]
+            landed_share(table)[:, None] * unread, none, unread, none, none, readings, none[:, :0]
         )
     history, kilo, landed = fleet_history(table)
     known = np.isfinite(readings)
@@ -126,14 +135,15 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     trust = np.where(
         landed[:, None] & (both > 0.0), history.scatter_in2 / np.where(both > 0.0, both, 1.0), 1.0
     )
-    read = np.where(known, readings, history.expected_in)
+    read = np.where(known, history.shown_in, history.expected_in)
     drawn = history.expected_in + trust * (read - history.expected_in)
     # A reading is never overruled by more than its own uncertainty makes likely.
     reach = FAR * np.sqrt(noise)
     likely = np.where(known, np.clip(drawn, read - reach, read + reach), drawn)
     spread = np.where(known, 0.0, np.sqrt(history.scatter_in2))
     shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))
-    left = np.where(known, np.sqrt(trust * noise + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
+    variance = trust * noise + trust**2 * history.written_in2
+    left = np.where(known, np.sqrt(variance + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
     common = np.zeros_like(readings)
     together = np.empty((len(readings), 0))
     seen = np.isfinite(readings).any(axis=0)
@@ -157,7 +167,7 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
             np.hstack([FOLLOWS * further, bent - np.mean(bent), BENT * np.mean(worn) / line])
             / JOINTS_APART
         )
-    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left, together)
+    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left, read, together)
 
 
 def gears_of(table: DiagnosisTable) -> Places:
@@ -253,49 +263,41 @@ def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
 
 
 def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
-    """Expect every joint in each row, readings rounded to the steps they show; the landings, and
-    which are known.
+    """Expect every joint in each row, of what was written as intervals; the landings, and which are
+    known.
     """
     readings = table.clearance_in
     gears = gears_of(table)
     kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
     worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
-    rounded = (
-        np.array([_resolution(column[np.isfinite(column)]) for column in readings[:, worn].T]) ** 2
-        / 12.0
-    )
-    declared = table.gauge_u_in[:, None] ** 2 + rounded
-    if table.below is not None:
-        # Anything from 0 to twice the value is as likely.
-        declared = (
-            declared + np.where(table.below, np.nan_to_num(readings) ** 2 / 3.0, 0.0)[:, worn]
-        )
     told = np.where(landed[:, None], readings, np.nan)[:, worn]
     told = np.where(np.isfinite(told).any(axis=0), told, readings[:, worn])
-    own = wear_history(told, gears, kilo, declared)
-    parts = (own.expected_in, own.unsure_in2, own.scatter_in2, np.maximum(own.reading_in2, rounded))
-    every = np.zeros((len(parts), *readings.shape))
-    every[:, :, worn] = parts
-    return WearHistory(*every), kilo, landed
+    declared = np.broadcast_to(table.gauge_u_in[:, None] ** 2, told.shape)
+    says = written(table).take(worn)
+    own = wear_history(told, gears, kilo, declared, says)
+    every = {f.name: np.zeros(readings.shape) for f in fields(own)}
+    every["shown_in"] = readings.copy()
+    for name, values in every.items():
+        values[:, worn] = getattr(own, name)
+    unsaid = np.isfinite(readings[:, worn]) & ~np.isfinite(told)
+    every["shown_in"][:, worn] = np.where(unsaid, readings[:, worn], own.shown_in)
+    return WearHistory(**every), kilo, landed
 
 
-def _resolution(values: Array) -> float:
-    """Step of the readings: the least difference between them, 0 if they lie on no grid. [in]"""
-    unique = np.unique(np.round(values, 7))
-    if len(unique) < 3:
-        return 0.0
-    step = float(np.min(np.diff(unique)))
-    on_grid = np.abs(unique / step - np.round(unique / step)) < 0.02
-    return step if step >= 1e-4 and bool(np.mean(on_grid) > 0.9) else 0.0
-
-
-def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Array) -> WearHistory:
+def wear_history(
+    reading_in: Array,
+    gears: Places,
+    kilo: Array,
+    reading_in2: Array,
+    says: Written | None = None,
+) -> WearHistory:
     """Expect joints in each row from what was read of them, of its gear and of the fleet; each
     joint on its own.
 
     reading_in, shape (n,) or (n, n_joints): readings, NaN where there is none. [in]
     gears, kilo, shape (n,): gear of each row, and its landings in thousands.
     reading_in2: variance of each reading as declared, of the same shape. [in²]
+    says: intervals of what the gauge showed, where readings were rounded.
     """
     shape = reading_in.shape
     # Joints run along the last axis; a row that lacks a joint has no weight in it.
@@ -303,6 +305,7 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     known = np.isfinite(y)
     x = kilo[:, None]
     y = np.where(known, y, 0.0)
+    left = np.zeros(y.shape)
     here = known.astype(float)
     declared = np.maximum(reading_in2.reshape(y.shape), _TIGHT_IN**2)
     by_gear = csr_array((np.ones(len(gears)), (gears, np.arange(len(gears)))))
@@ -320,14 +323,21 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     seen = (read > 0.0) / (read > 0.0).sum(axis=0)
     told = many.sum(axis=0) >= _LEAST_ROWS
     lines = unsure = np.empty(0)
+    fitted = y
     for step in range(_ROUNDS):
         variance = share * declared + scatter * level**2
-        lines, unsure = _lines(by_gear, x, y, here * far / variance, fleet, spread)
+        # An interval tells of its place as a point does that is as uncertain as it leaves it.
+        told_of = np.maximum(1.0 - left / variance, _LEAST_TOLD)
+        point = fitted + (y - fitted) / told_of
+        lines, unsure = _lines(by_gear, x, point, here * far * told_of / variance, fleet, spread)
         fleet = np.sum(seen * lines, axis=1)
         a, b = lines - fleet[:, None]
         spread = np.sum(seen * (unsure + np.array([a * a, a * b, b * b])), axis=1) + least_spread
         fitted = lines[0][gears] + lines[1][gears] * x
-        square = (y - fitted) ** 2 + _variance(unsure, gears, x)
+        if says is not None:
+            moments = says.moments(fitted, share * declared + scatter * level**2)
+            y, left = (np.where(known, moment, 0.0) for moment in moments)
+        square = (y - fitted) ** 2 + _variance(unsure, gears, x) + left
         far = np.minimum(1.0, FAR * np.sqrt(variance / np.maximum(square, 1e-30)))
         square = square * far**2
         worn = scatter * level**2
@@ -349,6 +359,8 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
         _variance(unsure, gears, x),
         scatter * np.maximum(expected, least) ** 2,
         share * reading_in2.reshape(y.shape),
+        np.where(known, y, np.nan),
+        left,
     )
     return WearHistory(*(values.reshape(shape) for values in found))
 

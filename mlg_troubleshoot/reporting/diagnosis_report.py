@@ -15,6 +15,7 @@ from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import diagnosis_figures as drawn
+from mlg_troubleshoot.reporting.data_figures import data_figures
 from mlg_troubleshoot.reporting.diagnosis_figures import Residuals
 from mlg_troubleshoot.reporting.diagnosis_lines import (
     cause_words,
@@ -97,6 +98,7 @@ def _context(
         "sure": chance_words(d.beliefs.sure),
         "likely": _likely(d),
         "probability_bar": drawn.probability_bar,
+        "of_data": data_figures(residuals),
         "plots": _plots(residuals),
         "scatter": drawn.measured_against_predicted(residuals),
         "strips": drawn.tail_strips(residuals),

@@ -14,8 +14,11 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting.data_figures import data_figures
+from mlg_troubleshoot.reporting.diagnosis_figures import Residuals
 from mlg_troubleshoot.reporting.diagnosis_lines import cause_words, headline, seven_lines
 from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
+from mlg_troubleshoot.reporting.figures import INK
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import publish
 from mlg_troubleshoot.units import LengthUnit
@@ -403,3 +406,27 @@ def test_the_report_says_how_much_a_rival_that_is_likelier_beforehand_would_chan
 
 def test_the_screen_says_it_as_well(named: Made) -> None:
     assert "were ten times as likely a priori" in seven_lines(named.diagnosis)[2].text
+
+
+def drawn_of(gear: Gear, table: DiagnosisTable) -> dict[str, str]:
+    """The figures of the data, by their title."""
+    found = diagnose(gear.model, table, gear.discrepancies)
+    figures = data_figures(Residuals(found, gear.joint_numbers, LengthUnit.INCH))
+    return {svg.partition("<title>")[2].partition("<")[0]: str(svg) for svg, _words in figures}
+
+
+def test_a_technician_s_step_of_rounding_is_a_comb_of_as_many_lines(gear: Gear) -> None:
+    table = fleet(gear.model, rows=60)
+    rounded = np.round(table.clearance_in, 3)
+    svg = drawn_of(gear, replace(table, clearance_in=rounded))["Clearances as they were written"]
+    people = table.factors["technician_id"]
+    values = sum(len(np.unique(rounded[people == person])) for person in np.unique(people))
+    assert svg.count(f'stroke="{INK}"') == values
+
+
+def test_blanks_are_drawn_only_where_there_are_some(gear: Gear) -> None:
+    table = fleet(gear.model, rows=60)
+    clearance = table.clearance_in.copy()
+    clearance[::3, 4] = np.nan
+    assert "Blank clearances" not in drawn_of(gear, table)
+    assert "Blank clearances" in drawn_of(gear, replace(table, clearance_in=clearance))

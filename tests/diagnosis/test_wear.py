@@ -12,7 +12,6 @@ from mlg_troubleshoot.diagnosis.wear import (
     WearHistory,
     _lines,
     _variance,
-    fleet_history,
     landings_of,
     likely_clearances,
     wear_history,
@@ -156,15 +155,6 @@ def test_a_gear_s_line_is_that_of_a_linear_mixed_model() -> None:
         assert lines[:, gear, 0] == pytest.approx(values)
         variance = _variance(unsure, np.full(own.sum(), gear), x[own])[:, 0]
         assert variance == pytest.approx(np.sum(shape @ covariance * shape, axis=1))
-
-
-def test_readings_on_a_grid_have_the_error_of_rounding(plain: DiagnosisTable) -> None:
-    rounded = np.round(plain.clearance_in, 3)
-    table = replace(plain, clearance_in=rounded, gauge_u_in=np.full(len(plain), 1e-6))
-    errors = np.random.default_rng(1).uniform(-0.0005, 0.0005, 100_000)
-    assert np.sqrt(fleet_history(table)[0].reading_in2) == pytest.approx(
-        np.full(rounded.shape, np.std(errors)), rel=0.01
-    )
 
 
 def test_a_reading_is_overruled_by_two_of_its_standard_errors_at_most(

@@ -25,6 +25,22 @@ def test_either_target_of_a_modification_is_right(name: tuple[str, str]) -> None
     assert judged("NAMED", said(name), [], truth(*MODIFIED))["right"]
 
 
+def test_half_of_the_aircraft_and_no_other_is_right_but_not_exact() -> None:
+    found = judged("NAMED", said(("modification", "tails N104")), [], truth(*MODIFIED))
+    assert (found["right"], found["exact"], found["wrong"]) == (True, False, False)
+
+
+def test_less_than_half_of_the_aircraft_is_neither_right_nor_wrong() -> None:
+    hidden = truth(("modification", "tails N101,N104,N107"))
+    found = judged("NAMED", said(("modification", "tails N104")), [], hidden)
+    assert (found["right"], found["wrong"]) == (False, False)
+
+
+def test_an_aircraft_that_was_not_modified_is_wrong() -> None:
+    name = ("modification", "tails N101,N102,N104")
+    assert judged("NAMED", said(name), [], truth(*MODIFIED))["wrong"]
+
+
 def test_a_name_beside_the_right_one_is_wrong() -> None:
     names = said(MODIFIED[0], ("date_step", None))
     found = judged("NAMED", names, [], truth(*MODIFIED))

@@ -5,6 +5,7 @@ technician who learns, a modification that only some gears have.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -20,7 +21,9 @@ from mlg_troubleshoot.diagnosis.causes.base import (
     share_never_read,
 )
 from mlg_troubleshoot.diagnosis.causes.reading import change_date, days_since
+from mlg_troubleshoot.diagnosis.noise import growth
 from mlg_troubleshoot.gear.adjustment import Adjustment
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.units import DAYS_PER_YEAR
 
 # A gauge is calibrated once a year; in which month is not known.
@@ -29,6 +32,8 @@ _MONTHS = 12
 _LEAST_AIRCRAFT = 3
 _TURNS = 20
 _TAILS = "tails "
+# Misfits have heavier tails than a normal distribution: degrees of freedom of Student's t. [1]
+_FREEDOM = 8.0
 # Times in which a beginner comes down to a third of what he was off, from two months on, each
 # twice the last. [d]
 _LEARNING_DAYS = DAYS_PER_YEAR / 6 * 2 ** np.arange(4)
@@ -159,11 +164,35 @@ class Modification(Cause):
     def _of_aircraft(self, scene: Scene) -> Iterator[Candidate]:
         misfit = scene.table.measured_in - scene.over_in
         for direction in (1.0, -1.0):
-            steps, rarity = _likeliest_steps(scene, direction * misfit)
-            if len(steps) >= _LEAST_AIRCRAFT:
-                dated = {tail: change_date(scene, day) or day for tail, day in steps.items()}
-                setting = {"steps": dated}
-                yield Candidate(self, _TAILS + ",".join(steps), setting, rarity=rarity)
+            steps = _likeliest_steps(scene, direction * misfit)
+            if steps is not None and len(steps.shown) >= _LEAST_AIRCRAFT:
+                dated = {tail: change_date(scene, day) or day for tail, day in steps.days.items()}
+                target = _TAILS + ",".join(steps.sure)
+                yield Candidate(self, target, {"steps": dated}, rarity=steps.rarity)
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """Which aircraft have a step of one size, and from which day on.
+
+    days: the likeliest first day of each that more likely has it than not. shown: how likely each
+    of them has rows on both sides of the step. [1] rarity: logarithm of the likelihood over all
+    aircraft and days, less that with these and their own best size.
+    """
+
+    days: dict[str, float]
+    shown: dict[str, float]
+    rarity: float
+
+    @property
+    def sure(self) -> list[str]:
+        """As many aircraft as have it together as surely as anything that is said; the likeliest
+        ones at least.
+        """
+        order = sorted(self.shown, key=lambda tail: -self.shown[tail])
+        together = np.cumprod([self.shown[tail] for tail in order])
+        count = max(int(np.sum(together >= Beliefs().sure)), _LEAST_AIRCRAFT)
+        return sorted(order[:count])
 
 
 def _apart(scene: Scene, column: str) -> list[str]:
@@ -176,54 +205,83 @@ def _apart(scene: Scene, column: str) -> list[str]:
     return found
 
 
-def _likeliest_steps(scene: Scene, misfit: Array) -> tuple[dict[str, float], float]:
-    """Which aircraft have a step up of one size, and from which day on.
+def _likeliest_steps(scene: Scene, misfit: Array) -> _Steps | None:
+    """Find the aircraft that have a step up of one size, if there is one.
 
-    Each is modified or not with equal chance, on each of its days with equal chance; size, level
-    and scatter by expectation and maximisation.
-
-    Returns
-    -------
-    tuple
-        The day of each modified aircraft, and the logarithm of the chance of just these steps: no
-        more than what all that are as likely have together.
+    Each is modified or not with equal chance, on each of its days with equal chance, its first one
+    among them; size, level and scatter by expectation and maximisation. The likeliest steps with
+    their own best size stand for all that are near them: rarity is what they fit better than all
+    together.
     """
-    days = scene.table.quantities["day"]
-    tails = scene.table.tails
-    rows = {t: np.flatnonzero((tails == t) & np.isfinite(days + misfit)) for t in levels(tails)}
+    day = scene.table.quantities["day"]
+    known = np.isfinite(day + misfit)
+    values = misfit[known]
+    if not len(values):
+        return None
+    days = day[known]
+    tails = scene.table.tails[known]
+    rows = {tail: np.flatnonzero(tails == tail) for tail in levels(tails)}
     # One visit after it is enough: that other aircraft have the same step holds it.
-    offered = {t: np.unique(days[own])[1:].tolist() for t, own in rows.items()}
-    after = {t: days[own] >= np.array(offered[t])[:, None] for t, own in rows.items()}
-    known = np.isfinite(misfit)
-    if not known.any():
-        return {}, 0.0
-    chance = (misfit > np.median(misfit[known])).astype(float)
-    steps: dict[str, float] = {}
-    rarity = 0.0
+    offered = {tail: np.unique(days[own]) for tail, own in rows.items()}
+    after = {tail: days[rows[tail]] >= at[:, None] for tail, at in offered.items()}
+    centred = values - np.median(values)
+    relative = growth(centred, scene.over_in[known])
+    # Of rows as they are, and with the step.
+    chance = np.array([centred <= 0.0, centred > 0.0], float)
+    likely = np.zeros(chance.shape, bool)
+    far = np.ones(chance.shape)
+    shown: dict[str, float] = {}
+    first: dict[str, float] = {}
+    together = 0.0
     for _turn in range(_TURNS):
-        if not 0.0 < chance[known].sum() < known.sum():
-            return {}, 0.0
-        level = np.average(misfit[known], weights=1.0 - chance[known])
-        size = np.average(misfit[known], weights=chance[known]) - level
-        if size <= 0.0:
-            return {}, 0.0
-        scatter = np.nanstd(misfit - level - size * chance)
-        gain = size * (misfit - level - 0.5 * size) / scatter**2
-        steps = {}
-        rarity = 0.0
-        chance = np.zeros(len(tails))
-        for tail, own in rows.items():
-            count = len(after[tail])
-            gains = np.r_[0.0, after[tail] @ gain[own]]
-            each = np.log(0.5) + gains - np.r_[0.0, np.full(count, np.log(max(count, 1)))]
+        fitted = _two_levels(values, relative, chance * far)
+        if fitted is None:
+            return None
+        density, far = fitted
+        gain = density[1] - density[0]
+        together = float(density[0].sum())
+        first = {}
+        shown = {}
+        chance[1] = 0.0
+        likely[1] = False
+        for tail, at in offered.items():
+            gains = after[tail] @ gain[rows[tail]]
+            each = np.log(0.5) + np.r_[0.0, gains - np.log(len(at))]
             total = float(log_sum(each))
-            chance[own] = np.exp(each[1:] - total) @ after[tail]
-            modified = count > 0 and each[0] - total < np.log(0.5)
-            best = 1 + int(np.argmax(each[1:])) if modified else 0
-            rarity += float(each[best] - gains[best])
-            if modified:
-                steps[tail] = offered[tail][best - 1]
-    return steps, rarity
+            together += total
+            own = np.exp(each - total)
+            chance[1, rows[tail]] = own[1:] @ after[tail]
+            if own[0] < 0.5:
+                best = int(np.argmax(gains))
+                first[tail] = float(at[best])
+                likely[1, rows[tail]] = after[tail][best]
+                if best:
+                    shown[tail] = float(own[2:].sum())
+        chance[0] = 1.0 - chance[1]
+    likely[0] = ~likely[1]
+    for _turn in range(_TURNS):
+        fitted = _two_levels(values, relative, likely * far)
+        if fitted is None:
+            return None
+        density, far = fitted
+    return _Steps(first, shown, together - float(density[likely].sum()))
+
+
+def _two_levels(values: Array, relative: Array, weight: Array) -> tuple[Array, Array] | None:
+    """Fit two levels, the second one higher, and a scatter to rows by their weights: log-density of
+    each row at either, and the weight of a row so far out in the tails of Student's t, both (2, n).
+    """
+    weight = weight / relative**2
+    if not weight.sum(axis=1).all():
+        return None
+    middle = weight @ values / weight.sum(axis=1)
+    if middle[1] <= middle[0]:
+        return None
+    off = values - middle[:, None]
+    scatter = np.sqrt(np.sum(weight * off**2) / len(values))
+    square = (off / (scatter * relative)) ** 2
+    density = -0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM) - np.log(scatter)
+    return density, (_FREEDOM + 1.0) / (_FREEDOM + square)
 
 
 def _of_value(scene: Scene, factor: str, candidate: Candidate) -> Mask:

@@ -23,7 +23,7 @@ from .departures import find
 from .fleet import Design, date_text
 from .generate import EffectSpec, _draw_effect, _Effects
 from .physics import Gears, State
-from .records import CLEARANCES, DISPLACEMENTS
+from .records import CLEARANCES, DISPLACEMENTS, FLOATS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -700,6 +700,9 @@ def blemished_fleet(
     written = _grid(np.maximum(design.clearance + state.recorded + errors, 0.0), STEP_IN)
     clean = gears.read(state)
     table = _sheet(scene, written, _grid(clean + scene.noise, STEP_IN), seen)
+    if beside is not None and set(find(beside).columns) & set(FLOATS):
+        for row, floats in zip(table, _grid(design.floats[seen], STEP_IN).tolist(), strict=True):
+            row.update(zip(FLOATS, floats, strict=True))
     proper = _grid(np.maximum(design.clearance + errors, 0.0), STEP_IN)
     unseen = _sheet(scene, proper, clean, ~seen)
     if blemish.write is not None:

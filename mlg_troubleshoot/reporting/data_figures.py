@@ -1,0 +1,137 @@
+"""Figures of the data of a diagnosis: the values that each technician wrote, when, and what is
+blank.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.columns import LANDINGS, TECHNICIAN_ID
+from mlg_troubleshoot.reporting.diagnosis_figures import Residuals, against_column
+from mlg_troubleshoot.reporting.figures import INK, PALE, SOFT, TEXT_SIZE, Axis, Canvas, Plot
+from mlg_troubleshoot.reporting.formats import short
+
+# Width of one of two figures side by side, and height of a line of it. [canvas units]
+_WIDTH = 335.0
+_LINE = 20.0
+_LEFT = 62.0
+_TOP = 22.0
+_BOTTOM = 38.0
+# Lines of technicians that are drawn, those who wrote most; cells of a row of blanks. [1]
+_MOST = 8
+_CELLS = 24
+
+
+def data_figures(residuals: Residuals) -> list[tuple[Markup, str]]:
+    """Draw what was written: by whom and in what steps, when, and which joints were not read.
+
+    Returns
+    -------
+    list of (Markup, str)
+        Figures, each with what to look for in it.
+    """
+    table = residuals.diagnosis.used
+    if not np.isfinite(table.clearance_in).any():
+        return []
+    figures = [
+        (
+            _values(residuals),
+            "How often each value was written. A comb is a step of rounding; a tall line among low"
+            " ones a limit gauge, or the end of a gauge.",
+        )
+    ]
+    if "day" in table.quantities and np.isfinite(table.quantities["day"]).any():
+        figures.append((_dates(residuals), "One line is one inspection."))
+    if np.isnan(table.clearance_in).any():
+        figures.append(
+            (
+                _blanks(residuals),
+                "Dark: the share of clearances that are blank. Darker on the left, or from joint to"
+                " joint: blanks that depend on wear.",
+            )
+        )
+    return figures
+
+
+def _people(residuals: Residuals) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Technicians with their rows, those who wrote most; all rows where none is named."""
+    table = residuals.diagnosis.used
+    texts = table.factors.get(TECHNICIAN_ID.variable)
+    every = [("all", np.ones(len(table), bool))]
+    if texts is None:
+        return every
+    names, counts = np.unique(texts[texts != ""], return_counts=True)
+    most = sorted(names[np.argsort(-counts, kind="stable")][:_MOST].tolist())
+    return [(name, texts == name) for name in most] or every
+
+
+def _frame(title: str, across: Axis, names: list[str]) -> Plot:
+    """Axes with a line for each name."""
+    height = _TOP + _LINE * len(names) + _BOTTOM
+    canvas = Canvas(_WIDTH, height, title, f"one line for each of {', '.join(names)}")
+    margins = {"left": _LEFT, "top": _TOP, "bottom": _BOTTOM}
+    plot = Plot(canvas, across, Axis("", 0.0, float(len(names))), **margins)
+    plot.draw_vertical_grid()
+    canvas.text(_LEFT, _TOP - 9, title, size=TEXT_SIZE, bold=True)
+    for place, name in enumerate(names):
+        base = _TOP + _LINE * (place + 1)
+        canvas.text(_LEFT - 6, base - 5, short(name, 9), size=9.5, anchor="end")
+        canvas.line(_LEFT, base, plot.area[2], base, colour=PALE)
+    return plot
+
+
+def _values(residuals: Residuals) -> Markup:
+    table = residuals.diagnosis.used
+    written = residuals.drawn(table.clearance_in)
+    people = _people(residuals)
+    across = Axis(f"clearance, {residuals.unit}", 0.0, float(np.nanmax(written)) or 1.0)
+    plot = _frame("Clearances as they were written", across, [name for name, _rows in people])
+    for place, (_name, rows) in enumerate(people):
+        values = written[rows & ~table.along]
+        found, counts = np.unique(np.round(values[np.isfinite(values)], 6), return_counts=True)
+        base = _TOP + _LINE * (place + 1)
+        for value, count in zip(found.tolist(), counts.tolist(), strict=True):
+            x = plot.at(value, 0.0)[0]
+            plot.canvas.line(x, base, x, base - 0.9 * _LINE * count / counts.max(), colour=INK)
+    return plot.canvas.svg()
+
+
+def _dates(residuals: Residuals) -> Markup:
+    days = against_column(residuals, "day")
+    people = _people(residuals)
+    across = Axis.around(days.label, days.values.tolist(), 0.02)
+    plot = _frame("When each technician read", across, [name for name, _rows in people])
+    for place, (_name, rows) in enumerate(people):
+        base = _TOP + _LINE * (place + 1)
+        for day in days.values[rows & np.isfinite(days.values)].tolist():
+            x = plot.at(day, 0.0)[0]
+            plot.canvas.line(x, base - 0.7 * _LINE, x, base - 2.0, colour=SOFT, width=0.8)
+    return plot.canvas.svg()
+
+
+def _blanks(residuals: Residuals) -> Markup:
+    """Share of blanks of each joint, rows in the order of their landings, else as they stand."""
+    table = residuals.diagnosis.used
+    landings = table.quantities.get(LANDINGS.variable, np.full(len(table), np.nan))
+    known = bool(np.isfinite(landings).any())
+    order = np.argsort(landings, kind="stable")
+    parts = np.array_split(order, min(_CELLS, len(order)))
+    label = "rows, few landings to many" if known else "rows as they stand"
+    names = [f"#{joint}" for joint in residuals.joints]
+    plot = _frame("Blank clearances", Axis(f"{label}, %", 0.0, 100.0), names)
+    across = (plot.area[2] - _LEFT) / len(parts)
+    for joint in range(len(names)):
+        for place, rows in enumerate(parts):
+            share = float(np.mean(np.isnan(table.clearance_in[rows, joint])))
+            if share > 0.0:
+                grey = round(255 - 215 * share)
+                plot.canvas.rectangle(
+                    _LEFT + place * across,
+                    _TOP + _LINE * joint + 2,
+                    across,
+                    _LINE - 3,
+                    fill=f"#{grey:02x}{grey:02x}{grey:02x}",
+                )
+    return plot.canvas.svg()
