@@ -124,12 +124,12 @@ def fleet_lines(
 def work_sentence(lines: Sequence[FleetLine]) -> str:
     """Sum the minutes and the parts that the plans of a fleet expect."""
     parts = Counter(joint for line in lines for joint in line.restore)
-    restored = ", ".join(f"#{joint} on {count}" for joint, count in sorted(parts.items()))
+    restored = ", ".join(f"#{joint} ({count})" for joint, count in sorted(parts.items()))
     minutes = sum(line.minutes for line in lines)
     return (
         f"Work that the plans expect: {minutes:.0f} min on"
-        f" {sum(line.minutes > 0.0 for line in lines)} of {len(lines)} gears; joints to restore:"
-        f" {restored or 'none'}."
+        f" {sum(line.minutes > 0.0 for line in lines)} of {len(lines)} gears; joints to restore"
+        f" (number of gears): {restored or 'none'}."
     )
 
 

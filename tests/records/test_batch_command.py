@@ -302,7 +302,9 @@ def test_the_worst_gear_stands_first_and_every_gear_on_one_line(mixed):
 
 
 def test_joints_over_their_limit_are_counted_over_the_batch(mixed):
-    assert "Joints over their limit: #10 on 1 of these." in mlg("check", mixed).out
+    assert "Joints over their limit (number of gears): #10 (1)." in mlg("check", mixed).out
+    every = mlg("check", mixed, "--all").out
+    assert "Joints over their limit (number of inspections): #10 (1)." in every
 
 
 def test_each_problem_is_told_with_place_value_and_remedy(mixed):

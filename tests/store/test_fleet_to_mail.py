@@ -119,7 +119,7 @@ def test_minutes_and_parts_are_summed_over_the_fleet(store: Path) -> None:
     assert minutes > 0
     assert f"{minutes:.0f} min" in told["work"]
     assert [gear["restore"] for gear in told["gears"] if gear["restore"]] == [[3]]
-    assert "#3 on 1" in told["work"]
+    assert "(number of gears): #3 (1)." in told["work"]
 
 
 def test_gears_without_work_are_not_counted_as_having_some(store: Path) -> None:

@@ -49,8 +49,9 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
         screen.print(f"… and {len(ordered) - _LINES} more; --csv or --json lists all of them.")
     worn = Counter(joint for line in ordered for joint in line.over_limit)
     if worn:
-        joints = ", ".join(f"#{joint} on {count}" for joint, count in worn.most_common())
-        screen.print(f"Joints over their limit: {joints} of these.")
+        joints = ", ".join(f"#{joint} ({count})" for joint, count in sorted(worn.items()))
+        rows_are = "inspections" if every else "gears"
+        screen.print(f"Joints over their limit (number of {rows_are}): {joints}.")
     screen.print(
         f"Model: {gear.name}, geometry {gear.provenance}. 'worst' is the displacement"
         " in the worst directions, a bound; 'chance' is of exceeding the margin with random"
