@@ -46,7 +46,9 @@ class FleetLine:
     @classmethod
     def of(cls, life: GearLife, latest: KeptInspection, ahead: Forecast) -> FleetLine:
         result = latest.result
-        plan = result.get("plan", ())
+        # A plan that was made before a repair says nothing of the work that is left.
+        done = any("" < latest.record.day < record.day for record in life.repairs)
+        plan = () if done else result.get("plan", ())
         return cls(
             life,
             *life.key,
@@ -63,7 +65,7 @@ class FleetLine:
             ahead.due_date,
             result.get("predicted_displacement_in"),
             result.get("margin_in"),
-            _in_brief(latest),
+            "Repaired since then: check again" if done else _in_brief(latest),
             sum(step["minutes"] for step in plan),
             tuple(n for step in plan if step["action"] == Action.RESTORE for n in step["joints"]),
         )

@@ -909,6 +909,12 @@ def test_a_small_reading_is_asked_again(flow: Flow) -> None:
     assert "less than new parts have" in shown(flow, turn.state)
 
 
+def test_an_upper_end_of_a_reading_is_not_said_to_be_less_than_new_parts(flow: Flow) -> None:
+    turn = play(flow, ["<0.002"], RADIAL_INCHES)
+    assert turn.state.ask is Ask.CONFIRM
+    assert "the upper end of what was found" in shown(flow, turn.state)
+
+
 def test_no_flag_is_named_at_a_prompt(flow: Flow) -> None:
     turn = play(flow, [".004"], replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE))
     assert "--" not in shown(flow, turn.state)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import shutil
 from pathlib import Path
 
 import openpyxl
@@ -120,6 +121,16 @@ def test_minutes_and_parts_are_summed_over_the_fleet(store: Path) -> None:
     assert f"{minutes:.0f} min" in told["work"]
     assert [gear["restore"] for gear in told["gears"] if gear["restore"]] == [[3]]
     assert "(number of gears): #3 (1)." in told["work"]
+
+
+def test_a_plan_from_before_a_repair_is_no_work_that_is_left(store: Path, tmp_path: Path) -> None:
+    repaired = tmp_path / "repaired.sqlite"
+    shutil.copy(store, repaired)
+    repair = ("--joint", "3", "--date", "2026-06-30", "--store", repaired)
+    assert mlg("history", "repair", "N123", "RH", *repair).code == 0
+    (gear,) = gears(repaired, "--only", "OUTSIDE_MARGIN", "--no-forecast")
+    assert (gear["restore"], gear["minutes"]) == ([], 0.0)
+    assert gear["next_action"] == "Repaired since then: check again"
 
 
 def test_gears_without_work_are_not_counted_as_having_some(store: Path) -> None:

@@ -279,9 +279,11 @@ def joint_page(
 
 def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | None) -> Page:
     joint = gear.joint(number)
-    above = f"is far beyond the limit of {length(joint.limit.value, unit)}"
-    below = f"is less than new parts have ({length(joint.new_part.value, unit)})"
-    what = above if joint.is_over_limit(reading.radial_in) else below
+    what = "is counted: the upper end of what was found"
+    if joint.is_over_limit(reading.radial_in):
+        what = f"is far beyond the limit of {length(joint.limit.value, unit)}"
+    elif reading.radial_in < joint.new_part.value:
+        what = f"is less than new parts have ({length(joint.new_part.value, unit)})"
     judged = judge(reading.written.text, number, reading.unit, reading.convention, gear)
     said = said_in(judged.said, reading.unit)
     shown = (
