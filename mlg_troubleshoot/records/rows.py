@@ -72,7 +72,13 @@ from mlg_troubleshoot.records.values import (
     read_value,
     says_failed,
 )
-from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence
+from mlg_troubleshoot.units import (
+    UNIT_SPELLINGS,
+    ClearanceConvention,
+    Length,
+    LengthUnit,
+    Sentence,
+)
 
 _REMEMBERED = 20_000
 _MISSING_CONVENTION = (
@@ -311,7 +317,7 @@ class RowReader:
             cell = self._cells[index]
             if cell is not None:
                 found.carried[name] = writable(show(cell))
-        self._look_for_words(convention, has_outcome=OUTCOME in found.values)
+        self._look_for_words(found, convention)
         return found
 
     def _read_lengths(
@@ -445,21 +451,25 @@ class RowReader:
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
 
-    def _look_for_words(self, convention: ClearanceConvention | None, *, has_outcome: bool) -> None:
+    def _look_for_words(self, found: _Found, convention: ClearanceConvention | None) -> None:
         """Stop a row in which a column that is only carried says that the gear failed, or that the
-        clearances were read in another way.
+        clearances were read in another way or another unit.
         """
+        units = {entered.unit for entered in found.entered.values()}
         for placed in self._unread_words:
             cell = self._cells[placed.index]
             if not isinstance(cell, str):
                 continue
             said = convention_word(cell)
-            if not has_outcome and says_failed(cell):
+            unit = UNIT_SPELLINGS.get(plain_text(cell).lower())
+            if OUTCOME not in found.values and says_failed(cell):
                 self._elsewhere(placed, OUTCOME)
             elif said is not None and (
                 convention is None or said.per_radial != convention.per_radial
             ):
                 self._elsewhere(placed, CONVENTION)
+            elif unit is not None and units and unit not in units:
+                self._elsewhere(placed, UNIT)
 
     def _elsewhere(self, placed: PlacedField, column: Column) -> None:
         what = column.filled
@@ -578,7 +588,7 @@ class RowReader:
                 fault.code = "clearance_negative"
             raise
         beyond = not low - ROUNDING_IN <= value_in / factor <= high + ROUNDING_IN
-        if beyond or (above_zero and value_in <= 0.0):
+        if beyond or ((above_zero or bound == "<") and value_in <= 0.0):
             if is_clearance:
                 usual = self._options.clearance_confirm_above_in
                 slip = scale_slip(value_in / factor, found, scale, usual)

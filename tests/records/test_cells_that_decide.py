@@ -152,6 +152,16 @@ def test_a_column_that_contradicts_the_convention_stops_the_row(tmp_path, gear, 
     assert "Reading=clearance_convention" in problem.remedy
 
 
+@pytest.mark.parametrize("word", ["mm", "mils"])
+def test_a_column_that_contradicts_the_unit_stops_the_row(tmp_path, gear, word):
+    (problem,) = read_many([table(tmp_path, **{"u/m": word})], ReadOptions.of(gear)).problems
+    assert (problem.code, problem.column) == ("unit_elsewhere", "u/m")
+
+
+def test_a_column_that_agrees_with_the_unit_is_only_carried(tmp_path, gear):
+    assert one(tmp_path, gear, **{"u/m": "inches"}).carried["u/m"] == "inches"
+
+
 def test_a_column_that_agrees_with_the_convention_is_only_carried(tmp_path, gear):
     assert one(tmp_path, gear, Reading="Radial").carried["Reading"] == "Radial"
 

@@ -70,7 +70,7 @@ def test_a_reading_above_less_than_the_limit_is_not_measured(gear: Gear) -> None
     )
 
 
-@pytest.mark.parametrize("cell", ["go", "no-go", "<", "<0.002 to 0.003", "<-0.002"])
+@pytest.mark.parametrize("cell", ["go", "no-go", "<", "<0.002 to 0.003", "<-0.002", "<0"])
 def test_words_without_a_size_are_refused(gear: Gear, cell: str) -> None:
     assert [p.column for p in read(gear, cell).problems] == ["clearance_3_in"]
 
