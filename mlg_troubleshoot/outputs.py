@@ -238,7 +238,9 @@ def _files_of(given: str | Path | int) -> list[Path | int]:
     if isinstance(given, int):
         return [given]
     path = Path(given)
-    return [file for file in path.iterdir() if not file.is_dir()] if path.is_dir() else [path]
+    if not path.is_dir():
+        return [path]
+    return [file for file in path.iterdir() if not file.is_dir()]
 
 
 def _named(file: Path | int) -> str:

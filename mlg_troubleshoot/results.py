@@ -101,7 +101,9 @@ def same(one: Any, other: Any) -> bool:
     others = _pieces(other)
     if pieces is None or others is None:
         return bool(one == other)
-    return pieces.keys() == others.keys() and all(same(pieces[key], others[key]) for key in pieces)
+    if pieces.keys() != others.keys():
+        return False
+    return all(same(pieces[key], others[key]) for key in pieces)
 
 
 def _pieces(value: Any) -> Mapping[Any, Any] | None:

@@ -69,7 +69,8 @@ def contradictions(moments: Sequence[Moment], name: Callable[[int], str]) -> dic
     up_to = _longest_rising(landings)
     onwards = _longest_rising([-each for each in reversed(landings)])[::-1]
     longest = max(up_to)
-    in_some = [n for n in range(len(placed)) if up_to[n] + onwards[n] - 1 == longest]
+    through = [before + after - 1 for before, after in zip(up_to, onwards, strict=True)]
+    in_some = [n for n, length in enumerate(through) if length == longest]
     alone = Counter(up_to[n] for n in in_some)
     trusted = [n for n in in_some if alone[up_to[n]] == 1]
     suspects = [n for n in range(len(placed)) if n not in set(trusted)]

@@ -212,7 +212,8 @@ def _forecast_part(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
         ]
     )
     # A joint that was never read counts as it does in the prediction: not at all.
-    wear = np.where(read[:, :, None, None], _wear_ahead(part, model, gear, ahead), 0.0)
+    wear = _wear_ahead(part, model, gear, ahead)
+    wear = np.where(read[:, :, None, None], wear, 0.0)
     displacement = _worst_case_of(wear, gear)
     for g, life in enumerate(part):
         margin = life.inspections[-1].inspection.margin_in
@@ -223,7 +224,8 @@ def _forecast_part(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
         to_margin = first_passage(
             ahead, displacement[g], gear.margin.value if margin is None else margin
         )
-        due = float(Samples(np.minimum(to_any, to_margin)).quantile(gear.accepted_chance.value))
+        to_either = Samples(np.minimum(to_any, to_margin))
+        due = float(to_either.quantile(gear.accepted_chance.value))
         bands = np.quantile(wear[g][:, _ASKED], [0.05, 0.5, 0.95], axis=2)
         first = to_limit.argmin(axis=0)[np.isfinite(to_any)]
         yield Forecast(
@@ -250,8 +252,10 @@ def _wear_ahead(part: Sequence[GearLife], model: WearModel, gear: Gear, ahead: A
             paths += own
             usage.append(np.maximum(now + ahead - begun, 0.0))
     units = [unit_of(life.key, number) for life in part for number in numbers]
-    found = model.of(paths).forecast(units, usage, reading=False, together=len(numbers)).samples
-    return np.maximum(found, 0.0).reshape(len(part), len(numbers), *found.shape[1:])
+    fitted = model.of(paths)
+    found = fitted.forecast(units, usage, reading=False, together=len(numbers)).samples
+    wear = np.maximum(found, 0.0)
+    return wear.reshape(len(part), len(numbers), *wear.shape[1:])
 
 
 def _worst_case_of(wear: Array, gear: Gear) -> Array:

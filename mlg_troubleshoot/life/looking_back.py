@@ -51,7 +51,7 @@ class Advice:
         if not self.outcomes:
             return None
         wrong = self.outcomes - self.right
-        low, high = (float(betaincinv(self.right + 0.5, wrong + 0.5, p)) for p in (0.05, 0.95))
+        low, high = betaincinv(self.right + 0.5, wrong + 0.5, [0.05, 0.95]).tolist()
         return low if self.right else 0.0, high if wrong else 1.0
 
     @property

@@ -148,7 +148,8 @@ def _program() -> bytes:
     room = Path(__file__).parent
     files = sorted([*room.glob("*.py"), *(room.parent / "wear").glob("*.py")])
     made = version("mlg-troubleshoot"), version("numpy"), version("scipy")
-    return _hash([repr(made).encode(), *(file.read_bytes() for file in files)]).encode()
+    texts = [file.read_bytes() for file in files]
+    return _hash([repr(made).encode(), *texts]).encode()
 
 
 def _folder() -> Path:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -68,14 +68,14 @@ def _exchanged(
     """Places of gears that fit each other's wear and not their own, the clearest pair first."""
     days = [life.inspections[-1].record.day for life in known]
     # Gears are exchanged on one aircraft, or by those who entered one day's sheets.
+    misfits = [i for i, z in enumerate(scores) if _fit(z) < _POOR_FIT]
     pairs = [
         (i, j)
-        for i, j in combinations([i for i, z in enumerate(scores) if _fit(z) < _POOR_FIT], 2)
+        for i, j in combinations(misfits, 2)
         if known[i].key[0] == known[j].key[0] or days[i] == days[j]
     ]
-    crossed = _departures(
-        [(known[a], known[b]) for i, j in pairs for a, b in ((i, j), (j, i))], model, gear
-    )
+    both_ways = [order for pair in pairs for order in permutations(pair)]
+    crossed = _departures([(known[a], known[b]) for a, b in both_ways], model, gear)
     gains = []
     for n, (i, j) in enumerate(pairs):
         others = crossed[2 * n : 2 * n + 2]
@@ -128,6 +128,7 @@ def _departures(
     if at:
         of_paths = replace(model, paths=paths)
         samples = of_paths.forecast(list(paths), np.array(ahead)[:, None]).samples[:, 0]
-        departures = (np.array(read) - samples.mean(axis=1)) / samples.std(axis=1)
+        departures = np.array(read) - samples.mean(axis=1)
+        departures /= samples.std(axis=1)
         scores[tuple(np.array(at).T)] = departures
     return list(scores)

@@ -40,7 +40,8 @@ def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]
         elif event.kind is RecordKind.REPAIR:
             at = _landings_of(event, life)
             for joint in found.keys() & set(event.body["joints"]):
-                found[joint].append(Stretch(found[joint][-1].begun if at is None else at, []))
+                begun = found[joint][-1].begun if at is None else at
+                found[joint].append(Stretch(begun, []))
     return found
 
 

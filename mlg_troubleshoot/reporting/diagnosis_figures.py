@@ -112,7 +112,8 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
     setting = candidate.setting
     joints = [setting["joint"]] if "joint" in setting else list(setting.get("pair", ()))
     if joints:
-        least = residuals.drawn(np.min([residuals.clearance(joint) for joint in joints], axis=0))
+        clearances = [residuals.clearance(joint) for joint in joints]
+        least = residuals.drawn(np.min(clearances, axis=0))
         named = " and ".join(f"#{joint}" for joint in joints)
         return ResidualAxis(
             f"{'smaller ' if len(joints) > 1 else ''}clearance of {named}, {residuals.unit}", least
@@ -200,7 +201,8 @@ def _most_correlated_float(
         both = floats_in[known, place], effect_in[known]
         if known.sum() <= 2 or min(map(np.std, both)) == 0.0:
             return -1.0
-        return abs(float(np.corrcoef(both[0] ** 2, both[1])[0, 1]))
+        correlation = np.corrcoef(both[0] ** 2, both[1])
+        return abs(float(correlation[0, 1]))
 
     place = max(range(floats_in.shape[1]), key=alike)
     label = f"end float of #{residuals.joints[place]}, {residuals.unit}"
@@ -280,9 +282,10 @@ def _mean_mark(plot: Plot, x: float, values: Array) -> None:
     mean = float(np.mean(values))
     error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
     px, py = plot.at(x, mean)
-    ends = [plot.at(x, mean + side * 2.0 * error)[1] for side in (-1.0, 1.0)]
-    plot.canvas.line(px, ends[0], px, ends[1], width=1.6)
-    for end in ends:
+    _, low = plot.at(x, mean - 2.0 * error)
+    _, high = plot.at(x, mean + 2.0 * error)
+    plot.canvas.line(px, low, px, high, width=1.6)
+    for end in (low, high):
         plot.canvas.line(px - 3, end, px + 3, end, width=1.6)
     plot.canvas.rectangle(px - 3, py - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
 
@@ -294,9 +297,11 @@ def tail_strips(residuals: Residuals) -> Markup:
     if residuals.diagnosis.causes:
         panels.append(("with the extension", residuals.drawn(residuals.after_in), True))
     before = panels[0][1]
-    names = sorted(
-        np.unique(tails).tolist(), key=lambda name: -abs(float(np.mean(before[tails == name])))
-    )
+
+    def size(name: str) -> float:
+        return abs(float(np.mean(before[tails == name])))
+
+    names = sorted(np.unique(tails).tolist(), key=size, reverse=True)
     shown = sorted(names[:MOST_TAILS])
     width = 690.0
     row = 13.0
@@ -312,7 +317,8 @@ def tail_strips(residuals: Residuals) -> Markup:
     for k, (name, values, is_after) in enumerate(panels):
         start = left + k * (room + gap)
         margins = {"left": start, "right": width - start - room, "top": top, "bottom": 34.0}
-        plot = Plot(canvas, residuals.axis, Axis("", 0.0, float(len(shown))), **margins)
+        rows = Axis("", 0.0, float(len(shown)))
+        plot = Plot(canvas, residuals.axis, rows, **margins)
         plot.draw_vertical_grid()
         canvas.text(start, top - 9, name, size=11, bold=True)
         for i, tail in enumerate(shown):
@@ -367,5 +373,6 @@ def probability_bar(chance: float) -> Markup:
     """Draw a probability as a bar that fills its frame at certainty."""
     canvas = Canvas(_BAR + 2, _BAR_HIGH + 2, f"probability {chance:.1%}")
     canvas.rectangle(1, 1, _BAR, _BAR_HIGH, fill=PAPER, colour=SOFT, width=1)
-    canvas.rectangle(1, 1, _BAR * min(max(chance, 0.0), 1.0), _BAR_HIGH, fill=INK)
+    length = _BAR * min(max(chance, 0.0), 1.0)
+    canvas.rectangle(1, 1, length, _BAR_HIGH, fill=INK)
     return canvas.svg()

@@ -186,7 +186,11 @@ def _against_each(residuals: Residuals) -> list[tuple[Markup, Markup | None]]:
     """Plots against each column that varies, before and, where the model was extended, after."""
     d = residuals.diagnosis
     axes = [drawn.against_column(residuals, name) for name in residuals.covariates]
-    varied = [axis for axis in axes if len(np.unique(axis.values[np.isfinite(axis.values)])) > 1]
+
+    def varies(axis: drawn.ResidualAxis) -> bool:
+        known = axis.values[np.isfinite(axis.values)]
+        return len(np.unique(known)) > 1
+
     return [
         (
             drawn.residual_plot(residuals, axis, "before"),
@@ -194,7 +198,7 @@ def _against_each(residuals: Residuals) -> list[tuple[Markup, Markup | None]]:
             if d.causes
             else None,
         )
-        for axis in varied
+        for axis in filter(varies, axes)
     ]
 
 

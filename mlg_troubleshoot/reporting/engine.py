@@ -146,5 +146,6 @@ def check_fonts(document: PdfReader | PdfWriter) -> bool:
 
 
 if __name__ == "__main__":
-    named = {Path(file).name: Path(file).read_bytes() for file in sys.argv[1:]}
+    files = map(Path, sys.argv[1:])
+    named = {file.name: file.read_bytes() for file in files}
     serve(sys.stdin.buffer, sys.stdout.buffer, named)

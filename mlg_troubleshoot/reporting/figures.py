@@ -102,9 +102,9 @@ class Canvas:
         **edge: Unpack[Stroke],
     ) -> None:
         outline = _stroke(edge) if edge else {}
-        self.add(
-            "rect", x=x, y=y, width=max(across, 0.0), height=max(down, 0.0), fill=fill, **outline
-        )
+        width = max(across, 0.0)
+        height = max(down, 0.0)
+        self.add("rect", x=x, y=y, width=width, height=height, fill=fill, **outline)
 
     def polyline(
         self,
@@ -158,23 +158,27 @@ class Canvas:
         self, shape: Marker, x: float, y: float, size: float = 5.0, *, colour: str = INK
     ) -> None:
         """Draw a marker centred on a point; `size` is half its width. [canvas units]"""
-        s = size
+        left = x - size
+        right = x + size
+        top = y - size
+        bottom = y + size
         match shape:
             case "circle":
-                self.add("circle", cx=x, cy=y, r=s, fill=colour)
+                self.add("circle", cx=x, cy=y, r=size, fill=colour)
             case "ring":
-                self.add("circle", cx=x, cy=y, r=s, fill=PAPER, stroke=colour, stroke_width=1.6)
+                self.add("circle", cx=x, cy=y, r=size, fill=PAPER, stroke=colour, stroke_width=1.6)
             case "square":
-                self.rectangle(x - s, y - s, 2 * s, 2 * s, fill=colour)
+                self.rectangle(left, top, 2 * size, 2 * size, fill=colour)
             case "diamond":
-                corners = [(x, y - s), (x + s, y), (x, y + s), (x - s, y)]
+                corners = [(x, top), (right, y), (x, bottom), (left, y)]
                 self.polyline(corners, fill=colour, colour=colour, width=1.0, closed=True)
             case "triangle":
-                corners = [(x, y - s), (x + s, y + 0.8 * s), (x - s, y + 0.8 * s)]
+                base = y + 0.8 * size
+                corners = [(x, top), (right, base), (left, base)]
                 self.polyline(corners, fill=colour, colour=colour, width=1.0, closed=True)
             case "cross":
-                self.line(x - s, y - s, x + s, y + s, colour=colour, width=2.0)
-                self.line(x - s, y + s, x + s, y - s, colour=colour, width=2.0)
+                self.line(left, top, right, bottom, colour=colour, width=2.0)
+                self.line(left, bottom, right, top, colour=colour, width=2.0)
 
     def svg(self, css_class: str = "figure") -> Markup:
         title = visible(self.title)
@@ -260,10 +264,9 @@ class Plot:
 
     def at(self, x: float, y: float) -> tuple[float, float]:
         x0, y0, x1, y1 = self.area
-        return (
-            x0 + (x - self.x.low) / (self.x.high - self.x.low) * (x1 - x0),
-            y1 - (y - self.y.low) / (self.y.high - self.y.low) * (y1 - y0),
-        )
+        across = (x - self.x.low) / (self.x.high - self.x.low)
+        up = (y - self.y.low) / (self.y.high - self.y.low)
+        return x0 + across * (x1 - x0), y1 - up * (y1 - y0)
 
     def draw_axes(self, x_ticks: int = 6, names: Sequence[str] = ()) -> None:
         """Draw grid, ticks, frame and labels; names take the place of numbers on the horizontal
@@ -291,7 +294,8 @@ class Plot:
             self.canvas.text(x, y1 + 14, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
         self.canvas.line(x0, y1, x1, y1, colour=SOFT)
         self.canvas.line(x0, y0, x0, y1, colour=SOFT)
-        self.canvas.text((x0 + x1) / 2, y1 + 29, self.x.label, size=10, anchor="middle")
+        middle = (x0 + x1) / 2
+        self.canvas.text(middle, y1 + 29, self.x.label, size=10, anchor="middle")
         self.canvas.add(
             "text",
             self.y.label,
@@ -318,16 +322,16 @@ class Plot:
             text = number(value, decimals_of(ticks))
             self.canvas.text(x, y1 + 13, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
         self.canvas.line(x0, y1, x1, y1, colour=SOFT)
-        self.canvas.text((x0 + x1) / 2, y1 + 27, self.x.label, size=10, anchor="middle")
+        middle = (x0 + x1) / 2
+        self.canvas.text(middle, y1 + 27, self.x.label, size=10, anchor="middle")
 
     def draw(self, series: Series) -> None:
-        for known, run in groupby(
-            zip(series.x, series.y, strict=True), lambda at: all(map(math.isfinite, at))
-        ):
+        places = zip(series.x, series.y, strict=True)
+        for known, run in groupby(places, lambda at: all(map(math.isfinite, at))):
             if known:
-                places = [self.at(x, y) for x, y in run]
+                corners = [self.at(x, y) for x, y in run]
                 self.canvas.polyline(
-                    places, colour=series.colour, width=series.width, dash=series.dash
+                    corners, colour=series.colour, width=series.width, dash=series.dash
                 )
 
     def draw_legend(
@@ -378,9 +382,12 @@ def draw_bar(
         high = x + bar.high * per_value
         middle = y + height / 2
         inside = PAPER if bar.style == "solid" else INK
-        canvas.line(max(low, x), middle, min(high, x + length), middle, colour=inside, width=1.2)
-        canvas.line(x + length, middle, max(high, x + length), middle, width=1.2)
-        canvas.line(max(low, x), middle - 2.5, max(low, x), middle + 2.5, colour=inside, width=1.2)
-        canvas.line(high, middle - 2.5, high, middle + 2.5, width=1.2)
+        start = max(low, x)
+        top = middle - 2.5
+        bottom = middle + 2.5
+        canvas.line(start, middle, min(high, end), middle, colour=inside, width=1.2)
+        canvas.line(end, middle, max(high, end), middle, width=1.2)
+        canvas.line(start, top, start, bottom, colour=inside, width=1.2)
+        canvas.line(high, top, high, bottom, width=1.2)
         end = max(end, high)
     return end

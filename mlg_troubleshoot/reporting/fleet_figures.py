@@ -90,11 +90,11 @@ def fleet_picture(places: Sequence[GearInPicture]) -> Markup:
         for number, place in enumerate(places, 1):
             if place.due is not None:
                 x, y = left.at(number, place.due)
-                wide = min(0.7 * (left.area[2] - left.area[0]) / len(places), 14.0)
-                base = left.area[3]
-                canvas.rectangle(
-                    x - wide / 2, min(y, base - 2.0), wide, max(base - y, 2.0), fill=ACCENT
-                )
+                start, _, end, base = left.area
+                wide = min(0.7 * (end - start) / len(places), 14.0)
+                top_y = min(y, base - 2.0)
+                tall = max(base - y, 2.0)
+                canvas.rectangle(x - wide / 2, top_y, wide, tall, fill=ACCENT)
     return canvas.svg()
 
 
@@ -182,7 +182,8 @@ def _panel(
     most = max(shown(value) for each in between for _at, value, _u in each.placed)
     x = _PANEL_WIDE * (place % 2)
     y = _PANEL_HIGH * (place // 2)
-    plot = Plot(canvas, Axis("landings", 0.0, end), Axis("", 0.0, 1.15 * max(limit, most)))
+    clearances = Axis("", 0.0, 1.15 * max(limit, most))
+    plot = Plot(canvas, Axis("landings", 0.0, end), clearances)
     plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
     canvas.text(x + 52, y + 13, f"#{number} {joint.name}, {lengths.unit}", bold=True)
     expected = wear.expected(number, gear, 25)
@@ -205,6 +206,8 @@ def _panel(
             top_y = plot.at(each.begun, plot.y.high)
             canvas.line(*base, *top_y, colour=SOFT, dash="1 3")
             canvas.marker("triangle", *base, 4.5)
-        plot.draw(Series("", tuple(at for at, _ in placed), tuple(value for _, value in placed)))
+        usage = tuple(at for at, _ in placed)
+        values = tuple(value for _, value in placed)
+        plot.draw(Series("", usage, values))
         for at, value in placed:
             canvas.marker("square" if value > limit else "circle", *plot.at(at, value), 3.2)

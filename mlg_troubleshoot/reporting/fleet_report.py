@@ -43,9 +43,8 @@ def interval_bar(ends: Mapping[str, float | None] | None, horizon: float) -> Mar
     canvas.rectangle(low, 4, max(high - low, 1.0), 10, fill=ACCENT)
     canvas.rectangle(middle, 0, 2.5, 18, fill=INK)
     if ends["p95"] is None:
-        canvas.polyline(
-            [(_BAR, 2), (_BAR + 6, 9), (_BAR, 16)], fill=ACCENT, colour=None, closed=True
-        )
+        arrow = [(_BAR, 2), (_BAR + 6, 9), (_BAR, 16)]
+        canvas.polyline(arrow, fill=ACCENT, colour=None, closed=True)
     return canvas.svg()
 
 

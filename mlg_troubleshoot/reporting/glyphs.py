@@ -53,10 +53,8 @@ def _code_points(font: bytes) -> frozenset[int]:
     (format 12).
     """
     found: set[int] = set()
-    tables = {
-        tag: start
-        for tag, _, start, _ in struct.iter_unpack(">4sIII", font[12 : 12 + 16 * font[5]])
-    }
+    directory = font[12 : 12 + 16 * font[5]]
+    tables = {tag: start for tag, _, start, _ in struct.iter_unpack(">4sIII", directory)}
     cmap = tables[b"cmap"]
     for i in range(struct.unpack_from(">H", font, cmap + 2)[0]):
         start = cmap + struct.unpack_from(">I", font, cmap + 8 + 8 * i)[0]

@@ -59,15 +59,16 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
         bold=True,
     )
     canvas.line(gauge.px(under), y, gauge.px(over), y, width=4)
-    canvas.rectangle(
-        gauge.px(sense * worst - u2), y - 6, gauge.px(2 * u2) - gauge.px(0.0), 12, colour=INK
-    )
+    left = gauge.px(sense * worst - u2)
+    width = gauge.px(2 * u2) - gauge.px(0.0)
+    canvas.rectangle(left, y - 6, width, 12, colour=INK)
     for value in (under, over):
         canvas.marker("diamond", gauge.px(value), y, 5.5)
     if upper is not None:
         y = gauge.lane("unmeasured at limit", lengths.bare(sense * upper, True))
-        canvas.line(gauge.px(0.0), y, gauge.px(sense * upper), y, width=1.5, dash="5 3")
-        canvas.marker("ring", gauge.px(sense * upper), y, 4.5)
+        end = gauge.px(sense * upper)
+        canvas.line(gauge.px(0.0), y, end, y, width=1.5, dash="5 3")
+        canvas.marker("ring", end, y, 4.5)
     if spread is not None:
         ends = [gauge.px(sense * value) for value in spread]
         y = gauge.lane(
@@ -113,11 +114,10 @@ class _Gauge:
         )
         canvas.text(self.centre, header, "allowed", size=10, anchor="middle", colour=SOFT)
         for end in (-margin, margin):
-            canvas.line(self.px(end), top - 8, self.px(end), bottom + 4, width=2.6)
+            x = self.px(end)
+            canvas.line(x, top - 8, x, bottom + 4, width=2.6)
             said = lengths.bare(end, True)
-            canvas.text(
-                self.px(end), top - 11, said, size=10.5, bold=True, anchor="middle", halo=True
-            )
+            canvas.text(x, top - 11, said, size=10.5, bold=True, anchor="middle", halo=True)
         canvas.line(self.centre, top - 4, self.centre, bottom, colour=SOFT, dash="3 3")
         canvas.text(self.left, header, "◀ short of mid-position", size=10, colour=SOFT)
         canvas.text(self.right, header, "beyond mid-position ▶", size=10, colour=SOFT, anchor="end")
@@ -198,10 +198,10 @@ def plunger_curve(
         ("worst under-travel", a.under_directions_rad, "6 3"),
     ):
         if directions:
-            moved = model.plunger(strokes, links_from(clearance, np.array(directions))) - nominal
-            series.append(
-                figures.Series(label, x, tuple((moved * per_inch).tolist()), dash=dash, width=2.2)
-            )
+            links = links_from(clearance, np.array(directions))
+            moved = model.plunger(strokes, links) - nominal
+            drawn = tuple((moved * per_inch).tolist())
+            series.append(figures.Series(label, x, drawn, dash=dash, width=2.2))
     measured = _measured_along(gear, a, start, end)
     margin = a.margin_in * per_inch
     farthest = max([end + 0.3 * (end - start), *(place for place, _ in measured)])
@@ -231,7 +231,9 @@ def plunger_curve(
         top=26,
     )
     plot.draw_axes()
-    canvas.line(*plot.at(plot.x.low, 0.0), *plot.at(end * per_inch, 0.0), width=1.2)
+    left_end = plot.at(plot.x.low, 0.0)
+    right_end = plot.at(end * per_inch, 0.0)
+    canvas.line(*left_end, *right_end, width=1.2)
     for one in series:
         plot.draw(one)
     px, high = plot.at(end * per_inch, margin)

@@ -67,13 +67,12 @@ def inspection_document(
         stem = safe_stem(
             row.tail_no, row.side.value if row.side else None, row.record_id, *_place(row.source)
         )
+        place = _place(row.source, "")
         context = {
             **_identified(judgement, gear, provenance, lengths),
             "carried": [],
             "correct": row.correct,
-            "problems": [
-                p for p in problems if (p.file, p.sheet, str(p.row or "")) == _place(row.source, "")
-            ],
+            "problems": [p for p in problems if (p.file, p.sheet, str(p.row or "")) == place],
         }
         return Document("rejected.html.j2", context, stem)
     inspection = judgement.inspection
@@ -197,9 +196,8 @@ def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
     places: list[tuple[str, float]] = []
     if a.inspection.measured_displacement_in is not None:
         places.append(("measured", a.inspection.measured_displacement_in))
-    worst = sorted(
-        (v for v in (a.over_travel_in, a.under_travel_in) if v is not None), key=abs, reverse=True
-    )
+    ends = (a.over_travel_in, a.under_travel_in)
+    worst = sorted((end for end in ends if end is not None), key=abs, reverse=True)
     places += [("worst case", v) for v in worst if abs(v) > a.margin_in or v == worst[0]]
     said: dict[str, list[str]] = {}
     for name, value in places:

@@ -121,10 +121,12 @@ def sections_of(html: str) -> dict[str, str]:
     """Return anchor and heading of each section of a document made from the base template, for the
     bookmarks.
     """
-    return {
-        found["id"]: " ".join(html_text.unescape(re.sub(r"<[^>]*>", " ", found["text"])).split())
-        for found in _HEADING.finditer(html)
-    }
+    sections = {}
+    for found in _HEADING.finditer(html):
+        without_tags = re.sub(r"<[^>]*>", " ", found["text"])
+        words = html_text.unescape(without_tags).split()
+        sections[found["id"]] = " ".join(words)
+    return sections
 
 
 def title_of(html: str) -> str:

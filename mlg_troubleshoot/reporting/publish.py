@@ -182,7 +182,8 @@ def publish_all(
 
     written: list[WrittenReport] = []
     try:
-        for report in spread(one, numbered(), min(4, os.cpu_count() or 1), threads=True):
+        workers = min(4, os.cpu_count() or 1)
+        for report in spread(one, numbered(), workers, threads=True):
             written.append(report)
             if progress is not None:
                 progress(len(written), total)

@@ -102,7 +102,18 @@ def blank_schematic(gear: Gear) -> Schematic:
     """Draw the linkage with its joints numbered and named, none of them measured yet."""
     nothing = tuple(
         JointFinding(
-            j.number, j.name, None, j.limit.value, False, None, 0.0, 0.0, 0.0, j.number, (1, 1), ()
+            joint=j.number,
+            name=j.name,
+            clearance_in=None,
+            limit_in=j.limit.value,
+            over_limit=False,
+            contribution_in=None,
+            first_order=0.0,
+            total_order=0.0,
+            plunger_amplification=0.0,
+            rank=j.number,
+            rank_range=(1, 1),
+            alike=(),
         )
         for j in gear.joints
     )
@@ -197,7 +208,8 @@ class _PlaneDrawing:
         # Points of another plane are drawn where they stand above this one.
         origin, axes = self.mechanism.frame(plane)
         self.points: dict[str, complex] = {}
-        for name in sorted({name for step in self.steps for name in (step.joint, *needs(step))}):
+        names = {name for step in self.steps for name in (step.joint, *needs(step))}
+        for name in sorted(names):
             offset = self.mechanism.reference_in_space(name) - origin
             self.points[name] = complex(offset @ axes[0], offset @ axes[1])
         self.cut = {s.upstream: s.joint for s in self.steps if isinstance(s, Dyad) and s.driven}
@@ -219,7 +231,8 @@ class _PlaneDrawing:
         span = max(np.ptp(others.real), np.ptp(others.imag))
         for anchor, joint in self.cut.items():
             run = self.points[anchor] - self.points[joint]
-            self.points[anchor] = self.points[joint] + min(1.0, 0.34 * span / abs(run)) * run
+            share = min(1.0, 0.34 * span / abs(run))
+            self.points[anchor] = self.points[joint] + share * run
 
     def draw(
         self, scale: float, side: float, height: float, shown: _Shown
@@ -294,7 +307,8 @@ class _PlaneDrawing:
             if isinstance(step, Dyad) and step.driven:
                 far = at[step.upstream]
                 left, _top, right, bottom = _box(place, far)
-                boxes.append((left - 62, (place + far).imag / 2 - 12, right + 8, bottom))
+                middle = (place + far).imag / 2
+                boxes.append((left - 62, middle - 12, right + 8, bottom))
         return boxes
 
     def _links(self, canvas: Canvas, at: Mapping[str, complex]) -> list[Segment]:
@@ -356,7 +370,8 @@ def _without_overlap(markers: Mapping[int, complex]) -> dict[int, complex]:
         for one, other in combinations(sorted(places), 2):
             apart = places[other] - places[one]
             if abs(apart) < least - 1e-6:
-                push = (least - abs(apart)) / 2 * (_unit(apart) if abs(apart) > 1e-6 else 1.0)
+                direction = _unit(apart) if abs(apart) > 1e-6 else 1.0
+                push = (least - abs(apart)) / 2 * direction
                 places[one] -= push
                 places[other] += push
                 moved = True
@@ -510,28 +525,32 @@ def _callout(
     framed: bool,
 ) -> None:
     """Write a label where it covers least, and remember its box."""
-    width = (
-        max(text_width(line.text, line.size) * (1.12 if line.bold else 1.0) for line in lines) + 6
-    )
+    widths = [text_width(line.text, line.size) * (1.12 if line.bold else 1.0) for line in lines]
+    width = max(widths) + 6
     height = sum(line.size + 2.0 for line in lines) + 3
     # From the marker's edge outwards until the label's box clears it, in every direction and at
     # several distances.
     with np.errstate(divide="ignore"):
-        clears = np.minimum(width / 2 / np.abs(_COSINES), height / 2 / np.abs(_SINES))
+        beside = width / 2 / np.abs(_COSINES)
+        above = height / 2 / np.abs(_SINES)
+    clears = np.minimum(beside, above)
     reach = _MARKER + 2 + _RINGS[:, None] + clears
     x = (joint.real + _COSINES * reach).ravel()
     y = (joint.imag + _SINES * reach).ravel()
-    tried = np.column_stack([x - width / 2, y - height / 2, x + width / 2, y + height / 2])
-    outside = np.any(tried < [0, 14, 0, 0], axis=1) | np.any(
-        tried > [np.inf, np.inf, canvas.width, canvas.height], axis=1
-    )
+    across = width / 2
+    up = height / 2
+    tried = np.column_stack([x - across, y - up, x + across, y + up])
+    too_low = tried < [0, 14, 0, 0]
+    too_high = tried > [np.inf, np.inf, canvas.width, canvas.height]
+    outside = np.any(too_low | too_high, axis=1)
     cost = (
         np.repeat(1.1 * _RINGS, len(_COSINES))
         + _overlap(tried, np.array(boxes))
         + _covered(tried, segments)
         + 2000.0 * outside
     )
-    box: Box = tuple(tried[int(np.argmin(np.round(cost, 6)))].tolist())
+    cheapest = int(np.argmin(np.round(cost, 6)))
+    box: Box = tuple(tried[cheapest].tolist())
     # A label under another cannot be read at all.
     boxes += [box] * 16
     edge = complex(
@@ -563,7 +582,11 @@ def _two_lines(name: str) -> list[str]:
     words = name.split()
     if len(name) <= 14 or len(words) < 2:
         return [name]
-    cut = min(range(1, len(words)), key=lambda k: abs(len(" ".join(words[:k])) - len(name) / 2))
+
+    def from_middle(cut: int) -> float:
+        return abs(len(" ".join(words[:cut])) - len(name) / 2)
+
+    cut = min(range(1, len(words)), key=from_middle)
     return [" ".join(words[:cut]), " ".join(words[cut:])]
 
 
@@ -589,6 +612,7 @@ def _covered(tried: Array, segments: list[Segment]) -> Array:
     last = (tried[:, None, 2:] + 3.0 - start) / run
     enter = np.maximum(np.minimum(first, last).max(axis=2), 0.0)
     leave = np.minimum(np.maximum(first, last).min(axis=2), 1.0)
-    length = np.clip(leave - enter, 0.0, None) * np.hypot(run[:, 0], run[:, 1])
+    share = np.clip(leave - enter, 0.0, None)
+    length = share * np.hypot(run[:, 0], run[:, 1])
     total: Array = length.sum(axis=1)
     return 6.0 * total

@@ -64,9 +64,8 @@ def grouped_bars(
         canvas.text(x + 23, 11.5, one.label, size=9.5)
         x += 36 + 5.6 * len(one.label)
     ends = [one.values for one in series] + [one.spread for one in series if one.spread is not None]
-    longest = max(
-        (float(v) for part in ends for v in part.ravel() if math.isfinite(v)), default=0.0
-    )
+    values = [float(v) for part in ends for v in part.ravel() if math.isfinite(v)]
+    longest = max(values, default=0.0)
     per_value = (_WIDTH - _LABEL_WIDTH - 46) / longest if longest > 0.0 else 0.0
     for i, label in enumerate(labels):
         top = _TOP + row * i
@@ -75,7 +74,7 @@ def grouped_bars(
             value = float(one.values[i])
             if not math.isfinite(value):
                 continue
-            low, high = (None, None) if one.spread is None else (float(v) for v in one.spread[i])
+            low, high = (None, None) if one.spread is None else one.spread[i].tolist()
             y = top + _BAR_HEIGHT * k
             bar = Bar(max(value, 0.0), low, high, one.style)
             end = draw_bar(canvas, bar, _LABEL_WIDTH, y + 0.5, _BAR_HEIGHT - 1.5, per_value)

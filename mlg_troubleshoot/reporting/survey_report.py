@@ -31,7 +31,8 @@ def survey_document(
     provenance: ReportProvenance,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> Document:
-    mark = sha256(repr([(r.words, r.value, r.u) for r in found.readings]).encode()).hexdigest()[:8]
+    readings = [(r.words, r.value, r.u) for r in found.readings]
+    mark = sha256(repr(readings).encode()).hexdigest()[:8]
     context = _context(result, found, provenance, Lengths(unit))
     return Document("survey.html.j2", context, safe_stem("survey", result.gear.id, mark))
 

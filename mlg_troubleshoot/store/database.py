@@ -313,7 +313,9 @@ class Store:
     @property
     def is_new(self) -> bool:
         """True if nothing was ever kept here: there is no file, or an empty one."""
-        return self.file is not None and (not self.file.exists() or self.file.stat().st_size == 0)
+        if self.file is None:
+            return False
+        return not self.file.exists() or self.file.stat().st_size == 0
 
     @contextmanager
     def transaction(self, *, writing: bool) -> Iterator[sql.Connection]:
@@ -374,7 +376,7 @@ class Store:
             if not self._postgres:
                 for trigger in _TRIGGERS.values():
                     connection.exec_driver_sql(trigger)
-        found = connection.execute(sql.select(sql.func.max(_meta.c.schema_version))).scalar_one()
+        found = connection.scalar(sql.select(sql.func.max(_meta.c.schema_version)))
         if not isinstance(found, int) or not 1 <= found <= SCHEMA_VERSION:
             raise StoreError(
                 f"store {self.place} has schema version {found!r}, and this program knows"

@@ -44,7 +44,7 @@ class Drafts:
             ).scalar()
             if before is not None and before not in writers:
                 return False
-            last = connection.execute(sql.select(sql.func.max(DRAFTS.c.saved))).scalar() or 0
+            last = connection.scalar(sql.select(sql.func.max(DRAFTS.c.saved))) or 0
             connection.execute(DRAFTS.delete().where(DRAFTS.c.draft_id == draft.id))
             row = {
                 "owner": draft.owner,

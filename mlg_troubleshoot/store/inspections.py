@@ -93,8 +93,9 @@ def inspection_from(record: Record) -> Inspection:
 
 def same_inspection(one: Record, two: Record) -> bool:
     """Tell whether two records say the same was found, wherever it was entered."""
-    bare = [
-        {k: v for k, v in r.body.get("inspection", {}).items() if k not in _NOT_CONTENT}
-        for r in (one, two)
-    ]
-    return bare[0] == bare[1]
+
+    def content(record: Record) -> dict[str, Any]:
+        inspection = record.body.get("inspection", {})
+        return {name: value for name, value in inspection.items() if name not in _NOT_CONTENT}
+
+    return content(one) == content(two)

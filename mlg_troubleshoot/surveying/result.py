@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import ExitCode, Problem
 from mlg_troubleshoot.gear.gear import Gear
@@ -24,6 +26,15 @@ class InspectedGear:
     displacement_in: float
     interval_in: tuple[float, float]
     probability_within_margin: float
+
+    @classmethod
+    def of(
+        cls, record_id: str, displacement_in: float, draws_in: Array, margin_in: float
+    ) -> InspectedGear:
+        """The inspection whose displacement has these draws from the posterior. [in]"""
+        low, high = np.nanquantile(draws_in, [0.05, 0.95]).tolist()
+        within = float(np.mean(draws_in <= margin_in))
+        return cls(record_id, displacement_in, (low, high), within)
 
     @property
     def words(self) -> Sentence:

@@ -328,7 +328,8 @@ def _clearances_of(table: Frame, gear: Gear, **declared: Any) -> Array:
         remedies = dict.fromkeys(problem.remedy for problem in shown)
         raise UsageError("; ".join(said), " ".join(remedies))
     numbers = gear.joint_numbers
-    return np.array([[row.clearance_in.get(n, 0.0) for n in numbers] for row in read.inspections])
+    clearance = [[row.clearance_in.get(n, 0.0) for n in numbers] for row in read.inspections]
+    return np.array(clearance)
 
 
 def read_inspections(
@@ -393,7 +394,8 @@ def _judge(
     counting = since_repairs(rows, found.gear, store)
     blocks = [slice(start, start + AT_ONCE) for start in range(0, total, AT_ONCE)]
     # As they were read, and as they count since repairs: packed they take a tenth of the memory.
-    waiting = [zlib.compress(pickle.dumps((rows[at], counting[at])), 1) for at in blocks]
+    pickled = (pickle.dumps((rows[at], counting[at])) for at in blocks)
+    waiting = [zlib.compress(block, 1) for block in pickled]
     rows.clear()
     del counting
     fleet = None

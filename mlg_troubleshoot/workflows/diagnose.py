@@ -182,7 +182,8 @@ def _once(valid: Sequence[Inspection]) -> list[Inspection]:
     """Each inspection once: again it is not further evidence. Rows that share an id and differ were
     refused.
     """
-    return list({(i.source.file, i.record_id): i for i in reversed(valid)}.values())[::-1]
+    by_record = {(i.source.file, i.record_id): i for i in reversed(valid)}
+    return list(by_record.values())[::-1]
 
 
 def diagnose(

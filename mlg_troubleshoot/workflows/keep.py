@@ -198,9 +198,8 @@ def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[
     if was is None or (stands and (was.day, was.joints) == (stands.day, stands.joints)):
         return []
     life = life_of(store, wrong.tail_no, wrong.side)
-    before = max(
-        (r.seq for r in life.records if r.kind in _ENTERED and r.seq < wrong.seq), default=0
-    )
+    earlier = (r.seq for r in life.records if r.kind in _ENTERED and r.seq < wrong.seq)
+    before = max(earlier, default=0)
     return [
         Record(
             RecordKind.VOID,

@@ -60,7 +60,8 @@ _TEXTS = tuple(column for column in COLUMNS if not column.carried and column.hol
 
 def _table(known: Mapping[str, Any], **others: Any) -> Any:
     """A table that has the known keys and may have the others, and any key beyond them."""
-    keys: list[Any] = [*known.items(), *((name, kind, None) for name, kind in others.items())]
+    optional = [(name, kind, None) for name, kind in others.items()]
+    keys: list[Any] = [*known.items(), *optional]
     return msgspec.defstruct(
         "Kept", keys, bases=(Table,), kw_only=True, forbid_unknown_fields=False
     )
@@ -185,7 +186,8 @@ def _unread(values: Mapping[Column, Any]) -> str:
             continue
         expected, read = _READ[column.holds]
         try:
-            if all(read(each) == each for each in ([value] if isinstance(value, str) else value)):
+            texts = [value] if isinstance(value, str) else value
+            if all(read(each) == each for each in texts):
                 continue
         except CellFaultError:
             pass

@@ -11,7 +11,7 @@ from functools import cache, partial
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.decision.columns import (
     APPROACH,
     AXIAL_FLOAT,
@@ -175,11 +175,12 @@ class _Plan:
         left, seen = beside(white, level)
         size = np.linalg.norm(left, axis=0)
         self.sign = np.array([c.cause.sign for c in found])
-        self.unit = np.where(seen, left / np.where(seen, size, 1.0), 0.0) * np.where(
-            self.sign == 0, 1, self.sign
-        )
+        direction = np.where(self.sign == 0, 1, self.sign)
+        unit = np.where(seen, left / np.where(seen, size, 1.0), 0.0)
+        self.unit = unit * direction
         # Root mean square of an effect over what of it can be seen.
-        self.hidden = np.linalg.norm(effects, axis=0) / np.where(seen, size, np.inf)
+        visible = np.where(seen, size, np.inf)
+        self.hidden = np.linalg.norm(effects, axis=0) / visible
         self.candidates = found
         self.keys: dict[Key, list[int]] = {}
         for k in np.flatnonzero(seen):
@@ -222,14 +223,15 @@ class _Plan:
                 cosine = self.unit[:, mine].T @ self.unit[:, places]
                 # Physics allows some causes one sign only: two that push apart are not rivals.
                 one_way = (self.sign[mine][:, None] * self.sign[places]) != 0
-                alike = float(np.max(np.where(one_way, np.maximum(cosine, 0.0), cosine) ** 2))
+                possible = np.where(one_way, np.maximum(cosine, 0.0), cosine)
+                alike = float(np.max(possible**2))
                 if alike > best:
                     best = alike
                     name = " ".join(part for part in other if part)
         apart = 1.0 - best
-        return name, (
-            float("inf") if apart < TESTABLE**2 else _APART * self._row(key) / float(np.sqrt(apart))
-        )
+        if apart < TESTABLE**2:
+            return name, float("inf")
+        return name, _APART * self._row(key) / float(np.sqrt(apart))
 
     def found_from(self, key: Key) -> float:
         """Size from which a cause stands out. [in]"""
@@ -255,13 +257,14 @@ def _divergence(size_in: float, true: Array, other: Array) -> float:
     one, two = (basis.T @ effects / ROW_IN for effects in (true, other))
     unit = np.eye(len(one))
     truth = unit + size_in**2 * one @ one.T
+    _, log_truth = np.linalg.slogdet(truth)
     least = np.inf
     for size in size_in * np.geomspace(0.2, 5.0, 15):
         wrong = unit + size**2 * two @ two.T
         excess = np.trace(np.linalg.solve(wrong, truth)) - len(one)
-        least = min(
-            least, 0.5 * float(excess + np.linalg.slogdet(wrong)[1] - np.linalg.slogdet(truth)[1])
-        )
+        _, log_wrong = np.linalg.slogdet(wrong)
+        divergence = 0.5 * float(excess + log_wrong - log_truth)
+        least = min(least, divergence)
     return least
 
 
@@ -317,7 +320,8 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
     n = TAILS * 2 * VISITS
     tail = np.repeat(np.arange(TAILS), 2 * VISITS)
     gears = np.repeat(np.arange(2 * TAILS), VISITS)
-    day = np.sort(rng.uniform(0.0, 730.0, (2 * TAILS, VISITS)), axis=1).ravel()
+    days = rng.uniform(0.0, 730.0, (2 * TAILS, VISITS))
+    day = np.sort(days, axis=1).ravel()
     landings = rng.uniform(500.0, 6000.0, 2 * TAILS)[gears] + 2.5 * day
     limits = gear.limits_in
     wear = (
@@ -338,16 +342,17 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
     }
     if ALONG in recorded:
         quantities[ALONG] = np.full(n, np.nan)
+
+    def mostly_own(count: int) -> Places:
+        """One of so many per row: the aircraft's own in seven of ten, else any."""
+        return np.where(rng.random(n) < 0.7, tail % count, rng.integers(0, count, n))
+
     factors = {
         TAIL_NO.variable: np.array([f"T{k:02d}" for k in tail]),
         SIDE.variable: np.where(gears % 2 == 0, "LH", "RH"),
         APPROACH.variable: rng.choice(["EXTENDING", "RETRACTING"], n),
-        GAUGE_ID.variable: np.where(rng.random(n) < 0.7, tail % 4, rng.integers(0, 4, n)).astype(
-            str
-        ),
-        TECHNICIAN_ID.variable: np.array(
-            [f"W{k}" for k in np.where(rng.random(n) < 0.7, tail % 5, rng.integers(0, 5, n))]
-        ),
+        GAUGE_ID.variable: mostly_own(4).astype(str),
+        TECHNICIAN_ID.variable: np.array([f"W{k}" for k in mostly_own(5)]),
     }
     floats = rng.uniform(0.0, 0.02, clearance.shape) if AXIAL_FLOAT.variable in recorded else None
     planned = DiagnosisTable(
@@ -365,7 +370,6 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
         return planned
     # One reading along the stroke in addition to each at mid-position.
     both = planned.take(np.tile(np.arange(n), 2))
-    stroke = np.r_[
-        np.full(n, np.nan), rng.permutation(np.linspace(0.0, gear.reference.stroke[1], n))
-    ]
+    along = np.linspace(0.0, gear.reference.stroke[1], n)
+    stroke = np.r_[np.full(n, np.nan), rng.permutation(along)]
     return replace(both, quantities={**both.quantities, ALONG: stroke})

@@ -102,7 +102,8 @@ def _searches(gear: Gear, options: StudyOptions, report: Progress) -> tuple[Wors
 
     found = []
     for k, sense in enumerate((1.0, -1.0)):
-        rng = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(1000 + k,)))
+        stream = np.random.SeedSequence(options.seed, spawn_key=(1000 + k,))
+        rng = np.random.default_rng(stream)
         limits = gear.limits_in if options.limits_in is None else options.limits_in
         found.append(search_worst(gear.model, limits, sense, rng, options.seed))
         report("proof", k + 1, 2)

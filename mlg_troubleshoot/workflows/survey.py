@@ -129,7 +129,7 @@ def survey(
                 known, found, file, f"{Path(source_label(table)).name}, SHA-256 {digest[:12]}"
             )
             warnings += _left_targets(known, path)
-    clearance = np.array([c for _, c in cases]).reshape(len(cases), len(known.joints))
+    clearance = np.array([c for _, c in cases]).reshape(-1, len(known.joints))
     moved = linkage.displacement(draws, clearance)
     own = linkage.displacement(middle, clearance)
     # Logarithms: a few linkages near a dead centre would else decide alone. Without clearance
@@ -143,16 +143,13 @@ def survey(
         suggestion = suggested_early(linkage, readings, quantity)
     else:
         suggestion = suggested(linkage, draws, unknown, readings)
-    judged = tuple(
-        InspectedGear(
-            name, float(d), (float(low), float(high)), float(np.mean(each <= known.margin.value))
-        )
-        for (name, _), d, each in zip(cases, own[0], moved.T, strict=True)
-        for low, high in [np.nanquantile(each, [0.05, 0.95])]
+    gears = tuple(
+        InspectedGear.of(name, float(displacement), draws, known.margin.value)
+        for (name, _), displacement, draws in zip(cases, own[0], moved.T, strict=True)
     )
     own_index = linkage.amplification(middle)[0]
     read = known, found, problems, before, interval, own_index
-    return SurveyResult(*read, suggestion, judged, warnings, path, digest, seed)
+    return SurveyResult(*read, suggestion, gears, warnings, path, digest, seed)
 
 
 def written_with(write: Path) -> list[OutputFile]:
