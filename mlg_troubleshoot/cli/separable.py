@@ -44,15 +44,10 @@ def separable(
     console = output.console()
     console.print(
         "Smallest effects, rms in thou over 200 rows of 20 aircraft, that are detected, and"
-        " distinguished from the nearest alternative, with 80 % power:"
+        " distinguished from the nearest alternative, with 80 % power; the last column is the"
+        " cheapest one that would distinguish them:"
     )
-    headings = (
-        "cause",
-        "detected",
-        "looks most like",
-        "distinguished",
-        "cheapest column that distinguishes them",
-    )
+    headings = ("cause", "detected", "looks most like", "distinguished", "column to add")
     table = output.plain_table(None, *headings, right=("detected", "distinguished"))
     for cause in (c for c in causes if c.missing_column is None):
         table.add_row(

@@ -435,7 +435,7 @@ def read_date(cell: Filled, order: DateOrder | None = None, latest: date = date.
     A day after `latest` is refused. Numbers of which only one order makes a day need no `order`;
     others raise `AmbiguousDateError` without one.
     """
-    expected = "a date as 2026-03-04 (year-month-day) or 4 Mar 2026"
+    expected = "a date such as 2026-03-04 (year-month-day) or 4 Mar 2026"
     if isinstance(cell, float):
         raise CellFaultError("date_serial", expected)
     if isinstance(cell, OddCell):
