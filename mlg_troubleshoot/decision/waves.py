@@ -32,7 +32,8 @@ _SINES = np.sin(FREQUENCIES[:, None] * AT_IN)
 
 @lru_cache(maxsize=1)
 def _bessel_table() -> Array:
-    turns = (np.arange(512) + 0.5) * np.pi / 512
+    # A quarter of a turn says all, and with 100 points as much as a double can hold.
+    turns = (np.arange(100) + 0.5) * np.pi / 200
     return np.asarray(np.mean(np.cos(np.arange(0.0, 260.0, 0.05)[:, None] * np.sin(turns)), axis=1))
 
 

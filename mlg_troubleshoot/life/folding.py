@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -68,6 +68,16 @@ class KeptInspection:
         return Moment.of(self.inspection)
 
 
+Event = KeptInspection | Record
+# When the events of a gear took place, each at its place. [ISO 8601, landings]
+MomentsOf = Callable[[GearKey, Sequence[Event]], Sequence[Moment]]
+
+
+def moments_of(_key: GearKey, events: Sequence[Event]) -> list[Moment]:
+    """Read from their contents when events took place."""
+    return [_moment(event) for event in events]
+
+
 @dataclass(frozen=True)
 class GearLife:
     """What stands of one gear: inspections and repairs in the order of time, outcomes, and every
@@ -79,7 +89,7 @@ class GearLife:
 
     key: GearKey
     records: tuple[Record, ...]
-    events: tuple[KeptInspection | Record, ...]
+    events: tuple[Event, ...]
     outcomes: tuple[Record, ...]
     warnings: tuple[str, ...]
 
@@ -108,18 +118,20 @@ def lives(
     return _lives(store.all() if tail is None else store.of_gear(tail, side))
 
 
-def lives_of(store: Store, keys: Collection[GearKey]) -> dict[GearKey, GearLife]:
+def lives_of(
+    store: Store, keys: Collection[GearKey], moments: MomentsOf = moments_of
+) -> dict[GearKey, GearLife]:
     """The lives of some gears."""
     wanted = set(keys)
     records = store.of_aircraft({tail for tail, _side in wanted})
-    return _lives(each for each in records if (each.tail_no, each.side) in wanted)
+    return _lives((each for each in records if (each.tail_no, each.side) in wanted), moments)
 
 
-def _lives(records: Iterable[Record]) -> dict[GearKey, GearLife]:
+def _lives(records: Iterable[Record], moments: MomentsOf = moments_of) -> dict[GearKey, GearLife]:
     by_gear: dict[GearKey, list[Record]] = {}
     for record in records:
         by_gear.setdefault((record.tail_no, record.side), []).append(record)
-    return {key: _life(key, own) for key, own in sorted(by_gear.items())}
+    return {key: _life(key, own, moments) for key, own in sorted(by_gear.items())}
 
 
 def life_of(store: Store, tail: str, side: str) -> GearLife:
@@ -187,7 +199,7 @@ def is_readable(record: Record) -> bool:
         return False
 
 
-def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
+def _life(key: GearKey, records: Sequence[Record], moments_of: MomentsOf) -> GearLife:
     kept: dict[str, KeptInspection] = {}
     others: dict[str, Record] = {}
     records = _readable_or_not_void(records)
@@ -218,9 +230,9 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
         else:
             others[record.digest] = record
     repairs = [r for r in others.values() if r.kind in (RecordKind.REPAIR, RecordKind.RERIG)]
-    events: list[KeptInspection | Record] = [*kept.values(), *repairs]
+    events: list[Event] = [*kept.values(), *repairs]
     events.sort(key=lambda event: _record_of(event).seq)
-    moments = [_moment(event) for event in events]
+    moments = moments_of(key, events)
     return GearLife(
         key,
         tuple(records),
@@ -243,18 +255,18 @@ def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:
     return kept[::-1]
 
 
-def _record_of(event: KeptInspection | Record) -> Record:
+def _record_of(event: Event) -> Record:
     return event.record if isinstance(event, KeptInspection) else event
 
 
-def _moment(event: KeptInspection | Record) -> Moment:
+def _moment(event: Event) -> Moment:
     if isinstance(event, KeptInspection):
         return event.moment
     return Moment(event.day, event.body.get("landings"))
 
 
 def _disagreements(
-    key: GearKey, events: Sequence[KeptInspection | Record], moments: Sequence[Moment]
+    key: GearKey, events: Sequence[Event], moments: Sequence[Moment]
 ) -> tuple[str, ...]:
     """Name the records whose dates and landings disagree, each with how to correct it."""
 

@@ -1,8 +1,9 @@
-"""What forecasts have found, remembered in the user's cache folder so as not to be computed again.
+"""What was read and forecast, remembered in the user's cache folder so as not to be done again.
 
-A file holds the last fit, another the forecasts of a store's gears, each under the hash of all that
-went into it: this program, the gear, and what was read. Without them, or where a hash differs, it
-is computed; the folder may be deleted at any time. Verdicts always come from the store.
+A file holds the last fit, others the forecasts of a store's gears and when their inspections took
+place, each under the hash of all that went into it: this program, the gear, and what was read.
+Without them, or where a hash differs, it is computed; the folder may be deleted at any time.
+Verdicts always come from the store.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ import numpy as np
 
 from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearKey, GearLife
+from mlg_troubleshoot.life.chronology import Moment
+from mlg_troubleshoot.life.folding import Event, GearKey, GearLife, KeptInspection, moments_of
 from mlg_troubleshoot.life.forecast import Forecast, forecast
 from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.store import Store
+from mlg_troubleshoot.store import Record, Store
 from mlg_troubleshoot.wear import WearModel, WearPath, fit_wear
 
 T = TypeVar("T")
@@ -34,6 +36,14 @@ class _Fit(msgspec.Struct):
 
     mark: str
     learnt: dict[str, Any]
+
+
+class _Times(msgspec.Struct):
+    """Days and landings of a gear's inspections and repairs."""
+
+    mark: str
+    days: list[str]
+    landings: list[float | None]
 
 
 _Quantiles = dict[str, float | None]
@@ -72,15 +82,32 @@ class Remembered:
         self._gear = gear
         of = gear.geometry_sha256, gear.ensemble_sha256, gear.joint_numbers, gear.limits_in
         bounds = gear.margin.value, gear.horizon.value, gear.accepted_chance.value
-        self._mark = _hash([_program(), repr(of).encode(), repr(bounds).encode()])
+        # What the gate of the store judges contents by.
+        judged = type(store.judge), gear.hard_limit, gear.confirm_above, gear.joints, gear.areas
+        self._mark = _hash([_program(), *(repr(each).encode() for each in (of, bounds, judged))])
         self._name = _hash([store.place.encode()])[:16]
         self._model_mark = ""
         self._new: dict[str, _Ahead] = {}
+        self._new_times: dict[str, _Times] = {}
+
+    def moments(self, key: GearKey, events: Sequence[Event]) -> list[Moment]:
+        """Read when the events of a gear took place, or recall it without unpacking them."""
+        name = " ".join(key)
+        inspected = [isinstance(event, KeptInspection) for event in events]
+        records = [e.record if isinstance(e, KeptInspection) else e for e in events]
+        mark = _hash([self._mark.encode(), repr(inspected).encode(), _content(records)])
+        known = self._known_times.get(name)
+        if known is None or known.mark != mark:
+            found = moments_of(key, events)
+            days = [moment.day for moment in found]
+            landings = [moment.landings for moment in found]
+            known = self._new_times[name] = _Times(mark, days, landings)
+        return [*map(Moment, known.days, known.landings)]
 
     def fit(self, paths: Sequence[WearPath]) -> WearModel:
         """Fit the wear of these paths, or recall it."""
         self._model_mark = mark = _hash(self._of_paths(paths))
-        file = _folder() / f"fit-{self._name}.msgpack"
+        file = self._file("fit")
         known = _read(file, _Fit)
         if known is not None and known.mark == mark:
             return WearModel.from_learnt(known.learnt, paths)
@@ -96,7 +123,8 @@ class Remembered:
         """
         if model is None:
             return forecast(lives, model, self._gear)
-        marks = {life.key: _hash(self._of_life(life)) for life in lives}
+        made_by = f"{self._mark} {self._model_mark}".encode()
+        marks = {life.key: _hash([made_by, _content(life.records)]) for life in lives}
         known = {life.key: self._known.get(" ".join(life.key)) for life in lives}
         recalled = {
             key: ahead.forecast
@@ -111,15 +139,20 @@ class Remembered:
     def save(self) -> None:
         """Remember what is new; nothing happens where the folder cannot be written."""
         if self._new:
-            _write(self._file, self._known | self._new)
+            _write(self._file("forecasts"), self._known | self._new)
+        if self._new_times:
+            _write(self._file("times"), self._known_times | self._new_times)
 
-    @property
-    def _file(self) -> Path:
-        return _folder() / f"forecasts-{self._name}.msgpack"
+    def _file(self, what: str) -> Path:
+        return _folder() / f"{what}-{self._name}.msgpack"
 
     @cached_property
     def _known(self) -> dict[str, _Ahead]:
-        return _read(self._file, dict[str, _Ahead]) or {}
+        return _read(self._file("forecasts"), dict[str, _Ahead]) or {}
+
+    @cached_property
+    def _known_times(self) -> dict[str, _Times]:
+        return _read(self._file("times"), dict[str, _Times]) or {}
 
     def _of_paths(self, paths: Iterable[WearPath]) -> Iterable[bytes]:
         yield self._mark.encode()
@@ -127,12 +160,6 @@ class Remembered:
             yield repr((path.unit, path.reading_u)).encode()
             yield np.asarray(path.usage).tobytes()
             yield np.asarray(path.value).tobytes()
-
-    def _of_life(self, life: GearLife) -> Iterable[bytes]:
-        yield f"{self._mark} {self._model_mark}".encode()
-        for record in life.records:
-            yield repr((record.kind, record.record_id, record.day, record.digest)).encode()
-            yield record.packed
 
 
 def _hash(parts: Iterable[bytes]) -> str:
@@ -143,10 +170,15 @@ def _hash(parts: Iterable[bytes]) -> str:
     return found.hexdigest()
 
 
+def _content(records: Sequence[Record]) -> bytes:
+    """All that records of one gear say."""
+    columns = [(str(r.kind), r.record_id, r.day, r.digest, len(r.packed)) for r in records]
+    return b"".join([repr(columns).encode(), *(r.packed for r in records)])
+
+
 def _program() -> bytes:
-    """The version of this program and the text of what forecasts."""
-    room = Path(__file__).parent
-    files = sorted([*room.glob("*.py"), *(room.parent / "wear").glob("*.py")])
+    """The version of this program and its text."""
+    files = sorted(Path(__file__).parents[1].rglob("*.py"))
     made = version("mlg-troubleshoot"), version("numpy"), version("scipy")
     texts = [file.read_bytes() for file in files]
     return _hash([repr(made).encode(), *texts]).encode()

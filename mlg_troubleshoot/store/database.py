@@ -16,6 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from sys import intern
@@ -113,6 +114,8 @@ class RecordKind(StrEnum):
 _KINDS = {kind.value: kind for kind in RecordKind}
 _TEXTS = ("kind", "record_id", "tail_no", "side", "day")
 _BYTES = ("identity", "body", "hash")
+_FIVE_TEXTS = (str,) * len(_TEXTS)
+_THREE_BYTES = (bytes,) * len(_BYTES)
 # A body that is too large is not fetched at all.
 _BOUNDED = sql.case(
     (sql.func.length(_records.c.body) <= MOST_BYTES, _records.c.body), else_=None
@@ -425,19 +428,16 @@ class Store:
 
     def _rows(self, connection: sql.Connection, *where: Any) -> Iterator[Any]:
         if self._ready:
-            yield from connection.execute(
-                sql.select(*_COLUMNS).where(*where).order_by(_records.c.seq)
-            )
+            found = connection.execute(sql.select(*_COLUMNS).where(*where).order_by(_records.c.seq))
+            for part in found.partitions(_AT_ONCE):
+                yield from part
 
     def _record(self, row: Any) -> Record:
         """A row as a record; a column that cannot be one is named."""
         seq, kind, record_id, tail_no, side, day, identity, body, digest = row
-        texts = {type(kind), type(record_id), type(tail_no), type(side), type(day)}
-        if (
-            texts != {str}
-            or {type(identity), type(body), type(digest)} != {bytes}
-            or kind not in _KINDS
-        ):
+        texts = type(kind), type(record_id), type(tail_no), type(side), type(day)
+        exact = type(identity), type(body), type(digest)
+        if texts != _FIVE_TEXTS or exact != _THREE_BYTES or kind not in _KINDS:
             self._refuse(row)
         # The records of a gear, and an inspection and its assessment, share what they repeat.
         return Record(
@@ -781,7 +781,7 @@ def _as_bytes_are(raw: Any, _record: Any) -> None:
     are.
     """
     raw.isolation_level = None
-    raw.text_factory = lambda found: found.decode("utf-8", "surrogateescape")
+    raw.text_factory = partial(str, encoding="utf-8", errors="surrogateescape")
 
 
 def _bytes(value: Any) -> bytes:

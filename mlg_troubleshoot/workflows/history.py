@@ -128,7 +128,8 @@ def show_fleet(
         # What was unpacked of one part is let go before the next one.
         for first in range(0, len(keys), _AT_ONCE):
             progress(doing, first, len(keys))
-            part = tuple(lives_of(store, keys[first : first + _AT_ONCE]).values())
+            asked = keys[first : first + _AT_ONCE]
+            part = tuple(lives_of(store, asked, remembered.moments).values())
             found += part
             forecasts |= remembered.forecast(part, model)
     finally:

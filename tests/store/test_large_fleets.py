@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
@@ -13,11 +14,13 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life import remembered
-from mlg_troubleshoot.life.folding import GearKey, GearLife, lives
+from mlg_troubleshoot.life.chronology import Moment
+from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection, lives
 from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
-from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record
+from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files, check_inspection
 from mlg_troubleshoot.workflows.history import Lives, show_fleet, show_lives, void
@@ -268,3 +271,55 @@ def test_unpacked_contents_are_judged_by_the_gate_of_their_own_store(tmp_path: P
     strict = Store(store.place, judge=lambda _record, _body: "it is wrong")
     with pytest.raises(StoreError, match="it is wrong"):
         lives(strict, TAILS[0])
+
+
+def unpacked(monkeypatch: pytest.MonkeyPatch, store: Store, gear: Gear) -> tuple[Lives, set[str]]:
+    """A fleet without forecasts, and the inspections that were unpacked for their times."""
+    read: set[str] = set()
+    found = KeptInspection.moment.fget
+
+    def moment(kept: KeptInspection) -> Moment:
+        read.add(kept.record.record_id)
+        return found(kept)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(KeptInspection, "moment", property(moment))
+        return show_fleet(store, gear, ahead=False), read
+
+
+def test_a_second_look_unpacks_the_times_of_the_gears_that_changed_only(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, gear = fleet_of(tmp_path), load_gear()
+    first, read = unpacked(monkeypatch, store, gear)
+    assert len(read) == 3 * len(TAILS)
+    again, read = unpacked(monkeypatch, store, gear)
+    assert not read
+    assert again == first
+    one_more(store, TAILS[0])
+    after, read = unpacked(monkeypatch, store, gear)
+    assert read == {f"{TAILS[0]}-{visit}" for visit in (1, 2, 3, 4)}
+    assert after.lives == tuple(lives(store).values())
+
+
+def test_times_are_read_again_for_a_gear_file_that_allows_other_readings(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, gear = fleet_of(tmp_path), load_gear()
+    unpacked(monkeypatch, store, gear)
+    strict = replace(gear, hard_limit=replace(gear.hard_limit, value=0.5))
+    assert len(unpacked(monkeypatch, store, strict)[1]) == 3 * len(TAILS)
+
+
+def test_times_are_read_again_where_a_content_was_changed_under_its_old_hash(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, gear = fleet_of(tmp_path), load_gear()
+    unpacked(monkeypatch, store, gear)
+    wrong = {"inspection": {**store.all()[0].body["inspection"], "gear_landings": 7.0}}
+    file = sqlite3.connect(store.place)
+    file.execute("DROP TRIGGER mlg_no_update")
+    file.execute("UPDATE mlg_records SET body = ? WHERE seq = 1", (packed(wrong),))
+    file.commit()
+    _, read = unpacked(monkeypatch, store, gear)
+    assert read == {f"{TAILS[0]}-{visit}" for visit in (1, 2, 3)}
