@@ -102,7 +102,7 @@ def _truncated(low: Array, high: Array) -> tuple[Array, Array, Array]:
     at = np.exp(-0.5 * np.array([a, b]) ** 2) / np.sqrt(2.0 * np.pi)
     at = at / np.where(some, chance, 1.0)
     # What is not expected at all is at its nearer end.
-    mean = np.clip(np.where(some, at[0] - at[1], end), start, end)
+    mean = np.clip(np.where(some, at[0] - at[1], b), start, end)
     square = np.where(some, 1.0 + a * at[0] - b * at[1] - mean**2, 0.0)
     square = np.clip(square, 0.0, 0.25 * (b - a) ** 2)
     return chance, np.where(flip, -mean, mean), square
