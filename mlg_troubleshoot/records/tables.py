@@ -18,6 +18,7 @@ from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet
+from mlg_troubleshoot.units import ClearanceConvention
 
 _PROGRESS_ROWS = 500
 # Rows by which a column is known that holds sides, whatever its header says.
@@ -59,8 +60,11 @@ def read_table(
     columns = ColumnReader(in_hand).place(header.texts, header.row, units=header.units)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
     taken = 0
+    titles: list[str] = []
     for number, cells in rows:
-        if number > header.row:
+        if number < header.rows_used[0]:
+            titles += [cell for cell in cells if isinstance(cell, str)]
+        elif number > header.row:
             table.take(number, cells)
             taken += 1
             if taken % _PROGRESS_ROWS == 0:
@@ -72,11 +76,29 @@ def read_table(
     )
     read, carried = columns.notes()
     about = "; ".join([*table.notes(), *_hidden_notes(sheet, columns, header.row)])
-    out.notes += filter(None, ("; ".join(filter(None, (placed, read, said))), carried, about))
+    against = _against_title(titles, options.convention)
+    out.notes += filter(
+        None, (against, "; ".join(filter(None, (placed, read, said))), carried, about)
+    )
     kind = "long" if columns.is_long else "wide"
     readings = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
     out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, len(header.texts), readings))
     return out
+
+
+def _against_title(titles: Sequence[str], declared: ClearanceConvention | None) -> str:
+    """Say that a title above the header names another convention than the one declared."""
+    if declared is None:
+        return ""
+    for title in titles:
+        words = tidy(title).replace("_", " ")
+        named = [c for c in ClearanceConvention if c.value.lower().replace("_", " ") in words]
+        if named and all(c.per_radial != declared.per_radial for c in named):
+            return (
+                f"above the header stands {quote(title, 60)!r}, but rows that state no convention"
+                f" are read as {declared}, as declared: one of the two is wrong"
+            )
+    return ""
 
 
 def _sides(
