@@ -42,9 +42,8 @@ class DesignSpace:
             or others
         )
         self.guide = level[0]
-        self.points = tuple(
-            p.name for p in m.points if p.name not in (self.held.name, self.guide.name)
-        )
+        ends = (self.held.name, self.guide.name)
+        self.points = tuple(p.name for p in m.points if p.name not in ends)
         self.planes = tuple(p.name for p in m.planes if p.parent is not None)
         self.sliders = tuple(s.joint for s in m.steps if isinstance(s, Slider))
         self.moves_reference = m.reference_input != given.stroke[0]

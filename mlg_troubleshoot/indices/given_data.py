@@ -70,7 +70,8 @@ def given_data_indices(
         rows[j] = len(x)
         if len(x) < _FEWEST or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
             continue
-        classes = max(2, min(20, round(len(x) ** (1.0 / 3.0) * 1.5)))
+        classes = round(len(x) ** (1.0 / 3.0) * 1.5)
+        classes = max(2, min(20, classes))
         first[j] = _share(x, y, classes)
         chosen = rng.integers(0, len(x), (resamples, len(x)))
         spread = np.array([_share(x[pick], y[pick], classes) for pick in chosen])

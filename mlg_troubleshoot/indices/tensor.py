@@ -68,8 +68,9 @@ def tensor_indices(
     values = np.empty(m**n)
     for start in range(0, m**n, _ROWS):
         flat = np.arange(start, min(start + _ROWS, m**n))
-        places = np.stack(np.unravel_index(flat, (m,) * n), axis=-1)
-        values[flat] = response(points[places] * limits)
+        places = np.unravel_index(flat, (m,) * n)
+        nodes_at = points[np.stack(places, axis=-1)]
+        values[flat] = response(nodes_at * limits)
     tensor = values.reshape((m,) * n)
     mean = float(_averaged(tensor, weights, set()))
     tensor = tensor - mean

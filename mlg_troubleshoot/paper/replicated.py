@@ -192,7 +192,8 @@ def replicated_first_order(
     evaluations = failed = 0
     for stream in np.random.SeedSequence(seed).spawn(iterations):
         try:
-            rows = first_order_design(n, design.n1, design.n2, ccd, np.random.default_rng(stream))
+            rng = np.random.default_rng(stream)
+            rows = first_order_design(n, design.n1, design.n2, ccd, rng)
             values = response(rows.points.reshape(-1, n)).reshape(design.n1, -1)
             evaluations += values.size
             failed += count_failed(values)

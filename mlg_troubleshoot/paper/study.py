@@ -266,7 +266,8 @@ def _on_linkage(
     that was asked for.
     """
     cube, n = _response(gear, gear.ensemble_models[k], inputs, options)
-    stream = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(k,)))
+    seeds = np.random.SeedSequence(options.seed, spawn_key=(k,))
+    stream = np.random.default_rng(seeds)
     accuracy = options.accuracy
     most = options.most
     advance = None if on_stage is None else (lambda done, _width: on_stage(done, None))

@@ -50,7 +50,8 @@ class Facts:
                 f"target {target.quantity!r}: measure {target.measure!r} is not known",
                 f"Use one of {', '.join(_MEASURES)}.",
             )
-        unknown = (set(target.joints) | set(target.clearance_in)) - set(self.gear.joint_numbers)
+        named = {*target.joints, *target.clearance_in}
+        unknown = named.difference(self.gear.joint_numbers)
         if unknown:
             raise GearFileError(
                 f"target {target.quantity!r}: {self.gear.name} has no joint {min(unknown)}",

@@ -123,7 +123,8 @@ def _stylesheet() -> str:
 def _scripted(name: str | None) -> dict[str, Markup]:
     """The script of a page, and the hash by which its policy lets it run and no other."""
     text = "" if name is None else (templates_folder() / name).read_text(encoding="utf-8")
-    mark = base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+    digest = hashlib.sha256(text.encode("utf-8")).digest()
+    mark = base64.b64encode(digest).decode("ascii")
     return {"script": Markup(text), "script_hash": Markup(mark)}
 
 

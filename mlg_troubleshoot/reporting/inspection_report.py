@@ -107,10 +107,10 @@ def _inspection(
     a: Assessment, gear: Gear, provenance: ReportProvenance, lengths: Lengths
 ) -> dict[str, Any]:
     inspection = a.inspection
-    carried = [
-        (k.replace("_", " "), v) for k, v in inspection.carried.items() if v and k not in _MANUAL
-    ]
-    in_front = [(short(label, 60), short(value, 120)) for label, value in carried[:_MOST_IN_FRONT]]
+    stated = {k: v for k, v in inspection.carried.items() if v and k not in _MANUAL}
+    carried = [(name.replace("_", " "), value) for name, value in stated.items()]
+    first = carried[:_MOST_IN_FRONT]
+    in_front = [(short(label, 60), short(value, 120)) for label, value in first]
     known = _identified(a, gear, provenance, lengths)
     warnings = known["warnings"]
     front = warnings if len(warnings) <= _WARNINGS_ON_FRONT else warnings[: _WARNINGS_ON_FRONT - 1]

@@ -208,13 +208,13 @@ def _designs(f: StudyFindings) -> Markup | None:
 
 def _designs_compared(f: StudyFindings) -> dict[str, Any] | None:
     first = f.result.table.first_order
-    if not f.designs or not all(
-        np.all(np.isfinite(values)) for values in (first, *(d.plain for d in f.designs))
-    ):
+    indices = [first, *(d.plain for d in f.designs)]
+    if not f.designs or not np.isfinite(indices).all():
         return None
     top = np.sort(np.argsort(first)[::-1][:5])
+    change = f.designs[-1].shares - f.designs[0].shares
     return {
         "top": _span(f.gear.joint_numbers[i] for i in top),
-        "change": float((f.designs[-1].shares - f.designs[0].shares)[top].sum()),
+        "change": float(change[top].sum()),
         "scatter": float(max(d.scatter.max() for d in f.designs)),
     }

@@ -82,8 +82,9 @@ class _Design:
         sound &= np.isfinite(wanted).all(axis=(1, 2))
         self.slopes = slopes[sound]
         self.wanted = wanted[sound]
-        self.given = [i for i, r in enumerate(self.pool) if r.kind is not ReadingKind.DISTANCE]
-        self.free = [i for i, r in enumerate(self.pool) if r.kind is ReadingKind.DISTANCE]
+        is_distance = [r.kind is ReadingKind.DISTANCE for r in self.pool]
+        self.given = [i for i, distance in enumerate(is_distance) if not distance]
+        self.free = [i for i, distance in enumerate(is_distance) if distance]
         self.known = np.eye(slopes.shape[2])
         if linkage.travel is not None:
             travel = prior.root[-1] / DEFAULT_U[ReadingKind.TRAVEL]
@@ -114,8 +115,8 @@ class _Design:
         moved = np.swapaxes(g @ covariance, 1, 2)
         known = (np.swapaxes(g, 1, 2) * moved).sum(axis=1)
         size = 1.0 + known[:, None, :]
-        before = (self.wanted @ covariance * self.wanted).sum(axis=2)[:, :, None]
-        wanted = before - (self.wanted @ moved) ** 2 / size
+        before = (self.wanted @ covariance * self.wanted).sum(axis=2)
+        wanted = before[:, :, None] - (self.wanted @ moved) ** 2 / size
         return wanted, covariance, moved, size
 
     def best(self, taken: list[int]) -> int:
@@ -128,7 +129,8 @@ class _Design:
         held = 1.0 - before + (known @ moved) ** 2 / size
         held = np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0)
         checks = np.log(held + tuned.LOOSE).sum(axis=1)
-        unknown = np.log(np.maximum(wanted, 0.0) + tuned.WELL_KNOWN**2).sum(axis=1)
+        variances = np.maximum(wanted, 0.0) + tuned.WELL_KNOWN**2
+        unknown = np.log(variances).sum(axis=1)
         cost = unknown - tuned.BRACING * checks
         return others[int(np.argmin(cost.mean(axis=0)))]
 
@@ -163,7 +165,8 @@ def suggested_early(
         return None
     variances = design.wanted @ design.covariance(rows) * design.wanted
     before = variances.sum(axis=(1, 2))[:, None]
-    after = np.maximum(design.after(rows, others)[0].sum(axis=1), 0.0)
+    wanted, *_ = design.after(rows, others)
+    after = np.maximum(wanted.sum(axis=1), 0.0)
     left = np.divide(after, before, out=np.ones_like(after), where=before > 0.0)
     narrowing = 1.0 - np.sqrt(left).mean(axis=0)
     return _worth_most(tuple(design.pool[j] for j in others), narrowing)

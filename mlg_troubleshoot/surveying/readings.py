@@ -149,9 +149,8 @@ class SurveyedLinkage:
             [n.endswith((".direction", ".dihedral", ".axis")) for n in self.names]
         )
         # Signs of the variables of the same linkage, seen from the other side.
-        self.mirror = np.where(
-            self.angles | np.array([n.endswith(".y") for n in self.names]), -1.0, 1.0
-        )
+        is_upward = np.array([n.endswith(".y") for n in self.names])
+        self.mirror = np.where(self.angles | is_upward, -1.0, 1.0)
         self.low = gear.reference.stroke[0]
         self.driven_in = (
             "rad" if any(isinstance(s, Crank) for s in self.space.mechanism.steps) else "in"
@@ -170,10 +169,9 @@ class SurveyedLinkage:
     def _assembled(self, vectors: Array) -> tuple[Mechanism, Array]:
         """Mechanisms of a batch and their reference inputs, shape (n_vectors, 1)."""
         mechanism = self.space.assembled(vectors[:, : len(self.space.names)])
-        return (
-            mechanism,
-            np.broadcast_to(np.asarray(mechanism.reference_input, float), len(vectors))[:, None],
-        )
+        reference = np.asarray(mechanism.reference_input, float)
+        reference = np.broadcast_to(reference, len(vectors))
+        return mechanism, reference[:, None]
 
     def _numbers(self, mechanism: Mechanism, count: int) -> list[Any]:
         numbers = write_program(mechanism).parameters.values()
@@ -311,10 +309,10 @@ class SurveyedLinkage:
         at = reference + self._beyond
         none = self.kernel.no_clearance()
         zero = self.kernel.output(at, none, numbers)
-        ends = [
-            self.kernel.output(at, [*np.moveaxis(sense * link, -1, 0)], numbers) - zero
-            for sense in (1.0, -1.0)
-        ]
+        ends = []
+        for sense in (1.0, -1.0):
+            links = [*np.moveaxis(sense * link, -1, 0)]
+            ends.append(self.kernel.output(at, links, numbers) - zero)
         moved: Array = np.max(np.abs(ends), axis=0) * np.abs(rate)
         return moved
 
@@ -340,7 +338,8 @@ class SurveyedLinkage:
         at = self._positions(reference)
         numbers = self._numbers(mechanism, len(vectors))
         curve = self.kernel.output(at, self.kernel.no_clearance(), numbers)
-        closes: Mask = np.isfinite(np.hstack([curve, self.amplification(vectors)])).all(axis=1)
+        values = np.hstack([curve, self.amplification(vectors)])
+        closes: Mask = np.isfinite(values).all(axis=1)
         return closes
 
     def _positions(self, reference: Array) -> Array:
@@ -355,7 +354,8 @@ class SurveyedLinkage:
         m, (low, high) = self.space.mechanism, self.gear.reference.stroke
         found = [SurveyReading(ReadingKind.EXTENSION)] if self.space.moves_reference else []
         # A round figure of each ninth of the stroke is easier to set than the ninth.
-        at = [round((high - low) * k / _PLUNGER_READINGS, 2) for k in range(_PLUNGER_READINGS + 1)]
+        stroke = high - low
+        at = [round(stroke * k / _PLUNGER_READINGS, 2) for k in range(_PLUNGER_READINGS + 1)]
         at.pop(0 if not self.space.moves_reference else _PLUNGER_READINGS)
         found += [
             SurveyReading(ReadingKind.PLUNGER, extension=e, is_angle=m.output.kind == "angle")

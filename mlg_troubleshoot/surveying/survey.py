@@ -107,7 +107,8 @@ class Survey:
     @property
     def degrees_of_freedom(self) -> float:
         """Readings that fit, less the numbers that they determine. [1]"""
-        return max(len(self.readings) - len(self.misfits) - self.modes[0].parameters, 0.0)
+        fitted = len(self.readings) - len(self.misfits)
+        return max(fitted - self.modes[0].parameters, 0.0)
 
     @property
     def contradicts(self) -> bool:
@@ -132,7 +133,8 @@ class Prior:
         angles = linkage.angles
         # The same direction, one turn further, is not a distance.
         turned = members[:, angles] - members[0, angles]
-        members[:, angles] -= 2 * np.pi * np.round(turned / (2 * np.pi))
+        turns = np.round(turned / (2 * np.pi))
+        members[:, angles] -= 2 * np.pi * turns
         self.members = members
         self.linkage = linkage
         points = gear.reference.mechanism.points
@@ -169,7 +171,8 @@ class Prior:
             if r.kind in (ReadingKind.ANGLE, ReadingKind.EXTENSION, ReadingKind.TRAVEL)
         )
         if own:
-            slopes = self.linkage.slopes(own, self.mean[None])[1][0] @ self.root
+            _, slopes = self.linkage.slopes(own, self.mean[None])
+            slopes = slopes[0] @ self.root
             spread = slopes @ slopes.T + np.diag([r.u**2 for r in own])
             gain = np.linalg.solve(spread, slopes) @ self.root.T
             misfit = [r.value for r in own] - self.linkage.predicted(own, found)
@@ -233,9 +236,9 @@ class Fitting:
     ) -> Fits:
         """Fits that begin at points, as a rule with all readings and the middle of the prior."""
         count = len(points)
-        believed, off = (
-            np.broadcast_to(each, (count, len(self.readings))) for each in (kept, noise)
-        )
+        shape = (count, len(self.readings))
+        believed = np.broadcast_to(kept, shape)
+        off = np.broadcast_to(noise, shape)
         middle = np.broadcast_to(self.prior.mean if means is None else means, points.shape)
         origin = np.broadcast_to(origin, count)
         return Fits(points, middle, believed, off, origin, np.zeros(count))
@@ -246,18 +249,26 @@ class Fitting:
             residuals: Array = (found - self.value) / self.u
         return residuals
 
+    def trusted(self, fits: Fits) -> Mask:
+        """Readings that the first of the fits does not contradict."""
+        residuals: Array = self.residuals(fits.points[:1])[0]
+        return np.abs(residuals) < tuned.TRUSTED
+
     def linear(self, points: Array, widened: float = 1.0) -> tuple[Array, Array]:
         """Residuals in the uncertainties of the readings, and their slopes in widened ones."""
         with np.errstate(all="ignore"):
             found, slopes = self.linkage.slopes(self.readings, points)
-            return (found - self.value) / self.u, slopes / (self.u * widened)[:, None]
+            residuals = (found - self.value) / self.u
+            widened_u = self.u * widened
+            return residuals, slopes / widened_u[:, None]
 
     def loss(self, fits: Fits, widened: float, robust: bool) -> Array:
         r = (self.residuals(fits.points) - fits.noise) / widened
         r = np.where(fits.kept, r, 0.0)
         open_ = ~np.isfinite(r)
         r = np.where(open_, 0.0, r)
-        data = np.where(open_, tuned.OPEN_LOSS, _robust(r)[0] if robust else r * r)
+        penalty = _robust(r)[0] if robust else r * r
+        data = np.where(open_, tuned.OPEN_LOSS, penalty)
         z = (fits.points - fits.means) @ self.prior.whiten.T
         loss: Array = data.sum(axis=1) + (z * z).sum(axis=1)
         return loss
@@ -291,18 +302,16 @@ class Fitting:
             for _ in range(4 if robust else tuned.DAMPINGS):
                 at = moving[left]
                 trial = here[left]
-                step = np.linalg.solve(
-                    gram[left] + damping[at, None, None] * np.eye(n), down[left][..., None]
-                )[..., 0]
+                damped = gram[left] + damping[at, None, None] * np.eye(n)
+                step = np.linalg.solve(damped, down[left][..., None])[..., 0]
                 step = np.where(np.isfinite(step), step, 0.0) @ self.prior.root.T
                 trial = replace(trial, points=trial.points - step)
                 new = self.loss(trial, widened, robust)
                 better = new < loss[at]
                 points[at[better]] = trial.points[better]
                 loss[at[better]] = new[better]
-                damping[at] = np.where(better, damping[at] / 5.0, damping[at] * 8.0).clip(
-                    1e-9, 1e12
-                )
+                changed = np.where(better, damping[at] / 5.0, damping[at] * 8.0)
+                damping[at] = changed.clip(1e-9, 1e12)
                 left = left[~better]
                 if not len(left):
                     break
@@ -339,7 +348,8 @@ class Fitting:
 
     def _standing(self) -> Fitting:
         """The same for what is read at the reference position."""
-        return Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in self.still))
+        readings = tuple(self.readings[i] for i in self.still)
+        return Fitting(self.linkage, self.prior, readings)
 
     def suspected(self, starts: Array) -> Fits:
         """Fit what stands still without each reading in turn, and with each two distances
@@ -361,7 +371,8 @@ class Fitting:
         starts = starts[: max(1, tuned.MOST_RESIDUALS // kept.size)]
         for row, (i, j) in zip(noise[len(still) :], pairs, strict=True):
             difference = part.value[j] - part.value[i]
-            row[[i, j]] = np.array([difference, -difference]) / part.u[[i, j]]
+            exchanged = np.array([difference, -difference])
+            row[[i, j]] = exchanged / part.u[[i, j]]
         points = np.tile(starts, (len(kept), 1))
         which = np.repeat(np.arange(len(kept)), len(starts))
         fits = part.begun(points, points, kept[which], noise[which], which)
@@ -401,7 +412,8 @@ class Fitting:
         near = fits[np.repeat(np.arange(count), tried)]
         for widened in tuned.REHEATED:
             z = rng.standard_normal((count, tried, n))
-            z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
+            precision = 1.0 + np.maximum(values, 0.0) / widened**2
+            z /= np.sqrt(precision)[:, None]
             step = np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
             trial = fits.points[:, None] + step
             near = replace(near, points=trial.reshape(-1, n))
@@ -430,8 +442,9 @@ class Fitting:
         found: list[int] = []
         whitened = fits.points @ self.prior.whiten.T
         for k in map(int, np.argsort(fits.loss)):
-            apart = np.abs(whitened[found] - whitened[k]).max(axis=1) > tuned.POINTS_APART
-            if len(found) < most and apart.all():
+            distance = np.abs(whitened[found] - whitened[k]).max(axis=1)
+            is_apart = np.all(distance > tuned.POINTS_APART)
+            if len(found) < most and is_apart:
                 found.append(k)
         return found
 
@@ -466,10 +479,11 @@ class Fitting:
             own.append(index[k])
             r = residuals[k][kept]
             determined = float(np.sum(values / (1.0 + values)))
-            modes.append(
-                Mode(points[k], means[k], root @ root.T, 0.0, float(r @ r), determined, sides)
-            )
-            evidence.append(-0.5 * loss[k] - 0.5 * float(np.log1p(values).sum()))
+            covariance = root @ root.T
+            square = float(r @ r)
+            modes.append(Mode(points[k], means[k], covariance, 0.0, square, determined, sides))
+            log_determinant = float(np.log1p(values).sum())
+            evidence.append(-0.5 * loss[k] - 0.5 * log_determinant)
         if not modes:
             return ()
         share = np.exp(np.array(evidence) - max(evidence))
@@ -478,7 +492,8 @@ class Fitting:
         return tuple(replace(modes[k], weight=float(share[k])) for k in order)
 
     def _sides(self, point: Array) -> tuple[int, ...]:
-        m = self.linkage.space.assembled(point[: len(self.linkage.space.names)])
+        space = self.linkage.space
+        m = space.assembled(point[: len(space.names)])
         signs = [int(s.sign) for s in m.steps if isinstance(s, (Dyad, Slider))]
         for crank in (s for s in m.steps if isinstance(s, Crank)):
             plane = m.point(crank.joint).plane
@@ -489,7 +504,8 @@ class Fitting:
             )
             arm = m.seen_in_plane(plane, crank.pivot, crank.joint)
             away = m.seen_in_plane(plane, crank.pivot, other)
-            signs.append(1 if arm[0] * away[1] >= arm[1] * away[0] else -1)
+            is_to_the_left = arm[0] * away[1] >= arm[1] * away[0]
+            signs.append(1 if is_to_the_left else -1)
         return tuple(signs)
 
     def with_mirrored(self, modes: tuple[Mode, ...], kept: Mask) -> tuple[Mode, ...]:
@@ -503,7 +519,8 @@ class Fitting:
         names = list(self.linkage.names)
         points = [m.vector for m in modes]
         means = [m.mean for m in modes]
-        m = self.linkage.space.assembled(best.vector[: len(self.linkage.space.names)])
+        space = self.linkage.space
+        m = space.assembled(best.vector[: len(space.names)])
         for step in m.steps:
             if not isinstance(step, (Dyad, Slider)) or f"{step.joint}.x" not in names:
                 continue
@@ -562,9 +579,8 @@ class Fitting:
             lines = (self.readings[j].row for j in group)
             rows = tuple(sorted(row for row in lines if row is not None))
             own = self.readings[i]
-            found[own.row] = Misfit(
-                own, float(self.value[i] - gap[i]), float(spread[i]), words, rows
-            )
+            predicted = float(self.value[i] - gap[i])
+            found[own.row] = Misfit(own, predicted, float(spread[i]), words, rows)
             for other in (self.readings[j] for j in group if j != i):
                 also = Misfit(
                     other, other.value, other.u, "contradicts the others of its group", rows
@@ -593,7 +609,8 @@ class Fitting:
         """
         slopes = self.linear(mode.vector[None])[1][0]
         column = mode.covariance @ slopes[i]
-        covariance = mode.covariance - np.outer(column, column) / (1.0 + slopes[i] @ column)
+        variance = 1.0 + slopes[i] @ column
+        covariance = mode.covariance - np.outer(column, column) / variance
         rows = np.flatnonzero(kept | (np.arange(len(kept)) == i))
         residual = np.eye(len(rows)) - slopes[rows] @ covariance @ slopes[rows].T
         at = int(np.flatnonzero(rows == i)[0])
@@ -759,17 +776,18 @@ def fit(
     starts = np.concatenate([prior.members, prior.closing(tuned.STARTS, rng, readings)])
     fits = fitting.reheated(fitting.begun(fitting.robust(starts)), rng)
     progress(1, tuned.STAGES)
-    kept = np.abs(fitting.residuals(fits.points[:1])[0]) < tuned.TRUSTED
+    kept = fitting.trusted(fits)
     if not kept.all() and fitting.still:
         # What does not fit is a slip or another valley.
         found = fits.points[: tuned.MOST_MODES]
         others = fitting.suspected(starts)
         others = replace(others, means=np.broadcast_to(prior.mean, others.points.shape))
         fits = fitting.reheated(Fits.joined(fitting.begun(found), others), rng)
-        kept = np.abs(fitting.residuals(fits.points[:1])[0]) < tuned.TRUSTED
+        kept = fitting.trusted(fits)
     # What is that much less likely, each slip counted, is not a mode: without what was exchanged it
     # might seem one.
-    points = fits.points[fits.loss <= fits.loss[0] - 2.0 * np.log(tuned.LEAST_WEIGHT)]
+    most_loss = fits.loss[0] - 2.0 * np.log(tuned.LEAST_WEIGHT)
+    points = fits.points[fits.loss <= most_loss]
     progress(2, tuned.STAGES)
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
     if not modes:

@@ -105,7 +105,8 @@ def follow(steps: Steps, draws: Draws) -> tuple[Array, FilterState]:
         xb = xb + d * bb + w2 * d / 2.0
         bb = bb + w2
         xu = xu + d * bu
-        s = xx + np.where(np.isnan(known), draws.reading_sd**2, known) + _LEAST_VARIANCE
+        reading = np.where(np.isnan(known), draws.reading_sd**2, known)
+        s = xx + reading + _LEAST_VARIANCE
         g = seen / s
         off = value - x
         total = total - 0.5 * seen * (off * off / s + np.log(s) + _LOG_2PI)

@@ -241,8 +241,10 @@ class _Streams:
     def gamma(self, shape: Array) -> Array:
         if len(self._streams) < self._groups:
             self._streams = [deepcopy(self._streams[0]) for _ in range(self._groups)]
-        parts = zip(self._streams, np.split(shape, self._groups, axis=1), strict=True)
-        return np.concatenate([stream.standard_gamma(part) for stream, part in parts], axis=1)
+        shapes = np.split(shape, self._groups, axis=1)
+        pairs = zip(self._streams, shapes, strict=True)
+        parts = [stream.standard_gamma(part) for stream, part in pairs]
+        return np.concatenate(parts, axis=1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,7 @@ class WearPath(Result):
                 f"path of {self.unit}: {len(usage)} usages and {len(value)} values",
                 "Give one value per usage.",
             )
-        if not (np.isfinite(usage).all() and np.isfinite(value).all()):
+        if not np.isfinite([usage, value]).all():
             raise UsageError(
                 f"path of {self.unit}: a usage or a value is not a finite number", "Leave it out."
             )
@@ -122,11 +122,12 @@ def scale_of(paths: Sequence[WearPath]) -> Scale:
     """Find the scales of usage and value, the common start, and which way the wear goes (the sign
     of the value).
     """
-    read = [(np.asarray(path.usage), np.asarray(path.value)) for path in paths]
-    read = [(usage, value) for usage, value in read if len(usage)]
+    known_paths = (path for path in paths if path.n_readings)
+    read = [(np.asarray(path.usage), np.asarray(path.value)) for path in known_paths]
     everything = np.concatenate([*(value for _usage, value in read), np.empty(0)])
     reach = max((float(usage[-1]) for usage, _value in read), default=0.0) or 1.0
-    start = float(np.median([value[0] for _usage, value in read])) if read else 0.0
+    first = [value[0] for _usage, value in read]
+    start = float(np.median(first)) if first else 0.0
     changes = [(usage[-1] - usage[0], value[-1] - value[0]) for usage, value in read]
     rates = np.array([rise / run for run, rise in changes if run > 0.0])
     rise = float(np.median(rates)) * reach if len(rates) else 0.0
