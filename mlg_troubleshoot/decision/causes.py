@@ -301,8 +301,12 @@ def _believed(
     known = known * blur(pins.cosine * unread.amplification * cases.gauge_u_in)
     flat = unread.unread.reshape(len(LEVELS), -1)
     waves = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
-    sums = _sums(unread, read, known, levels)
-    exceeds = 1.0 - inside(sums, cases.margin_in)
+    sums = np.prod(known, axis=1)
+    unseen = np.flatnonzero(~np.isfinite(cases.mean_in) & ~read.all(axis=1))
+    sums[unseen] = sum(
+        levels[unseen, k, None] * np.prod(np.where(read[unseen, :, None], known[unseen], each), 1)
+        for k, each in enumerate(unread.unread)
+    )
     worn = np.repeat((levels @ BEYOND.sum(axis=1))[:, None], read.shape[1], axis=1)
     fits = np.ones(len(cases))
     likely = levels.copy()
@@ -313,7 +317,7 @@ def _believed(
         at = (at if pins is HELD else at.real) * blur(u[rows]) * _LINKAGE
         whole = np.zeros((len(cases), len(FREQUENCIES)), at.dtype)
         whole[rows] = at
-        fits[rows], likely[rows], worn[rows] = _given_plunger(
+        fits[rows], likely[rows], worn[rows], sums[rows] = _given_plunger(
             unread, read[rows], known[rows], levels[rows], at
         )
         rest = waves[doubted.rows]
@@ -323,30 +327,17 @@ def _believed(
         by_share = np.maximum(pins.sense * (0.5 + moved), 0.0)
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
+    sums *= _LINKAGE
+    exceeds = 1.0 - inside(sums, cases.margin_in)
     usually = float(unread.exceeds @ (cases.fleet.levels or np.full(len(LEVELS), 1 / len(LEVELS))))
     return _Believed(unread, fits, likely, worn, waves, sums, exceeds, usually, by_share)
 
 
-def _sums(unread: _Unread, read: Mask, known: Array, levels: Array) -> Array:
-    """Characteristic function of the sum of all joints: the unread ones of a gear are worn to one
-    level, whichever it is.
-    """
-    whole = read.all(axis=1)
-    sums = np.prod(known, axis=1)
-    some = np.flatnonzero(~whole)
-    each = sum(
-        levels[some, k, None] * np.prod(np.where(read[some, :, None], known[some], waves), axis=1)
-        for k, waves in enumerate(unread.unread)
-    )
-    sums[some] = each
-    return np.asarray(sums * _LINKAGE)
-
-
 def _given_plunger(
     unread: _Unread, read: Mask, known: Array, levels: Array, at: Array
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:
     """Density of the plunger's reading, and given it chances of the levels, and of each unread
-    joint being worn.
+    joint being worn; characteristic function of the sum of all joints, not given it.
     """
     count = read.shape[1]
     beyond = BEYOND.sum(axis=1)
@@ -354,12 +345,15 @@ def _given_plunger(
     worn = np.zeros((len(at), len(LEVELS), count))
     # Where every joint was read, no level changes anything, and no joint is asked about.
     whole = read.all(axis=1)
-    through = np.prod(known[whole], axis=1) * at[whole]
+    sums = np.prod(known, axis=1)
+    through = sums[whole] * at[whole]
     fits[whole] = 0.5 + np.sum(through.real, axis=1)[:, None]
     some = np.flatnonzero(~whole)
+    sums[some] = 0.0
     for k in range(len(LEVELS)):
         waves = np.where(read[some, :, None], known[some], unread.unread[k])
         ahead, behind = _products(waves)
+        sums[some] += levels[some, k, None] * ahead[-1]
         fits[some, k] = 0.5 + np.sum((ahead[-1] * at[some]).real, axis=1)
         for j in range(count):
             asked = np.flatnonzero(~read[some, j])
@@ -372,7 +366,7 @@ def _given_plunger(
     total = likely.sum(axis=1, keepdims=True)
     likely /= total
     worn = np.sum(likely[:, :, None] * worn / fits[:, :, None], axis=1)
-    return unread.pins.sense * total[:, 0], likely, worn
+    return unread.pins.sense * total[:, 0], likely, worn, sums
 
 
 def _weighed(
