@@ -240,7 +240,7 @@ class Run:
             visit = find(inspection.tail_no, inspection.side)
             if visit is None:
                 return result
-            entry = ask(given, visit=visit)
+            entry = ask(given, visit=visit.read_in(answers.unit))
 
     def _publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
         """Show and write one gear that was entered by hand."""

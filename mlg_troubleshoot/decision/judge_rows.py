@@ -369,7 +369,7 @@ def _warnings(
         differs = plunger_reading.disagreement(inspection, *worst_in, u)
         if differs is not None:
             warnings.append(differs)
-    if inspection.gauge_u_is_default:
+    if inspection.gauge_u_is_default and inspection.clearance_in:
         warnings.append(
             Sentence.of(
                 "Standard uncertainty of the gauge not stated: {} radial taken as the default.",
@@ -378,8 +378,10 @@ def _warnings(
         )
     if inspection.standing_readings_in and inspection.plunger_gauge_u_in is None:
         warnings.append(
-            "Standard uncertainty of the plunger reading not stated:"
-            f" {DEFAULT_PLUNGER_U_IN:.4f} in taken as the default."
+            Sentence.of(
+                "Standard uncertainty of the plunger reading not stated: {} taken as the default.",
+                Length(DEFAULT_PLUNGER_U_IN),
+            )
         )
     if inspection.is_repaired:
         over = [f.joint for f in findings if f.over_limit]

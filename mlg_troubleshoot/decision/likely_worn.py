@@ -18,6 +18,7 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import Causes, believed
+from mlg_troubleshoot.decision.inspection import RiggingCheck
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
@@ -64,7 +65,8 @@ def explain(one: Cases, causes: Causes | None = None) -> Posterior:
     )
     called = tuple(chance.joints for chance in chances if chance.probability > 0.5)
     none = chance_of_none(gear.joint_numbers)
-    said = _text(chances, called, none, rigging)
+    looked = one.inspections[0].rigging_checked not in (None, RiggingCheck.NO)
+    said = _text(chances, called, none, rigging, looked=looked)
     return Posterior(tuple(chances), none, rigging, intervals, called, said)
 
 
@@ -147,6 +149,8 @@ def _text(
     called: Sequence[tuple[int, ...]],
     none: float,
     not_clearance: float,
+    *,
+    looked: bool,
 ) -> str:
     likely = [chance for chance in chances[:2] if chance.probability >= 1.0 - CONFORMANCE]
     ranked = ", then ".join(
@@ -155,6 +159,11 @@ def _text(
     )
     # Another chance than those of the joints: both can be so at once.
     also = f" Chance that rigging or lock roller moved the plunger: {percent(not_clearance)}."
+    if not_clearance > 0.8 and looked:
+        return (
+            "The joints hardly explain where the plunger stands"
+            f" ({percent(1.0 - not_clearance)}), and rigging and lock roller were looked at."
+        )
     if not_clearance > 0.8:
         return (
             "Rigging or lock roller, not joint clearance, likely moved the plunger"

@@ -381,7 +381,7 @@ class RowReader:
         """Say what of a good row is of no use, or unusual."""
         clearance = found.lengths.get(CLEARANCE, {})
         if CLEARANCE in self._at and not clearance:
-            warnings.append("no clearance is given in this row: no joint was measured")
+            warnings.append("no clearance is given: no joint was measured")
         elif len(clearance) > 1 and not any(clearance.values()):
             warnings.append(
                 "every clearance is 0: a zero is read as measured; leave a joint blank if it was"

@@ -185,3 +185,14 @@ def test_the_chance_of_wear_is_that_of_sampling_the_same_model(gear: Gear) -> No
     weight = np.exp(-0.5 * ((0.02 - moved) / np.hypot(0.0015, PRIORS.linkage_u_in)) ** 2)
     sampled = float(weight @ (drawn > 1.0) / weight.sum())
     assert chance(found, 2) == pytest.approx(sampled, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("looked", "said"),
+    [(None, "Rigging or lock roller"), (RiggingCheck.YES, "rigging and lock roller were looked")],
+)
+def test_a_rigging_that_was_looked_at_is_not_named_again(
+    gear: Gear, looked: RiggingCheck | None, said: str
+) -> None:
+    row = inspected(every_joint(0.001), readings_in=(0.045,), rigging_checked=looked)
+    assert said in explain(Cases.of(gear, [row])).text

@@ -389,3 +389,19 @@ def test_a_step_that_no_longer_fits_in_the_day_is_not_next(visit: Visit) -> None
     screen = visit(*GEAR, "y", "yes").screen
     assert "0 of 30 min are left today" in screen
     assert "Stop for today" in visit(*GEAR).screen
+
+
+def test_of_a_gear_of_which_only_the_failure_is_known_the_plunger_is_read_first(
+    visit: Visit,
+) -> None:
+    screen = visit(*GEAR, "t", "t", "done", "f", *ENTERS, "").screen
+    assert "y = I did NEXT" in screen
+    assert "NEXT: Read the plunger" in visit(*GEAR).screen
+
+
+def test_the_unit_that_was_chosen_before_any_clearance_is_not_asked_again(
+    visit: Visit, store: SessionStore
+) -> None:
+    screen = visit(*GEAR, "t", "t", "done", "f", *ENTERS, "", "y", "36").screen
+    assert screen.count("Unit > ") == 1
+    assert life(store).inspections[-1].inspection.readings_in == (0.036,)

@@ -31,7 +31,7 @@ from mlg_troubleshoot.cli.prompts.conversation import Effect, Page, Turn, again
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line, warning
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.cli.prompts.visit import Visit
-from mlg_troubleshoot.decision.columns import DATE, PLUNGER_DISPLACEMENT
+from mlg_troubleshoot.decision.columns import DATE, OUTCOME, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
@@ -467,11 +467,12 @@ class Flow:
         )
 
     def _compute(self, state: State) -> Turn[State]:
-        if not (state.answers.radial_in or PLUNGER_DISPLACEMENT.name in state.answers.more):
+        told = {PLUNGER_DISPLACEMENT.name, OUTCOME.name} & {*state.answers.more}
+        if not (state.answers.radial_in or told):
             return again(
                 state,
-                "No joint has a clearance and the plunger was not read, so there is nothing to"
-                " compute. Type a joint number, or more to enter the plunger.",
+                "No joint has a clearance, the plunger was not read, and no outcome is stated, so"
+                " there is nothing to compute. Type a joint number, or more to enter the others.",
             )
         if state.answers.unit_question(self.gear):
             return Turn(replace(state, ask=Ask.CONFIRM_UNIT))

@@ -86,6 +86,10 @@ class Visit:
         inspected = self.row.inspection_date
         return today is None or inspected is None or today <= inspected
 
+    def read_in(self, unit: LengthUnit | None) -> Visit:
+        """The visit in the unit that was just chosen, where no clearance says which."""
+        return replace(self, answers=replace(self.answers, unit=self.answers.unit or unit))
+
     def spent(self, answers: Answers, today: date | None) -> Answers:
         """The answers once NEXT is done: of the minutes of its day it takes some, those of another
         day lapse.
