@@ -213,7 +213,7 @@ class _PlanBuilder:
         if self.read_plunger and beyond and not self._again():
             return self._failed()
         if not self.read_plunger or beyond:
-            self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
+            self._read_the_plunger(again=self.read_plunger)
         return self._retract()
 
     def _again(self) -> bool:
@@ -228,7 +228,7 @@ class _PlanBuilder:
         joints = float(causes.joints[i])
         rigging = float(causes.rigging[i])
         if not self.read_plunger or self._again():
-            self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
+            self._read_the_plunger(again=self.read_plunger)
         if not self.read_plunger:
             if causes.before_plunger[i] < 1.0:
                 return self._restore_over_limit()._end(End.NOT_EXPLAINED)
@@ -451,8 +451,12 @@ class _PlanBuilder:
             return self._restore_over_limit()._stop_for_today()
         ranked = self._joints(np.array([n in joints for n in self.numbers]))
         self._restore(ranked, best, expected=expected)
-        self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
+        self._read_the_plunger()
         return self._retract()
+
+    def _read_the_plunger(self, *, again: bool = False) -> None:
+        text = sentences.READ_PLUNGER_AGAIN if again else sentences.READ_PLUNGER
+        self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, text)
 
     def _retract(self) -> Plan:
         self._step(Action.RETRACT, self.gear.retraction.value, sentences.RETRACT)

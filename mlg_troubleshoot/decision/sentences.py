@@ -327,6 +327,10 @@ def measure_again(joints: Sequence[int], gauge_u_needed_in: float) -> Sentence:
 
 
 READ_PLUNGER = "Read the plunger displacement at mid-position."
+READ_PLUNGER_AGAIN = (
+    "Read the plunger displacement at mid-position once more: it is too close to its margin for one"
+    " reading."
+)
 
 
 def restore(

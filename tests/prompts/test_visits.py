@@ -405,3 +405,24 @@ def test_the_unit_that_was_chosen_before_any_clearance_is_not_asked_again(
     screen = visit(*GEAR, "t", "t", "done", "f", *ENTERS, "", "y", "36").screen
     assert screen.count("Unit > ") == 1
     assert life(store).inspections[-1].inspection.readings_in == (0.036,)
+
+
+@pytest.mark.parametrize("did", [("y", ".0310"), ("y", ".0280"), ("p .0280",)])
+def test_a_second_reading_of_the_plunger_stands_with_the_first(
+    visit: Visit, store: SessionStore, did: tuple[str, ...]
+) -> None:
+    visit(*GEAR, "i", "t", *[".005"] * 10, "f p .0310", *ENTERS, "")
+    assert "once more: it is too close to its margin" in visit(*GEAR).screen
+    visit(*GEAR, *did)
+    second = float(did[-1].removeprefix("p "))
+    assert life(store).inspections[-1].inspection.readings_in == (0.031, second)
+    assert "once more" not in visit(*GEAR).screen
+
+
+def test_a_reading_of_the_plunger_that_is_corrected_takes_the_place_of_both(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*GEAR, "i", "t", *[".005"] * 10, "f p .0310", *ENTERS, "")
+    visit(*GEAR, "y", ".0280")
+    visit(*GEAR, "c", "more", "p .0400", "", "")
+    assert life(store).inspections[-1].inspection.readings_in == (0.04,)

@@ -185,6 +185,11 @@ class Answers:
             CONVENTION.name: self.convention,
             **self.more,
         }
+        if PLUNGER_DISPLACEMENT.name in self.more:
+            first, *again = self.more[PLUNGER_DISPLACEMENT.name].split(";")
+            values[PLUNGER_DISPLACEMENT.name] = first
+            for number, text in enumerate(again, 2):
+                values[f"{PLUNGER_DISPLACEMENT.name}_{number}"] = text.strip()
         for number in gear.joint_numbers:
             reading = self.reading(number)
             if reading is not None:
@@ -246,6 +251,9 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
     """Let the gate judge one optional answer; `UsageError` if it is refused."""
     from mlg_troubleshoot.records import ReadOptions, judge_length
 
+    if column == PLUNGER_DISPLACEMENT.name and ";" in typed:
+        found = [judge_more(column, text.strip(), unit, gear) for text in typed.split(";")]
+        return replace(found[0], readings_in=tuple(x for read in found for x in read.readings_in))
     options = ReadOptions.of(
         gear, unit=unit or LengthUnit.INCH, convention=ClearanceConvention.RADIAL
     )

@@ -260,6 +260,8 @@ class Flow:
         changed = given.changed_since(visit.answers)
         if DAY["t"] in changed or changed.isdisjoint(visit.todo):
             return turn
+        if PLUNGER_DISPLACEMENT.name in changed:
+            given = visit.with_both_readings(given)
         spent = visit.spent(given, self.today)
         said = pages.minutes_left(given, spent)
         return replace(turn, state=replace(turn.state, answers=spent), lines=(*turn.lines, *said))
@@ -299,6 +301,8 @@ class Flow:
                 answers, remarks = read_more(state.answers, given, self.gear)
             except UsageError as error:
                 return again(state, f"{error.message}. {error.remedy}")
+        if column == PLUNGER_DISPLACEMENT.name and (visit := self._visit(answers)) is not None:
+            answers = visit.with_both_readings(answers)
         if self._is_far(answers, state.answers):
             return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), remarks)
         answers = self._reread_restored(state.answers, answers).without(column)

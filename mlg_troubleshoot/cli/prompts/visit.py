@@ -86,6 +86,14 @@ class Visit:
         inspected = self.row.inspection_date
         return today is None or inspected is None or today <= inspected
 
+    def with_both_readings(self, answers: Answers) -> Answers:
+        """The answers with the plunger's first reading too, where NEXT asked for a second one."""
+        name = PLUNGER_DISPLACEMENT.name
+        first = self.answers.more.get(name)
+        if first is None or self.todo != (name,) or len(self.row.standing_readings_in) != 1:
+            return answers
+        return answers.with_more(**{name: f"{first}; {answers.more[name]}"})
+
     def read_in(self, unit: LengthUnit | None) -> Visit:
         """The visit in the unit that was just chosen, where no clearance says which."""
         return replace(self, answers=replace(self.answers, unit=self.answers.unit or unit))
@@ -252,7 +260,8 @@ def _more(row: Inspection, unit: LengthUnit) -> dict[str, str]:
         column = BY_NAME[name]
         value = getattr(row, column.filled, None) if not column.carried else row.carried.get(name)
         if column.copies > 1 and value:
-            value = value[0]
+            found[name] = "; ".join(f"{unit.from_inches(float(each)):.6g} {unit}" for each in value)
+            continue
         if value in (None, (), "", False):
             continue
         if column.is_length:
