@@ -354,7 +354,7 @@ class Assessment(_Planned, Result):
         """The next action in words that stand alone."""
         step = self.next_action
         retracted = self.inspection.outcome is Outcome.RETRACTED
-        return in_brief(step.action, step.joints, self.end, retracted=retracted)
+        return in_brief(step.action, step.joints, self.end, step.text, retracted=retracted)
 
     @property
     def as_loaded(self) -> bool:

@@ -53,12 +53,18 @@ _ENDS = {
 }
 _RETRACTED = "Engineering decides: outside its bound, retracted normally"
 _DONE = "Done: no further action on the joints"
+# How a step begins that the day forces, whatever the end.
+STOP = "Stop for today"
 
 
-def in_brief(action: Action, joints: Sequence[int], end: End, *, retracted: bool) -> str:
-    """Say the next action in words that stand alone: the same on screen, in files and on paper."""
+def in_brief(action: Action, joints: Sequence[int], end: End, text: str, *, retracted: bool) -> str:
+    """Say the next action in words that stand alone: the same on screen, in files and on paper;
+    `text` is its sentence.
+    """
     if action is Action.DONE:
         return _DONE
+    if action is Action.CONTINUE and text.startswith(STOP):
+        return f"{STOP}: hand over what stays open"
     if action is Action.CONTINUE:
         return _RETRACTED if retracted and end is End.OUTSIDE_NO_COMPLAINT else _ENDS[end]
     return f"{action.words} {', '.join(f'#{joint}' for joint in joints)}".rstrip().capitalize()

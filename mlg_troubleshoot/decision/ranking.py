@@ -118,7 +118,7 @@ class Listed:
     """What a list of many says of one judgement, and what orders it: a fraction of its memory.
 
     worst_in, margin_in, chance: of the prediction; None of a row that was not judged, and the first
-    also where the linkage does not close. [in, in, 1]
+    also where no joint was read or the linkage does not close. [in, in, 1]
     """
 
     record_id: str | None
@@ -150,7 +150,7 @@ class Listed:
             _severity(judgement),
             a is not None and a.inspection.outcome is Outcome.FAILED,
             () if a is None else tuple(f.joint for f in a.joints if f.over_limit),
-            None if a is None else a.predicted_displacement_in,
+            a.predicted_displacement_in if a is not None and a.inspection.clearance_in else None,
             None if a is None else a.margin_in,
             None if a is None else a.probability_exceed_random_directions,
         )

@@ -16,7 +16,7 @@ from mlg_troubleshoot.decision.assessment import (
     Rigging,
 )
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.decision.plan import End, Step
+from mlg_troubleshoot.decision.plan import STOP, End, Step
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import Length, Sentence
@@ -62,7 +62,7 @@ _BEYOND_AND_LOOKED = (
     " to engineering."
 )
 STOP_FOR_TODAY = (
-    "Stop for today: what would decide takes longer than the minutes that are left. Hand over what"
+    f"{STOP}: what would decide takes longer than the minutes that are left. Hand over what"
     " stays open."
 )
 RETRACT = "Retract the gear (trial retraction). Enter the outcome with its date and time."
@@ -169,7 +169,7 @@ def stop_without_spares(joints: Sequence[int]) -> str:
     """Step CONTINUE where joints over their limit cannot be restored today."""
     are = "is" if len(joints) == 1 else "are"
     return (
-        f"Stop for today: {joint_list(joints)} {are} to be restored and cannot be. Hand over what"
+        f"{STOP}: {joint_list(joints)} {are} to be restored and cannot be. Hand over what"
         " stays open."
     )
 

@@ -86,7 +86,8 @@ def _in_brief(kept: KeptInspection) -> str | None:
     if step is None or end is None:
         return None if step is None else str(step["text"])
     retracted = kept.inspection.outcome is Outcome.RETRACTED
-    return in_brief(Action(step["action"]), step["joints"], End(end), retracted=retracted)
+    action = Action(step["action"])
+    return in_brief(action, step["joints"], End(end), step["text"], retracted=retracted)
 
 
 class Order(StrEnum):

@@ -138,6 +138,13 @@ def test_the_worst_gear_of_a_batch_stands_first(table: Table) -> None:
     assert "OUT, MEASURED" in lines[0]
 
 
+def test_a_gear_of_which_nothing_was_read_has_no_worst_case_in_a_batch(table: Table) -> None:
+    blank = {f"clearance_{j}_in": "" for j in range(1, 11)}
+    lines = mlg("check", table(row(record_id="A"), row(record_id="B", **blank))).out.splitlines()
+    (shown,) = (line for line in lines if VERDICT_LINE.match(line) and " B " in line)
+    assert "0.0000" not in shown
+
+
 def test_a_gear_measured_outside_is_never_shown_as_within(table: Table) -> None:
     shown = mlg("check", table(row(plunger_displacement_in="-0.045"))).out
     assert "[!] OUTSIDE MARGIN, MEASURED" in shown

@@ -153,3 +153,11 @@ def test_an_expected_end_is_that_of_the_gear_once_its_joints_are_read(
     )
     whole = judge(every_joint(0.0018), outcome=outcome)
     assert (found.next_action.action, found.end, whole.end) == (Action.MEASURE, end, end)
+
+
+@pytest.mark.parametrize("day", [{"no_spare": (3,)}, {"minutes_available": 10.0}])
+def test_a_stop_that_the_day_forces_is_called_one_in_brief(judge: Judge, day: dict) -> None:
+    read = every_joint(0.002, j3=0.0148)
+    found = judge(read, **FAILED, **day)
+    assert found.next_action.text.startswith("Stop for today")
+    assert found.in_brief == "Stop for today: hand over what stays open"

@@ -74,7 +74,10 @@ def _cells(line: Listed, screen: DataConsole) -> dict[str, Cell]:
     }
     if line.margin_in is not None:
         cells["date"] = "-" if line.day is None else line.day.isoformat()
-        cells["worst"] = "open" if line.worst_in is None else screen.length(line.worst_in)
+        if line.worst_in is not None:
+            cells["worst"] = screen.length(line.worst_in)
+        elif line.chance is None:
+            cells["worst"] = "open"
         cells["margin"] = screen.length(line.margin_in)
         cells["chance"] = "-" if line.chance is None else percent(line.chance)
         if line.measured:
