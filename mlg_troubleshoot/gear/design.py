@@ -34,7 +34,8 @@ class DesignSpace:
                     "A linkage can be searched or surveyed only if its guides stand still.",
                 )
         base = [p for p in m.points if p.plane == m.planes[0].name]
-        self.held = next((p for p in base if p.fixed and p.virtual_link is not None), base[0])
+        pivots = (p for p in base if p.fixed and p.virtual_link is not None)
+        self.held = next(pivots, base[0])
         others = [p for p in base if p is not self.held and _distance(p, self.held) > 0.0]
         level = (
             [p for p in others if p.y == self.held.y and not p.fixed]
@@ -71,7 +72,8 @@ class DesignSpace:
             x = point.x
             y = point.y
             if point.plane == base and is_elsewhere:
-                moved = complex(x - held.x, y - held.y) * np.exp(1j * back) + place
+                turned = complex(x - held.x, y - held.y) * np.exp(1j * back)
+                moved = turned + place
                 x = moved.real
                 y = moved.imag
             values += [x, y]

@@ -153,7 +153,8 @@ class _Theirs:
             # Their guide of a dyad RRP: two points on the ground and what slides between them.
             first, second = (complex(*self.places[p]) for p in still)
             along = second - first
-            self.guides[moving[0]] = math.degrees(math.atan2(along.imag, along.real))
+            angle = math.atan2(along.imag, along.real)
+            self.guides[moving[0]] = math.degrees(angle)
         elif moving and link.type != "ground":
             self.links[link.id] = ends
 
@@ -229,7 +230,8 @@ def _of_components(linkage: Any) -> dict[str, Any]:
                 links.append(link | {"type": "driver", "motor_joint": pivot})
             case "LinearActuator":
                 (base,) = _names([part.anchor])
-                joint |= {"type": "prismatic", "axis": [math.cos(part.angle), math.sin(part.angle)]}
+                axis = [math.cos(part.angle), math.sin(part.angle)]
+                joint |= {"type": "prismatic", "axis": axis}
                 travel = [-part.extension, part.stroke - part.extension]
                 link = {"id": f"{part.name} actuator", "joints": [base, part.name]}
                 links.append(link | {"type": "linear_actuator", "travel": travel})
@@ -240,7 +242,8 @@ def _of_components(linkage: Any) -> dict[str, Any]:
                 (end,) = _names([part.revolute_anchor])
                 a = part.line_anchor1
                 b = part.line_anchor2
-                joint |= {"type": "prismatic", "axis": [b.x - a.x, b.y - a.y]}
+                axis = [b.x - a.x, b.y - a.y]
+                joint |= {"type": "prismatic", "axis": axis}
                 links.append({"id": f"{end}-{part.name}", "joints": [end, part.name]})
             case "RRPDyad":
                 (end,) = _names([part.revolute_anchor])

@@ -102,7 +102,8 @@ class LinkageModel:
         """
         at = self.stroke[1] if stroke is None else stroke
         zero = self.mid if stroke is None else self.kernel.output(at, self.kernel.no_clearance())
-        return self.rate * (self.kernel.output(at, links, self.numbers(changed)) - zero)
+        moved = self.kernel.output(at, links, self.numbers(changed)) - zero
+        return self.rate * moved
 
     def plunger(self, stroke: Any, links: Sequence[Any] | None = None) -> Array:
         """Plunger position (Fig. 12), P(s) = P(0) + k (p(s) − p(0)), by extension and links; NaN if

@@ -346,9 +346,8 @@ class _Builder:
         if point in self.form.ground:
             return number
         own = self.steps[point]
-        user = next(
-            (s for s in self.steps.values() if point in (s.get("upstream"), s.get("pin"))), None
-        )
+        users = (s for s in self.steps.values() if point in (s.get("upstream"), s.get("pin")))
+        user = next(users, None)
         step = own if own["type"] in ("dyad", "slider", "guide") else user or own
         if step["type"] == "slot" and step is own:
             raise self.file.fail(

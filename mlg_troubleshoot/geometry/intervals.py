@@ -368,7 +368,8 @@ def cosine_range(angle: Interval) -> Interval:
     ends = np.cos(low), np.cos(high)
     turn = 2 * np.pi
     top = np.floor(high / turn) > np.floor(low / turn)
-    bottom = np.floor((high - np.pi) / turn) > np.floor((low - np.pi) / turn)
+    last_bottom = np.floor((high - np.pi) / turn)
+    bottom = last_bottom > np.floor((low - np.pi) / turn)
     least = np.where(bottom, -1.0, np.minimum(*ends) - 1e-15)
     most = np.where(top, 1.0, np.maximum(*ends) + 1e-15)
     return Interval(np.maximum(least, -1.0), np.minimum(most, 1.0))

@@ -254,7 +254,8 @@ class Mechanism:
             for step in self.steps
             for number in step.virtual_links
         }
-        return tuple(dict.fromkeys(ends.get(number, (number,)) for number in self.virtual_links))
+        groups = (ends.get(number, (number,)) for number in self.virtual_links)
+        return tuple(dict.fromkeys(groups))
 
     def frame(self, plane: str) -> tuple[Array, Array]:
         """Origin and axes of a plane in space.

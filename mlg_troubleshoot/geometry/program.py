@@ -240,7 +240,9 @@ def _dyad(w: _Writer, step: Dyad) -> None:
     w.same_side(step)
     sign = w.parameter(f"sign.{step.joint}", step.sign)
     seen, height = w.seen_from(step.upstream, plane)
-    ax, ay = w.starts[step.joint, step.upstream] = w.shifted(seen, step.virtual_links)
+    start = w.shifted(seen, step.virtual_links)
+    w.starts[step.joint, step.upstream] = start
+    ax, ay = start
     bx, by = w.joints[step.downstream]
     reach = w.let(f"{first} + {_travel(w)}") if step.driven else first
     dx = w.let(f"{bx} - {ax}")
@@ -266,7 +268,7 @@ def _dyad(w: _Writer, step: Dyad) -> None:
         w.let(f"{ay} + {along} * {dy} + {across} * {dx}"),
     )
     w.joints[step.joint] = place
-    w.closures.append(Closure(place, (ax, ay), (bx, by), square, area))
+    w.closures.append(Closure(place, start, (bx, by), square, area))
 
 
 def _arm(pivot: Point, end: Point) -> Any:
@@ -323,12 +325,13 @@ def _slider(w: _Writer, step: Slider) -> None:
     ox = w.parameter(f"slider.{step.joint}.x", joint.x)
     oy = w.parameter(f"slider.{step.joint}.y", joint.y)
     seen, height = w.seen_from(step.upstream, joint.plane)
-    ux, uy = w.starts[step.joint, step.upstream] = w.shifted(seen, step.virtual_links)
+    start = w.shifted(seen, step.virtual_links)
+    w.starts[step.joint, step.upstream] = start
     c = w.let(f"cos({axis})")
     s = w.let(f"sin({axis})")
     square = w.let(f"{length} * {length}" + (f" - {height} * {height}" if height else ""))
     line = ox, oy, c, s
-    _slide(w, step.joint, line, _reach(line, (ux, uy), square, sign, w))
+    _slide(w, step.joint, line, _reach(line, start, square, sign, w))
 
 
 # A point of a line and its direction: the names of x, y, cosine and sine.

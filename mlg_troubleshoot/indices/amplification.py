@@ -124,7 +124,8 @@ def amplification(
 
 def csc(first: Array, second: Array) -> Array:
     """Cosecant of the angle between two links, at least 1, shape (...). [1]"""
-    cosine = np.sum(first * second, axis=-1) / (_lengths(first) * _lengths(second))
+    lengths = _lengths(first) * _lengths(second)
+    cosine = np.sum(first * second, axis=-1) / lengths
     sine: Array = np.sqrt(1.0 - cosine**2)
     return 1.0 / sine
 
@@ -155,10 +156,8 @@ class _Chain:
             return self._of_output(number), []
         entry = self._entry(first)
         path = self._path(entry)
-        end = next(
-            (i for i, step in enumerate(path) if self.numbers.get(step.joint, 0) > first),
-            len(path) - 1,
-        )
+        later = (i for i, step in enumerate(path) if self.numbers.get(step.joint, 0) > first)
+        end = next(later, len(path) - 1)
         if self.mechanism.point(self.points[first]).fixed:
             own = self._derivative(first, path[end].joint)
         else:
@@ -259,7 +258,9 @@ class _Chain:
 
     def _arms(self, step: Lever | Slot, other: str) -> Array:
         pivot = self.place[step.pivot]
-        return _lengths(self.place[step.joint] - pivot) / _lengths(self.place[other] - pivot)
+        driven = _lengths(self.place[step.joint] - pivot)
+        driving = _lengths(self.place[other] - pivot)
+        return driven / driving
 
     def _derivative(self, number: int, joint: str) -> Array:
         """Largest movement of a joint per unit of one clearance over all directions."""

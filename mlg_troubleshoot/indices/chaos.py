@@ -52,7 +52,8 @@ class ChaosFit:
 
     def closed(self, group: tuple[int, ...]) -> float:
         """Closed index of a group: what it explains alone, interactions within it included."""
-        outside = np.delete(self.exponents, list(group), axis=1).sum(axis=1)
+        others = np.delete(self.exponents, list(group), axis=1)
+        outside = others.sum(axis=1)
         squares = self.coefficients[1:] ** 2
         return float(squares[outside[1:] == 0].sum() / self.variance)
 

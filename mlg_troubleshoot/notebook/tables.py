@@ -178,8 +178,11 @@ def _frame(rows: list[Any]) -> pd.DataFrame:
     """One line per row; what is a table itself has its own."""
     if not all(isinstance(row, dict) for row in rows):
         return pd.DataFrame({"value": rows})
-    bare = [{k: each for k, each in row.items() if not (each and _is_table(each))} for row in rows]
-    return pd.json_normalize(bare)
+
+    def bare(row: dict[str, Any]) -> dict[str, Any]:
+        return {k: each for k, each in row.items() if not (each and _is_table(each))}
+
+    return pd.json_normalize(list(map(bare, rows)))
 
 
 def _columns(lists: dict[str, Any]) -> dict[str, Any]:
