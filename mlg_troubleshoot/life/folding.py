@@ -229,7 +229,8 @@ def _life(key: GearKey, records: Sequence[Record], moments_of: MomentsOf) -> Gea
                 kept[same] = KeptInspection(kept[same].record, record)
         else:
             others[record.digest] = record
-    repairs = [r for r in others.values() if r.kind in (RecordKind.REPAIR, RecordKind.RERIG)]
+    work = (RecordKind.REPAIR, RecordKind.RERIG)
+    repairs = [r for r in others.values() if r.kind in work]
     events: list[Event] = [*kept.values(), *repairs]
     events.sort(key=lambda event: _record_of(event).seq)
     moments = moments_of(key, events)

@@ -105,10 +105,10 @@ def fit_fleet(
             for path in own
             if len(own) > 1 or len(np.asarray(path.usage))
         ]
-        followed = {path.unit for path in paths if len(np.asarray(path.usage)) > 1}
+        followed = {path.unit for path in paths if path.n_readings > 1}
         if len(followed) >= WearModel.learns_from:
             break
-    return fit(paths) if any(len(np.asarray(path.usage)) for path in paths) else None
+    return fit(paths) if any(path.n_readings for path in paths) else None
 
 
 def forecast(
@@ -226,11 +226,13 @@ def _forecast_part(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
         )
         to_either = Samples(np.minimum(to_any, to_margin))
         due = float(to_either.quantile(gear.accepted_chance.value))
-        bands = np.quantile(wear[g][:, _ASKED], [0.05, 0.5, 0.95], axis=2)
+        asked = wear[g][:, _ASKED]
+        bands = np.quantile(asked, [0.05, 0.5, 0.95], axis=2)
+        known = [(j, number) for j, number in enumerate(numbers) if read[g, j]]
         first = to_limit.argmin(axis=0)[np.isfinite(to_any)]
         yield Forecast(
-            {number: _quantiles(to_limit[j]) for j, number in enumerate(numbers) if read[g, j]},
-            {number: bands[:, j] for j, number in enumerate(numbers) if read[g, j]},
+            {number: _quantiles(to_limit[j]) for j, number in known},
+            {number: bands[:, j] for j, number in known},
             _quantiles(to_any),
             numbers[int(np.bincount(first).argmax())] if len(first) else None,
             _quantiles(to_margin),
@@ -268,7 +270,8 @@ def _worst_case_of(wear: Array, gear: Gear) -> Array:
     straight = np.einsum("j,gjts->gts", amplification, wear)
     middle = np.median(wear[:, :, _ASKED, :], axis=3)
     clearances = np.moveaxis(middle, 1, 2)
-    predicted = worst_case(gear.model, clearances.reshape(-1, clearances.shape[-1])).magnitude_in
+    rows = clearances.reshape(-1, clearances.shape[-1])
+    predicted = worst_case(gear.model, rows).magnitude_in
     predicted = np.where(np.isnan(predicted), _NOT_CLOSING_IN, predicted)
     summed = np.einsum("j,gjt->gt", amplification, middle)
     departure = predicted.reshape(summed.shape) / np.maximum(summed, 1e-12)

@@ -167,7 +167,8 @@ def to_frame(result: Any, of: str = "") -> pd.DataFrame:
 
 def _tables(lists: dict[str, Any], rows: list[Any]) -> list[str]:
     within = [key for row in rows[:1] for key, each in row.items() if _is_table(each)]
-    return [*(name for name, each in lists.items() if _is_table(each)), *within]
+    own = [name for name, each in lists.items() if _is_table(each)]
+    return own + within
 
 
 def _is_table(value: Any) -> bool:

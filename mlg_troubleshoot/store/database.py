@@ -171,7 +171,8 @@ class Record:
             self.day,
             self.packed.hex(),
         )
-        return hashlib.sha256(_canonical([self.kind.value, *what]).encode()).digest()
+        text = _canonical([self.kind.value, *what])
+        return hashlib.sha256(text.encode()).digest()
 
 
 Judge = Callable[[Record, Any], str]
@@ -428,7 +429,8 @@ class Store:
 
     def _rows(self, connection: sql.Connection, *where: Any) -> Iterator[Any]:
         if self._ready:
-            found = connection.execute(sql.select(*_COLUMNS).where(*where).order_by(_records.c.seq))
+            wanted = sql.select(*_COLUMNS).where(*where)
+            found = connection.execute(wanted.order_by(_records.c.seq))
             for part in found.partitions(_AT_ONCE):
                 yield from part
 
@@ -591,11 +593,14 @@ class Store:
             if not self._ready:
                 return []
             pairs = sql.select(_records.c.tail_no, _records.c.side).distinct()
-            return sorted((str(row.tail_no), str(row.side)) for row in connection.execute(pairs))
+            rows = connection.execute(pairs)
+            return sorted((str(row.tail_no), str(row.side)) for row in rows)
 
     def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:
         """All records of a gear, or of both gears of an aircraft, in the order of the chain."""
-        where = [_records.c.tail_no == tail_no] + ([_records.c.side == side] if side else [])
+        where = [_records.c.tail_no == tail_no]
+        if side:
+            where.append(_records.c.side == side)
         with self.transaction(writing=False) as connection:
             return [self._record(row) for row in self._rows(connection, *where)]
 

@@ -52,7 +52,8 @@ class Drafts:
                 "complete": draft.complete,
                 "content": draft.content,
             }
-            connection.execute(DRAFTS.insert().values(draft_id=draft.id, saved=last + 1, **row))
+            new = DRAFTS.insert().values(draft_id=draft.id, saved=last + 1, **row)
+            connection.execute(new)
         return True
 
     def newest_first(self, owner: str | None = None) -> list[Draft]:
