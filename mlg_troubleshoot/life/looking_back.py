@@ -46,10 +46,10 @@ class Advice:
     @property
     def interval(self) -> tuple[float, float] | None:
         """None where no outcome names a joint."""
-        from scipy.special import betaincinv
-
         if not self.outcomes:
             return None
+        from scipy.special import betaincinv
+
         wrong = self.outcomes - self.right
         low, high = betaincinv(self.right + 0.5, wrong + 0.5, [0.05, 0.95]).tolist()
         return low if self.right else 0.0, high if wrong else 1.0
