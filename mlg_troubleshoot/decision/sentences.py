@@ -15,7 +15,7 @@ from mlg_troubleshoot.decision.assessment import (
     RepairSet,
     Rigging,
 )
-from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.inspection import Inspection, surely_later
 from mlg_troubleshoot.decision.plan import STOP, End, Step
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
@@ -423,17 +423,20 @@ def older_than_the_repair(inspection: Inspection, over_limit: Collection[int]) -
         for joint in inspection.restored_joints
         if joint in over_limit
     ]
-    if inspection.outcome is not None and inspection.standing_outcome is None:
+    repaired = inspection.repair_date
+    undecided = not surely_later(repaired, inspection.outcome_date)
+    if inspection.outcome is not None and inspection.standing_outcome is None and undecided:
         said.append(
             f"The outcome {inspection.outcome} counts as older than the repair. Is it newer? Then"
             " enter outcome_date, on the day of the repair with both times."
         )
-    if inspection.readings_in and not inspection.standing_readings_in:
+    undecided = not surely_later(repaired, inspection.plunger_date)
+    if inspection.readings_in and not inspection.standing_readings_in and undecided:
         said.append(
             "The plunger reading counts as older than the repair. Is it newer? Then enter"
             " plunger_date, on the day of the repair with both times."
         )
-    if inspection.repair_date is None:
+    if repaired is None:
         said.append("The repair has no date: enter repair_date, with the time if known.")
     return said
 

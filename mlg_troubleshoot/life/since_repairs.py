@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from mlg_troubleshoot.decision.inspection import (
     Inspection,
     InvalidRow,
+    Outcome,
     RiggingCheck,
     surely_later,
 )
@@ -56,8 +57,9 @@ def since_repairs(
     repair on the day of a row or later makes its outcome, its plunger reading and what it says of
     the restored joints older.
 
-    A row that states a repair itself stays as it is; what the store keeps reaches only rows with a
-    date.
+    A row that states a repair and no outcome is that of a gear that failed, if the last outcome
+    above it, or in the store, is a failure: nobody has tried it since. What the store keeps of
+    repairs reaches only rows with a date.
     """
     repairs: defaultdict[GearKey, list[Repair]] = defaultdict(list)
     for place, row in enumerate(rows):
@@ -69,12 +71,44 @@ def since_repairs(
             repairs[key].append(kept)
     if not repairs:
         return rows
-    return [
-        _since(row, place, repairs[key_of(row)], gear)
-        if isinstance(row, Inspection) and not row.is_repaired and key_of(row) in repairs
-        else row
-        for place, row in enumerate(rows)
-    ]
+    counting: list[Inspection | InvalidRow] = []
+    failed = _failed(rows, store)
+    for place, row in enumerate(rows):
+        counts = row
+        if isinstance(row, Inspection):
+            key = key_of(row)
+            if row.outcome is not None:
+                failed[key] = row if row.outcome is Outcome.FAILED else None
+            before = failed.get(key)
+            if not row.is_repaired:
+                counts = _since(row, place, repairs[key], gear) if key in repairs else row
+            elif row.outcome is None and before is not None:
+                said = f"{before.record_id} states that this gear failed: it was not tried since"
+                counts = replace(
+                    row,
+                    outcome=Outcome.FAILED,
+                    outcome_date=before.inspection_date,
+                    warnings=(*row.warnings, said),
+                )
+        counting.append(counts)
+    return counting
+
+
+def _failed(
+    rows: Sequence[Inspection | InvalidRow], store: Store | None
+) -> dict[GearKey, Inspection | None]:
+    """The kept inspection of each gear with its last outcome, where that is a failure."""
+    if store is None:
+        return {}
+    from mlg_troubleshoot.life.folding import lives_of
+
+    untried = {key_of(r) for r in rows if isinstance(r, Inspection) and r.is_repaired}
+    found: dict[GearKey, Inspection | None] = {}
+    for key, life in lives_of(store, untried).items() if untried else ():
+        tried = (each.inspection for each in reversed(life.inspections))
+        last = next((each for each in tried if each.outcome is not None), None)
+        found[key] = last if last is not None and last.outcome is Outcome.FAILED else None
+    return found
 
 
 def _kept(store: Store) -> Iterator[tuple[GearKey, Repair]]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mlg_troubleshoot.decision.inspection import Inspection, RiggingCheck
+from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.store import Store, inspection_record
@@ -85,3 +85,66 @@ def test_what_a_row_was_warned_of_stands_before_what_the_store_keeps(counted: Co
     told = counted(date(2026, 1, 31), warnings=("as read",)).warnings
     assert told[0] == "as read"
     assert "the store keeps a repair of #3 on 2026-02-01" in told[1]
+
+
+REPAIRED = {"restored_joints": (3,), "repair_date": date(2026, 1, 20)}
+
+
+def again(gear: Gear, *above: Inspection, store: Store | None = None, **more: Any) -> Inspection:
+    """A row below others of its gear that states a repair, as it counts."""
+    own = inspected({3: SOUND}, inspection_date=date(2026, 1, 21), **{**REPAIRED, **more})
+    found = since_repairs([*above, own], gear, store)[-1]
+    assert isinstance(found, Inspection)
+    return found
+
+
+def failing(**more: Any) -> Inspection:
+    return inspected({3: WORN}, outcome=Outcome.FAILED, inspection_date=date(2026, 1, 1), **more)
+
+
+def test_a_gear_that_failed_and_was_repaired_has_still_to_be_tried(gear: Gear) -> None:
+    assert again(gear, failing()).outcome is Outcome.FAILED
+
+
+def test_a_gear_whose_failure_is_kept_and_was_repaired_has_still_to_be_tried(
+    gear: Gear, tmp_path: Path
+) -> None:
+    store = Store(tmp_path / "store.sqlite")
+    store.add([inspection_record(failing())])
+    assert again(gear, store=store).outcome is Outcome.FAILED
+
+
+def test_it_is_said_which_row_states_the_failure(gear: Gear) -> None:
+    assert "R0 states that this gear failed" in again(gear, failing(record_id="R0")).warnings[-1]
+
+
+def test_a_gear_that_retracted_after_its_failure_has_no_complaint(gear: Gear) -> None:
+    retracted = inspected({3: SOUND}, outcome=Outcome.RETRACTED)
+    assert again(gear, failing(), retracted).outcome is None
+
+
+def test_the_failure_of_another_gear_is_not_a_complaint(gear: Gear) -> None:
+    assert again(gear, failing(tail_no="N9")).outcome is None
+
+
+def test_a_row_that_states_its_own_outcome_keeps_it(gear: Gear) -> None:
+    assert again(gear, failing(), outcome=Outcome.RETRACTED).outcome is Outcome.RETRACTED
+
+
+def test_without_a_repair_an_earlier_failure_is_not_a_complaint(gear: Gear) -> None:
+    assert again(gear, failing(), restored_joints=(), repair_date=None).outcome is None
+
+
+def test_the_plan_reads_the_plunger_and_retracts_a_gear_whose_failure_stands_above(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "two.csv"
+    file.write_text(
+        "record_id,tail_no,side,clearance_convention,clearance_3_in,outcome,inspection_date,"
+        "restored_joints,repair_date\n"
+        "R1,N1,LH,RADIAL,0.013,FAILED,2026-01-01,,\nR2,N1,LH,RADIAL,0.001,,2026-01-03,3,2026-01-02\n"
+    )
+    last = mlg("check", file, "--json").json["inspections"][-1]
+    assert last["outcome"] is None
+    assert [step["action"] for step in last["plan"]] == ["READ_PLUNGER", "RETRACT", "DONE"]
+    assert not any("Is it newer?" in warning for warning in last["warnings"])

@@ -28,9 +28,8 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
     screen.print(f"{len(lines)} inspections: {said}")
     latest, earlier = latest_of_each_gear(lines)
     if earlier and not every:
-        screen.print(
-            f"{len(latest)} gears, the latest inspection of each; --all shows every inspection."
-        )
+        gears = "1 gear" if len(latest) == 1 else f"{len(latest)} gears"
+        screen.print(f"{gears}, the latest inspection of each; --all shows every inspection.")
     places = worst_first(lines, (*latest, *earlier)) if every else latest
     ordered = [lines[place] for place in places]
     headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance", "next"]
