@@ -58,8 +58,8 @@ def since_repairs(
     the restored joints older.
 
     A row that states a repair and no outcome is that of a gear that failed, if the last outcome
-    above it, or in the store, is a failure: nobody has tried it since. What the store keeps of
-    repairs reaches only rows with a date.
+    above it, or in the store, is a failure before the repair: nobody has tried it since. What the
+    store keeps of repairs reaches only rows with a date.
     """
     repairs: defaultdict[GearKey, list[Repair]] = defaultdict(list)
     for place, row in enumerate(rows):
@@ -69,7 +69,7 @@ def since_repairs(
     if store is not None:
         for key, kept in _kept(store):
             repairs[key].append(kept)
-    if not repairs:
+    if not repairs and not any(isinstance(row, Inspection) and row.is_repaired for row in rows):
         return rows
     counting: list[Inspection | InvalidRow] = []
     failed = _failed(rows, store)
@@ -82,7 +82,11 @@ def since_repairs(
             before = failed.get(key)
             if not row.is_repaired:
                 counts = _since(row, place, repairs[key], gear) if key in repairs else row
-            elif row.outcome is None and before is not None:
+            elif (
+                row.outcome is None
+                and before is not None
+                and not surely_later(before.inspection_date, row.repair_date)
+            ):
                 said = f"{before.record_id} states that this gear failed: it was not tried since"
                 counts = replace(
                     row,

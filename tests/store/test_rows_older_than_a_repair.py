@@ -114,6 +114,10 @@ def test_a_gear_whose_failure_is_kept_and_was_repaired_has_still_to_be_tried(
     assert again(gear, store=store).outcome is Outcome.FAILED
 
 
+def test_a_repair_without_a_date_leaves_the_complaint_as_well(gear: Gear) -> None:
+    assert again(gear, failing(), repair_date=None).outcome is Outcome.FAILED
+
+
 def test_it_is_said_which_row_states_the_failure(gear: Gear) -> None:
     assert "R0 states that this gear failed" in again(gear, failing(record_id="R0")).warnings[-1]
 
@@ -125,6 +129,11 @@ def test_a_gear_that_retracted_after_its_failure_has_no_complaint(gear: Gear) ->
 
 def test_the_failure_of_another_gear_is_not_a_complaint(gear: Gear) -> None:
     assert again(gear, failing(tail_no="N9")).outcome is None
+
+
+def test_a_failure_after_the_repair_is_not_the_complaint_that_led_to_it(gear: Gear) -> None:
+    later = inspected({3: WORN}, outcome=Outcome.FAILED, inspection_date=date(2026, 1, 25))
+    assert again(gear, later).outcome is None
 
 
 def test_a_row_that_states_its_own_outcome_keeps_it(gear: Gear) -> None:
