@@ -282,12 +282,12 @@ def believed(cases: Cases) -> Causes:
     found = _weighed(cases, both, mean_in, worn, likely, u, doubted.if_restored(read, levels))
     # Readings in doubt, given where the plunger stands.
     of = doubted.rows
-    told = np.isfinite(cases.mean_in[of, None])
+    is_read = np.isfinite(cases.mean_in[of, None])
     random, held = (each.by_share / each.usually for each in both)
     by_cause = (1.0 - cases.fleet.loaded) * random + cases.fleet.loaded * held
     by_cause *= (np.sqrt(2.0 * np.pi) * u[of] / STEP_IN)[:, None]
     by_cause += found.by_rigging[of, None]
-    chances = doubted.chances * np.where(told, by_cause, 1.0)
+    chances = doubted.chances * np.where(is_read, by_cause, 1.0)
     worn[of, doubted.joints] = np.minimum((chances @ (SHARES > 1.0)) / chances.sum(axis=1), 1.0)
     return found
 

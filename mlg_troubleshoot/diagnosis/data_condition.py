@@ -239,7 +239,7 @@ def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
             "rounded",
             where,
             share,
-            f"each is known to ± {0.5 * step:.4g} in only; small effects of joints are not told",
+            f"each is known to ± {0.5 * step:.4g} in only; small effects of joints are not seen",
             "the value as the gauge shows it, to 0.0005 in",
             share > _MANY_CUT and _too_coarse(table.clearance_in[rounded], step),
         )

@@ -350,10 +350,10 @@ def diagnose(
             for name, values in scene.table.quantities.items()
             if len(np.unique(values[np.isfinite(values)])) < 2
         }
-        told = set(scene.table.columns) - same
-        testable = [cause for cause in catalogue if set(cause.needs) <= told]
+        columns = set(scene.table.columns) - same
+        testable = [cause for cause in catalogue if set(cause.needs) <= columns]
         blind = [cause for cause in catalogue if cause not in testable]
-        not_testable = tuple((c.name, next(n for n in c.needs if n not in told)) for c in blind)
+        not_testable = tuple((c.name, next(n for n in c.needs if n not in columns)) for c in blind)
         told_by = (testable, blind)
         beliefs = beliefs or Beliefs()
         case = _explained(scene, rows, told_by, ensemble, beliefs)
@@ -752,7 +752,7 @@ def _gain(case: _Case) -> Gain:
         others = [*others, block.effects_in]
         block = None
     if others:
-        noise = noise.beside(np.hstack(others))
+        noise = noise.with_effects(np.hstack(others))
     return measure_gain(
         noise,
         case.columns[:, firm],

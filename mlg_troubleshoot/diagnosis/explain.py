@@ -151,9 +151,9 @@ class MisfitProblem:
         """
         beliefs = self.beliefs
         weight = {cause.name: beliefs.rarer.get(cause.name, 1.0) for cause in self.causes}
-        told = {c.cause.name for c in self.candidates} | {b.cause.name for b in self.blocks}
+        names = {c.cause.name for c in self.candidates} | {b.cause.name for b in self.blocks}
         listed = beliefs.expected * (1.0 - beliefs.unlisted) / sum(weight.values())
-        shares = {name: listed * weight[name] for name in told}
+        shares = {name: listed * weight[name] for name in sorted(names)}
         return shares | {UNLISTED: beliefs.expected - sum(shares.values())}
 
 
@@ -192,7 +192,7 @@ class Finding:
     ruled_out: names
     that would explain something alone, but hardly act, likeliest first. noise: the noise under
     which all are compared. smallest_rms_in: root mean square of the smallest effect that is
-    detected with 80 % power. [in] left: probability that something else acts beside what is
+    detected with 80 % power. [in] left: probability that something else acts in addition to what is
     sure. classes: names that these rows cannot tell from a name.
     """
 
@@ -289,7 +289,7 @@ def _noise_beside(problem: MisfitProblem, explained: Array) -> NoiseModel:
     if not smooth:
         return noise
     bent = explained[:, None] * np.column_stack(list(smooth.values()))
-    return noise.beside(problem.beliefs.form * bent / np.sqrt(len(smooth)))
+    return noise.with_effects(problem.beliefs.form * bent / np.sqrt(len(smooth)))
 
 
 def _said(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> Finding:

@@ -48,7 +48,7 @@ HABIT = 0.035
 USUAL_RATIO = 0.1
 RATIO_SPREAD = 0.6
 _RATIOS = USUAL_RATIO * np.exp(RATIO_SPREAD * np.linspace(-3, 4, 24))
-# With fewer levels nothing can be told; with more the first tell enough.
+# Fewer levels do not determine it; of more the first are enough.
 _LEAST_LEVELS = 4
 _MOST_LEVELS = 400
 # Ratios of the scatter between tails to the scatter of a row that are tried, nodes of a sum: none,
@@ -171,13 +171,13 @@ def build_noise(
     gears = tail_numbers(rows.gears)
     unread = rows.unread_in if rows.unread_in.any() else np.empty((len(rest), 0))
     for _ in range(_ROUNDS if wide.size + unread.size else 0):
-        known = noise.beside(wide)
+        known = noise.with_effects(wide)
         left = rest - known.share_of(wide, rest)
         alone = left - known.share_of(unread, rest)
         if unread.size:
             alone = alone - known.share_of_groups(rows.u_shared_in, gears, rest)
         noise = _scatter(left, alone, rows)
-    return noise.beside(wide) if wide.size else noise
+    return noise.with_effects(wide) if wide.size else noise
 
 
 def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
@@ -230,8 +230,8 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     each_own = [USUAL_RATIO] * len(rows.readers)
     for place, levels in enumerate(rows.readers):
         others = [USUAL_RATIO * other for k, other in enumerate(rows.readers) if k != place]
-        beside = replace(noise, loadings=np.hstack([loadings, *others]))
-        each_own[place] = _ratio(beside, levels, standard, USUAL_RATIO, RATIO_SPREAD)
+        with_others = replace(noise, loadings=np.hstack([loadings, *others]))
+        each_own[place] = _ratio(with_others, levels, standard, USUAL_RATIO, RATIO_SPREAD)
     loadings = np.hstack(
         [loadings, *(ratio * levels for ratio, levels in zip(each_own, rows.readers, strict=True))]
     )

@@ -149,9 +149,9 @@ def _share_of_declared(misfit: Array, drawn: Array) -> float:
         weight = np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(rest), 1e-12))
         middle = float(weight @ d / weight.sum())
         level = float(weight @ (y - share * d) / weight.sum())
-        told = float(weight @ (d - middle) ** 2) / scale**2
+        information = float(weight @ (d - middle) ** 2) / scale**2
         slope = float(weight @ ((d - middle) * y)) / scale**2
-        share = (slope + 1.0 / SHARE_DOUBT**2) / (told + 1.0 / SHARE_DOUBT**2)
+        share = (slope + 1.0 / SHARE_DOUBT**2) / (information + 1.0 / SHARE_DOUBT**2)
     return float(np.clip(share, 0.0, 1.0))
 
 

@@ -173,7 +173,7 @@ def _level(x: Array, y: Array, slope: float) -> tuple[float, float]:
 
 
 def _slopes_without(x: Array, y: Array) -> Callable[[int], float]:
-    """Slope of the median line through all points but one, 0 where it is not told.
+    """Slope of the median line through all points but one, 0 where it is not determined.
 
     All pairs are sorted once: those of one point move the median by a few places only.
     """

@@ -229,10 +229,10 @@ def landed_share(table: DiagnosisTable) -> Array:
 
 def inspection_of(table: DiagnosisTable) -> Places:
     """Number of the inspection of each row: of one gear at one number of landings and on one day,
-    so far as told, shape (n,).
+    so far as known, shape (n,).
     """
-    told = {"gear_landings", "day"} & set(table.quantities)
-    parts = [np.nan_to_num(table.quantities[name], nan=-1.0) for name in told]
+    known = {"gear_landings", "day"} & set(table.quantities)
+    parts = [np.nan_to_num(table.quantities[name], nan=-1.0) for name in sorted(known)]
     whole = np.column_stack([gears_of(table), *parts])
     found: Places = np.unique(whole, axis=0, return_inverse=True)[1].ravel()
     return found
@@ -270,16 +270,16 @@ def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
     gears = gears_of(table)
     kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
     worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
-    told = np.where(landed[:, None], readings, np.nan)[:, worn]
-    told = np.where(np.isfinite(told).any(axis=0), told, readings[:, worn])
-    declared = np.broadcast_to(table.gauge_u_in[:, None] ** 2, told.shape)
+    dated = np.where(landed[:, None], readings, np.nan)[:, worn]
+    dated = np.where(np.isfinite(dated).any(axis=0), dated, readings[:, worn])
+    declared = np.broadcast_to(table.gauge_u_in[:, None] ** 2, dated.shape)
     says = written(table).take(worn)
-    own = wear_history(told, gears, kilo, declared, says)
+    own = wear_history(dated, gears, kilo, declared, says)
     every = {f.name: np.zeros(readings.shape) for f in fields(own)}
     every["shown_in"] = readings.copy()
     for name, values in every.items():
         values[:, worn] = getattr(own, name)
-    unsaid = np.isfinite(readings[:, worn]) & ~np.isfinite(told)
+    unsaid = np.isfinite(readings[:, worn]) & ~np.isfinite(dated)
     every["shown_in"][:, worn] = np.where(unsaid, readings[:, worn], own.shown_in)
     return WearHistory(**every), kilo, landed
 
@@ -321,7 +321,7 @@ def wear_history(
     share = np.ones(y.shape[1])
     far = np.ones(y.shape)
     seen = (read > 0.0) / (read > 0.0).sum(axis=0)
-    told = many.sum(axis=0) >= _LEAST_ROWS
+    enough = many.sum(axis=0) >= _LEAST_ROWS
     lines = unsure = np.empty(0)
     fitted = y
     for step in range(_ROUNDS):
@@ -349,9 +349,9 @@ def wear_history(
             np.sum(many * ((1.0 - part) ** 2 * square + (1.0 - part) * worn) / declared, axis=0)
             / size
         )
-        scatter = np.where(told, larger, scatter)
+        scatter = np.where(enough, larger, scatter)
         if step >= _SETTLED:
-            share = np.where(told, np.minimum(better, 1.0), share)
+            share = np.where(enough, np.minimum(better, 1.0), share)
         level = np.maximum(fitted, least)
     expected = lines[0][gears] + lines[1][gears] * x
     found = (

@@ -49,8 +49,8 @@ class Conclusion:
         """Names of which one is sure, and none of them alone."""
         names = tuple(n for n in self.listed if n in self.either)
         alone = any(self.listed[n] >= self.beliefs.sure for n in names)
-        told = len(names) > 1 and not alone and self.any_of(names) >= self.beliefs.sure
-        return names if told else ()
+        is_sure = len(names) > 1 and not alone and self.any_of(names) >= self.beliefs.sure
+        return names if is_sure else ()
 
     @cached_property
     def _standing_out(self) -> tuple[Key, ...]:

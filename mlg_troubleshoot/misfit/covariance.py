@@ -128,7 +128,7 @@ class NoiseModel:
         product[before] -= alike[:, None] * fresh[row]
         return np.asarray(product / self.relative[:, None])
 
-    def beside(self, effects_in: Array) -> NoiseModel:
+    def with_effects(self, effects_in: Array) -> NoiseModel:
         """Add effects of unknown size, each at one standard deviation."""
         return replace(self, loadings=np.hstack([self.loadings, effects_in / self.scale_in]))
 

@@ -47,7 +47,7 @@ def basis_of(columns: Array, tolerance: float = 1e-7) -> Array:
     return np.asarray(left[:, values > tolerance * values[0]])
 
 
-def beside(columns: Array, fixed: Array) -> tuple[Array, Mask]:
+def project_out(columns: Array, fixed: Array) -> tuple[Array, Mask]:
     """Whitened columns less what fixed ones absorb, and whether enough is left to be tested."""
     basis = basis_of(fixed)
     left = columns - basis @ (basis.T @ columns)
@@ -59,7 +59,7 @@ def beside(columns: Array, fixed: Array) -> tuple[Array, Mask]:
 
 def design_of(columns: Array, nuisance: Array) -> Design:
     """Find untestable suspects and alias classes from whitened sensitivities."""
-    left, seen = beside(columns, nuisance)
+    left, seen = project_out(columns, nuisance)
     own = np.linalg.norm(left, axis=0)
     testable = [int(k) for k in np.flatnonzero(seen)]
     unit = left / np.where(own > 0.0, own, 1.0)

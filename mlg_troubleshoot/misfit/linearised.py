@@ -13,7 +13,7 @@ from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.conclusion import Conclusion
 from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
-from mlg_troubleshoot.misfit.design import Design, beside, design_of
+from mlg_troubleshoot.misfit.design import Design, design_of, project_out
 from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
 from mlg_troubleshoot.misfit.fitting import Fit, fit
 from mlg_troubleshoot.misfit.posterior import posterior
@@ -91,12 +91,12 @@ class JudgedPoint:
 
     def linear(self, chosen: Sequence[int], context: int) -> Fit:
         """Fit changes of some suspects in their trials, as far as the columns say."""
-        noise = self.noise.beside(self.contexts[context].shared_in)
+        noise = self.noise.with_effects(self.contexts[context].shared_in)
         return fit(noise, self.columns[:, list(chosen)], self.point.whole / self.unit)
 
     def settled(self, chosen: Sequence[int], context: int) -> NoiseModel:
         """Noise with the likeliest scatter between groups, and the discrepancy of a context."""
-        noise = self.noise.beside(self.contexts[context].shared_in)
+        noise = self.noise.with_effects(self.contexts[context].shared_in)
         return noise.with_tails(self.linear(chosen, context).tail_ratio)
 
 
@@ -227,14 +227,14 @@ class Study:
             noise, unit = self.readings.noise(scale, free)
             point = self._fit(point.values, (), noise.with_tails(0.0), unit)
             columns = point.columns / unit[:, None]
-            _left, seen = beside(columns[:, : self.count], columns[:, self.count :])
+            _left, seen = project_out(columns[:, : self.count], columns[:, self.count :])
             self.design = self.design.within(seen)
         return point
 
     def _look_again(self, point: FittedPoint, unit: Array) -> None:
         """Ask for suspects that did nothing at the nominal values and do something here."""
         columns = point.columns / unit[:, None]
-        _left, seen = beside(columns[:, : self.count], columns[:, self.count :])
+        _left, seen = project_out(columns[:, : self.count], columns[:, self.count :])
         idle = ~np.any(self.nominal.columns[:, : self.count] != 0.0, axis=0)
         new = set(np.flatnonzero(seen & idle).tolist()) - self.design.testable
         self.design = Design((*self.design.classes, *((k,) for k in sorted(new))))

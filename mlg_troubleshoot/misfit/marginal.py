@@ -256,13 +256,13 @@ class Marginal:
             scale = self.products.noise.scale_in
             held, data, inner = (part[-1] for part in self._corrected)
             size = self.effects.size[places] / scale
-            beside = held[:, places] * size
+            cross = held[:, places] * size
             own = np.eye(len(places))
             for row, k in enumerate(members):
                 own[row] += size[row] * self.products.cross(k)[-1, places] * size
             along = size * self.products.along[-1, places]
             product = np.column_stack([inner, data])
-            product -= beside @ np.linalg.solve(own, np.column_stack([beside.T, along]))
+            product -= cross @ np.linalg.solve(own, np.column_stack([cross.T, along]))
             square = product[:, :-1]
             along = product[:, -1]
             self._corrections[members] = self.context.correction(

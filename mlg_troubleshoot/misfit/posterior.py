@@ -121,7 +121,7 @@ class _Search:
         return self._alone[key]
 
     def extend(self, context: int, members: frozenset[int]) -> None:
-        """Ask for every further effect beside a set; one variant of a name acts, not two."""
+        """Ask for every further effect given a set; one variant of a name acts, not two."""
         key = context, members
         if key in self.extended:
             return
@@ -275,7 +275,7 @@ class _Search:
             if about.shared_in.shape[1] and total > 1e-3:
                 left = self.data - self.effects.kept.take(places) @ at.own.values
                 independent = about.independent_in
-                wide = self.noise.beside(independent)
+                wide = self.noise.with_effects(independent)
                 expected += total * wide.share_of(independent, left)
         acting = np.array([name is not None for name in self.effects.names], bool)
         expected += self.effects.kept.times(np.where(acting, size, 0.0))

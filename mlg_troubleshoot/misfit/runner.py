@@ -55,7 +55,7 @@ class Runner:
     parameters.
 
     channels: names of the outputs where the readings have names. call: a function like ``map`` that
-    makes several calls at once. failed: calls without a number for each reading, told: the first
+    makes several calls at once. failed: calls without a number for each reading, reasons: the first
     of them with their parameters. silent: parameters around whose value no call gives numbers.
     """
 
@@ -83,7 +83,7 @@ class Runner:
         self.high = np.array([np.inf if s.high is None else s.high for s in suspects])
         self.progress: Callable[[], object] = lambda: None
         self.calls = self.failed = 0
-        self.told: list[str] = []
+        self.reasons: list[str] = []
         self.silent = set[int]()
         self._asked: dict[bytes, Array] = {}
 
@@ -104,7 +104,7 @@ class Runner:
                 self.failed += 1
                 why = repr(predicted) if isinstance(predicted, Exception) else "not finite"
                 given = ", ".join(f"{name}={value:.6g}" for name, value in parameters.items())
-                self.told += [f"{given}: {why}"]
+                self.reasons += [f"{given}: {why}"]
         if new:
             self.progress()
 
@@ -152,7 +152,7 @@ class Runner:
             place = f"row {self.row[bad[0]]}, output {self.output[bad[0]]}"
             raise UsageError(
                 f"The simulation gives no number for {len(bad)} of {len(self.row)} readings at the"
-                f" nominal values, the first at {place} (counted from 0); {self.told[0]}",
+                f" nominal values, the first at {place} (counted from 0); {self.reasons[0]}",
                 "set these readings to NaN or correct the simulation",
             )
         return predicted
@@ -200,7 +200,7 @@ class Runner:
             s = self.suspects[min(which)]
             raise UsageError(
                 f"The simulation gives no number for all readings at {s.nominal:g} ±"
-                f" {abs(s.trial):g} of {s.name}; {self.told[0]}",
+                f" {abs(s.trial):g} of {s.name}; {self.reasons[0]}",
                 f"give {s.name} a smaller trial, or correct the simulation",
             )
 
@@ -307,7 +307,7 @@ class _Normal:
 
 
 def least_squares(columns: Array, data: Array) -> Array:
-    """Least squares with columns of one length; what cannot be told is spread, not enlarged."""
+    """Least squares with columns of one length; what is not determined is spread, not enlarged."""
     size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0.0, size, 1.0)
     found = np.linalg.lstsq(columns / size, data, rcond=1e-7)[0]
@@ -340,9 +340,9 @@ def held_out(
         known = unknown = free
         if free.shape[1]:
             values, across = np.linalg.eigh(free[train].T @ free[train])
-            told = values > _KNOWN**2 * max(float(values[-1]), 1e-300)
-            known = free @ across[:, told]
-            unknown = free @ across[:, ~told]
+            determined = values > _KNOWN**2 * max(float(values[-1]), 1e-300)
+            known = free @ across[:, determined]
+            unknown = free @ across[:, ~determined]
         both = np.hstack([chosen, known])
         if both.shape[1]:
             left[test] -= both[test] @ least_squares(both[train], rest[train])

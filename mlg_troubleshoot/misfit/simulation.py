@@ -61,7 +61,7 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     predict : callable
         Takes the parameters by name, returns the prediction of all rows and outputs, shape (n, m),
         or a mapping or DataFrame of channels by name. Where it raises an ArithmeticError, a
-        ValueError or a RuntimeError, or returns NaN, the values are avoided, counted and told;
+        ValueError or a RuntimeError, or returns NaN, the values are avoided, counted and reported;
         other exceptions are passed on.
     measured : array_like, shape (n, m) or (n,), or mapping or DataFrame of channels, each (n,)
         Readings, NaN where not read.
@@ -188,7 +188,7 @@ def _diagnosed(study: Study, most_calls: int) -> SimulationDiagnosis:
 
 
 def _causes(study: Study, at: JudgedPoint) -> list[int]:
-    """Suspects that are sure, and beside a discrepancy also those that take away most of the misfit
+    """Suspects that are sure, and given a discrepancy also those that take away most of the misfit
     where they act; without those that make held-out rows worse, and those whose interval
     contains the nominal value.
     """
@@ -285,9 +285,9 @@ class _Report:
         run = self.study.runner
         names = self.study.runner.names
         others = [j for j in self.causes if j != k]
-        told = float(at.linear([k, *others], at.likeliest.context).values[0])
-        change = told * run.trial[k]
-        whole = at.point.columns[:, k] * told
+        size = float(at.linear([k, *others], at.likeliest.context).values[0])
+        change = size * run.trial[k]
+        whole = at.point.columns[:, k] * size
         if k in self.causes:
             change = self.final.values[k] - run.nominal[k]
             without = np.where(np.arange(len(names)) == k, run.nominal, self.final.values)
@@ -403,7 +403,7 @@ class _Report:
         if run.failed:
             notes.append(
                 f"{run.failed} of {run.calls} calls gave no number for some reading, the first"
-                f" with {run.told[0]}."
+                f" with {run.reasons[0]}."
             )
         return tuple(notes)
 

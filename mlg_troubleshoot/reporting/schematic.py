@@ -531,9 +531,9 @@ def _callout(
     # From the marker's edge outwards until the label's box clears it, in every direction and at
     # several distances.
     with np.errstate(divide="ignore"):
-        beside = width / 2 / np.abs(_COSINES)
+        sideways = width / 2 / np.abs(_COSINES)
         above = height / 2 / np.abs(_SINES)
-    clears = np.minimum(beside, above)
+    clears = np.minimum(sideways, above)
     reach = _MARKER + 2 + _RINGS[:, None] + clears
     x = (joint.real + _COSINES * reach).ravel()
     y = (joint.imag + _SINES * reach).ravel()

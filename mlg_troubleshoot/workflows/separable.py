@@ -39,7 +39,7 @@ from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.design import TESTABLE, beside
+from mlg_troubleshoot.misfit.design import TESTABLE, project_out
 from mlg_troubleshoot.records.headers import Joints, parse_canonical
 from mlg_troubleshoot.units import LengthUnit
 
@@ -172,7 +172,7 @@ class _Plan:
 
         white = whitened(effects)
         level = whitened(np.ones((len(table), 1)))
-        left, seen = beside(white, level)
+        left, seen = project_out(white, level)
         size = np.linalg.norm(left, axis=0)
         self.sign = np.array([c.cause.sign for c in found])
         direction = np.where(self.sign == 0, 1, self.sign)
@@ -196,7 +196,7 @@ class _Plan:
         for key, blocks in tried.items() if all(tried.values()) else ():
             effects = blocks[_MIDDLE].effects_in
             size = float(np.sqrt(np.sum(effects**2) / len(table)))
-            self.blocks[key] = beside(whitened(effects), level)[0] / size
+            self.blocks[key] = project_out(whitened(effects), level)[0] / size
 
     def tests(self, key: Key) -> bool:
         return key in self.keys or key in self.blocks

@@ -118,7 +118,7 @@ def test_what_is_known_beforehand_shrinks_a_fit_as_bayes_says() -> None:
 
 def test_effects_of_unknown_size_explain_what_is_expected_of_them_given_the_data() -> None:
     effects, data = 0.6 * RNG.standard_normal((N, 2)), RNG.standard_normal(N)
-    wide = replace(NOISE, scale_in=1.5).beside(effects)
+    wide = replace(NOISE, scale_in=1.5).with_effects(effects)
     low = wide.factors(wide.tail_ratios[-1])
     whole = 1.5**2 * (np.diag(wide.relative**2) + low @ low.T)
     assert wide.share_of(effects, data) == pytest.approx(

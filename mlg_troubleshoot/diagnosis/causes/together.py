@@ -167,14 +167,14 @@ class JointFactors(Cause):
 
 
 class LoadDirections(JointFactors):
-    """Load rests each pin beside its worst direction, by an angle of its own that is the same in
+    """Load holds each pin away from its worst direction, by an angle of its own that is the same in
     all gears.
     """
 
     name: ClassVar[str] = "load_directions"
     bounds: ClassVar[tuple[float, float]] = (-1.0, 1.0)
     sentence: ClassVar[str] = (
-        "Load rests the pins beside their worst directions: readings are smaller than the bound,"
+        "Load holds the pins away from their worst directions: readings are smaller than the bound,"
         " joint by joint"
     )
     inspect: ClassVar[str] = (
