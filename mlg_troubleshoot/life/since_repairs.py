@@ -69,7 +69,10 @@ def since_repairs(
     if store is not None:
         for key, kept in _kept(store):
             repairs[key].append(kept)
-    if not repairs and not any(isinstance(row, Inspection) and row.is_repaired for row in rows):
+    worked_on = (
+        isinstance(r, Inspection) and (r.restored_joints or r.rigging_checked) for r in rows
+    )
+    if not repairs and not any(worked_on):
         return rows
     counting: list[Inspection | InvalidRow] = []
     failed = _failed(rows, store)
