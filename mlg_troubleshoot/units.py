@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Self
 
 from mlg_troubleshoot.errors import UsageError
 
@@ -22,26 +23,29 @@ DAYS_PER_YEAR = 365.25
 
 
 class LengthUnit(StrEnum):
-    """A unit that a length may be entered in."""
+    """A unit that a length may be entered in.
 
-    INCH = "in"
-    THOU = "thou"
-    MILLIMETRE = "mm"
+    per_inch: how many of this unit make one inch. words: the unit in full, in the plural.
+    decimals: that show a length to about 0.0001 in.
+    """
 
-    @property
-    def per_inch(self) -> float:
-        """How many of this unit make one inch."""
-        return {"in": 1.0, "thou": THOU_PER_IN, "mm": MM_PER_IN}[self.value]
+    per_inch: float
+    words: str
+    decimals: int
 
-    @property
-    def words(self) -> str:
-        """The unit in full, in the plural."""
-        return {"in": "inches", "thou": "thou", "mm": "millimetres"}[self.value]
+    INCH = "in", 1.0, "inches", 4
+    THOU = "thou", THOU_PER_IN, "thou", 1
+    MILLIMETRE = "mm", MM_PER_IN, "millimetres", 3
 
-    @property
-    def decimals(self) -> int:
-        """Decimals that show a length to about 0.0001 in."""
-        return {"in": 4, "thou": 1, "mm": 3}[self.value]
+    def __new__(
+        cls, name: str, per_inch: float = 1.0, words: str = "", decimals: int = 4
+    ) -> Self:
+        unit = str.__new__(cls, name)
+        unit._value_ = name
+        unit.per_inch = per_inch
+        unit.words = words
+        unit.decimals = decimals
+        return unit
 
     @property
     def spellings(self) -> tuple[str, ...]:
@@ -106,25 +110,24 @@ SLIPS: dict[str, Slip] = {
 class ClearanceConvention(StrEnum):
     """What a clearance reading is a reading of. There is no default: the factor 2 flips
     verdicts.
+
+    per_radial: how many of such a reading make one radial clearance, 1 or 2. meaning: in a
+    technician's words.
     """
 
-    RADIAL = "RADIAL"
-    DIAMETRAL = "DIAMETRAL"
-    TOTAL_PLAY = "TOTAL_PLAY"
+    per_radial: float
+    meaning: str
 
-    @property
-    def per_radial(self) -> float:
-        """How many of a reading in this convention make one radial clearance: 1 or 2."""
-        return 1.0 if self is ClearanceConvention.RADIAL else 2.0
+    RADIAL = "RADIAL", 1.0, "offset of the pin centre from the hole centre (half the play)"
+    DIAMETRAL = "DIAMETRAL", 2.0, "hole diameter minus pin diameter"
+    TOTAL_PLAY = "TOTAL_PLAY", 2.0, "dial reading from one limit to the other"
 
-    @property
-    def meaning(self) -> str:
-        """The convention in a technician's words."""
-        return {
-            "RADIAL": "offset of the pin centre from the hole centre (half the play)",
-            "DIAMETRAL": "hole diameter minus pin diameter",
-            "TOTAL_PLAY": "dial reading from one limit to the other",
-        }[self.value]
+    def __new__(cls, name: str, per_radial: float = 1.0, meaning: str = "") -> Self:
+        convention = str.__new__(cls, name)
+        convention._value_ = name
+        convention.per_radial = per_radial
+        convention.meaning = meaning
+        return convention
 
     @classmethod
     def parse(cls, text: str) -> ClearanceConvention:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Gear, JointSpec
 
 
 class Action(StrEnum):
@@ -114,16 +114,18 @@ def minutes_to_measure(
     gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()
 ) -> float:
     """Minutes to read joints, opening an area once where it is not open."""
-    return _opening(gear, joints, opened) + sum(gear.joint(n).access.value for n in joints)
+    specs = [gear.joint(n) for n in joints]
+    return _opening(gear, specs, opened) + sum(spec.access.value for spec in specs)
 
 
 def minutes_to_restore(
     gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()
 ) -> float:
     """Minutes to restore joints, opening an area once where it is not open."""
-    return _opening(gear, joints, opened) + sum(gear.joint(n).restore.value for n in joints)
+    specs = [gear.joint(n) for n in joints]
+    return _opening(gear, specs, opened) + sum(spec.restore.value for spec in specs)
 
 
-def _opening(gear: Gear, joints: Sequence[int], opened: frozenset[str]) -> float:
-    names = {gear.joint(n).area for n in joints} - opened
+def _opening(gear: Gear, specs: Sequence[JointSpec], opened: frozenset[str]) -> float:
+    names = {spec.area for spec in specs} - opened
     return sum(area.access.value for area in gear.areas if area.name in names)

@@ -79,12 +79,10 @@ class LinkageModel:
             high = strokes[min(least + 1, 100)]
         return float(direction * travel_in / (direction * self.mid - along[least]))
 
-    def numbers(self, changed: Mapping[str, Any] | None) -> Sequence[Any] | None:
+    def numbers(self, changed: Mapping[str, Any]) -> Sequence[Any]:
         """The linkage's numbers with some changed by name, for the kernel; arrays broadcast with
         the virtual links.
         """
-        if not changed:
-            return None
         values: list[Any] = self.kernel.parameters.tolist()
         for name, value in changed.items():
             values[self.kernel.parameter_index(name)] = value
@@ -102,7 +100,7 @@ class LinkageModel:
         """
         at = self.stroke[1] if stroke is None else stroke
         zero = self.mid if stroke is None else self.kernel.output(at, self.kernel.no_clearance())
-        moved = self.kernel.output(at, links, self.numbers(changed)) - zero
+        moved = self.kernel.output(at, links, self.numbers(changed) if changed else None) - zero
         return self.rate * moved
 
     def plunger(self, stroke: Any, links: Sequence[Any] | None = None) -> Array:
