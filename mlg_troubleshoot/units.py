@@ -37,9 +37,7 @@ class LengthUnit(StrEnum):
     THOU = "thou", THOU_PER_IN, "thou", 1
     MILLIMETRE = "mm", MM_PER_IN, "millimetres", 3
 
-    def __new__(
-        cls, name: str, per_inch: float = 1.0, words: str = "", decimals: int = 4
-    ) -> Self:
+    def __new__(cls, name: str, per_inch: float = 1.0, words: str = "", decimals: int = 4) -> Self:
         unit = str.__new__(cls, name)
         unit._value_ = name
         unit.per_inch = per_inch

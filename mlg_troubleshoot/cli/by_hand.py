@@ -168,7 +168,8 @@ def advice_for(
             return None
         if advice.stop and left:
             return f"{advice.text} Type done.", None
-        joint = next((worth.joint for worth in advice.worth if worth.joint in left), None)
+        useful = (worth.joint for worth in advice.worth if worth.joint in left)
+        joint = next(useful, None)
         if joint is None:
             return None
         return f"Most useful next reading: {gear.joint(joint).label}.", joint

@@ -337,7 +337,8 @@ class Run:
         if before is not None:
             if not is_same(before, result):
                 supersede(self._place, before, result, self._asked)
-            added = Kept(1, 0, tuple(warnings_of(self._place, [(before.tail_no, before.side)])))
+            warnings = warnings_of(self._place, [(before.tail_no, before.side)])
+            added = Kept(1, 0, tuple(warnings))
         else:
             with stages(quiet=self._wanted.quiet) as bar:
                 progress = partial(bar, "Keeping")

@@ -152,7 +152,8 @@ class _Course:
             short_form(self.values, self.file.name).closes()
         except TroubleshootError as error:
             # "file: key.name: what": a point that nothing locates lacks a link.
-            key = error.message.partition(": ")[2].split(":")[0].split(".")[0]
+            named = error.message.partition(": ")[2]
+            key = named.split(":")[0].split(".")[0]
             asked = [question[0] for question in _QUESTIONS]
             lacks_link = key not in asked or "nothing locates" in error.message
             state = asked.index("links" if lacks_link else key)

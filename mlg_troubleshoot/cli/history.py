@@ -335,7 +335,8 @@ def rerig(
     from mlg_troubleshoot.workflows import history
 
     place = records.kept
-    record = history.work(place, RecordKind.RERIG, (tail, side), day, work_order, landings)
+    gear_key = (tail, side)
+    record = history.work(place, RecordKind.RERIG, gear_key, day, work_order, landings)
     _say_added(place, f"re-rigging of {record.tail_no} {record.side}", record)
 
 
@@ -474,7 +475,8 @@ def export(*, file: Chain, records: options.Records, force: options.Force = Fals
     lines = list(records.kept.export())
     # An export of another store may be all that is left of it.
     own = OutputKind.marked("is not an export of this store", lines[0] if lines else "")
-    claim(None, (), [OutputFile("the export", file, own)], store=records.store, force=force)
+    export = OutputFile("the export", file, own)
+    claim(None, (), [export], store=records.store, force=force)
     write_text(file, "".join(lines))
     output.say(f"Written: {file}, {len(lines)} records.")
 

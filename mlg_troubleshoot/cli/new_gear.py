@@ -106,5 +106,6 @@ def draw(
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.outputs import OutputFile
 
-    claim(context.obj, (), [OutputFile("the drawing", file, DRAWING)], force=force)
+    drawing = OutputFile("the drawing", file, DRAWING)
+    claim(context.obj, (), [drawing], force=force)
     output.write(f"Drawn: {load_gear(context.obj).plot().save(file)}")

@@ -91,7 +91,8 @@ def abandon_stdout() -> None:
     """Drop what is still to be written to stdout: the reader of the pipe went away, the work goes
     on.
     """
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
 
 
 class DataConsole(Console):

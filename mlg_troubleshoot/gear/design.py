@@ -72,7 +72,8 @@ class DesignSpace:
             x = point.x
             y = point.y
             if point.plane == base and is_elsewhere:
-                turned = complex(x - held.x, y - held.y) * np.exp(1j * back)
+                arm = complex(x - held.x, y - held.y)
+                turned = arm * np.exp(1j * back)
                 moved = turned + place
                 x = moved.real
                 y = moved.imag

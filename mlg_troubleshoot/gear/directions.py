@@ -142,7 +142,8 @@ def _argmax_on_circle(sampled: Array) -> Array:
             slope -= (k + 1) * (real[k] * sines[k] + imaginary[k] * cosines[k])
             curvature -= (k + 1) ** 2 * (real[k] * cosines[k] - imaginary[k] * sines[k])
         concave = curvature < 0.0
-        angle = angle - np.where(concave, slope / np.where(concave, curvature, 1.0), 0.0)
+        divisor = np.where(concave, curvature, 1.0)
+        angle = angle - np.where(concave, slope / divisor, 0.0)
     return angle
 
 
@@ -218,6 +219,7 @@ def chance_beyond(
             moved = moved + offset_in[part, None]
         within = np.abs(moved) <= margin[part, None]
         tried = within.shape[1]
-        held = np.count_nonzero(np.broadcast_to(within, (len(c), tried)), axis=1)
+        each = np.broadcast_to(within, (len(c), tried))
+        held = np.count_nonzero(each, axis=1)
         chance[part] = 1.0 - held / tried
     return chance

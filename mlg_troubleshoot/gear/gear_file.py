@@ -540,7 +540,10 @@ def _add_numbers(table: GeometryTable, numbers: _Numbers) -> None:
 def linkage_of(table: GeometryTable, name: str) -> Linkage:
     """The linkage that the tables of a gear file describe."""
     drive = table.input
-    points = (Point(p.name, p.plane, *p.at, p.fixed, p.virtual_link) for p in table.points)
+    points = (
+        Point(each.name, each.plane, *each.at, each.fixed, each.virtual_link)
+        for each in table.points
+    )
     read = table.output
     mechanism = Mechanism(
         tuple(plane.plane() for plane in table.planes),
@@ -575,7 +578,8 @@ def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
     file = read_toml(path, EnsembleFile)
     full = {}
     for name, member in file.content.members.items():
-        new: dict[str, Any] = deepcopy({k: raw.get(k) for k in _GEOMETRY_KEYS})
+        geometry = {key: raw.get(key) for key in _GEOMETRY_KEYS}
+        new: dict[str, Any] = deepcopy(geometry)
         new["input"].update(range=list(member.range), reference=member.reference)
         changes: dict[str, Mapping[str, Mapping[str, object]]] = {
             "points": {point: {"at": list(at)} for point, at in member.points.items()},

@@ -346,7 +346,9 @@ class _Builder:
         if point in self.form.ground:
             return number
         own = self.steps[point]
-        users = (s for s in self.steps.values() if point in (s.get("upstream"), s.get("pin")))
+        users = (
+            step for step in self.steps.values() if point in (step.get("upstream"), step.get("pin"))
+        )
         user = next(users, None)
         step = own if own["type"] in ("dyad", "slider", "guide") else user or own
         if step["type"] == "slot" and step is own:

@@ -167,7 +167,9 @@ class Range:
             number = Interval.exactly(other)
             return self._each(lambda bounds: bounds * number)
         crossed = self.slope[:, None] * other.slope[None]
-        turned = Interval(crossed.low.swapaxes(0, 1), crossed.high.swapaxes(0, 1))
+        low = crossed.low.swapaxes(0, 1)
+        high = crossed.high.swapaxes(0, 1)
+        turned = Interval(low, high)
         return Range(
             self.value * other.value,
             self.slope * other.value + other.slope * self.value,
@@ -239,7 +241,8 @@ def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area:
         inverse = (cross & (ux * vy - uy * vx).value).inverse()
         slopes = _implicit_slopes(u, v, inverse, a, b, grown)
         c = [replace(p, slope=p.slope & slope) for p, slope in zip(c, slopes, strict=True)]
-        first = _dot(u, [p.bend for p in a]) + grown.bend - _link_rotation(c, a)
+        turned = _link_rotation(c, a)
+        first = _dot(u, [p.bend for p in a]) + grown.bend - turned
         second = _dot(v, [p.bend for p in b]) - _link_rotation(c, b)
         bends = _solved(u, v, inverse, first, second)
         c = [replace(p, bend=p.bend & bend) for p, bend in zip(c, bends, strict=True)]
@@ -295,7 +298,8 @@ def _implicit_slopes(
 ) -> Bounds:
     """Gradients of the joint from the equations of length; u and v are the links."""
     first = _dot(u, [p.slope for p in a]) + grown.slope
-    return _solved(u, v, inverse, first, _dot(v, [p.slope for p in b]))
+    second = _dot(v, [p.slope for p in b])
+    return _solved(u, v, inverse, first, second)
 
 
 def _as_range(part: Any, like: Range) -> Range:

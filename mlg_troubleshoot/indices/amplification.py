@@ -170,7 +170,8 @@ class _Chain:
         output = self.mechanism.output
         if output.kind == "position":
             return 1.0
-        arm = (self.place[output.joint] - self.place[output.pivot])[-1]
+        arms = self.place[output.joint] - self.place[output.pivot]
+        arm = arms[-1]
         return float(1.0 / np.linalg.norm(arm))
 
     def _entry(self, number: int) -> Step:

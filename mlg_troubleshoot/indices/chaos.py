@@ -79,7 +79,8 @@ def chaos_indices(
     checks = np.concatenate([held, corners])
     # Points of the first fit: enough for the second degree, or for a good one where variables are
     # few.
-    points = _latin(rng, max(128, 2 * len(total_degree(n, 2))), n)
+    count = max(128, 2 * len(total_degree(n, 2)))
+    points = _latin(rng, count, n)
     values = response(np.concatenate([checks, points]))
     check_values = values[: len(checks)]
     values = values[len(checks) :]

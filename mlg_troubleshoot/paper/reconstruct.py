@@ -146,7 +146,8 @@ class _Search:
                 misses = [_miss(target, facts.measure(target)) for target in self.targets]
         except (MechanismError, ValueError, np.linalg.LinAlgError):
             misses = [_FAR] * len(self.targets)
-        finite = np.nan_to_num(np.array(misses), nan=_FAR, posinf=_FAR, neginf=-_FAR)
+        found = np.array(misses)
+        finite = np.nan_to_num(found, nan=_FAR, posinf=_FAR, neginf=-_FAR)
         return np.concatenate([finite, sense])
 
     def loss(self, vector: Array) -> float:
@@ -221,7 +222,8 @@ class _Search:
             determined = int(np.count_nonzero(sizes > 1e-6))
             free = np.linalg.norm(turned[determined:], axis=0)
             order = np.argsort(-free)[:5].tolist()
-            loosest = tuple((self.space.names[i], float(free[i])) for i in order)
+            names = self.space.names
+            loosest = tuple((names[i], float(free[i])) for i in order)
         return Reconstruction(linkage, met, len(vector), determined, loosest, self.tried, seed)
 
     def _binding_slopes(self, vector: Array, met: tuple[Computed, ...]) -> Array:

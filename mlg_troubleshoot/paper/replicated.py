@@ -79,7 +79,8 @@ def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> Wholes:
     Returns, shape (n1, n2, n): levels from 0. [1]
     """
     levels = np.tile(np.arange(n2, dtype=np.int64), (n1, n, 1))
-    return np.ascontiguousarray(rng.permuted(levels, axis=2).transpose(0, 2, 1))
+    permuted = rng.permuted(levels, axis=2)
+    return np.ascontiguousarray(permuted.transpose(0, 2, 1))
 
 
 def middle_of_level(levels: Wholes, n2: int) -> Array:
@@ -194,7 +195,8 @@ def replicated_first_order(
         try:
             rng = np.random.default_rng(stream)
             rows = first_order_design(n, design.n1, design.n2, ccd, rng)
-            values = response(rows.points.reshape(-1, n)).reshape(design.n1, -1)
+            values = response(rows.points.reshape(-1, n))
+            values = values.reshape(design.n1, -1)
             evaluations += values.size
             failed += count_failed(values)
             found.append(_group_shares(values, rows.places))

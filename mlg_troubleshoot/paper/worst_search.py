@@ -68,7 +68,8 @@ def certified_bound(
         examined += boxes.low.shape[1]
         boxes, bounds, smear = search.contract(boxes)
         within = bounds <= search.best + _GAP_IN
-        settled = max(settled, float(np.max(bounds[within], initial=-np.inf)))
+        largest = np.max(bounds[within], initial=-np.inf)
+        settled = max(settled, float(largest))
         if not np.all(within):
             # The most promising box comes last and is taken next.
             waiting = _joined(waiting, *_halves(boxes[:, ~within], smear[:, ~within]))

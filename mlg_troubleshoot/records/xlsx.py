@@ -253,7 +253,8 @@ class _Rows(WorkSheetParser):
         value = element.findtext(VALUE_TAG)
         formula = element.find(FORMULA_TAG) is not None
         if value or formula:
-            cell = self._value(element.get("t", "n"), element.get("s"), value)
+            kind = element.get("t", "n")
+            cell = self._value(kind, element.get("s"), value)
         else:
             inline = element.find(INLINE_STRING)
             cell = None if inline is None else _text(inline)

@@ -196,7 +196,8 @@ def nice_ticks(low: float, high: float, about: int = 5) -> list[float]:
         return [low]
     raw = span / max(about, 1)
     power = 10.0 ** math.floor(math.log10(raw))
-    step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= raw * 0.999)
+    steps = (multiple * power for multiple in (1.0, 2.0, 5.0, 10.0))
+    step = next(each for each in steps if each >= raw * 0.999)
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
     return [k * step for k in range(first, last + 1)]
@@ -205,7 +206,8 @@ def nice_ticks(low: float, high: float, about: int = 5) -> list[float]:
 def decimals_of(ticks: Sequence[float]) -> int:
     if len(ticks) < 2:
         return 3
-    return max(0, -math.floor(math.log10(ticks[1] - ticks[0]) + 1e-9))
+    step = ticks[1] - ticks[0]
+    return max(0, -math.floor(math.log10(step) + 1e-9))
 
 
 @dataclass(frozen=True, slots=True)

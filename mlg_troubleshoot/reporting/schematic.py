@@ -212,7 +212,8 @@ class _PlaneDrawing:
         for name in sorted(names):
             offset = self.mechanism.reference_in_space(name) - origin
             self.points[name] = complex(offset @ axes[0], offset @ axes[1])
-        self.cut = {s.upstream: s.joint for s in self.steps if isinstance(s, Dyad) and s.driven}
+        driven = [s for s in self.steps if isinstance(s, Dyad) and s.driven]
+        self.cut = {s.upstream: s.joint for s in driven}
         self._shorten()
         places = self.points.values()
         if places:
@@ -247,7 +248,10 @@ class _PlaneDrawing:
         canvas = Canvas(width, height, f"Linkage schematic, {name}", said)
         # Upward in the plane is to lower numbers on the canvas.
         corner = complex(side, (height + _ABOVE - _BELOW + self.size.imag * scale) / 2)
-        at = {n: corner + scale * (p - self.low).conjugate() for n, p in self.points.items()}
+        at = {
+            name: corner + scale * (point - self.low).conjugate()
+            for name, point in self.points.items()
+        }
 
         canvas.text(2, 11, name, size=10.5, bold=True, colour=SOFT)
         segments = self._links(canvas, at)
@@ -465,7 +469,9 @@ def _named(canvas: Canvas, place: complex, name: str, anchor: Anchor) -> None:
 def _ground(canvas: Canvas, place: complex) -> None:
     _polygon(canvas, place, place + (12 + 19j), place + (-12 + 19j), fill=PAPER, width=1.4)
     for k in range(-2, 3):
-        _line(canvas, place + complex(5 * k + 1, 19), place + complex(5 * k - 3, 24))
+        above = place + complex(5 * k + 1, 19)
+        below = place + complex(5 * k - 3, 24)
+        _line(canvas, above, below)
 
 
 def joint_state(finding: JointFinding) -> JointState:

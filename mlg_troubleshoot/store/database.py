@@ -380,7 +380,8 @@ class Store:
             if not self._postgres:
                 for trigger in _TRIGGERS.values():
                     connection.exec_driver_sql(trigger)
-        found = connection.scalar(sql.select(sql.func.max(_meta.c.schema_version)))
+        newest = sql.select(sql.func.max(_meta.c.schema_version))
+        found = connection.scalar(newest)
         if not isinstance(found, int) or not 1 <= found <= SCHEMA_VERSION:
             raise StoreError(
                 f"store {self.place} has schema version {found!r}, and this program knows"
@@ -622,7 +623,8 @@ class Store:
             if not self._ready:
                 return []
             wanted = sql.select(*_COLUMNS).where(_records.c.kind == kind.value)
-            rows = connection.execute(wanted.order_by(_records.c.seq.desc()).limit(most))
+            newest = wanted.order_by(_records.c.seq.desc()).limit(most)
+            rows = connection.execute(newest)
             return [self._record(row) for row in rows]
 
     def all(self) -> list[Record]:

@@ -44,7 +44,8 @@ class Drafts:
             ).scalar()
             if before is not None and before not in writers:
                 return False
-            last = connection.scalar(sql.select(sql.func.max(DRAFTS.c.saved))) or 0
+            newest = sql.select(sql.func.max(DRAFTS.c.saved))
+            last = connection.scalar(newest) or 0
             connection.execute(DRAFTS.delete().where(DRAFTS.c.draft_id == draft.id))
             row = {
                 "owner": draft.owner,

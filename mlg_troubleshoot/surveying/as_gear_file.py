@@ -36,7 +36,8 @@ def surveyed_values(before: Mapping[str, Any], found: Survey, source: str) -> di
     linkage = found.linkage
     mode = found.modes[0]
     new = member_values(linkage.linkage(np.round(mode.vector, _DECIMALS), "A"))
-    spread = dict(zip(linkage.names, np.std(found.draws, axis=0), strict=True))
+    deviations = np.std(found.draws, axis=0)
+    spread = dict(zip(linkage.names, deviations, strict=True))
     sources = values["sources"]
 
     def put(
@@ -114,7 +115,8 @@ def assemblies(found: Survey) -> tuple[str, ...]:
         if len({m.sides for m in modes}) == 1:
             moved = np.abs(mode.vector - modes[0].vector)
             moved[found.linkage.angles] = 0.0
-            name = found.linkage.names[int(np.argmax(moved))].split(".")[0]
+            farthest = int(np.argmax(moved))
+            name = found.linkage.names[farthest].split(".")[0]
             parts = [
                 (
                     Sentence.of(

@@ -76,7 +76,8 @@ class _Design:
         self.pool = (*linkage.candidates(), *taken)
         u = np.array([r.u for r in self.pool])
         with np.errstate(all="ignore"):
-            slopes = linkage.slopes(self.pool, points)[1] / u[:, None] @ prior.root
+            _, slopes = linkage.slopes(self.pool, points)
+            slopes = slopes / u[:, None] @ prior.root
             wanted = linkage.log_slopes(points, quantity) @ prior.root
         sound = np.isfinite(slopes).all(axis=(1, 2))
         sound &= np.isfinite(wanted).all(axis=(1, 2))
@@ -127,7 +128,8 @@ class _Design:
         known = self.slopes[:, rows]
         before = (known @ covariance * known).sum(axis=2)[:, :, None]
         held = 1.0 - before + (known @ moved) ** 2 / size
-        held = np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0)
+        held = np.concatenate([held, 1.0 / size], axis=1)
+        held = np.maximum(held, 0.0)
         checks = np.log(held + tuned.LOOSE).sum(axis=1)
         variances = np.maximum(wanted, 0.0) + tuned.WELL_KNOWN**2
         unknown = np.log(variances).sum(axis=1)

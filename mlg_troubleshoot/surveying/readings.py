@@ -246,7 +246,8 @@ class SurveyedLinkage:
                         }
                     )
                     apart = places[r.start] - places[r.end]
-                    found[:, i] = np.sqrt((apart * apart).sum(axis=-1))
+                    squared = (apart * apart).sum(axis=-1)
+                    found[:, i] = np.sqrt(squared)
                 case ReadingKind.PLUNGER:
                     found[:, i] = curve[:, extensions.index(r.extension)]
                 case ReadingKind.ANGLE:
@@ -261,7 +262,8 @@ class SurveyedLinkage:
                 case ReadingKind.TRAVEL:
                     found[:, i] = vectors[:, -1]
                 case ReadingKind.ORDER:
-                    found[:, i] = np.log(self.amplification(vectors)).mean(axis=1)
+                    indices = self.amplification(vectors)
+                    found[:, i] = np.log(indices).mean(axis=1)
         return found
 
     def slopes(self, readings: Readings, vectors: Array) -> tuple[Array, Array]:

@@ -138,7 +138,8 @@ class Prior:
         self.members = members
         self.linkage = linkage
         points = gear.reference.mechanism.points
-        size = float(np.std([c for p in points for c in (p.x, p.y)]))
+        coordinates = [c for p in points for c in (p.x, p.y)]
+        size = float(np.std(coordinates))
         alone = np.where(angles, np.radians(tuned.ALONE_ANGLE), tuned.ALONE_SIZE * size)
         least = tuned.LEAST_SPREAD * alone
         if linkage.travel is not None:
@@ -290,10 +291,12 @@ class Fitting:
             weight = _robust(r)[1] if robust else np.ones_like(r)
             g = np.where(here.kept[..., None], g, 0.0) @ self.prior.root
             # A position that does not close pulls nowhere.
-            bad = ~(np.isfinite(g).all(axis=2) & np.isfinite(r))
+            sound = np.isfinite(g).all(axis=2) & np.isfinite(r)
+            bad = ~sound
             r = np.where(bad, 0.0, r)
             g = np.where(bad[..., None], 0.0, g)
-            gram = np.swapaxes(g, 1, 2) @ (weight[..., None] * g) + np.eye(n)
+            weighted = weight[..., None] * g
+            gram = np.swapaxes(g, 1, 2) @ weighted + np.eye(n)
             down = (
                 np.einsum("smi,sm->si", g, weight * r)
                 + (here.points - here.means) @ self.prior.whiten.T
@@ -303,7 +306,8 @@ class Fitting:
                 at = moving[left]
                 trial = here[left]
                 damped = gram[left] + damping[at, None, None] * np.eye(n)
-                step = np.linalg.solve(damped, down[left][..., None])[..., 0]
+                solved = np.linalg.solve(damped, down[left][..., None])
+                step = solved[..., 0]
                 step = np.where(np.isfinite(step), step, 0.0) @ self.prior.root.T
                 trial = replace(trial, points=trial.points - step)
                 new = self.loss(trial, widened, robust)
@@ -421,8 +425,10 @@ class Fitting:
             # with.
             loss = self.loss(near, widened, True)
             order = np.argsort(loss.reshape(count, -1), axis=1)
-            best = order[:, : tuned.FITTED_AGAIN] + tried * np.arange(count)[:, None]
-            around.append(self.descend(near[best.ravel()], widened, tuned.REHEAT_STEPS, True))
+            first = tried * np.arange(count)[:, None]
+            best = order[:, : tuned.FITTED_AGAIN] + first
+            tried_again = near[best.ravel()]
+            around.append(self.descend(tried_again, widened, tuned.REHEAT_STEPS, True))
         fits = Fits.joined(*around)
         fits = replace(fits, kept=np.ones_like(fits.kept))
         for steps, most in (
@@ -431,7 +437,8 @@ class Fitting:
         ):
             fits = self.descend(fits, 1.0, steps, True)
             # A few readings may be fitted by what does not move over its stroke.
-            loss = np.where(self.linkage.closes(fits.points), fits.loss, np.inf)
+            closes = self.linkage.closes(fits.points)
+            loss = np.where(closes, fits.loss, np.inf)
             loss += tuned.EXCHANGE_LOSS * fits.noise.any(axis=1)
             fits = replace(fits, loss=loss)
             fits = fits[self._apart(fits, most)]
@@ -452,7 +459,8 @@ class Fitting:
         """Least squares on the readings kept, from every point; each mode with its Laplace
         posterior and evidence.
         """
-        fits = self.descend(self.begun(points, means, kept), 1.0, tuned.LAST_STEPS, False)
+        begun = self.begun(points, means, kept)
+        fits = self.descend(begun, 1.0, tuned.LAST_STEPS, False)
         points = fits.points
         loss = fits.loss
         residuals, slopes = self.linear(points)
@@ -488,7 +496,8 @@ class Fitting:
             return ()
         share = np.exp(np.array(evidence) - max(evidence))
         share /= share.sum()
-        order = [int(k) for k in np.argsort(-share) if share[k] > tuned.LEAST_WEIGHT]
+        likeliest = np.argsort(-share).tolist()
+        order = [k for k in likeliest if share[k] > tuned.LEAST_WEIGHT]
         return tuple(replace(modes[k], weight=float(share[k])) for k in order)
 
     def _sides(self, point: Array) -> tuple[int, ...]:
@@ -531,7 +540,8 @@ class Fitting:
                 across = np.array([np.cos(step.axis), np.sin(step.axis)])
             else:
                 base = np.array(m.seen_in_plane(plane, step.upstream, step.downstream))
-                across = np.array([-base[1], base[0]]) / np.hypot(*base)
+                across = np.array([-base[1], base[0]])
+                across = across / np.hypot(*base)
             far = float(arm @ across)
             if np.sqrt(
                 across @ best.covariance[i : i + 2, i : i + 2] @ across
@@ -612,7 +622,8 @@ class Fitting:
         variance = 1.0 + slopes[i] @ column
         covariance = mode.covariance - np.outer(column, column) / variance
         rows = np.flatnonzero(kept | (np.arange(len(kept)) == i))
-        residual = np.eye(len(rows)) - slopes[rows] @ covariance @ slopes[rows].T
+        explained = slopes[rows] @ covariance @ slopes[rows].T
+        residual = np.eye(len(rows)) - explained
         at = int(np.flatnonzero(rows == i)[0])
         variances = residual[at, at] * np.diag(residual)
         alike = residual[at] ** 2 / np.clip(variances, 1e-12, None)
@@ -773,7 +784,8 @@ def fit(
     if len(readings) < tuned.FEW * len(linkage.names):
         readings = (*readings, prior.order)
     fitting = Fitting(linkage, prior, readings)
-    starts = np.concatenate([prior.members, prior.closing(tuned.STARTS, rng, readings)])
+    drawn = prior.closing(tuned.STARTS, rng, readings)
+    starts = np.concatenate([prior.members, drawn])
     fits = fitting.reheated(fitting.begun(fitting.robust(starts)), rng)
     progress(1, tuned.STAGES)
     kept = fitting.trusted(fits)

@@ -159,7 +159,8 @@ class WearModel(Result):
             found = np.concatenate(
                 [end.follow(ascending, last, known, rng, reading=reading) for end in ends]
             )
-            samples = found.transpose(1, 3, 0, 2).reshape(*ascending.shape, -1)
+            ordered = found.transpose(1, 3, 0, 2)
+            samples = ordered.reshape(*ascending.shape, -1)
             places = np.argsort(order, axis=1)
             back = np.take_along_axis(samples, places[:, :, None], axis=1)
             parts.append(self.scale.start + self.scale.value * back)
@@ -181,7 +182,10 @@ class WearModel(Result):
         wear = self.forecast(units, last + ahead, reading=False).samples
         # Wear that falls passes its limit from above.
         up = np.sign(self.scale.value)
-        passed = [first_passage(ahead, up * w, up * c) for w, c in zip(wear, limits, strict=True)]
+        passed = [
+            first_passage(ahead, up * value, up * limit)
+            for value, limit in zip(wear, limits, strict=True)
+        ]
         samples = last + np.stack(passed)
         return Samples(samples[0] if isinstance(unit, str) else samples)
 
@@ -218,7 +222,8 @@ class WearModel(Result):
         for is_gamma in (False, True):
             draws = every.take(every.gamma[:, 0] == is_gamma)
             if len(draws.start):
-                ends.append(_Ends.drawn(draws, follow(steps, draws)[1], repeats, rng))
+                _, states = follow(steps, draws)
+                ends.append(_Ends.drawn(draws, states, repeats, rng))
         return ends
 
 

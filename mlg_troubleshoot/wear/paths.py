@@ -124,7 +124,8 @@ def scale_of(paths: Sequence[WearPath]) -> Scale:
     """
     known_paths = (path for path in paths if path.n_readings)
     read = [(np.asarray(path.usage), np.asarray(path.value)) for path in known_paths]
-    everything = np.concatenate([*(value for _usage, value in read), np.empty(0)])
+    values = [value for _usage, value in read]
+    everything = np.concatenate([*values, np.empty(0)])
     reach = max((float(usage[-1]) for usage, _value in read), default=0.0) or 1.0
     first = [value[0] for _usage, value in read]
     start = float(np.median(first)) if first else 0.0

@@ -101,7 +101,8 @@ def _log_posterior(member: Member, steps: Steps, resolution: float) -> Callable[
             parts.append(follow(steps, draws)[0].sum(axis=1))
         likelihood = np.nan_to_num(np.concatenate(parts), nan=-1e12, neginf=-1e12)
         z = (theta - mean) / sd
-        prior = -0.5 * z**2 - np.log(sd) - 0.5 * np.log(2.0 * np.pi)
+        prior = -0.5 * z**2
+        prior = prior - np.log(sd) - 0.5 * np.log(2.0 * np.pi)
         posterior: Array = likelihood + prior.sum(axis=1)
         return posterior
 
@@ -142,7 +143,8 @@ def _student(centre: Array, root: Array, n: int, rng: np.random.Generator) -> tu
     p = len(centre)
     z = rng.standard_normal((n, p))
     chi = rng.chisquare(_FREEDOM, n)
-    theta = centre + (z * np.sqrt(_FREEDOM / chi)[:, None]) @ root.T
+    widened = z * np.sqrt(_FREEDOM / chi)[:, None]
+    theta = centre + widened @ root.T
     return theta, _student_density(theta, centre, root)
 
 
@@ -150,7 +152,8 @@ def _student_density(theta: Array, centre: Array, root: Array) -> Array:
     p = len(centre)
     off = np.linalg.solve(root, (theta - centre).T)
     half = (_FREEDOM + p) / 2.0
-    constant = gammaln(half) - gammaln(_FREEDOM / 2.0) - 0.5 * p * np.log(_FREEDOM * np.pi)
+    constant = gammaln(half) - gammaln(_FREEDOM / 2.0)
+    constant -= 0.5 * p * np.log(_FREEDOM * np.pi)
     log_det = np.log(np.abs(np.diag(root))).sum()
     squares = (off**2).sum(axis=0)
     density: Array = constant - log_det - half * np.log1p(squares / _FREEDOM)
@@ -199,7 +202,8 @@ def posterior(
     owner = np.repeat(np.arange(len(kinds)), counts)
     # Systematic resampling.
     quantiles = (np.arange(count) + rng.uniform()) / count
-    chosen = np.searchsorted(np.cumsum(share), quantiles).clip(max=len(share) - 1)
+    chosen = np.searchsorted(np.cumsum(share), quantiles)
+    chosen = chosen.clip(max=len(share) - 1)
     first = np.cumsum([0, *counts])
     parts = []
     for k, member in enumerate(kinds):

@@ -120,7 +120,8 @@ def under_a_free_id(made: Inspection, store: Store) -> Inspection:
     """An inspection whose id was made from the second of its entry: with a number behind it where
     the gear has another inspection of that id.
     """
-    kept = [r for r in store.of_gear(*key_of(made)) if r.kind is RecordKind.INSPECTION]
+    records = store.of_gear(*key_of(made))
+    kept = [r for r in records if r.kind is RecordKind.INSPECTION]
     by_id = {record.record_id: record for record in kept}
     free = made
     number = 1

@@ -51,7 +51,8 @@ def reconstruct_linkage(
             f"{known.name} has no linkage {start!r}", f"Give one of {', '.join(linkages)}."
         )
     begin = None if start is None else linkages[start]
-    found = reconstruct(known, wanted, np.random.default_rng(seed), seed, begin, minutes, progress)
+    rng = np.random.default_rng(seed)
+    found = reconstruct(known, wanted, rng, seed, begin, minutes, progress)
     text = tomli_w.dumps({"members": {name: member_values(found.linkage)}})
     if out is not None:
         write_text(out, _HEADING + text)

@@ -164,7 +164,8 @@ class _Plan:
         effects[:, [not _speaks_for_all(c, table) for c in found]] = 0.0
         tails = TAIL_RATIOS[1] * (table.tails[:, None] == np.unique(table.tails))
         tails = np.hstack([tails, rows.along_in / ROW_IN])
-        common = np.linalg.cholesky(np.eye(len(table)) + tails @ tails.T)
+        covariance = np.eye(len(table)) + tails @ tails.T
+        common = np.linalg.cholesky(covariance)
         # A slope of the prediction is a cause of its own; a shift of all rows is not.
 
         def whitened(x: Array) -> Array:
@@ -186,7 +187,8 @@ class _Plan:
         for k in np.flatnonzero(seen):
             self.keys.setdefault(_key(found[k]), []).append(int(k))
         self.stand_ins = {_key(c) for c in found if c.stands_in}
-        often = _BELIEFS.expected / (len({name for name, _target in self.keys}) + 1.0)
+        names = {name for name, _target in self.keys}
+        often = _BELIEFS.expected / (len(names) + 1.0)
         self.found = _BELIEFS.seen_from(often / 2.0, len(table))
         self.row_in = ROW_IN / float(np.sqrt(len(table)))
         causes = [c for c in CATALOGUE if isinstance(c, JointFactors)]
@@ -213,7 +215,8 @@ class _Plan:
         """
         if key in self.blocks:
             rival = next(other for other in self.blocks if other != key)
-            lead = partial(_divergence, true=self.blocks[key], other=self.blocks[rival])
+            theirs = self.blocks[rival]
+            lead = partial(_divergence, true=self.blocks[key], other=theirs)
             return rival[0], _size_of(lead, 0.5 * _APART**2)
         best = 0.0
         name = None
@@ -243,7 +246,8 @@ class _Plan:
         return self.found * self._row(key)
 
     def _row(self, key: Key) -> float:
-        return self.row_in * float(np.min(self.hidden[self.keys[key]]))
+        hidden = self.hidden[self.keys[key]]
+        return self.row_in * float(np.min(hidden))
 
 
 def _divergence(size_in: float, true: Array, other: Array) -> float:

@@ -108,7 +108,8 @@ def survey(
     rng = np.random.default_rng(seed)
     cases = _clearances(inspections, known)
     readings, problems, digest = read_survey(table, linkage)
-    members = linkage.amplification(np.array([linkage.vector(each) for each in known.ensemble]))
+    vectors = np.array([linkage.vector(each) for each in known.ensemble])
+    members = linkage.amplification(vectors)
     before = np.quantile(members, [0.05, 0.95], axis=0).T
     found = fit(known, readings, rng, on_progress) if readings else None
     warnings: tuple[str, ...] = ()
@@ -184,7 +185,10 @@ def _clearances(file: Source | None, gear: Gear) -> list[tuple[str, Array]]:
             "Run mlg check on it and correct what it names.",
         )
     return [
-        (each.record_id, np.array([each.clearance_in.get(n) or 0.0 for n in gear.joint_numbers]))
+        (
+            each.record_id,
+            np.array([each.clearance_in.get(n) or 0.0 for n in gear.joint_numbers]),
+        )
         for each in read.inspections
     ]
 
@@ -198,7 +202,8 @@ def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:
     targets = targets_file(before)
     if not targets.exists():
         return ()
-    left = [n for n in verify(load_gear(path), targets) if n.target.expected and not n.holds]
+    numbers = verify(load_gear(path), targets)
+    left = [n for n in numbers if n.target.expected and not n.holds]
     return tuple(
         f"{n.target.quantity}: the paper prints {n.target.printed}, "
         f"this gear has {n.computed:.4g} {n.target.unit}".rstrip()
@@ -213,7 +218,8 @@ def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
 
     ensemble, indices = _beside(path)
     names = {"id": path.stem, "ensemble": ensemble.name, "indices": indices.name}
-    values = {**surveyed_values(read_toml(gear.path, GearFile).values, found, source), **names}
+    before = read_toml(gear.path, GearFile).values
+    values = {**surveyed_values(before, found, source), **names}
     values["provenance"] = f"surveyed ({len(found.read)} readings, {source})"
     drawn = {
         "source": f"Drawn from the posterior of survey {source}.",

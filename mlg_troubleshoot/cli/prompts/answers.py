@@ -163,7 +163,8 @@ class Answers:
     def inspection(self, gear: Gear, record_id: str) -> Inspection:
         from mlg_troubleshoot.records import ReadOptions, admit
 
-        read = admit(self._row(gear, record_id), ReadOptions.of(gear, asks=True))
+        options = ReadOptions.of(gear, asks=True)
+        read = admit(self._row(gear, record_id), options)
         confirmed = [f"#{n}" for n, answer in sorted(self.joints.items()) if answer.confirmed]
         said = CONFIRMED + ", ".join(confirmed)
         return replace(read, warnings=(*read.warnings, said)) if confirmed else read
@@ -173,7 +174,8 @@ class Answers:
         from mlg_troubleshoot.records import ReadOptions
         from mlg_troubleshoot.records.gate import judge_row
 
-        read, _ = judge_row(self._row(gear, "-"), ReadOptions.of(gear, asks=True))
+        options = ReadOptions.of(gear, asks=True)
+        read, _ = judge_row(self._row(gear, "-"), options)
         return read.unit_question if isinstance(read, Inspection) else ""
 
     def _row(self, gear: Gear, record_id: str) -> dict[str, object]:
@@ -244,7 +246,8 @@ def judge(
         )
     if number not in read.entered:
         return JudgedReading()
-    return JudgedReading(Sentence.joined(read.warnings), parse_length(read.entered[number].text))
+    written = parse_length(read.entered[number].text)
+    return JudgedReading(Sentence.joined(read.warnings), written)
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:

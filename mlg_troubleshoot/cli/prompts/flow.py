@@ -228,12 +228,14 @@ class Flow:
         if yes:
             return self._on_with(saved, state.answers)
         turn = self._offer_visit(state.answers)
-        return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.PUT_AWAY)
+        state = replace(turn.state, saved=saved)
+        return replace(turn, state=state, effect=Effect.PUT_AWAY)
 
     def _on_with(self, saved: Session, given: Answers) -> Turn[State]:
         answers = saved.answers.completed_from(given)
         turn = self._read_anew(answers, remarks=self._resumed(saved.answers))
-        return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.RESUME)
+        state = replace(turn.state, saved=saved)
+        return replace(turn, state=state, effect=Effect.RESUME)
 
     def _next(self, state: State, typed: str) -> Turn[State]:
         """What follows a result, now or at the next visit."""
@@ -264,7 +266,8 @@ class Flow:
             given = visit.with_both_readings(given)
         spent = visit.spent(given, self.today)
         said = pages.minutes_left(given, spent)
-        return replace(turn, state=replace(turn.state, answers=spent), lines=(*turn.lines, *said))
+        state = replace(turn.state, answers=spent)
+        return replace(turn, state=state, lines=(*turn.lines, *said))
 
     def _added(self, state: State, kept: Answers, typed: str) -> Turn[State]:
         """Take an optional answer that is added to a kept inspection."""
@@ -430,7 +433,8 @@ class Flow:
         """How far all joints at their limits could push the plunger: what is farther is asked
         again. [in]
         """
-        return float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
+        at_limits = worst_case(self.gear.model, self.gear.limits_in[None])
+        return float(at_limits.magnitude_in[0])
 
     def _detail(self, state: State, typed: str) -> Turn[State]:
         column = str(state.at)
@@ -516,7 +520,8 @@ class Flow:
             return self._go_on(answers)
         if answers.more:
             return self._go_on(visit.answers.with_more(**answers.more))
-        return Turn(State(Ask.NEXT, answers, visit=visit), pages.visit_lines(visit, self.gear))
+        state = State(Ask.NEXT, answers, visit=visit)
+        return Turn(state, pages.visit_lines(visit, self.gear))
 
     def _resumed(self, answers: Answers) -> tuple[Line, ...]:
         return (line((f"Resumed: {pages.identity(answers)}, ", Tone.GOOD), self._heading(answers)),)
