@@ -68,7 +68,7 @@ class Approach(StrEnum):
 
 
 class RiggingCheck(StrEnum):
-    """Whether rigging and lock roller were looked at; set right counts as a repair."""
+    """Whether rigging and lock roller were checked; corrected counts as a repair."""
 
     NO = "no"
     YES = "yes"
@@ -168,7 +168,7 @@ class Inspection(Result):
         When they were restored, the plunger was read and the outcome was seen; a `datetime` states
         the time.
     rigging_checked : RiggingCheck or None
-        Whether rigging and lock roller were looked at, or set right on `repair_date`.
+        Whether rigging and lock roller were checked, or corrected on `repair_date`.
     measured_again : tuple of int
         Joints that were measured a second time, with another gauge.
     cannot_reach, no_spare : tuple of int

@@ -161,8 +161,8 @@ def _text(
     also = f" Chance that rigging or lock roller moved the plunger: {percent(not_clearance)}."
     if not_clearance > 0.8 and looked:
         return (
-            "The joints hardly explain where the plunger stands"
-            f" ({percent(1.0 - not_clearance)}), and rigging and lock roller were looked at."
+            "The joints are unlikely to explain the plunger position"
+            f" ({percent(1.0 - not_clearance)}), and rigging and lock roller were checked."
         )
     if not_clearance > 0.8:
         return (

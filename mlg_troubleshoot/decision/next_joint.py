@@ -104,5 +104,5 @@ def advise(
         expected=(found if found is not Verdict.INCONCLUSIVE else None)
         if complete
         else enough(ahead.within, ahead.too_close),
-        text=text if reads else f"Nothing is to be measured now. {text}",
+        text=text if reads else f"No measurement is needed now. {text}",
     )

@@ -41,7 +41,7 @@ GO_ON = {
     End.OUTSIDE_NO_COMPLAINT: (
         "Go on: clearances could contribute, but no failure is recorded. Engineering decides."
     ),
-    End.CANNOT_CLEAR: f"Go on to engineering: no {_SET_THAT_HOLDS}",
+    End.CANNOT_CLEAR: f"Refer the gear to engineering: no {_SET_THAT_HOLDS}",
 }
 
 
@@ -54,12 +54,12 @@ FAILED_AND_UNREAD = (
     " plunger is read within its margin."
 )
 _BEYOND_NOT_EXPLAINED = (
-    "Joint clearances do not explain where the plunger stands: the cause is rigging or the lock"
-    " roller first, then the plunger gauge and parts outside the listed joints."
+    "Joint clearances do not explain the plunger position: suspect rigging or the lock roller"
+    " first, then the plunger gauge and parts outside the listed joints."
 )
 _BEYOND_AND_LOOKED = (
-    "Joint clearances do not explain where the plunger stands, and the rigging was looked at: go on"
-    " to engineering."
+    "Joint clearances do not explain the plunger position, and rigging and lock roller were"
+    " checked: refer the gear to engineering."
 )
 STOP_FOR_TODAY = (
     f"{STOP}: what would decide takes longer than the minutes that are left. Hand over what"
@@ -107,7 +107,7 @@ def check_rigging(stands_in: float | None, as_new: Sequence[int]) -> Sentence:
     stands = (
         ""
         if stands_in is None
-        else Sentence.of(" The plunger stands {} off.", Length(stands_in, sign=True))
+        else Sentence.of(" The plunger is {} off.", Length(stands_in, sign=True))
     )
     said = Sentence.of(
         "Check rigging and lock roller.{} Enter rigging_checked: yes or corrected.", stands
@@ -143,7 +143,7 @@ def look_again(inspection: Inspection) -> str:
 
 
 def open_question(unread: Sequence[int], over: Sequence[int]) -> str | None:
-    """What the day does not allow to settle."""
+    """What cannot be settled today."""
     said = []
     if unread:
         are = "cannot be reached and is" if len(unread) == 1 else "cannot be reached and are"
@@ -167,15 +167,13 @@ def never_read(unread: Sequence[int], minutes: float) -> str:
 
 def stop_without_spares(joints: Sequence[int]) -> str:
     """Step CONTINUE where joints over their limit cannot be restored today."""
-    are = "is" if len(joints) == 1 else "are"
     return (
-        f"{STOP}: {joint_list(joints)} {are} to be restored and cannot be. Hand over what"
-        " stays open."
+        f"{STOP}: {joint_list(joints)} must be restored but cannot be. Hand over what stays open."
     )
 
 
 def does_not_fit(step: Step, left: float, before: str | None) -> str:
-    """What stays open because the minutes of the day do not reach."""
+    """What stays open because the minutes of the day do not suffice."""
     said = f"To {step.words} takes {step.minutes:.0f} min; {left:.0f} min are left today."
     return f"{said} {before}" if before else said
 
@@ -301,7 +299,8 @@ def inconclusive(margin_in: float, said: Predicted, p_within: float) -> Sentence
     """Headline of INCONCLUSIVE."""
     what = "the plunger" if said.loaded else "the bound"
     return Sentence.of(
-        "Too close to the margin of {} to say ({}; probability that {} is within the margin {}).",
+        "Too close to the margin of {} to decide ({}; probability that {} is within the margin"
+        " {}).",
         Length(margin_in),
         said.words,
         what,

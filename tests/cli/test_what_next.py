@@ -46,7 +46,7 @@ def test_what_the_plan_expects_stands_below_with_its_minutes_and_its_end(failure
 
 
 def test_nothing_else_is_to_be_measured_while_next_is_the_plunger(failure: str) -> None:
-    assert "Nothing is to be measured now. Next: read the plunger." in failure
+    assert "No measurement is needed now. Next: read the plunger." in failure
 
 
 def test_the_quickest_repair_is_shown_with_what_it_leaves() -> None:

@@ -189,7 +189,7 @@ def test_the_chance_of_wear_is_that_of_sampling_the_same_model(gear: Gear) -> No
 
 @pytest.mark.parametrize(
     ("looked", "said"),
-    [(None, "Rigging or lock roller"), (RiggingCheck.YES, "rigging and lock roller were looked")],
+    [(None, "Rigging or lock roller"), (RiggingCheck.YES, "rigging and lock roller were checked")],
 )
 def test_a_rigging_that_was_looked_at_is_not_named_again(
     gear: Gear, looked: RiggingCheck | None, said: str

@@ -318,7 +318,7 @@ def test_where_the_plan_measures_nothing_one_may_stop(judge: Judge) -> None:
     found = judge(every_joint(0.004), advice=True).measuring
     assert found is not None
     assert (found.stop, found.verdict) == (True, Verdict.OUTSIDE_MARGIN)
-    assert found.text.startswith("Nothing is to be measured now.")
+    assert found.text.startswith("No measurement is needed now.")
 
 
 def test_the_next_joint_is_the_first_that_the_plan_measures(judge: Judge) -> None:

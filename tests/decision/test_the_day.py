@@ -109,7 +109,7 @@ def test_no_joint_is_read_where_the_one_that_explains_it_waits_for_its_spare(jud
     assert judge(read, **FAILED).next_action.action is Action.RESTORE
     waits = judge(read, **FAILED, no_spare=(3,))
     assert [step.action for step in waits.plan.steps] == [Action.CONTINUE]
-    assert waits.next_action.text.startswith("Stop for today: #3 is to be restored and cannot be.")
+    assert waits.next_action.text.startswith("Stop for today: #3 must be restored but cannot be.")
     assert "#3 is over the limit and cannot be restored today" in (waits.plan.open_question or "")
 
 

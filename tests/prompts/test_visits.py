@@ -329,7 +329,7 @@ def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionS
 def test_next_of_an_earlier_visit_is_said_in_the_unit_of_its_readings(visit: Visit) -> None:
     visit(*SOUND)
     visit(*GEAR, "y", "36")
-    assert "The plunger stands +36.0 thou off." in visit(*GEAR).screen
+    assert "The plunger is +36.0 thou off." in visit(*GEAR).screen
 
 
 def test_a_result_of_the_prompts_names_no_column_of_a_file(

@@ -53,7 +53,10 @@ def what_follows(a: Assessment) -> str | None:
 
     rest = [words(step) for step in a.plan.steps[1:-1]]
     return Sentence.of(
-        "Expected after that: {}{}{}", ", ".join(rest), ". " if rest else "", a.plan.steps[-1].text
+        "Expected after that: {}{}{}",
+        ", ".join(rest),
+        ". At the end: " if rest else "",
+        a.plan.steps[-1].text,
     )
 
 
