@@ -141,6 +141,11 @@ class _Search:
         """Logarithmic posterior of the likeliest set so far."""
         return max(found.own.log_posterior for found in self.extended.values())
 
+    def _best_of(self, kind: bool) -> float:
+        """The same of the sets in a context, or of those in none."""
+        own = (e.own for e in self.extended.values() if bool(e.own.context) == kind)
+        return max((found.log_posterior for found in own), default=-np.inf)
+
     def run(self, start: Sequence[Explanation]) -> None:
         """Extend the likeliest sets, with a context and without, then take every step from the
         leading ones.
@@ -188,7 +193,7 @@ class _Search:
 
     def _nearest(self, kind: bool) -> tuple[int, frozenset[int]] | None:
         """The likeliest set that was not extended itself, in a context or in none."""
-        top = self.best - REACH
+        top = self._best_of(kind) - REACH
         found = None
         for (context, members), at in self.extended.items():
             if bool(context) != kind:

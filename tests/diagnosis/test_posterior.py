@@ -207,6 +207,19 @@ def test_no_set_within_one_step_is_likelier_than_the_one_that_is_found() -> None
         assert chance <= truth[best.context, best.members] + 1e-12
 
 
+def test_a_context_far_ahead_of_every_single_effect_does_not_hide_two_that_act_together() -> None:
+    rng, n = np.random.default_rng(8), 60
+    columns = rng.standard_normal((n, 5))
+    both = columns[:, 0] + columns[:, 1]
+    data = 4.0 * both + rng.standard_normal(n)
+    bent = both + 0.15 * rng.standard_normal(n)
+    names: list[Key | None] = [(name, None) for name in "abcde"]
+    listed = Effects.free(columns, names, -6.0, 5.0)
+    contexts = Context.none(n), Context(("all", None), -11.0, 5.0 * bent[:, None])
+    found = posterior(NoiseModel.white(n), data, listed, contexts, Beliefs())
+    assert (found.likeliest[0].context, found.likeliest[0].members) == (0, (0, 1))
+
+
 def test_two_that_only_explain_together_are_found() -> None:
     rng, n = np.random.default_rng(4), 60
     first, rest = rng.standard_normal(n), rng.standard_normal(n)
