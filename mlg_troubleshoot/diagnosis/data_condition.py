@@ -14,6 +14,7 @@ from scipy.special import pdtrc
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
+from mlg_troubleshoot.diagnosis.blanks import BY_CHANCE, LEAST_ROWS, blanks_by_wear
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import gears_of, visits
 from mlg_troubleshoot.diagnosis.written import piles, step_of, steps_of
@@ -21,15 +22,10 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 
-# Share of rows that show a habit, that may be exceptions. [1]
-_EXCEPTIONS = 0.05
-# With fewer rows, or joints, nothing is said of them. [1]
-_LEAST_ROWS = 5
+# With fewer joints nothing is said of a row. [1]
 _LEAST_JOINTS = 5
 # Share of clearances that are known to be cut off, from which their effects are. [1]
 _MANY_CUT = 0.1
-# Chance of a false statement about the data of a table. [1]
-BY_CHANCE = 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,60 +285,34 @@ def _piled(table: DiagnosisTable) -> Iterator[DataCondition]:
 
 def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
     """Blanks that depend on what would have been read."""
-    use = np.isfinite(table.clearance_in).any(axis=1) & _at_mid(table)
-    values = table.clearance_in[use]
-    blank = np.isnan(values)
-    blank[:, blank.all(axis=0)] = False
-    partly = blank.any(axis=1)
-    if partly.sum() < _LEAST_ROWS:
-        return
-    where = "blank clearances"
-    share = float(blank.mean())
-    # Read in order until one is worn: that one is the largest.
-    joints = values.shape[1]
-    last = joints - 1 - np.argmax(~np.isnan(values)[:, ::-1], axis=1)
-    stopped = partly & (blank.sum(axis=1) == joints - 1 - last)
-    stopped &= values[np.arange(len(values)), last] >= np.nanmax(values, axis=1)
-    if stopped.sum() >= (1.0 - 2.0 * _EXCEPTIONS) * partly.sum():
+    read = np.isfinite(table.clearance_in)
+    for habit in blanks_by_wear(table):
+        if habit.below_in is None:
+            what = "joints were read until the first that is worn"
+            effect = "what the blanks add is estimated from the wear of other gears"
+            record = "every joint, also after a worn one"
+        else:
+            what = "worn joints were written, sound ones were not"
+            effect = f"each blank stands for less than {habit.below_in:.4g} in"
+            record = "every joint that was read, also the sound ones"
+        whose = f" of technician {habit.whose}" if habit.whose else ""
+        share = float(habit.cells.sum() / (read.sum() + habit.cells.sum()))
         yield DataCondition(
             "blank_not_at_random",
-            f"{where}: joints were read until the first that is worn",
+            f"blank clearances{whose}: {what}",
             share,
-            "worn joints are over-represented; what the blanks add is not known",
-            "every joint, also after a worn one",
-            doubtful=True,
+            effect,
+            record,
+            # What others read of the same joints says what the blanks hide.
+            doubtful=not habit.whose and share > _MANY_CUT,
         )
-    elif _only_worn(table, use):
-        yield DataCondition(
-            "blank_not_at_random",
-            f"{where}: worn joints were written, sound ones were not",
-            share,
-            "the blanks are smaller than what was written: names of joints and of scale may be"
-            " wrong",
-            "every joint that was read, also the sound ones",
-            doubtful=True,
-        )
-
-
-def _only_worn(table: DiagnosisTable, use: Mask) -> bool:
-    """No small value was written, and rows with fewer landings have more blanks."""
-    landings = table.quantities.get("gear_landings")
-    least = float(np.nanmin(table.clearance_in[use]))
-    if landings is None or least <= 2.0 * float(np.median(table.gauge_u_in)):
-        return False
-    # Only where it is needed: the import of scipy.stats takes as long as a diagnosis.
-    from scipy.stats import spearmanr
-
-    use = use & np.isfinite(landings)
-    blanks = np.isnan(table.clearance_in[use]).sum(axis=1)
-    return bool(spearmanr(landings[use], blanks, alternative="less").pvalue < BY_CHANCE)
 
 
 def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
     """Whether the plunger was read depends on the displacement that is predicted."""
     use = np.isfinite(table.clearance_in).any(axis=1) & _at_mid(table)
     read = np.isfinite(table.readings_in[use]).any(axis=1)
-    if min(read.sum(), (~read).sum()) < 2 * _LEAST_ROWS:
+    if min(read.sum(), (~read).sum()) < 2 * LEAST_ROWS:
         return
     over = worst_case(gear.model, np.nan_to_num(table.clearance_in[use])).over_in
     known = np.isfinite(over)

@@ -15,11 +15,12 @@ from threadpoolctl import threadpool_limits
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.bank import build_bank
+from mlg_troubleshoot.diagnosis.blanks import BY_CHANCE
 from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
-from mlg_troubleshoot.diagnosis.data_condition import BY_CHANCE, DataCondition
+from mlg_troubleshoot.diagnosis.data_condition import DataCondition
 from mlg_troubleshoot.diagnosis.explain import (
     Finding,
     MisfitProblem,

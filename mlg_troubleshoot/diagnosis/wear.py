@@ -135,14 +135,15 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     trust = np.where(
         landed[:, None] & (both > 0.0), history.scatter_in2 / np.where(both > 0.0, both, 1.0), 1.0
     )
-    read = np.where(known, history.shown_in, history.expected_in)
+    told = np.isfinite(history.shown_in)
+    read = np.where(told, history.shown_in, history.expected_in)
     drawn = history.expected_in + trust * (read - history.expected_in)
     # A reading is never overruled by more than its own uncertainty makes likely.
     reach = FAR * np.sqrt(noise)
-    likely = np.where(known, np.clip(drawn, read - reach, read + reach), drawn)
-    spread = np.where(known, 0.0, np.sqrt(history.scatter_in2))
+    likely = np.where(told, np.clip(drawn, read - reach, read + reach), drawn)
+    variance = np.where(told, trust * noise + trust**2 * history.written_in2, history.scatter_in2)
+    spread = np.where(known, 0.0, np.sqrt(variance))
     shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))
-    variance = trust * noise + trust**2 * history.written_in2
     left = np.where(known, np.sqrt(variance + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
     common = np.zeros_like(readings)
     together = np.empty((len(readings), 0))
@@ -266,15 +267,17 @@ def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
     """Expect every joint in each row, of what was written as intervals; the landings, and which are
     known.
     """
-    readings = table.clearance_in
+    says = written(table)
+    # A blank may stand for anything below some value: what matters is its interval.
+    blank = np.isnan(table.clearance_in) & np.isfinite(says.high)
+    readings = np.where(blank, 0.5 * says.high, table.clearance_in)
     gears = gears_of(table)
     kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
     worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
     dated = np.where(landed[:, None], readings, np.nan)[:, worn]
     dated = np.where(np.isfinite(dated).any(axis=0), dated, readings[:, worn])
     declared = np.broadcast_to(table.gauge_u_in[:, None] ** 2, dated.shape)
-    says = written(table).take(worn)
-    own = wear_history(dated, gears, kilo, declared, says)
+    own = wear_history(dated, gears, kilo, declared, says.take(worn))
     every = {f.name: np.zeros(readings.shape) for f in fields(own)}
     every["shown_in"] = readings.copy()
     for name, values in every.items():

@@ -1,8 +1,9 @@
 """What a written clearance says of what the gauge showed: an interval, not a point.
 
 A value rounded to a step stands for half of it on either side, `0` for anything up to half a step,
-`<0.002` for anything below. Where a limit gauge goes in, its size may be written although the joint
-is tighter: then that value is more frequent than its neighbours lead to.
+`<0.002` for anything below, and a blank likewise where only worn joints were written. Where a limit
+gauge goes in, its size may be written although the joint is tighter: then that value is more
+frequent than its neighbours lead to.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from scipy.special import ndtr, ndtri
 
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
+from mlg_troubleshoot.diagnosis.blanks import blanks_by_wear
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.units import MM_PER_IN
 
@@ -62,8 +64,8 @@ class Pile:
 class Written:
     """Intervals of what the gauge showed, shape (n, n_joints). [in]
 
-    low, high: ends of the interval of each value. lower: how often a value below its interval is
-    written so as well. [1]
+    low, high: ends of the interval of each value; NaN of a blank that may be anything. lower: how
+    often a value below its interval is written so as well. [1]
     """
 
     low: Array
@@ -127,6 +129,10 @@ def written(table: DiagnosisTable) -> Written:
         low = np.where(table.below, 0.0, low)
         high = np.where(table.below, 2.0 * values, high)
         lower[table.below] = 0.0
+    for habit in blanks_by_wear(table):
+        if habit.below_in is not None:
+            low[habit.cells] = 0.0
+            high[habit.cells] = habit.below_in
     return Written(low, high, lower)
 
 

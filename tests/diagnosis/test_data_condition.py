@@ -17,7 +17,7 @@ from mlg_troubleshoot.diagnosis import diagnose
 from mlg_troubleshoot.diagnosis.causes import RiggingOffset
 from mlg_troubleshoot.diagnosis.data_condition import data_condition, doubt_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
-from mlg_troubleshoot.diagnosis.wear import gears_of
+from mlg_troubleshoot.diagnosis.wear import gears_of, likely_clearances
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions, read_many
@@ -110,6 +110,17 @@ def until_the_first_worn(clearance: NDArray[np.float64], _readings: NDArray[np.f
             row[worn[0] + 1 :] = np.nan
 
 
+def only_worn_of_one(clearance: NDArray[np.float64], readings: NDArray[np.float64]) -> None:
+    only_worn(clearance[1::3], readings)
+
+
+def until_the_first_worn_of_one(
+    clearance: NDArray[np.float64], readings: NDArray[np.float64]
+) -> None:
+    until_the_first_worn(clearance[1::3], readings)
+    clearance[::6, 2] = np.nan
+
+
 def copied(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
     clearance[3::12] = clearance[2::12]
 
@@ -144,6 +155,29 @@ def plunger_of_worn_gears(clearance: NDArray[np.float64], readings: NDArray[np.f
 )
 def test_what_was_done_to_the_data_is_said(gear: Gear, change: Change, kind: str) -> None:
     assert kind in kinds(changed(gear, change), gear)
+
+
+@pytest.mark.parametrize("change", [only_worn_of_one, until_the_first_worn_of_one])
+def test_blanks_not_at_random_are_said_of_the_technician_whose_they_are(
+    gear: Gear, change: Change
+) -> None:
+    (found,) = data_condition(changed(gear, change), gear)[0]
+    assert (found.kind, "of technician T-1:" in found.where) == ("blank_not_at_random", True)
+
+
+def test_where_others_read_the_same_joints_nothing_is_in_doubt(gear: Gear) -> None:
+    (found,) = data_condition(changed(gear, only_worn_of_one), gear)[0]
+    assert (found.share > 0.1, found.doubtful) == (True, False)
+
+
+def test_blanks_of_one_who_writes_only_worn_joints_are_filled_below_his_least_value(
+    gear: Gear,
+) -> None:
+    full, cut = histories(gear), changed(gear, only_worn_of_one)
+    blank = np.isnan(cut.clearance_in)
+    filled = likely_clearances(cut).likely_in
+    assert filled[blank].max() < np.nanmin(cut.clearance_in[1::3]) + 0.0001
+    assert abs(np.mean(filled[blank] - full.clearance_in[blank])) < 0.0001
 
 
 def test_blanks_at_random_are_not_remarked_on(gear: Gear) -> None:

@@ -454,6 +454,33 @@ def _until_over(scene: Scene, rows: Rows) -> Rows:
     return rows
 
 
+def _only_worn_of_one(scene: Scene, rows: Rows) -> Rows:
+    least = scene.size(0.0025, _LIMIT_IN)
+    person = scene.usual(scene.design.technician)
+    for row in rows:
+        if row["technician_id"] == person:
+            for column in CLEARANCES:
+                row[column] = row[column] if row[column] >= least else None
+    return rows
+
+
+def _until_over_of_one(scene: Scene, rows: Rows) -> Rows:
+    """One technician stops at the first joint over its limit, or half as worn; blanks of the others
+    are at random.
+    """
+    over_in = scene.size(_LIMIT_IN, 0.5 * _LIMIT_IN)
+    person = scene.usual(scene.design.technician)
+    for row in rows:
+        over = False
+        for column in CLEARANCES:
+            value = row[column]
+            own = row["technician_id"] == person
+            if over if own else scene.rng.random() < 0.02:
+                row[column] = None
+            over = over or value > over_in
+    return rows
+
+
 def _selected(mild: float, strong: float) -> Write:
     def write(scene: Scene, rows: Rows) -> Rows:
         for row in rows:
@@ -632,8 +659,12 @@ FURTHER = (
     Blemish("shared_id", act=_shared_id, near=("technician_bias",)),
     Blemish("renumbered", write=_renumbered),
 )
-#: One that acts more strongly than its like in the review.
-ADDED = (Blemish("worn_repair", act=_worn_repair),)
+#: One that acts more strongly than its like in the review, and habits of one technician.
+ADDED = (
+    Blemish("worn_repair", act=_worn_repair),
+    Blemish("mnar_one", _BLANK, write=_only_worn_of_one),
+    Blemish("stop_one", _BLANK, write=_until_over_of_one),
+)
 BLEMISHES = {blemish.name: blemish for blemish in (*LISTED, *FURTHER, *ADDED)}
 
 
