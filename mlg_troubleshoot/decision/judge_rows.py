@@ -43,7 +43,7 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.decision.wear_levels import Unread
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import Length, Sentence
 
@@ -326,6 +326,9 @@ def _warnings(
     extension: Extension | None,
 ) -> tuple[str, ...]:
     warnings = list(inspection.warnings)
+    margin_in = inspection.margin_in
+    if margin_in is not None and margin_in > gear.margin.value + ROUNDING_IN:
+        warnings.append(sentences.larger_margin(margin_in, gear.margin.value))
     lacking = () if extension is None else extension.lacks(inspection)
     if lacking:
         warnings.append(

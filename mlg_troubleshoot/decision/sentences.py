@@ -239,6 +239,16 @@ def measured(measured_in: float, margin_in: float, where: str) -> Sentence:
     )
 
 
+def larger_margin(stated_in: float, of_the_gear_in: float) -> Sentence:
+    """An inspection whose own margin allows more than that of the gear file."""
+    return Sentence.of(
+        "The margin of {} stated for this gear is larger than that of the gear file ({}): the"
+        " verdict uses the stated one. Check the entry.",
+        Length(stated_in),
+        Length(of_the_gear_in),
+    )
+
+
 def explained(explained_in: float, unexplained_in: float) -> Sentence:
     if unexplained_in <= 0.0:
         return Sentence("Joint clearances can explain all of it.")

@@ -58,6 +58,17 @@ _READ: dict[Holds, tuple[str, Callable[[str], str]]] = {
 _TEXTS = tuple(column for column in COLUMNS if not column.carried and column.holds in _READ)
 
 
+class _Entered(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
+    """A reading as it was entered; `bound` where only an end of it was found."""
+
+    text: str
+    unit: LengthUnit
+    bound: Literal["", "<", ">"] = ""
+
+
+_ENTERED = Annotated[_Entered, Meta(extra_json_schema={"description": "a text with its unit"})]
+
+
 def _table(known: Mapping[str, Any], **others: Any) -> Any:
     """A table that has the known keys and may have the others, and any key beyond them."""
     optional = [(name, kind, None) for name, kind in others.items()]
@@ -87,7 +98,7 @@ class KeptGate:
                     **{field.name: Any for field in fields(Inspection)},
                     **columns,
                     "gauge_u_is_default": bool,
-                    "entered": _BY[self._by_joint, tuple[str, LengthUnit]],
+                    "entered": _BY[self._by_joint, _ENTERED],
                     "carried": dict[str, str],
                     "warnings": tuple[str, ...],
                     "source": tuple[str | None, str | None, int | None],

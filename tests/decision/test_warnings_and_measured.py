@@ -25,6 +25,21 @@ def said(warnings: tuple[str, ...], words: str) -> bool:
     return any(words in warning for warning in warnings)
 
 
+def test_a_margin_larger_than_that_of_the_gear_file_is_said_with_both(judge: Judge) -> None:
+    found = judge(every_joint(0.004), margin_in=0.15)
+    assert said(
+        found.warnings,
+        "margin of 0.1500 in stated for this gear is larger than that of the gear file (0.0300 in)",
+    )
+
+
+@pytest.mark.parametrize("margin_in", [None, 0.028, 0.03, 0.762 / 25.4])
+def test_a_margin_up_to_that_of_the_gear_file_is_taken_without_a_word(
+    judge: Judge, margin_in: float | None
+) -> None:
+    assert not said(judge(every_joint(0.004), margin_in=margin_in).warnings, "margin of")
+
+
 @pytest.mark.parametrize("base", [0.0, 0.002, 0.006])
 def test_a_joint_above_its_limit_is_rejected_to_the_manual_whatever_the_verdict(
     judge: Judge, base: float

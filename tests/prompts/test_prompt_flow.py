@@ -915,6 +915,12 @@ def test_an_upper_end_of_a_reading_is_not_said_to_be_less_than_new_parts(flow: F
     assert "the upper end of what was found" in shown(flow, turn.state)
 
 
+def test_an_upper_end_of_a_reading_is_the_same_reading_as_in_a_file(flow: Flow) -> None:
+    read = play(flow, ["<0.002", "y", *TEN[1:]]).state.answers.inspection(flow.gear, "R1")
+    assert (read.clearance_in[1], str(read.entered[1])) == (0.002, "<0.002 in")
+    assert "joint 1: <0.002 is counted as 0.002, its upper end" in read.warnings
+
+
 def test_no_flag_is_named_at_a_prompt(flow: Flow) -> None:
     turn = play(flow, [".004"], replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE))
     assert "--" not in shown(flow, turn.state)

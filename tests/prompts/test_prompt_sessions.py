@@ -213,6 +213,14 @@ def test_a_resumed_inspection_equals_an_uninterrupted_one(
     assert resumed == straight
 
 
+def test_an_upper_end_of_a_reading_outlasts_an_interruption(
+    gear: Gear, store: SessionStore
+) -> None:
+    interrupted(gear, store, [*HEADING, "<.002", "y"])
+    resumed = inspect(gear, store, [*TEN[:9], *ENTERS, ""], saved=latest(store))
+    assert str(resumed.entered[1]) == "<.002 in"
+
+
 def test_a_resumed_inspection_stays_one_draft(gear: Gear, store: SessionStore) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     interrupted(gear, store, [".005"], saved=latest(store))

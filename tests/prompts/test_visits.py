@@ -97,6 +97,22 @@ def test_readings_of_an_earlier_visit_stand_without_being_typed_again(
     assert (after.clearance_in, after.entered) == (before.clearance_in, before.entered)
 
 
+def test_an_upper_end_of_an_earlier_visit_stands_as_it_was_read(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*GEAR, "t", "t", "<2", "y", *PLAY[1:], "f", *ENTERS, "")
+    visit(*GEAR, "y", "36")
+    assert str(life(store).inspections[-1].inspection.entered[1]) == "<2 thou"
+
+
+def test_a_margin_larger_than_that_of_the_gear_file_is_said_with_the_verdict(
+    visit: Visit, capsys: pytest.CaptureFixture
+) -> None:
+    visit(*GEAR, "t", "t", *["4"] * 10, "m 150", *ENTERS, "")
+    screen = " ".join(capsys.readouterr().out.split())
+    assert "larger than that of the gear file (30.0 thou)" in screen
+
+
 def test_a_continued_inspection_is_one_inspection_and_the_former_stays_in_the_chain(
     visit: Visit, store: SessionStore
 ) -> None:

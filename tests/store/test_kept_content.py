@@ -62,6 +62,7 @@ WRONG_INSPECTIONS = {
     "a number as a text": with_field(gear_landings="400"),
     "another day than its record": with_field(inspection_date="2026-01-03"),
     "an entry without a unit": with_field(entered={"3": ["4"]}),
+    "an entry with an end that is none": with_field(entered={"3": ["4", "thou", "~"]}),
     "a source that is none": with_field(source=["file"]),
     "remarks that are no texts": with_field(carried={"remarks": 3}),
     "no tail": {
@@ -206,6 +207,7 @@ def test_every_kind_of_record_that_the_program_keeps_is_read_again(
             remarks="größer <b>",
             gauge_u_in="0.0004",
             gauge_u_3_in="0.0002",
+            clearance_7_in="<0.002",
             axial_float_4_in="0.01",
             actuator_extension_in="0.5",
             plunger_position_in="-0.1",

@@ -246,8 +246,14 @@ def judge(
         )
     if number not in read.entered:
         return JudgedReading()
-    written = parse_length(read.entered[number].text)
+    entered = read.entered[number]
+    written = parse_reading(entered.bound + entered.text)
     return JudgedReading(Sentence.joined(read.warnings), written)
+
+
+def parse_reading(text: str) -> WrittenLength:
+    """A clearance as it was typed: ``<0.002`` where only its upper end was found."""
+    return replace(parse_length(text.removeprefix("<")), text=text)
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:

@@ -17,13 +17,20 @@ from typing import Any, Literal
 
 import msgspec
 
-from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, REST, Answers, JointAnswer
+from mlg_troubleshoot.cli.prompts.answers import (
+    MORE,
+    NOT_MEASURED,
+    REST,
+    Answers,
+    JointAnswer,
+    parse_reading,
+)
 from mlg_troubleshoot.datafile import walk
 from mlg_troubleshoot.decision.columns import MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.store import Draft, Drafts, Store, own_file
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _SCHEMA: Literal[2] = 2
 _KEPT_COMPLETE = 20
@@ -302,7 +309,7 @@ def _from_json(raw: Any) -> Session:
 def _answer(draft: JointDraft | None) -> JointAnswer:
     if draft is None:
         return NOT_MEASURED
-    written = parse_length(draft.text)
+    written = parse_reading(draft.text)
     if written.unit not in (None, draft.unit):
         raise ValueError(f"{written.text!r} does not agree with its unit {draft.unit}")
     return JointAnswer(replace(written, unit=draft.unit), draft.confirmed)

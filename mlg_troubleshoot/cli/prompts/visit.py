@@ -12,7 +12,14 @@ from datetime import date
 from types import MappingProxyType
 from typing import Any
 
-from mlg_troubleshoot.cli.prompts.answers import CONFIRMED, MORE, NOT_MEASURED, Answers, JointAnswer
+from mlg_troubleshoot.cli.prompts.answers import (
+    CONFIRMED,
+    MORE,
+    NOT_MEASURED,
+    Answers,
+    JointAnswer,
+    parse_reading,
+)
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.columns import (
     BY_NAME,
@@ -243,7 +250,7 @@ def _answer(row: Inspection, joint: int) -> JointAnswer:
     entered = row.entered.get(joint)
     if entered is not None:
         try:
-            written = parse_length(entered.text)
+            written = parse_reading(entered.bound + entered.text)
             said = next((each for each in row.warnings if each.startswith(CONFIRMED)), "")
             named = said.removeprefix(CONFIRMED).split(", ")
             return JointAnswer(replace(written, unit=entered.unit), f"#{joint}" in named)
