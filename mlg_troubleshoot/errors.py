@@ -62,7 +62,13 @@ class OutputError(TroubleshootError):
 
 
 class InconclusiveDataError(TroubleshootError):
-    """The table cannot answer the question that was asked (exit code 3)."""
+    """The table cannot answer the question that was asked (exit code 3).
+
+    notes, problems: what was seen of the table all the same.
+    """
+
+    notes: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -326,6 +326,7 @@ class NotConcluded(TypedDict):
     verdict: None
     reason: str
     remedy: str
+    warnings: list[str]
 
 
 class StudiedGear(TypedDict):

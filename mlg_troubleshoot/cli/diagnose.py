@@ -91,8 +91,11 @@ def diagnose(
             )
     except InconclusiveDataError as error:
         if shown.as_json:
-            reason = {"reason": error.message, "remedy": error.remedy}
-            output.write_json(written(NotConcluded, verdict=None, **reason))
+            said = {"remedy": error.remedy, "warnings": list(error.notes)}
+            output.write_json(written(NotConcluded, verdict=None, reason=error.message, **said))
+        elif not shown.quiet:
+            show_notes(error.notes)
+        show_problems(error.problems)
         raise
     if shown.as_json:
         warnings = (*filter(None, [asked.remembered]), *result.notes)

@@ -189,10 +189,12 @@ def _copies(table: DiagnosisTable) -> Mask:
 
 def _identical(table: DiagnosisTable) -> Mask:
     """Rows in which many joints were read and all have one value that is not zero, more than chance
-    allows of the values of the other rows.
+    allows of the values of the other rows. What is below an end of a gauge has no value of its own.
     """
     values = table.clearance_in
-    known = np.isfinite(table.clearance_in)
+    known = np.isfinite(values)
+    if table.below is not None:
+        known &= ~table.below
     low = np.where(known, values, np.inf).min(axis=1)
     count = known.sum(axis=1)
     same = (np.where(known, values, -np.inf).max(axis=1) == low) & (low > 0.0)

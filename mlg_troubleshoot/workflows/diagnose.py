@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from mlg_troubleshoot.arrays import Mask
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import InconclusiveDataError, Problem
@@ -17,9 +22,15 @@ from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
+    from mlg_troubleshoot.diagnosis import (
+        DataCondition,
+        Diagnosis,
+        DiagnosisTable,
+        ModelExtension,
+    )
     from mlg_troubleshoot.diagnosis.faults import DataFault
     from mlg_troubleshoot.misfit.beliefs import Beliefs
+    from mlg_troubleshoot.records.model import ReadResult
     from mlg_troubleshoot.records.read import Source
     from mlg_troubleshoot.reporting.publish import WrittenReport
 
@@ -136,7 +147,8 @@ def diagnose_files(
     whole = table_from_inspections(once, gear, along=True)
     condition, aside = data_condition(whole, gear)
     table = replace(whole.take(~aside), doubt=doubt_of(condition))
-    with in_own_cause(own, table.columns):
+    unused = _unused(read, whole, condition, aside)
+    with in_own_cause(own, table.columns), _saying(chain(notes, unused), read.problems):
         diagnosis = diagnosed(
             gear.model,
             table,
@@ -169,13 +181,47 @@ def diagnose_files(
     )
 
 
-def _nothing_read(problems: Sequence[Problem]) -> InconclusiveDataError:
+def _nothing_read(problems: tuple[Problem, ...]) -> InconclusiveDataError:
     """Say why there is nothing to diagnose, by the first problem."""
     if not problems:
         return InconclusiveDataError("nothing to diagnose: no row could be read", "")
     first = problems[0]
     why = f"{first.place()}: expected {first.expected}"
-    return InconclusiveDataError(f"nothing to diagnose: {why}", first.remedy)
+    error = InconclusiveDataError(f"nothing to diagnose: {why}", first.remedy)
+    error.problems = problems[1:]
+    return error
+
+
+@contextmanager
+def _saying(notes: Iterable[str], problems: tuple[Problem, ...]) -> Iterator[None]:
+    """Say with a refusal what was seen of the table."""
+    try:
+        yield
+    except InconclusiveDataError as error:
+        error.notes = tuple(notes)
+        error.problems = problems
+        raise
+
+
+def _unused(
+    read: ReadResult, whole: DiagnosisTable, condition: Sequence[DataCondition], aside: Mask
+) -> Iterator[str]:
+    """Which rows a table that is refused has that could not be used."""
+    from mlg_troubleshoot.reporting.diagnosis_lines import condition_words
+
+    unmeasured = np.count_nonzero(np.isnan(whole.measured_in))
+    unread = np.count_nonzero(np.isnan(whole.clearance_in).all(axis=1) & ~whole.along)
+    counts = {
+        "with an error": len(read.rows) - len(read.inspections),
+        "without a measured displacement": unmeasured,
+        "without a clearance": unread,
+        "set aside": np.count_nonzero(aside),
+    }
+    said = [f"{count} {why}" for why, count in counts.items() if count]
+    if said:
+        yield f"{len(read.rows)} rows read: {', '.join(said)}"
+    for seen in condition:
+        yield f"{condition_words(seen.kind)}: {seen.where}; {seen.effect}"
 
 
 def _once(valid: Sequence[Inspection]) -> list[Inspection]:

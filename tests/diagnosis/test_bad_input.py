@@ -273,6 +273,17 @@ def test_the_same_inspections_again_are_no_further_evidence(tmp_path: Path) -> N
     assert "15 usable rows are too few" in said
 
 
+def test_what_a_refused_table_lost_is_said(tmp_path: Path) -> None:
+    rows = [[*row, 0.02 + 0.001 * k if k < 15 else None] for k, row in enumerate(inspections(25))]
+    rows[3][4] = "large"
+    file = write(tmp_path / "t.csv", rows, "plunger_displacement_in")
+    found = run(str(file))
+    assert "Note: 25 rows read: 1 with an error, 10 without a measured displacement" in found.stderr
+    assert "found 'large'" in found.stderr
+    warnings = json.loads(run(str(file), "--json").stdout)["warnings"]
+    assert any("1 with an error" in said for said in warnings)
+
+
 def test_a_header_can_be_named(tmp_path: Path) -> None:
     rows = [[*row, 0.02 + 0.001 * k] for k, row in enumerate(inspections(5))]
     file = write(tmp_path / "t.csv", rows, "Weg")

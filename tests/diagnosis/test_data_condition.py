@@ -204,6 +204,15 @@ def test_rows_that_stand_twice_count_once(gear: Gear) -> None:
     assert np.flatnonzero(aside).tolist() == [120, 121]
 
 
+def test_a_row_with_every_joint_below_the_end_of_its_gauge_is_not_one_value_ten_times(
+    gear: Gear,
+) -> None:
+    table = changed(gear, all_alike)
+    below = np.zeros(table.clearance_in.shape, bool)
+    below[4::30] = True
+    assert "identical_cells" not in kinds(replace(table, below=below), gear)
+
+
 @pytest.mark.parametrize("change", [copied, all_alike, at_the_limit])
 def test_rows_without_readings_of_their_own_are_set_aside(gear: Gear, change: Change) -> None:
     touched = changed(gear, change)
