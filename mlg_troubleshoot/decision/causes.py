@@ -299,6 +299,11 @@ def _believed(
     read = cases.measured
     known = pins.waves(FREQUENCIES * (unread.amplification * cases.filled(0.0))[:, :, None])
     known = known * blur(pins.cosine * unread.amplification * cases.gauge_u_in)
+    # A reading in doubt counts as what the joint may be worn to.
+    doubts = doubted.chances / doubted.chances.sum(axis=1, keepdims=True)
+    by_joint = [np.flatnonzero(doubted.joints == j) for j in range(read.shape[1])]
+    for j, of in enumerate(by_joint):
+        known[doubted.rows[of], j] = doubts[of] @ unread.by_share[j]
     flat = unread.unread.reshape(len(LEVELS), -1)
     waves = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
     sums = np.prod(known, axis=1)
@@ -323,8 +328,9 @@ def _believed(
         rest = waves[doubted.rows]
         rest[np.arange(len(rest)), doubted.joints] = 1.0
         rest = np.prod(rest, axis=1) * whole[doubted.rows]
-        moved = np.matmul(unread.by_share[doubted.joints], rest[:, :, None])[:, :, 0].real
-        by_share = np.maximum(pins.sense * (0.5 + moved), 0.0)
+        for j, of in enumerate(by_joint):
+            by_share[of] = (rest[of] @ unread.by_share[j].T).real
+        by_share = np.maximum(pins.sense * (0.5 + by_share), 0.0)
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
     sums *= _LINKAGE

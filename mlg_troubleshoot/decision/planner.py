@@ -47,8 +47,9 @@ _TOGETHER = 0.6
 _MOST_EXTRA = 2
 # They are chosen among as many joints, those that move the plunger most.
 _MOST_TRIED = 6
-# What one repair may be above the chance that the shop accepts over all: most are far below it. [1]
-_FOR_ONE_REPAIR = 3
+# What one repair may be above the chance that the shop accepts over all: most are far below it, and
+# the average of simulated gears stays below it. [1]
+_FOR_ONE_REPAIR = 4
 
 
 def _correction(text: str) -> Plan:
@@ -143,11 +144,13 @@ class _BatchContext:
         self.rest = self.open & ~self.group
         self.too_close = ~missing & (ahead.too_close() >= TOO_CLOSE)
         self.rest_needed = ahead.settled(self.group, self.rest) < 0.5
-        # Restoring a joint that may be sound costs more than reading it with another gauge.
-        doubt = (1.0 - causes.worn) * self.restore_min
-        self.doubted = (
-            cases.over_limit & cases.reachable & ~cases.own_gauge & (doubt > gear.access_minutes)
-        )
+        # Restoring a joint that may be sound costs more than reading it with another gauge, and on
+        # a gear that failed it leads to a second repair.
+        sound = 1.0 - causes.worn
+        failed = (cases.failed | self.complained)[:, None]
+        doubt = sound * self.restore_min > gear.access_minutes
+        doubt |= failed & (sound > gear.second_repair_chance.value)
+        self.doubted = cases.over_limit & cases.reachable & ~cases.own_gauge & doubt
         self.after_limits = _verdicts_after_limits(cases, judged)
         self.again, self.again_u_in = _measure_again(cases, judged)
         self.expected_end = _expected(cases, judged, ahead)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
@@ -13,12 +14,17 @@ from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import Causes, believed
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
+from mlg_troubleshoot.decision.judge_rows import assess
+from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.wear_levels import LEVELS
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import every_joint, inspected
 
 WORN = every_joint(0.004)
+# The third reading may be the total play: with a probability of about 5 %.
+IN_DOUBT = {2: 0.0017, 3: 0.0115, 5: 0.0038}
 
 
 def causes_of(gear: Gear, clearance_in: dict[int, float], **more: Any) -> Causes:
@@ -59,6 +65,27 @@ def test_a_second_repair_is_no_surer_than_sure_where_nothing_is_restored(gear: G
     worst_in = float(0.94 * gear.model.plunger_amplification() @ np.full(10, 0.006))
     found = causes_of(gear, every_joint(0.006), readings_in=(worst_in,))
     assert found.second_repair(0, np.zeros((1, 10), bool))[0] == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_second_repair_is_likelier_after_one_that_rests_on_a_reading_in_doubt(gear: Gear) -> None:
+    only = np.eye(10, dtype=bool)[[2]]
+    once, twice = (
+        causes_of(gear, IN_DOUBT, readings_in=(0.034,), measured_again=again).second_repair(0, only)
+        for again in ((), (3,))
+    )
+    assert once[0] > 1.2 * twice[0]
+
+
+@pytest.mark.parametrize(
+    ("accepted", "action"), [(0.02, Action.MEASURE_AGAIN), (0.2, Action.RESTORE)]
+)
+def test_a_reading_that_may_lead_to_a_second_repair_oftener_than_accepted_is_taken_again(
+    gear: Gear, table: IndexTable, accepted: float, action: Action
+) -> None:
+    shop = replace(gear, second_repair_chance=replace(gear.second_repair_chance, value=accepted))
+    row = inspected(IN_DOUBT, outcome=Outcome.FAILED, readings_in=(0.034,))
+    (found,) = assess([row], shop, table, advice=False)
+    assert (found.next_action.action, found.next_action.joints) == (action, (3,))
 
 
 def test_of_a_gear_of_which_nothing_was_read_the_joints_are_the_cause_as_often_as_usual(
