@@ -72,16 +72,15 @@ class Response:
         """Virtual links in the worst directions of one sense, each along the gradient where the
         others lead. [in]
         """
-        n, joints = clearance_in.shape
-        towards = np.reshape(sense, (-1, 1, 1))
+        towards = np.reshape(sense, (-1, 1))
         # Without links the gradient is the same for every gear.
-        gradient = towards * self.gradient.reshape(joints, 2)
-        links = np.zeros((n, 2 * joints))
-        for step in range(5):
-            if step:
-                gradient = towards * (self.gradient + links @ self.curvature).reshape(n, joints, 2)
-            length = np.maximum(np.hypot(gradient[..., :1], gradient[..., 1:]), 1e-300)
-            links = (gradient / length * clearance_in[..., None]).reshape(n, 2 * joints)
+        links = np.zeros((1, self.gradient.size))
+        for _ in range(5):
+            gradient = towards * (self.gradient + links @ self.curvature)
+            x = gradient[:, 0::2]
+            y = gradient[:, 1::2]
+            length = np.maximum(np.sqrt(x * x + y * y), 1e-300)
+            links = np.repeat(clearance_in / length, 2, axis=1) * gradient
         return links
 
     def chance_beyond(self, clearance_in: Array, margin_in: Array, n: int) -> Array:
