@@ -48,7 +48,8 @@ _LINEAR_U_IN = 0.001
 @dataclass(frozen=True)
 class Reached:
     """What the oracle's repairs of failures by clearance take; the fewest sound joints among those
-    restored; other failures that look like one by clearance where 0.5 % of those are let go.
+    restored; other failures that look like one by clearance where 0.5 % of those are let go, and
+    what other failures take then: two readings of the plunger, and the same repair of those alike.
     """
 
     minutes: float
@@ -56,6 +57,10 @@ class Reached:
     second: float
     fewest_sound: float
     alike: float
+
+    @property
+    def others_minutes(self) -> float:
+        return 2.0 * PLUNGER_MIN * (1.0 - self.alike) + self.minutes * self.alike
 
 
 def reached(world: World, n: int, seed: int, accepted: float) -> Reached:
@@ -182,7 +187,8 @@ def main() -> None:
                 print(
                     f"seed {seed + place}, {world.name}: {found.minutes:.0f} min; of those"
                     f" restored {found.sound:.1%} sound, {found.fewest_sound:.1%} at least; second"
-                    f" repairs {found.second:.1%}; other failures alike {found.alike:.0%}",
+                    f" repairs {found.second:.1%}; other failures alike {found.alike:.0%},"
+                    f" {found.others_minutes:.0f} min",
                     flush=True,
                 )
 

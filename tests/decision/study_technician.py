@@ -20,6 +20,9 @@ def main() -> None:
     parser.add_argument("--world", help="the beginning of a world's name")
     parser.add_argument("--replay", action="store_true", help="rows left as before their repair")
     parser.add_argument("--known", type=int, default=0, help="gears of the fleet that are kept")
+    parser.add_argument(
+        "--accepted", type=float, default=0.02, help="chance of a second repair; default 0.02"
+    )
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         if chosen.replay:
@@ -31,7 +34,12 @@ def main() -> None:
             for place, world in enumerate(WORLDS):
                 if chosen.world is None or world.name.startswith(chosen.world):
                     found, _ = counted(
-                        world, chosen.gears, seed + place, Path(folder), chosen.known
+                        world,
+                        chosen.gears,
+                        seed + place,
+                        Path(folder),
+                        chosen.known,
+                        chosen.accepted,
                     )
                     print(f"seed {seed + place}, {say(world.name, found)}", flush=True)
 

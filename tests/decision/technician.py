@@ -10,7 +10,7 @@ import csv
 import tomllib
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mlg_troubleshoot
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
@@ -120,6 +121,7 @@ class Hangar:
         self.world, self.rng = world, np.random.default_rng(seed)
         self.loads = seed if loads is None else loads
         self.store: Store | None = None
+        self.options = CheckOptions(advice=False)
         self.load = np.random.default_rng(self.loads + 77).uniform(0.0, 2.0 * np.pi, 10)
         self.gears: list[Gear] = []
         share = np.array(world.mix) / sum(world.mix)
@@ -323,7 +325,7 @@ class Hangar:
                         *cells,
                     ]
                 )
-        result = check_files([file], CheckOptions(advice=False), store=self.store)
+        result = check_files([file], self.options, store=self.store)
         assert not result.problems, result.problems[0]
         form = check_as_json(result.gear, result.judgements, result.problems, result.notes)
         return list(form["inspections"])
@@ -375,12 +377,15 @@ class Counted:
 
 
 def counted(
-    world: World, n: int, seed: int, folder: Path, known: int = 0
+    world: World, n: int, seed: int, folder: Path, known: int = 0, accepted: float = 0.02
 ) -> tuple[Counted, Hangar]:
     """Work on the gears of a world, and on the same ones by measuring everything; `known` others
-    were kept before.
+    were kept before, and the shop accepts that chance of a second repair.
     """
     hangar = Hangar(world, n, seed)
+    gear = load_gear()
+    chance = replace(gear.second_repair_chance, value=accepted)
+    hangar.options = CheckOptions(gear=replace(gear, second_repair_chance=chance), advice=False)
     best = oracle(hangar) if world.mix[CLEARANCE] else Oracle(float("nan"), float("nan"))
     base = deepcopy(hangar)
     if known:
