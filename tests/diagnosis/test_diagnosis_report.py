@@ -231,6 +231,12 @@ def test_residuals_are_drawn_against_the_named_column_before_and_after(named: Ma
     assert "against technician" in first
 
 
+@pytest.mark.parametrize("section", ["residuals", "columns"])
+def test_a_heading_stays_on_the_page_of_its_first_figure(section: str, named: Made) -> None:
+    kept = named.html.split(f'aria-labelledby="{section}"')[1].split("<svg")[0]
+    assert re.search(rf'<div class="keep">\s*<h2 id="{section}"', kept)
+
+
 def test_residuals_are_drawn_against_the_column_that_a_cause_needs(gear: Gear, make: Make) -> None:
     warm = make(fleet(gear.model, lambda t, _: 3e-4 * (t.quantities["temperature_c"] - 20.0)))
     assert [each.candidate.cause.name for each in warm.diagnosis.causes] == ["thermal_growth"]
