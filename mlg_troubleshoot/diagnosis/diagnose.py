@@ -134,7 +134,9 @@ class NamedCause(Term):
             return {f"factor_{joint}": value for joint, value in fixed["factors"].items()}
         shown: dict[str, float | str] = dict(self.candidate.cause.shown(self.value))
         return shown | {
-            name: fixed[name] for name in ("since", "wear_exponent") if fixed.get(name) is not None
+            name: fixed[name]
+            for name in ("since", "until", "wear_exponent")
+            if fixed.get(name) is not None
         }
 
     @property

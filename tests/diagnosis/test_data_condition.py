@@ -389,3 +389,14 @@ def test_landings_that_fall_are_said_of_the_data_and_not_row_by_row(tmp_path: Pa
     said = mlg("diagnose", tmp_path / "overhaul.csv", "--convention", "RADIAL", "--json").json
     assert "landings_fall" in {found["kind"] for found in said["data_condition"]}
     assert not [note for note in said["warnings"] if "never fall" in note]
+
+
+def test_a_gauge_that_was_read_as_a_diameter_for_a_time_is_named_with_its_dates(
+    tmp_path: Path,
+) -> None:
+    rows, _truth = blemished_fleet("diametral_month", "strong", 61_000, rows=150)
+    write_rows(rows, tmp_path / "diametral.csv")
+    said = mlg("diagnose", tmp_path / "diametral.csv", "--json").json
+    (cause,) = said["causes"]
+    assert (cause["cause"], cause["target"][:5]) == ("convention_slip", "gauge")
+    assert cause["parameters"]["since"] < cause["parameters"]["until"]

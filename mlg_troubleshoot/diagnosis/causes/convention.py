@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, levels
+from mlg_troubleshoot.diagnosis.causes.reading import change_date
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import likely_clearances
 from mlg_troubleshoot.gear.adjustment import Adjustment
@@ -27,7 +28,7 @@ _LABELS = {"technician_id": "technician", "gauge_id": "gauge", "tail_no": "tail"
 
 class ConventionSlip(Cause):
     """Diametral or total play written as radial in the rows of one technician, gauge or aircraft,
-    or the reverse.
+    all of them or for a time, or the reverse.
     """
 
     name: ClassVar[str] = "convention_slip"
@@ -54,11 +55,14 @@ class ConventionSlip(Cause):
             if texts is None or usual <= 0.0:
                 continue
             for value in levels(texts[at_mid], _LEAST_ROWS):
-                own = float(np.median(measured[at_mid & (texts == value)])) / usual
+                group = at_mid & (texts == value)
+                own = float(np.median(measured[group])) / usual
+                setting = {"column": column, "value": value}
                 if own * _DOUBT < 1.0 or own > _DOUBT:
                     factor = 2.0 if own < 1.0 else 0.5
-                    setting = {"column": column, "value": value, "written_factor": factor}
-                    yield Candidate(self, f"{label} {value}", setting)
+                    yield Candidate(self, f"{label} {value}", setting | {"written_factor": factor})
+                for stretch, rarity in _stretches(scene, group, measured / usual):
+                    yield Candidate(self, f"{label} {value}", setting | stretch, rarity=rarity)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Take the group's clearances as they were meant, and what wear makes expect of all rows
@@ -73,9 +77,43 @@ class ConventionSlip(Cause):
         )
 
 
+def _stretches(
+    scene: Scene, group: Mask, over_usual: Array
+) -> Iterator[tuple[dict[str, Any], float]]:
+    """The days between which a group's readings are furthest off, either way, and the logarithm of
+    the share that these are of all that may be chosen.
+
+    Of all stretches the one with the largest sum of how far each row is beyond doubt, in the
+    logarithm: it ends where rows are as usual.
+    """
+    day = scene.table.quantities.get("day", np.full(len(group), np.nan))
+    rows = np.flatnonzero(group & np.isfinite(day) & (over_usual > 0.0))
+    rows = rows[np.argsort(day[rows], kind="stable")]
+    for factor, way in ((2.0, -1.0), (0.5, 1.0)):
+        beyond = way * np.log(over_usual[rows]) - np.log(_DOUBT)
+        total = np.r_[0.0, np.cumsum(beyond)]
+        sums = np.triu(total - total[:, None])
+        first, end = np.unravel_index(np.argmax(sums), sums.shape)
+        days = np.unique(day[rows[first:end]])
+        # One visit alone is more likely misread.
+        if len(days) > 1 and end - first < len(rows):
+            yield (
+                {
+                    "written_factor": factor,
+                    "days": (days[0], days[-1]),
+                    "since": change_date(scene, days[0]),
+                    "until": change_date(scene, days[-1]),
+                },
+                -float(np.log(0.5 * len(rows) * (len(rows) + 1))),
+            )
+
+
 def as_meant(table: DiagnosisTable, setting: Any) -> DiagnosisTable:
     """The table with the clearances of the group as they were meant."""
     rows = table.factors[setting["column"]] == setting["value"]
+    if "days" in setting:
+        first, last = setting["days"]
+        rows &= (table.quantities["day"] >= first) & (table.quantities["day"] <= last)
     factor: Array = np.where(rows, 1.0 / setting["written_factor"], 1.0)
     return replace(
         table,
