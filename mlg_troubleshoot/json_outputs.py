@@ -207,14 +207,13 @@ class RivalTenTimesLikelier(TargetedCause):
 
 
 class NamedCauseOutput(DescribedCause):
-    """A cause that the data name; aliases: what these rows cannot tell from it."""
+    """A cause that the data name."""
 
     effect_rms_in: Size
     probability: Probability
     class_probability: Probability
     parameters: dict[str, float]
     interval_95: dict[str, Interval]
-    aliases: list[PossibleCause]
 
 
 class NotTestable(TypedDict):

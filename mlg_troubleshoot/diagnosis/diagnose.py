@@ -91,15 +91,11 @@ class NamedCause(Term):
         Probability that something of its name acts. [1]
     class_probability : float
         Probability that it acts, or something that these rows cannot tell from it. [1]
-    aliases : tuple of Candidate
-        What these rows cannot tell from it, one cause or two together: the class is named by its
-        likeliest member.
     """
 
     effect_in: Array
     probability: float
     class_probability: float
-    aliases: tuple[Candidate, ...] = ()
 
     @property
     def effect_rms_in(self) -> float:
@@ -813,7 +809,6 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
             case.block.columns @ change,
             finding.probability(key),
             finding.class_probability(key),
-            tuple(case.problem.candidate(other) for other in finding.aliases),
         )
     none = np.zeros(len(case.problem.misfit))
 

@@ -186,8 +186,8 @@ class Finding:
     """What the posterior says.
 
     follows: the verdict, with the posterior that it follows from. said: names that are sure.
-    open: names of which something acts, or something more than what is sure. aliases: what these
-    data cannot tell from a sure all-joint effect. best: the explanation that is reported.
+    open: names of which something acts, or something more than what is sure. best: the explanation
+    that is reported.
     variables: what an unlisted effect moves with. unlisted_rms_in: its root mean square. [in]
     ruled_out: names
     that would explain something alone, but hardly act, likeliest first. noise: the noise under
@@ -201,7 +201,6 @@ class Finding:
     best: Explanation
     said: tuple[Key, ...]
     open: tuple[Key, ...]
-    aliases: tuple[Key, ...]
     ruled_out: tuple[Key, ...]
     variables: tuple[str, ...]
     unlisted_rms_in: float
@@ -215,10 +214,8 @@ class Finding:
         return max(self.probability(key), alike)
 
     def probability(self, key: Key) -> float:
-        """Probability that something of this name acts, its look-alikes counted with it."""
-        blocks = {context.name for context in self.posterior.contexts}
-        aliases = self.aliases if key in self.said and key in blocks else ()
-        return min(self.follows.any_of({key, *aliases}), 1.0)
+        """Probability that something of this name acts."""
+        return min(self.follows.any_of({key}), 1.0)
 
     @property
     def verdict(self) -> Verdict:
@@ -294,35 +291,31 @@ def _noise_beside(problem: MisfitProblem, explained: Array) -> NoiseModel:
 
 def _said(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> Finding:
     """What is sure, what is open, and what is ruled out."""
-    blocks = frozenset((b.cause.name, None) for b in problem.blocks)
-    rivals_only = frozenset(c.key for c in problem.candidates if c.stands_in)
+    rivals_only = {c.key for c in problem.candidates if c.stands_in}
     if problem.doubtful:
-        rivals_only |= blocks
-    follows = Conclusion(found, problem.beliefs, blocks, rivals_only)
-    said = follows.sure
-    aliases = follows.aliases
-    if follows.verdict in {Verdict.NONE, Verdict.UNLISTED}:
-        said = ()
-        aliases = ()
+        rivals_only |= {(b.cause.name, None) for b in problem.blocks}
+    variables, size = _unlisted(found)
+    # What moves with a cause's own variable speaks against the cause's form.
+    moved = {*variables, *(name.rstrip("_0123456789") for name in variables)}
+    firm = frozenset(c.key for c in problem.candidates if c.own_variables.isdisjoint(moved))
+    follows = Conclusion(found, problem.beliefs, frozenset(rivals_only), firm)
+    said = follows.said
     open_ = follows.open_beside(said)
-    variables, size = _unlisted(found, follows.verdict)
-    counted = {*said, *aliases}
     alone: dict[Key, float] = {}
     for k, candidate in enumerate(problem.candidates):
         alone[candidate.key] = max(alone.get(candidate.key, -np.inf), found.over_nothing[k])
-    hardly = [n for n in alone if alone[n] > 0.0 and n not in {*counted, *open_}]
+    hardly = [n for n in alone if alone[n] > 0.0 and n not in {*said, *open_}]
     return Finding(
         follows,
         noise,
         follows.reported(said),
         said,
         open_,
-        aliases,
         tuple(sorted(hardly, key=lambda n: -alone[n])),
-        variables,
-        size,
+        variables if follows.unlisted_acts else (),
+        size if follows.unlisted_acts else 0.0,
         _smallest(problem, found, noise),
-        follows.any_of(set(found.names) - counted),
+        follows.any_of(set(found.names) - set(said)),
         _classes(problem, found, [*said, *open_]),
     )
 
@@ -359,11 +352,11 @@ def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
     return float(min(1.0, shapes.p * erfc(largest / sqrt(2.0))))
 
 
-def _unlisted(found: MisfitPosterior, verdict: Verdict) -> tuple[tuple[str, ...], float]:
-    """Variables of an effect that is on no list, and its root mean square. [in]"""
-    if verdict is not Verdict.UNLISTED:
-        return (), 0.0
+def _unlisted(found: MisfitPosterior) -> tuple[tuple[str, ...], float]:
+    """Variables of the likeliest effect that is on no list, and its root mean square. [in]"""
     chances = {name: p for name, p in found.names.items() if name[0] == UNLISTED}
+    if not chances:
+        return (), 0.0
     name = max(chances, key=lambda n: chances[n])
     variables = tuple(str(name[1]).split(_BY))
     for explanation in found.likeliest:

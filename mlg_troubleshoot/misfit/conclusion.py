@@ -18,15 +18,15 @@ from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 class Conclusion:
     """What a posterior says.
 
-    sure: names that act, the likeliest first, whatever else does. either: names of which one acts
-    for certain, but any may stand for it. never: names that only stand for what the data cannot
-    test.
+    sure: names that act, the likeliest first, whatever else does. never: names that only stand for
+    what the data cannot test. firm: names that are said even if something acts that is on no list:
+    it has nothing in common with their form.
     """
 
     posterior: MisfitPosterior
     beliefs: Beliefs
-    either: frozenset[Key] = frozenset()
     never: frozenset[Key] = frozenset()
+    firm: frozenset[Key] = frozenset()
 
     @cached_property
     def listed(self) -> dict[Key, float]:
@@ -40,22 +40,27 @@ class Conclusion:
         """NONE, NAMED, AMBIGUOUS or UNLISTED."""
         if self.posterior.nothing >= 0.5:
             return Verdict.NONE
-        if self.posterior.unlisted >= min(0.5, self.any_of(self.listed)):
-            return Verdict.UNLISTED
-        return Verdict.NAMED if self.sure else Verdict.AMBIGUOUS
+        if self.said:
+            return Verdict.NAMED
+        return Verdict.UNLISTED if self.unlisted_acts else Verdict.AMBIGUOUS
+
+    @property
+    def unlisted_acts(self) -> bool:
+        """True if something acts that is on no list, more likely than not or than anything else."""
+        found = self.posterior
+        return found.nothing < 0.5 and found.unlisted >= min(0.5, self.any_of(self.listed))
 
     @cached_property
-    def _one_of(self) -> tuple[Key, ...]:
-        """Names of which one is sure, and none of them alone."""
-        names = tuple(n for n in self.listed if n in self.either)
-        alone = any(self.listed[n] >= self.beliefs.sure for n in names)
-        is_sure = len(names) > 1 and not alone and self.any_of(names) >= self.beliefs.sure
-        return names if is_sure else ()
+    def said(self) -> tuple[Key, ...]:
+        """Names that are sure, unless their form is in doubt."""
+        if self.posterior.nothing >= 0.5:
+            return ()
+        return tuple(n for n in self.sure if n in self.firm or not self.unlisted_acts)
 
     @cached_property
     def _standing_out(self) -> tuple[Key, ...]:
-        sure = [n for n, p in self.listed.items() if p >= self.beliefs.sure and n not in self.never]
-        return (*sure, *self._one_of[:1])
+        sure = self.beliefs.sure
+        return tuple(n for n, p in self.listed.items() if p >= sure and n not in self.never)
 
     @cached_property
     def _alike(self) -> set[Key]:
@@ -89,15 +94,9 @@ class Conclusion:
         """Names that act, the likeliest first."""
         return tuple(n for n in self._standing_out if n not in self._alike)
 
-    @cached_property
-    def aliases(self) -> tuple[Key, ...]:
-        """Names that may stand in the place of the last one that is sure."""
-        return self._one_of[1:]
-
     def open_beside(self, said: Sequence[Key]) -> tuple[Key, ...]:
         """Names of which something more acts than what is said; look-alikes with them."""
-        counted = {*said, *(self.aliases if said else ())}
-        rest = [n for n in self.listed if n not in counted]
+        rest = [n for n in self.listed if n not in said]
         further = self.any_of(rest)
         names = list[Key]()
         if self.verdict is Verdict.AMBIGUOUS or (self.verdict is Verdict.NAMED and further >= 0.5):

@@ -93,9 +93,6 @@ def target_words(candidate: Candidate) -> str:
 def cause_words(cause: NamedCause) -> str:
     candidate = cause.candidate
     words = candidate.cause.words(candidate.target)
-    if cause.aliases:
-        others = " with ".join(name_words(other.cause.name) for other in cause.aliases)
-        words += f" (these rows cannot distinguish it from {others})"
     if not candidate.stands_in:
         return words
     needed = " and ".join(map(column_words, candidate.cause.needs)) or "every joint as read"

@@ -109,9 +109,7 @@ def _context(
         "catalogue": {cause.name: cause for cause in CATALOGUE},
         "most_ruled_out": _MOST_RULED_OUT,
         "kind_words": kind_words,
-        "as_loaded": any(
-            "load_directions" in (o.cause.name for o in (c.candidate, *c.aliases)) for c in d.causes
-        ),
+        "as_loaded": "load_directions" in [c.candidate.cause.name for c in d.causes],
         "changes": _changes(residuals),
         "more_changes": len(d.gain.verdicts_changed) - _MOST_CHANGES if d.gain else 0,
         "do": [

@@ -290,9 +290,7 @@ def _rival(c: NamedCause) -> dict[str, Any]:
 
 
 def _cause(c: NamedCause) -> dict[str, Any]:
-    aliases = [_possible(candidate) for candidate in c.aliases]
-    shown = {**_named(c.candidate), "interval_95": c.interval_shown, "aliases": aliases}
-    return written(NamedCauseOutput, c, **shown)
+    return written(NamedCauseOutput, c, **_named(c.candidate), interval_95=c.interval_shown)
 
 
 def _extension(extension: ModelExtension) -> dict[str, Any]:

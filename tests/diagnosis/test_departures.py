@@ -460,8 +460,7 @@ def test_one_pin_beside_its_worst_direction_in_another_linkage_stays_possible() 
 
 
 def test_readings_beyond_the_bound_are_another_linkage_and_no_resting_place_of_pins() -> None:
-    (cause,) = found("a linkage that nobody calibrated").causes
-    assert (cause.candidate.cause.name, cause.aliases) == ("geometry", ())
+    assert named("a linkage that nobody calibrated") == {("geometry", None)}
 
 
 def test_a_scale_of_that_size_is_not_put_down_to_the_rate_alone() -> None:

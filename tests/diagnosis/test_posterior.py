@@ -13,13 +13,18 @@ from scipy.stats import multivariate_normal
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
 from mlg_troubleshoot.diagnosis.bank import Bank
+from mlg_troubleshoot.diagnosis.causes.base import Candidate
+from mlg_troubleshoot.diagnosis.causes.joint import JointContact
+from mlg_troubleshoot.diagnosis.causes.linkage import CalibrationRate
+from mlg_troubleshoot.diagnosis.causes.reading import GaugeBias
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.diagnosis.explain import MisfitProblem
 from mlg_troubleshoot.diagnosis.noise import Rows
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import EffectColumns
+from mlg_troubleshoot.misfit.conclusion import Conclusion
 from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.explanation import Context, Effects, Key
+from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Key
 from mlg_troubleshoot.misfit.marginal import Marginal, Products
 from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions
@@ -231,6 +236,27 @@ def test_two_that_only_explain_together_are_found() -> None:
     listed = Effects.free(columns, names, -3.0, 5.0)
     found = posterior(NoiseModel.white(n), data, listed, (Context.none(n),), Beliefs())
     assert set(found.likeliest[0].members) == {0, 1}
+
+
+@pytest.mark.parametrize(("firm", "verdict"), [(False, "UNLISTED"), (True, "NAMED")])
+def test_a_sure_name_is_said_beside_something_unlisted_that_leaves_its_form_alone(
+    firm: bool, verdict: str
+) -> None:
+    rng, n = np.random.default_rng(9), 60
+    columns = rng.standard_normal((n, 2))
+    data = columns @ np.full(2, 5.0) + rng.standard_normal(n)
+    free = Effects.free(columns, [("a", None), (UNLISTED, "x")], -3.0, 5.0)
+    listed = replace(free, listed=np.array([True, False]))
+    found = posterior(NoiseModel.white(n), data, listed, (Context.none(n),), Beliefs())
+    names = frozenset({("a", None)}) if firm else frozenset()
+    assert Conclusion(found, Beliefs(), firm=names).verdict == verdict
+
+
+def test_a_cause_moves_with_its_own_column_or_with_the_clearances_of_its_joints() -> None:
+    contact = Candidate(JointContact(), "joints 2,3", {"pair": (2, 3)})
+    assert contact.own_variables == {"clearance_2", "clearance_3"}
+    assert Candidate(GaugeBias(), "gauge G-1").own_variables == {"gauge_id"}
+    assert Candidate(CalibrationRate()).own_variables == {"predicted"}
 
 
 def test_a_slip_of_the_pen_is_nothing_that_is_wrong() -> None:

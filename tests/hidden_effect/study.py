@@ -161,7 +161,8 @@ def compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
     record["also"] = also
     record |= stated(found)
     if listed and truth:
-        told = not found.beside and len(names) == len(truth)
+        more = found.beside or found.unlisted_variables
+        told = not more and len(names) == len(truth)
         record["right"] = told and all(any(_same(n, t) for n in names) for t in truth)
         record["in_set"] = all(any(_same(n, t) for n in (*names, *also)) for t in truth)
         record["some_right"] = any(_same(n, t) for n in names for t in truth)

@@ -103,6 +103,15 @@ class Candidate:
         return self.cause.name, self.cause.family(self.target)
 
     @property
+    def own_variables(self) -> frozenset[str]:
+        """Columns that its effect moves with: those that it needs, its joints' clearances, or else
+        what all joints add.
+        """
+        joints = (self.setting.get("joint"), *self.setting.get("pair", ()))
+        own = [f"clearance_{joint}" for joint in joints if joint is not None]
+        return frozenset((*self.cause.needs, *own)) or frozenset(("predicted",))
+
+    @property
     def separates(self) -> str:
         """The one reading that would separate it from its rivals."""
         if self.stands_in and (self.setting or not self.cause.needs):
