@@ -92,8 +92,8 @@ def _stretches(
     for factor, way in ((2.0, -1.0), (0.5, 1.0)):
         beyond = way * np.log(over_usual[rows]) - np.log(_DOUBT)
         total = np.r_[0.0, np.cumsum(beyond)]
-        sums = np.triu(total - total[:, None])
-        first, end = np.unravel_index(np.argmax(sums), sums.shape)
+        end = int(np.argmax(total - np.minimum.accumulate(total)))
+        first = int(np.argmin(total[: end + 1]))
         days = np.unique(day[rows[first:end]])
         # One visit alone is more likely misread.
         if len(days) > 1 and end - first < len(rows):
