@@ -79,9 +79,9 @@ def whitened(fleet: simulator.Fleet, usable: Mask, columns: Array) -> Array:
 
 
 def known(task: Task) -> dict[str, bool]:
-    """Whether the true cause alone is named: as it is; if it is known beforehand that the study's
-    causes alone may act; and if clearances are read without error, the effect being as large as
-    before.
+    """Whether all true causes and no other are named: as it is; if it is known beforehand that the
+    study's causes alone may act; and if clearances are read without error, the effects being as
+    large as before.
     """
     spec = simulator.draw_spec(task["seed"], **task["arguments"])
     fleet = simulator.simulate_fleet(spec, task["seed"])
@@ -141,11 +141,12 @@ def ceiling(plan: Sequence[Task], workers: int) -> dict[str, Any]:
     }
 
 
-def worth(fleets: int, first_seed: int, workers: int) -> dict[str, int]:
-    """How many of some fleets with one cause, five in nine of S = 10 and the others of 15, have it
-    named alone.
+def worth(fleets: int, first_seed: int, workers: int, group: str | None) -> dict[str, int]:
+    """How many of some fleets have all that is wrong named and nothing else: of one group, or with
+    one cause, five in nine of S = 10 and the others of 15.
     """
     plan = {"single:10": round(fleets * 5 / 9), "single:15": fleets - round(fleets * 5 / 9)}
+    plan = {group: fleets} if group else plan
     with ProcessPoolExecutor(workers) as pool:
         found = list(pool.map(known, tasks(plan, first_seed), chunksize=4))
     return {"fleets": len(found), **{name: sum(f[name] for f in found) for name in found[0]}}
@@ -170,11 +171,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--known", type=int, help="of so many fleets only: what knowledge is worth")
+    parser.add_argument("--group", help="of these fleets alone, double or triple")
     parser.add_argument("--first-seed", type=int, default=study.FIRST_SEED)
     parser.add_argument("--write", action="store_true", help=f"write {RESULT.name}")
     arguments = parser.parse_args()
     if arguments.known:
-        print(json.dumps(worth(arguments.known, arguments.first_seed, arguments.workers), indent=1))
+        given = arguments.known, arguments.first_seed, arguments.workers, arguments.group
+        print(json.dumps(worth(*given), indent=1))
         return
     result = ceiling([task for task in tasks(PLAN) if task["group"] in GROUPS], arguments.workers)
     print(json.dumps(result, indent=1))
