@@ -88,7 +88,9 @@ def show(
         else:
             _show_gears(everything, place.place)
         return
-    found = history.show_lives(place, known, tail, side, ahead=not no_forecast)
+    with stages(quiet=shown.quiet) as bar:
+        ahead = not no_forecast
+        found = history.show_lives(place, known, tail, side, ahead=ahead, progress=bar)
     if shown.as_json and len(found.lives) != 1:
         tail = found.lives[0].key[0]
         raise UsageError(

@@ -27,6 +27,8 @@ _EXCHANGED = 8
 # An inspection that fits another gear's wear as badly as this was not taken there: without it a
 # restored gear passed for exchanged in 3 of 20 fleets of 100. [1]
 _NO_FIT = 0.001
+# Gears that are compared at once: their simulated clearances are 2 MB. [1]
+_AT_ONCE = 100
 
 
 def suggestions(lives: Sequence[GearLife], model: WearModel | None, gear: Gear) -> list[str]:
@@ -107,6 +109,16 @@ def _departures(
     """How far the newest inspections of gears lie from what others' histories promised, in standard
     deviations.
     """
+    return [
+        score
+        for first in range(0, len(pairs), _AT_ONCE)
+        for score in _departures_of_part(pairs[first : first + _AT_ONCE], model, gear)
+    ]
+
+
+def _departures_of_part(
+    pairs: Sequence[tuple[GearLife, GearLife]], model: WearModel, gear: Gear
+) -> list[Array]:
     numbers = gear.joint_numbers
     paths: dict[str, tuple[WearPath, ...]] = {}
     at: list[tuple[int, int]] = []
@@ -127,7 +139,9 @@ def _departures(
     scores = np.full((len(pairs), len(numbers)), np.nan)
     if at:
         of_paths = replace(model, paths=paths)
-        samples = of_paths.forecast(list(paths), np.array(ahead)[:, None]).samples[:, 0]
+        # Each joint as if it were the only one: what is said of a gear does not depend on others.
+        usage = np.array(ahead)[:, None]
+        samples = of_paths.forecast(list(paths), usage, together=1).samples[:, 0]
         departures = np.array(read) - samples.mean(axis=1)
         departures /= samples.std(axis=1)
         scores[tuple(np.array(at).T)] = departures

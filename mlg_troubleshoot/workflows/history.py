@@ -156,7 +156,15 @@ def _taught(
     return fit_fleet(taught, gear, remembered.fit)
 
 
-def show_lives(store: Store, gear: Gear, tail: str, side: str | None, *, ahead: bool) -> Lives:
+def show_lives(
+    store: Store,
+    gear: Gear,
+    tail: str,
+    side: str | None,
+    *,
+    ahead: bool,
+    progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
+) -> Lives:
     """The lives of one aircraft's gears, or of one of them."""
     from mlg_troubleshoot.life.forecast import forecast
     from mlg_troubleshoot.life.remembered import Remembered
@@ -166,7 +174,9 @@ def show_lives(store: Store, gear: Gear, tail: str, side: str | None, *, ahead: 
     wanted = [key for key in keys if key == (tail, meant if side else key[1])]
     if not wanted:
         life_of(store, tail, meant)
-    model = _taught(store, gear, keys, Remembered(store, gear)) if ahead else None
+    model = _taught(store, gear, keys, Remembered(store, gear), progress) if ahead else None
+    if ahead:
+        progress("Looking ahead", 0, None)
     found = tuple(lives_of(store, wanted).values())
     return Lives(gear, found, forecast(found, model, gear), model)
 

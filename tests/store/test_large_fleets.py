@@ -20,6 +20,7 @@ from mlg_troubleshoot.life import remembered
 from mlg_troubleshoot.life.chronology import Moment
 from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection, lives
 from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
+from mlg_troubleshoot.life.unrecorded_work import _departures
 from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files, check_inspection
@@ -63,6 +64,30 @@ def test_a_gear_has_the_same_forecast_alone_as_in_its_fleet(tmp_path: Path) -> N
         assert alone.landings_to_limit == fleet.forecasts[key].landings_to_limit is not None
         assert alone.landings_to_margin == fleet.forecasts[key].landings_to_margin
         assert alone.due_date == fleet.forecasts[key].due_date
+
+
+def test_how_far_a_gear_departs_from_its_wear_does_not_depend_on_other_gears(
+    tmp_path: Path,
+) -> None:
+    fleet = show_fleet(fleet_of(tmp_path), load_gear(), ahead=True)
+    assert fleet.model is not None
+    pairs = [(life, life) for life in fleet.lives]
+    alone = _departures(pairs[-1:], fleet.model, fleet.gear)
+    assert np.isfinite(alone).any()
+    np.testing.assert_array_equal(_departures(pairs, fleet.model, fleet.gear)[-1:], alone)
+
+
+def test_the_life_of_one_gear_says_what_it_is_doing_while_wear_is_learnt(tmp_path: Path) -> None:
+    said: list[str] = []
+    show_lives(
+        fleet_of(tmp_path),
+        load_gear(),
+        TAILS[0],
+        "LH",
+        ahead=True,
+        progress=lambda name, _done, _total: said.append(name),
+    )
+    assert said == ["Learning how joints wear", "Looking ahead"]
 
 
 def test_the_life_of_one_gear_is_shown_without_reading_the_whole_store(

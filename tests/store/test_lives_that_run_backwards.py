@@ -438,7 +438,8 @@ class Steady:
 
     paths: Mapping[str, Sequence[WearPath]] = field(default_factory=dict)
 
-    def forecast(self, units: Sequence[str], _usage: np.ndarray) -> Samples:
+    def forecast(self, units: Sequence[str], _usage: np.ndarray, *, together: int) -> Samples:
+        assert together == 1
         last = [np.asarray(self.paths[unit][-1].value)[-1] for unit in units]
         return Samples(np.add.outer(last, np.array([[-0.001, 0.001]])))
 
