@@ -158,8 +158,9 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
         alike = OWN_GEAR if n == 1 else np.clip((n - apart) / (n - 1), 0.0, 1.0)
         line = np.mean(lines, axis=1, keepdims=True)
         worn = np.maximum(line + alike * line * np.mean(further, axis=1, keepdims=True), 0.0)
+        # Over the wear of all rows: over that of each, rows of new joints would decide.
         rows_apart = np.sqrt(
-            np.mean(history.scatter_in2[:, seen] / np.maximum(own, _TIGHT_IN) ** 2)
+            np.mean(history.scatter_in2[:, seen]) / max(np.mean(own**2), _TIGHT_IN**2)
         )
         likely[:, ~seen], common[:, ~seen] = worn, JOINTS_APART * worn
         shared[:, ~seen], spread[:, ~seen] = GEARS_APART * worn, rows_apart * worn

@@ -220,3 +220,16 @@ def test_an_unread_joint_of_a_row_without_landings_is_as_worn_as_the_row_s_other
         replace(table, quantities={**table.quantities, "gear_landings": gap})
     ).likely_in
     assert likely[latest, 9] == pytest.approx(true_in[latest, 9], rel=0.25)
+
+
+def test_a_gear_of_new_joints_does_not_make_unread_joints_scatter_more(
+    plain: DiagnosisTable,
+) -> None:
+    scatter = np.exp(np.random.default_rng(5).normal(0.0, 0.2, plain.clearance_in.shape))
+    clearance = plain.clearance_in * scatter
+    clearance[:, 9] = np.nan
+    new = (plain.factors["tail_no"] == "N103") & (plain.factors["side"] == "LH")
+    with_new = replace(plain, clearance_in=np.where(new[:, None], clearance * 0.001, clearance))
+    usual = likely_clearances(replace(plain, clearance_in=clearance))
+    found = likely_clearances(with_new)
+    assert found.u_row_in[~new, 9] == pytest.approx(usual.u_row_in[~new, 9], rel=0.3)
