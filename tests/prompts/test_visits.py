@@ -336,8 +336,9 @@ def test_done_of_a_gear_that_needed_no_repair_speaks_of_none(visit: Visit) -> No
 
 def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
-    visit(*GEAR, "y", "36", "y", "18")
-    screen = visit(*GEAR, "y", "", "3", "3", "y", "4", "y", "r").screen
+    visit(*GEAR, "y", "36", "y", "yes")
+    visit(*GEAR, "y", "18", "y", "", "3", "3")
+    screen = visit(*GEAR, "y", "4", "y", "r").screen
     assert "DONE. The repair is in the records. r writes the report to sign." in screen
     assert life(store).repairs
 
