@@ -336,7 +336,8 @@ def test_done_of_a_gear_that_needed_no_repair_speaks_of_none(visit: Visit) -> No
 
 def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
-    visit(*GEAR, "y", "36", "y", "yes")
+    visit(*GEAR, "y", "36")
+    visit(*GEAR, "y", "yes")
     visit(*GEAR, "y", "18", "y", "", "3", "3")
     screen = visit(*GEAR, "y", "4", "y", "r").screen
     assert "DONE. The repair is in the records. r writes the report to sign." in screen
@@ -366,6 +367,7 @@ def test_an_area_that_next_opened_stays_open_until_the_repair(
 ) -> None:
     visit(*FIRST)
     visit(*GEAR, "y", "36")
+    visit(*GEAR, "y", "yes")
     assert "again" in visit(*GEAR, "y", "18").screen
     assert life(store).inspections[-1].inspection.open_areas == ("sidestay",)
     visit(*GEAR, "n 3", "1")
