@@ -37,7 +37,7 @@ def test_the_program_is_nowhere_better_than_the_oracle() -> None:
         <= told["rate"]
     )
     told = COMMITTED["directions"]["one scale, and one joint's direction"]["beats"]
-    line = "load directions, spread 40°: named (or their class), where a regression beats one scale"
+    line = "load directions, spread 40°: named or in the set, where a regression beats one scale"
     assert lines[line]["low"] <= told["rate"]
 
 

@@ -27,8 +27,8 @@ LOOK_ALIKE = np.column_stack([APART[:, 0], APART[:, 0], APART[:, 2], APART[:, 3]
 def concluded(
     sets: dict[tuple[Key, ...], float],
     columns: np.ndarray[tuple[int, ...], np.dtype[np.float64]] = APART,
-    either: frozenset[Key] = frozenset(),
     never: frozenset[Key] = frozenset(),
+    firm: frozenset[Key] = frozenset(),
     log_prior_of_a: float = -2.0,
 ) -> Conclusion:
     """Conclude from the probability of each set of names."""
@@ -59,7 +59,7 @@ def concluded(
         of_effect,
         np.zeros(N),
     )
-    return Conclusion(found, Beliefs(), either, never)
+    return Conclusion(found, Beliefs(), never, firm)
 
 
 @pytest.mark.parametrize(
@@ -103,15 +103,12 @@ def test_effects_that_only_share_a_part_are_no_look_alikes() -> None:
     assert concluded({(A,): 0.95, (B,): 0.05}, related, log_prior_of_a=-1.0).sure == (A,)
 
 
-def test_names_of_which_one_acts_for_certain_are_a_name_and_its_alias() -> None:
-    found = concluded({(A,): 0.55, (B,): 0.45}, either=frozenset({A, B}))
-    assert (found.sure, found.aliases) == ((A,), (B,))
-
-
-def test_the_alias_of_what_is_said_is_not_left_open_beside_it() -> None:
-    sets = {(A, C): 0.4, (B, C): 0.3, (A,): 0.15, (B,): 0.15}
-    found = concluded(sets, either=frozenset({A, B}))
-    assert found.open_beside(found.sure) == (C,)
+def test_a_sure_name_is_said_beside_an_unlisted_effect_only_if_its_form_is_not_in_doubt() -> None:
+    sets = {(SHAPE, A): 0.95, (A,): 0.05}
+    firm = concluded(sets, firm=frozenset({A}))
+    assert (firm.verdict, firm.said) == (MisfitVerdict.NAMED, (A,))
+    in_doubt = concluded(sets)
+    assert (in_doubt.verdict, in_doubt.said) == (MisfitVerdict.UNLISTED, ())
 
 
 def test_a_further_cause_that_is_likelier_than_not_is_left_open_beside_a_name() -> None:
