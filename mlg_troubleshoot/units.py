@@ -106,7 +106,7 @@ SLIPS: dict[str, Slip] = {
 
 
 class ClearanceConvention(StrEnum):
-    """What a clearance reading is a reading of. There is no default: the factor 2 flips
+    """What a clearance reading is a reading of. It must be stated: the factor 2 flips
     verdicts.
 
     per_radial: how many of such a reading make one radial clearance, 1 or 2. meaning: in a

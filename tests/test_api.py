@@ -151,7 +151,7 @@ def test_predict_takes_a_gear_its_name_or_its_file() -> None:
     ],
     ids=str,
 )
-def test_predict_refuses_what_is_no_clearance(clearance: object, said: str) -> None:
+def test_predict_refuses_what_is_not_a_clearance(clearance: object, said: str) -> None:
     with pytest.raises(mlg.TroubleshootError, match=said):
         mlg.predict(clearance)  # type: ignore[arg-type]
 

@@ -238,7 +238,7 @@ def test_contributors_are_sent_to_every_room_that_holds_a_rule() -> None:
     assert {"cli", "decision", "diagnosis", "gear", "misfit", "records", "store"} <= rooms
 
 
-def test_the_readme_is_no_book() -> None:
+def test_the_readme_is_not_a_book() -> None:
     assert len(TEXT.splitlines()) <= 200
 
 

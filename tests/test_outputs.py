@@ -85,7 +85,7 @@ def test_a_pipe_is_refused_and_stays_one(tmp_path: Path) -> None:
     assert (tmp_path / "pipe").is_fifo()
 
 
-def test_a_folder_is_no_file_to_write(tmp_path: Path) -> None:
+def test_a_folder_is_not_a_file_to_write(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="a folder"):
         write_bytes(tmp_path, b"x")
 

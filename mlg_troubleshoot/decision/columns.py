@@ -529,7 +529,7 @@ OF_THE_DAY: tuple[Column, ...] = (
     Column(
         name="no_spare",
         holds=Holds.JOINTS,
-        meaning="Joints for which there is no spare part today.",
+        meaning="Joints without a spare part today.",
     ),
     Column(
         name="open_areas",

@@ -18,7 +18,7 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, with_unit
 
 
 class Side(StrEnum):
-    """Which main landing gear. There is no default."""
+    """Which main landing gear: it must be stated."""
 
     LH = "LH"
     RH = "RH"
@@ -172,7 +172,7 @@ class Inspection(Result):
     measured_again : tuple of int
         Joints that were measured a second time, with another gauge.
     cannot_reach, no_spare : tuple of int
-        Joints that cannot be reached today, and those for which there is no spare part.
+        Joints that cannot be reached today, and those without a spare part.
     open_areas : tuple of str
         Areas that are open already.
     minutes_available : float or None

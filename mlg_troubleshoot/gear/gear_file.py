@@ -387,7 +387,7 @@ def load_gear(name_or_path: str | Path | Gear = DEFAULT_GEAR) -> Gear:
     Raises
     ------
     UsageError
-        If there is no such gear.
+        If the gear is not known.
     GearFileError
         If the file is not valid; the message names the place.
     MechanismError

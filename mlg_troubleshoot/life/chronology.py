@@ -29,7 +29,7 @@ class Moment:
 
 
 def in_order(moments: Sequence[Moment]) -> list[int]:
-    """Places in the order of time: by date, and by landings on one date and where there is no date.
+    """Places in the order of time: by date, and by landings on one date and without a date.
 
     What states no landings stands behind what came before it with the same date.
     """

@@ -83,8 +83,8 @@ class GearLife:
     """What stands of one gear: inspections and repairs in the order of time, outcomes, and every
     record as it came.
 
-    warnings: the records whose dates and landings disagree, and how to correct them; with any there
-    is no forecast.
+    warnings: the records whose dates and landings disagree, and how to correct them; with any of
+    them nothing is forecast.
     """
 
     key: GearKey

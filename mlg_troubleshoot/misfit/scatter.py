@@ -131,7 +131,7 @@ class Readings:
 
     def first_scale(self, columns: Array, free: Array, data: Array) -> Array:
         """The same before anything is explained: from what all columns leave, or the free ones
-        where there is no room for all.
+        where rows are too few for all.
         """
         relative = np.ones(len(data)) if self.declared is None else self.declared
         spare = 1.0 - basis_of(columns / relative[:, None], 1e-4).shape[1] / len(data)

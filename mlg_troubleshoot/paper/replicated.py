@@ -58,7 +58,7 @@ def central_composite(n: int) -> Array:
     values of the others, which adds 0.004 to every first-order index.)
 
     Returns, shape (n_corners + n, n): points of the unit cube. [1]
-    Raises `UsageError` if there is no such design.
+    Raises `UsageError` for a number of variables without a design.
     """
     if not 2 <= n <= max(_FRACTIONS):
         raise UsageError(

@@ -80,7 +80,7 @@ class Joints:
         return f"{min(self.numbers)} to {max(self.numbers)}"
 
     def lack(self, number: object) -> str:
-        """Say that there is no such joint."""
+        """Say that the gear does not have this joint."""
         return f"this gear has no joint {number}: its joints are {self.span}"
 
     @cached_property

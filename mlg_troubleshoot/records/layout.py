@@ -53,7 +53,7 @@ class Columns:
     """The columns of a table.
 
     mapped, carried: headers that are not canonical with what they were read as; headers of what is
-    only carried. ids_made: True if there is no column of record ids. is_long: True if one row is
+    only carried. ids_made: True without a column of record ids. is_long: True if one row is
     one joint's reading.
     """
 

@@ -55,7 +55,7 @@ def as_text(value: Any) -> str:
     try:
         return _ENCODED(value)
     except (TypeError, ValueError):
-        # A number that is none, or a key that is not a text.
+        # NaN or an infinity, or a key that is not a text.
         return _ENCODED(_cleaned(value))
 
 

@@ -44,7 +44,7 @@ def schema(name: str) -> dict[str, Any]:
     Raises
     ------
     UsageError
-        If there is no schema of that name.
+        If the name is not that of a schema.
     """
     if name not in NAMES + FILES:
         known = ", ".join(NAMES + FILES)

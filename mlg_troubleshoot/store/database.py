@@ -316,7 +316,7 @@ class Store:
 
     @property
     def is_new(self) -> bool:
-        """True if nothing was ever kept here: there is no file, or an empty one."""
+        """True if nothing was ever kept here: the file is missing or empty."""
         if self.file is None:
             return False
         return not self.file.exists() or self.file.stat().st_size == 0

@@ -219,7 +219,7 @@ def test_an_extension_that_is_not_there_is_refused(tmp_path: Path) -> None:
     refused(mlg("check", FAILURE, "--extension", tmp_path / "lost.toml"), 2, "lost.toml")
 
 
-def test_a_gear_file_that_is_no_toml_is_refused(tmp_path: Path) -> None:
+def test_a_gear_file_that_is_not_toml_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "gear.toml"
     path.write_text("[[points", encoding="utf-8")
     refused(mlg("check", FAILURE, "--gear", path), 2, "gear.toml", "cannot be read as TOML")

@@ -221,7 +221,7 @@ def test_from_python_a_renewed_table_is_warned_of(gear: Path) -> None:
         next_joint(loaded, {1: 0.001})
 
 
-def test_a_file_that_is_no_table_is_not_replaced_by_one(gear: Path) -> None:
+def test_a_file_that_is_not_a_table_is_not_replaced_by_one(gear: Path) -> None:
     table = load_gear(gear).indices_file
     table.write_text('{"mine": 1}')
     found = mlg("check", FAILURE, "--gear", gear)
@@ -235,7 +235,7 @@ def test_a_gear_draws_itself(tmp_path: Path) -> None:
     assert len(panels) == 2
 
 
-def test_a_drawing_does_not_replace_what_is_no_drawing(tmp_path: Path) -> None:
+def test_a_drawing_does_not_replace_what_is_not_a_drawing(tmp_path: Path) -> None:
     file = tmp_path / "gear.svg"
     file.write_text("<svg/>")
     assert mlg("gear", "draw", file).code == 2

@@ -72,7 +72,7 @@ def test_a_reading_can_be_skipped_and_gone_back_to(file: Path) -> None:
 
 
 @pytest.mark.parametrize("answer", ["two", "-2.1", "2.1 kg", "900", "2.1 deg"])
-def test_what_is_no_such_reading_is_asked_again_and_not_kept(file: Path, answer: str) -> None:
+def test_what_is_not_such_a_reading_is_asked_again_and_not_kept(file: Path, answer: str) -> None:
     terminal, _, values = typed(file, answer, "done")
     assert "expected" in terminal.said
     assert values == {}
@@ -92,7 +92,7 @@ def test_a_later_run_goes_on_at_the_first_reading_that_lacks(file: Path) -> None
     assert values == {2: 2.1, 3: 7.15}
 
 
-def test_a_table_that_is_no_template_is_left_alone(tmp_path: Path) -> None:
+def test_a_table_that_is_not_a_template_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "s.csv").write_text("a;b\n1;2\n")
     with pytest.raises(UsageError):
         typed(tmp_path / "s.csv", "1")

@@ -174,7 +174,7 @@ def test_the_provenance_travels_into_every_view(source: object) -> None:
 
 
 @pytest.mark.parametrize("source", [FAILURE, FLEET], ids=["one", "batch"])
-def test_every_view_says_that_it_is_no_approval(source: object) -> None:
+def test_every_view_says_that_it_is_not_an_approval(source: object) -> None:
     words = " ".join(mlg("check", source).out.split())
     assert "not maintenance data" in words
     assert "not an approval for return to service" in words

@@ -100,7 +100,7 @@ def test_joints_that_read_like_new_on_a_gear_that_failed_are_asked_about(judge: 
     assert "If #3 were restored after the failure" in found.next_action.text
 
 
-def test_a_blank_outcome_is_no_complaint(judge: Judge) -> None:
+def test_a_blank_outcome_is_not_a_complaint(judge: Judge) -> None:
     found = judge(every_joint(0.0003, j10=0.0148))
     assert [(s.action, s.joints) for s in found.plan.steps] == [
         (Action.RESTORE, (10,)),

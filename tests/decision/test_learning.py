@@ -107,7 +107,7 @@ def test_an_empty_store_teaches_nothing(gear: Gear, tmp_path: Path) -> None:
     assert expected_of(Store(tmp_path / "none.sqlite"), gear) is None
 
 
-def test_a_few_gears_are_no_fleet(gear: Gear, tmp_path: Path) -> None:
+def test_a_few_gears_are_not_a_fleet(gear: Gear, tmp_path: Path) -> None:
     rows = ["record_id,tail_no,side,clearance_convention,clearance_3_in"]
     rows += [f"R{k},N{k},LH,RADIAL,0.004" for k in range(9)]
     (tmp_path / "few.csv").write_text("\n".join(rows), encoding="utf-8")

@@ -61,7 +61,7 @@ def test_a_large_displacement_says_that_unread_joints_are_worn_more(gear: Gear) 
     assert much > 1.3 * little
 
 
-def test_a_second_repair_is_no_surer_than_sure_where_nothing_is_restored(gear: Gear) -> None:
+def test_a_second_repair_is_not_surer_than_sure_where_nothing_is_restored(gear: Gear) -> None:
     worst_in = float(0.94 * gear.model.plunger_amplification() @ np.full(10, 0.006))
     found = causes_of(gear, every_joint(0.006), readings_in=(worst_in,))
     assert found.second_repair(0, np.zeros((1, 10), bool))[0] == pytest.approx(1.0, abs=0.01)

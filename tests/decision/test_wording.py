@@ -26,7 +26,7 @@ from tests.decision.conftest import Judge, every_joint
         (1.0, "100 %"),
     ],
 )
-def test_a_probability_is_written_as_a_percentage_that_is_no_false_certainty(
+def test_a_probability_is_written_as_a_percentage_that_is_not_a_false_certainty(
     share: float, written: str
 ) -> None:
     assert percent(share) == written

@@ -130,7 +130,7 @@ def test_an_extension_that_the_linkage_does_not_reach_is_named(gear: Gear) -> No
     assert ("R6", "actuator_extension_in") in {cell[:2] for cell in cells(diagnosis(gear, rows))}
 
 
-def test_where_the_rod_of_one_rig_was_rigged_is_no_cause(gear: Gear) -> None:
+def test_where_the_rod_of_one_rig_was_rigged_is_not_a_cause(gear: Gear) -> None:
     rows = [
         replace(row, plunger_position_in=(row.plunger_position_in or 0.0) + 0.02)
         for row in rig(gear, rows=40)

@@ -100,7 +100,7 @@ def test_a_constant_name_names_nothing(factor: str, gear: Gear, plain: Diagnosis
     assert found.verdict == "NONE"
 
 
-def test_constant_clearances_are_no_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:
+def test_constant_clearances_are_not_a_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:
     alike = fleet(gear.model, clearance_in=np.full_like(plain.clearance_in, 0.002))
     assert diagnose(gear.model, alike, gear.discrepancies).verdict == "NONE"
 
@@ -143,7 +143,7 @@ TABLE_IS_WRONG: dict[str, tuple[Spoil, str]] = {
 
 
 @pytest.mark.parametrize("case", TABLE_IS_WRONG)
-def test_what_is_wrong_with_the_table_is_no_cause(
+def test_what_is_wrong_with_the_table_is_not_a_cause(
     case: str, gear: Gear, plain: DiagnosisTable
 ) -> None:
     spoil, remedy = TABLE_IS_WRONG[case]
@@ -152,7 +152,7 @@ def test_what_is_wrong_with_the_table_is_no_cause(
     assert remedy in refused.value.remedy
 
 
-def test_a_column_with_one_value_known_is_no_reason_to_fail(
+def test_a_column_with_one_value_known_is_not_a_reason_to_fail(
     gear: Gear, plain: DiagnosisTable
 ) -> None:
     lonely = np.full(len(plain), np.nan)
@@ -246,7 +246,7 @@ def test_an_empty_file_leaves_with_3(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["x = (", "import nothing_of_that_name", "y = 1", "1/0"])
-def test_a_file_of_causes_that_is_none_leaves_with_2(text: str, tmp_path: Path) -> None:
+def test_a_file_of_causes_that_is_not_valid_leaves_with_2(text: str, tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(text, encoding="utf-8")
     rows, columns, _why = COMMANDS["five rows"]
     found = run(
@@ -256,7 +256,7 @@ def test_a_file_of_causes_that_is_none_leaves_with_2(text: str, tmp_path: Path) 
     assert "own.py" in found.stderr
 
 
-def test_the_json_of_a_diagnosis_holds_no_number_that_is_none(tmp_path: Path) -> None:
+def test_the_json_of_a_diagnosis_holds_no_invalid_number(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     rows = [[*row, 0.02 + rng.normal(0.0, 0.002)] for row in inspections(40)]
     found = run(
@@ -267,7 +267,7 @@ def test_the_json_of_a_diagnosis_holds_no_number_that_is_none(tmp_path: Path) ->
     assert not {"NaN", "Infinity"} & set(found.stdout.split())
 
 
-def test_the_same_inspections_again_are_no_further_evidence(tmp_path: Path) -> None:
+def test_the_same_inspections_again_are_not_further_evidence(tmp_path: Path) -> None:
     rows = [[*row, 0.02 + 0.001 * k] for k, row in enumerate(inspections(15))]
     said = run(str(write(tmp_path / "t.csv", [*rows, *rows], "plunger_displacement_in"))).stderr
     assert "15 usable rows are too few" in said

@@ -207,7 +207,9 @@ def test_a_clearance_that_is_not_taken_up_is_never_negative(scene: Scene) -> Non
     assert np.min(cause.adjust(scene, first(cause, scene), -7.0).clearance_in) == 0.0
 
 
-def test_a_joint_without_any_clearance_is_no_candidate(gear: Gear, plain: DiagnosisTable) -> None:
+def test_a_joint_without_any_clearance_is_not_a_candidate(
+    gear: Gear, plain: DiagnosisTable
+) -> None:
     clearance = plain.clearance_in.copy()
     clearance[:, 6] = 0.0
     scene = scene_of(gear.model, replace(plain, clearance_in=clearance), gear.discrepancies)
@@ -260,7 +262,7 @@ def test_a_bias_acts_on_the_rows_of_its_level_alone(name: str, scene: Scene) -> 
     assert moved == pytest.approx(np.where(column == candidate.setting["value"], 0.002, 0.0))
 
 
-def test_an_empty_gauge_is_no_gauge(gear: Gear, plain: DiagnosisTable) -> None:
+def test_an_empty_gauge_is_not_a_gauge(gear: Gear, plain: DiagnosisTable) -> None:
     gauges = plain.factors["gauge_id"].copy()
     gauges[:20] = ""
     scene = scene_of(

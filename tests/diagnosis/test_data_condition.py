@@ -283,7 +283,7 @@ def test_the_wear_of_a_gear_begins_anew_at_an_overhaul(gear: Gear) -> None:
     assert [len(set(gears_of(t)[:6].tolist())) for t in (table, anew)] == [1, 2]
 
 
-def test_one_mistyped_number_of_landings_is_no_overhaul(gear: Gear) -> None:
+def test_one_mistyped_number_of_landings_is_not_an_overhaul(gear: Gear) -> None:
     table = histories(gear)
     for place, wrong in ((2, 9000.0), (3, 12.0)):
         landings = table.quantities["gear_landings"].copy()

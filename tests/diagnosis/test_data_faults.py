@@ -250,7 +250,7 @@ def test_two_visits_are_enough_to_find_a_swapped_side_by_its_landings(gear: Gear
     assert faults(gear, wrong) == [(17, "side", "swapped_side")]
 
 
-def test_a_gear_read_twice_on_one_of_two_visits_is_no_swapped_side(gear: Gear) -> None:
+def test_a_gear_read_twice_on_one_of_two_visits_is_not_a_swapped_side(gear: Gear) -> None:
     table = paired(gear, [10.0, 300.0])
     landings = table.quantities["gear_landings"].copy()
     landings[17] = landings[12]
@@ -258,7 +258,7 @@ def test_a_gear_read_twice_on_one_of_two_visits_is_no_swapped_side(gear: Gear) -
     assert faults(gear, with_side(again, 17, "LH")) == []
 
 
-def test_a_gear_inspected_twice_on_its_day_is_no_swapped_side_where_aircraft_come_in_pairs(
+def test_a_gear_inspected_twice_on_its_day_is_not_a_swapped_side_where_aircraft_come_in_pairs(
     gear: Gear,
 ) -> None:
     table = paired(gear, [10.0, 150.0, 300.0])
@@ -275,7 +275,7 @@ def test_a_row_in_millimetres_is_found_in_its_clearances(gear: Gear, sound: Diag
     assert {(f.kind, f.column.split("_")[0]) for f in found} == {("mm_as_in", "clearance")}
 
 
-def test_a_worn_joint_that_moves_the_plunger_is_no_slip(gear: Gear) -> None:
+def test_a_worn_joint_that_moves_the_plunger_is_not_a_slip(gear: Gear) -> None:
     values = fleet(gear.model).clearance_in.copy()
     values[29, 6] = 0.024
     assert faults(gear, fleet(gear.model, noise_in=0.003, clearance_in=values)) == []

@@ -488,13 +488,11 @@ def test_a_convention_never_changes_a_prediction() -> None:
     assert found("convention").terms == ()
 
 
-def test_joints_that_nobody_read_are_no_cause() -> None:
+def test_joints_that_nobody_read_are_not_a_cause() -> None:
     assert found("unread").verdict == "NONE"
 
 
-def test_joints_that_nobody_read_and_that_wear_with_the_read_ones_of_their_gear_are_no_cause() -> (
-    None
-):
+def test_unread_joints_that_wear_with_the_read_ones_of_their_gear_are_not_a_cause() -> None:
     assert named("unread, worn with the read ones") == set()
 
 

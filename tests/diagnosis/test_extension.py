@@ -146,7 +146,7 @@ def test_an_extension_of_another_geometry_is_refused(gear: Gear, tmp_path: Path)
     assert "Diagnose again" in refused.value.remedy
 
 
-def test_a_file_that_is_no_extension_is_refused(gear: Gear, tmp_path: Path) -> None:
+def test_a_file_that_is_not_an_extension_is_refused(gear: Gear, tmp_path: Path) -> None:
     (tmp_path / "e.toml").write_text("schema = 1\n", encoding="utf-8")
     with pytest.raises(GearFileError, match="geometry_sha256: expected a text"):
         load_extension([tmp_path / "e.toml"], gear)

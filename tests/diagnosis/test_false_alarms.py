@@ -46,14 +46,14 @@ def test_a_model_that_is_right_to_the_last_digit_has_no_cause(gear: Gear) -> Non
 
 @every_day_and_slow
 @pytest.mark.parametrize("high_in", [0.005, 0.010])
-def test_clearances_drawn_evenly_and_read_exactly_are_no_cause(
+def test_clearances_drawn_evenly_and_read_exactly_are_not_a_cause(
     high_in: float, seeds: range, allowed: int, gear: Gear
 ) -> None:
     assert alarms(gear, lambda seed: read_exactly(gear, seed, high_in), seeds) <= allowed
 
 
 @every_day_and_slow
-def test_small_clearances_read_better_than_declared_are_no_cause(
+def test_small_clearances_read_better_than_declared_are_not_a_cause(
     seeds: range, allowed: int, gear: Gear
 ) -> None:
     assert alarms(gear, lambda seed: read_exactly(gear, seed, None), seeds) <= allowed
@@ -75,7 +75,7 @@ def habits(gear: Gear, seed: int, column: str) -> DiagnosisTable:
 
 @every_day_and_slow
 @pytest.mark.parametrize("column", ["gauge_id", "technician_id", "tail_no"])
-def test_readers_and_aircraft_that_all_differ_a_little_are_no_cause(
+def test_readers_and_aircraft_that_all_differ_a_little_are_not_a_cause(
     column: str, seeds: range, allowed: int, gear: Gear
 ) -> None:
     assert alarms(gear, lambda seed: habits(gear, seed, column), seeds) <= allowed
@@ -108,7 +108,7 @@ def worn_apart(gear: Gear, seed: int) -> DiagnosisTable:
 
 
 @every_day_and_slow
-def test_gears_that_wear_from_different_levels_at_different_rates_are_no_cause(
+def test_gears_that_wear_from_different_levels_at_different_rates_are_not_a_cause(
     seeds: range, allowed: int, gear: Gear
 ) -> None:
     assert alarms(gear, lambda seed: worn_apart(gear, seed), seeds) <= allowed

@@ -169,7 +169,7 @@ def test_what_is_true_of_two_tails_is_learned_from_the_other_one() -> None:
     assert found.rms_after_in < 0.1 * found.rms_before_in
 
 
-def test_what_pins_scatter_is_no_part_of_what_an_extension_corrects() -> None:
+def test_what_pins_scatter_is_not_part_of_what_an_extension_corrects() -> None:
     predicted = np.tile([0.0274, 0.02], 40)
     found = gained(
         predicted, (0.1 + EXPECTED_SLOPE) * predicted, predicted, np.repeat(np.arange(10), 8)

@@ -89,7 +89,7 @@ def test_a_column_of_the_tables_own_is_named_with_its_value(gear: Gear) -> None:
     assert names(gear, own_column(table, np.zeros(200))) == [("modification", "mod_status POST")]
 
 
-def test_a_step_of_all_aircraft_is_no_modification(gear: Gear) -> None:
+def test_a_step_of_all_aircraft_is_not_a_modification(gear: Gear) -> None:
     def all_from(table: DiagnosisTable, _over: Array) -> Array:
         return 0.006 * (table.quantities["day"] >= 350)
 

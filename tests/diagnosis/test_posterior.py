@@ -259,7 +259,7 @@ def test_a_cause_moves_with_its_own_column_or_with_the_clearances_of_its_joints(
     assert Candidate(CalibrationRate()).own_variables == {"predicted"}
 
 
-def test_a_slip_of_the_pen_is_nothing_that_is_wrong() -> None:
+def test_an_entry_error_is_nothing_that_is_wrong() -> None:
     slip = replace(FREE, columns=np.column_stack([COLUMNS[:, :5], np.eye(N)[:, 7]]))
     data = DATA - 0.9 * COLUMNS[:, 1]
     data[7] += 40.0

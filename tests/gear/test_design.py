@@ -48,7 +48,7 @@ def test_branch_signs_are_those_of_the_coordinates(gear: Gear) -> None:
         assert signs[0] == signs[1]
 
 
-def test_moving_and_turning_everything_together_is_no_other_design(gear: Gear) -> None:
+def test_moving_and_turning_everything_together_is_not_another_design(gear: Gear) -> None:
     space = DesignSpace(gear.reference)
     for member in gear.ensemble[:4]:
         assert space.vector(moved_as_a_whole(member)) == pytest.approx(

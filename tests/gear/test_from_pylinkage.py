@@ -277,7 +277,7 @@ def test_the_stroke_of_an_actuator_in_millimetres_becomes_inches(tmp_path: Path)
     assert gear.model.stroke == pytest.approx((-0.4 / 25.4, 1.1 / 25.4))
 
 
-def test_the_housing_of_an_actuator_is_no_joint_and_its_end_is_one() -> None:
+def test_the_housing_of_an_actuator_is_not_a_joint_and_its_end_is_one() -> None:
     found = short_form_of(toggle_press(), **LIMITS)
     assert set(found["joints"]) == {"cylinder", "knee", "top", "ram"}
 

@@ -87,7 +87,7 @@ def test_a_curve_tells_the_linkage_from_load_directions(seed: int) -> None:
     assert named(found("OTHER_LINKAGE", seed)) == ["geometry"]
 
 
-def test_a_smooth_curve_of_misfit_is_no_slip_of_the_pen() -> None:
+def test_a_smooth_curve_of_misfit_is_not_an_entry_error() -> None:
     assert found("OTHER_LINKAGE", 4).faults == ()
 
 

@@ -128,7 +128,7 @@ def test_one_joint_beside_another_linkage_is_not_taken_for_directions_of_all() -
     assert rate("another linkage, one cause, S = 15: named, with geometry or without", one) == 1.0
 
 
-def test_what_moves_with_temperature_on_one_aircraft_is_no_re_rigging_of_its_last_two_rows() -> (
+def test_what_moves_with_temperature_on_one_aircraft_is_not_a_re_rigging_of_its_last_two_rows() -> (
     None
 ):
     # Fleet 49 of those that the rule was set on; its other rows show what moves.
@@ -136,6 +136,6 @@ def test_what_moves_with_temperature_on_one_aircraft_is_no_re_rigging_of_its_las
     assert (found["named"], found["variables"]) == ([], ["tail_no", "temperature_c"])
 
 
-def test_a_row_that_does_not_close_without_one_of_its_clearances_is_no_crash() -> None:
+def test_a_row_that_does_not_close_without_one_of_its_clearances_is_not_a_crash() -> None:
     # The seed at which it was found.
     assert run(("loads and gauge_bias", 41, 6_900_041))["verdict"] == "NAMED"

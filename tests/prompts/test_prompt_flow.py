@@ -216,7 +216,7 @@ def test_a_decimal_comma_is_refused_with_the_suggestion(flow: Flow) -> None:
 @pytest.mark.parametrize(
     "typed", ["abc", "1/8", "-.002", "−0.002", ".013 cm", "nan", "1e999", ".0 13", "y", "n"]
 )
-def test_what_is_no_clearance_is_not_taken(flow: Flow, typed: str) -> None:
+def test_what_is_not_a_clearance_is_not_taken(flow: Flow, typed: str) -> None:
     turn = play(flow, [typed])
     assert (turn.state.ask, turn.state.answers.joints) == (Ask.JOINT, {})
 
@@ -446,7 +446,7 @@ def test_order_date_landings_technician_and_gauge_are_asked_once_and_reach_the_i
     assert (str(found.inspection_date), found.gear_landings) == ("2026-03-01", 2100.0)
 
 
-def test_a_date_that_is_none_is_asked_again(flow: Flow) -> None:
+def test_a_date_that_is_not_valid_is_asked_again(flow: Flow) -> None:
     turn = play(flow, [*TEN, "", "", "some day"])
     assert (turn.state.ask, turn.state.at) == (Ask.DETAIL, "inspection_date")
     assert "is not accepted" in said(turn)

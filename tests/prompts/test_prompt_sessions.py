@@ -100,7 +100,7 @@ def test_one_session_is_one_draft(gear: Gear, store: SessionStore) -> None:
     assert len(drafts(store)) == 1
 
 
-def test_a_draft_is_no_record_and_in_no_chain(gear: Gear, store: SessionStore) -> None:
+def test_a_draft_is_not_a_record_and_in_no_chain(gear: Gear, store: SessionStore) -> None:
     interrupted(gear, store, [*HEADING, *TEN])
     assert (Store(store.place).all(), Store(store.place).verify()) == ([], (0, None))
 

@@ -248,7 +248,7 @@ def test_without_line_editing_an_arrow_key_is_refused(start: Start, tmp_path: Pa
 
 
 @pytest.mark.parametrize("errors", ["strict", "surrogateescape"])
-def test_bytes_that_are_no_text_are_refused(start: Start, errors: str) -> None:
+def test_bytes_that_are_not_text_are_refused(start: Start, errors: str) -> None:
     child = start(PYTHONIOENCODING=f"utf-8:{errors}")
     child.expect_exact(_PROMPT)
     os.write(child.fileno(), b"N\xff\xfe1\n")

@@ -64,7 +64,7 @@ def test_a_date_that_can_be_read_in_several_ways_is_refused(text):
 
 
 @pytest.mark.parametrize("text", ["31/02/2026", "13.13.2025", "13.1.4", "2026-02-30"])
-def test_numbers_that_are_no_day_are_refused(text):
+def test_numbers_that_are_not_a_day_are_refused(text):
     with pytest.raises(CellFaultError, match="date_invalid"):
         read_date(text)
 
@@ -77,7 +77,7 @@ def test_a_stated_order_settles_a_date(order, day):
     assert read_date("01-02-03", DateOrder(order)) == day
 
 
-def test_a_date_that_is_no_day_in_the_stated_order_is_refused():
+def test_a_date_that_is_not_a_day_in_the_stated_order_is_refused():
     with pytest.raises(CellFaultError, match="date_invalid"):
         read_date("25/01/2024", DateOrder.MDY)
 
@@ -133,7 +133,7 @@ def test_the_flag_settles_a_column(tmp_path):
     assert not run.json["problems"]
 
 
-def test_an_order_that_is_none_is_a_usage_error(tmp_path):
+def test_an_order_that_is_not_valid_is_a_usage_error(tmp_path):
     run = mlg("check", column(tmp_path, "03/04/2024"), "--dates", "dym")
     assert run.code == 2
     assert "dmy, mdy or ymd" in run.err

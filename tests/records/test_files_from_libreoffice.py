@@ -114,7 +114,7 @@ def test_a_truncated_old_workbook_is_named_as_damaged(samples, read, keep):
     assert [p.code for p in result.problems] == ["file_damaged"]
 
 
-def test_an_old_office_file_that_is_no_workbook_is_refused(samples, read):
+def test_an_old_office_file_that_is_not_a_workbook_is_refused(samples, read):
     data = (samples / "sample.xls").read_bytes()
     renamed = data.replace("Workbook".encode("utf-16-le"), "WordDoc1".encode("utf-16-le"))
     assert [p.code for p in read(renamed, "t.doc").problems] == ["file_kind"]

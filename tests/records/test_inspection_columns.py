@@ -420,7 +420,9 @@ def test_a_row_without_any_clearance_is_read_with_a_warning(read, table):
 @pytest.mark.parametrize(
     "text", ["n/a?", "?", "x", "0.01-0.02", "~0.013", "0.013 cm", "0.0.13", "0.013 in in"]
 )
-def test_a_text_that_is_no_length_is_an_error_that_says_how_to_leave_a_joint_out(read, xlsx, text):
+def test_a_text_that_is_not_a_length_is_an_error_that_says_how_to_leave_a_joint_out(
+    read, xlsx, text
+):
     def change(book):
         book.worksheets[0]["E2"] = text
 
@@ -475,7 +477,7 @@ def test_a_line_break_in_an_identity_is_refused(read, table):
     assert only(result).code == "text_control_character"
 
 
-def test_a_number_whose_digits_are_lost_is_no_identity(read, xlsx):
+def test_a_number_whose_digits_are_lost_is_not_an_identity(read, xlsx):
     def change(book):
         book.worksheets[0]["A2"] = 20260304123456789
 
@@ -495,7 +497,7 @@ def test_progress_is_told_as_the_rows_are_read(table):
     assert told == [500, 1000, 1200]
 
 
-def test_a_row_repeated_in_a_table_that_lacks_its_convention_is_no_contradiction(read, table):
+def test_a_row_repeated_in_a_table_that_lacks_its_convention_is_not_a_contradiction(read, table):
     header = [h for h in HEADER if h != "clearance_convention"]
     row = ("R1", "N1", "LH", 0.013, 0.007)
     assert {p.code for p in read(table(header, [row, row])).problems} == {"convention_missing"}
@@ -538,7 +540,7 @@ def test_a_slip_is_suggested_only_where_somebody_would_write_such_a_number(
     assert [unit for unit in ("thou", "millimetres") if f"read in {unit}" in remedy] == [said]
 
 
-def test_a_margin_of_nothing_is_no_slip_of_the_decimal_point(read, table):
+def test_a_margin_of_nothing_is_not_a_slip_of_the_decimal_point(read, table):
     assert "slipped" not in only(read(with_column(table, "margin_in", 0))).remedy
 
 

@@ -309,7 +309,7 @@ def test_15_a_table_without_any_clearance_is_an_error(read, table):
 
 
 @pytest.mark.parametrize("header", ["clerance_3_in", "clearence_3_in"])
-def test_15_a_slip_of_the_pen_in_a_header_is_refused_with_the_nearest_name(read, table, header):
+def test_15_an_entry_error_in_a_header_is_refused_with_the_nearest_name(read, table, header):
     result = read(table((*HEADER[:4], header, "clearance_5_in")))
     problem = only(result)
     assert problem.code == "header_doubtful"
@@ -353,7 +353,7 @@ def test_19_a_negative_number_is_an_error(read, xlsx):
 
 
 @pytest.mark.parametrize("text", ["NaN", "nan", "inf", "-inf", "Infinity", "1e309", "1.#QNAN"])
-def test_20_what_is_no_finite_number_is_an_error(read, table, text):
+def test_20_what_is_not_a_finite_number_is_an_error(read, table, text):
     result = read(table(rows=[(*GOOD[:4], text, 0.007)]))
     assert (only(result).code, only(result).cell) == ("not_finite", "E2")
 
@@ -546,7 +546,7 @@ def test_29_several_sheets_with_inspections_are_an_error_that_lists_them(read, x
     assert not result.rows
 
 
-def test_29_a_sheet_of_instructions_is_no_candidate_even_with_an_example(read, xlsx):
+def test_29_a_sheet_of_instructions_is_not_a_candidate_even_with_an_example(read, xlsx):
     def change(book):
         _second_sheet(
             book, [["Instructions"], ["Fill in like this:"], HEADER, ("X1", *GOOD[1:])], "How to"
@@ -586,7 +586,7 @@ def test_30_hidden_rows_are_read_and_counted(read, xlsx):
 # 31 to 35: text files
 
 
-def test_31_a_byte_order_mark_is_no_part_of_the_header(read, table):
+def test_31_a_byte_order_mark_is_not_part_of_the_header(read, table):
     result = read(b"\xef\xbb\xbf" + table().encode())
     assert clearances(result) == {3: 0.013, 5: 0.007}
     assert result.notes == ()
@@ -633,7 +633,7 @@ def test_35_a_ragged_row_is_an_error_with_its_row_and_the_others_are_read(read, 
     assert len(result.inspections) == 2
 
 
-def test_35_empty_fields_at_the_end_are_no_error(read, table):
+def test_35_empty_fields_at_the_end_are_not_errors(read, table):
     assert not read(table().replace("0.007\n", "0.007,,\n")).problems
 
 
@@ -696,7 +696,7 @@ def test_36_the_last_allowed_column_is_read(read, xlsx):
     assert result.rows[0].carried == {"note": "x"}
 
 
-def test_36_an_empty_formatted_cell_far_outside_is_no_error(read, package):
+def test_36_an_empty_formatted_cell_far_outside_is_not_an_error(read, package):
     data = _rows_with('<c r="E2"><v>0.013</v></c><c r="F2"><v>0.007</v></c><c r="XFD2" s="0"/>')
     result = read(
         package(data + '<row r="1048576" hidden="1"><c r="A1048576" s="0"/></row>'), "t.xlsx"
@@ -889,14 +889,14 @@ def test_43_a_pdf_named_csv_is_named_as_a_pdf(read):
     assert "PDF" in only(read(b"%PDF-1.4\n%\xe2\xe3", "t.csv")).value
 
 
-def test_43_bytes_that_are_no_text_are_refused(read):
+def test_43_bytes_that_are_not_text_are_refused(read):
     assert only(read(bytes(range(256)) * 8, "t.csv")).code == "not_a_table"
 
 
 @pytest.mark.parametrize(
     "text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", " =cmd|' /C calc'!A0", "＝1+1"]
 )
-def test_44_an_exported_text_is_no_formula(tmp_path, text):
+def test_44_an_exported_text_is_not_a_formula(tmp_path, text):
     from mlg_troubleshoot.outputs import write_csv
 
     write_csv(tmp_path / "out.csv", ["remarks", "n"], [[text, -0.5]])
@@ -905,7 +905,7 @@ def test_44_an_exported_text_is_no_formula(tmp_path, text):
     assert lines[1].endswith(",-0.5")
 
 
-def test_44_a_text_in_an_annotated_workbook_is_no_formula(tmp_path, read, xlsx):
+def test_44_a_text_in_an_annotated_workbook_is_not_a_formula(tmp_path, read, xlsx):
     from mlg_troubleshoot.records import ReadOptions
     from mlg_troubleshoot.records.annotate import annotate_workbook
     from tests.records.reading import read_inspections
@@ -1007,7 +1007,7 @@ def test_50_a_row_of_totals_or_a_signature_is_set_aside(read, table, word):
     )
 
 
-def test_50_a_row_of_a_gear_is_no_totals_row_however_its_record_is_called(read, table):
+def test_50_a_row_of_a_gear_is_not_a_totals_row_however_its_record_is_called(read, table):
     result = read(table(rows=[GOOD, ("Page 7", *GOOD[1:4], None, None)]))
     assert [row.record_id for row in result.rows] == ["R1", "Page 7"]
 

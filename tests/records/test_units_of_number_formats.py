@@ -99,7 +99,7 @@ def test_the_stored_number_is_read_and_not_the_one_that_is_shown(formatted):
 
 
 @pytest.mark.parametrize("code", ['0.00" furlongs"', '[<1]0.00" mm";0.00" in"', '"unread"'])
-def test_words_that_are_no_unit_are_refused_like_words_in_the_cell(formatted, code):
+def test_words_that_are_not_a_unit_are_refused_like_words_in_the_cell(formatted, code):
     problem = only(formatted(F=code))
     assert (problem.code, problem.cell) == ("not_a_length", "F2")
 
@@ -124,7 +124,7 @@ def test_a_format_without_words_changes_nothing(formatted, code):
     assert result.rows[0].clearance_in == {3: 0.0005, 5: 0.00033}
 
 
-def test_a_zero_that_its_format_shows_as_a_word_is_no_measured_zero(formatted):
+def test_a_zero_that_its_format_shows_as_a_word_is_not_a_measured_zero(formatted):
     row = (*ROW[:5], 0, *ROW[6:])
     assert only(formatted(row=row, F='0.00;-0.00;"not read"')).value == "not read"
 

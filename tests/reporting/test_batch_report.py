@@ -209,7 +209,7 @@ def test_each_gear_has_one_line_with_its_latest_inspection(twice: list[Judgement
     assert named == [["autumn", "other"], ["spring", "summer"]]
 
 
-def test_an_inspection_without_a_date_is_no_earlier_one(
+def test_an_inspection_without_a_date_is_not_an_earlier_one(
     judge: Judge, twice: list[Judgement]
 ) -> None:
     undated = judge(SOUND, record_id="undated", tail_no="N2", inspection_date=None)

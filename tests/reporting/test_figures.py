@@ -107,7 +107,7 @@ def test_an_axis_around_values_holds_them_all() -> None:
 
 
 @pytest.mark.parametrize("value", [0.02, -0.02, 3000.0])
-def test_an_axis_around_one_value_is_no_wider_than_the_value(value: float) -> None:
+def test_an_axis_around_one_value_is_not_wider_than_the_value(value: float) -> None:
     axis = Axis.around("x", [value])
     assert axis.low < value < axis.high
     assert axis.high - axis.low < abs(value)

@@ -95,11 +95,11 @@ def test_joints_stand_in_the_order_to_inspect_them(judge: Judge, worn: Made) -> 
     assert places == sorted(places)
 
 
-def test_a_joint_over_its_limit_is_told_apart_by_text_in_the_schematic(failure: Made) -> None:
+def test_a_joint_over_its_limit_is_distinguished_by_text_in_the_schematic(failure: Made) -> None:
     assert ">0.0130 OVER LIMIT</text>" in failure.html
 
 
-def test_a_joint_over_its_limit_is_told_apart_by_shape_in_the_schematic(failure: Made) -> None:
+def test_a_joint_over_its_limit_is_distinguished_by_shape_in_the_schematic(failure: Made) -> None:
     drawing = failure.html[failure.html.index('<svg class="figure panel"') :]
     number = drawing.index('font-weight="bold" fill="#ffffff" text-anchor="middle">3</text>')
     assert drawing[:number].rsplit("<", 2)[1].startswith("rect")

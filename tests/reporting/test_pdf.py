@@ -176,7 +176,7 @@ def test_with_the_date_of_the_sources_two_runs_give_the_same_bytes(
     assert "report made 2024-05-17" in made.text
 
 
-def test_a_date_of_the_sources_that_is_none_is_refused(
+def test_a_date_of_the_sources_that_is_not_valid_is_refused(
     gear: Gear, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")

@@ -98,7 +98,7 @@ def test_a_look_alike_that_the_data_speak_against_leaves_a_name_alone() -> None:
     assert concluded({(A,): 0.995, (B,): 0.005}, LOOK_ALIKE).sure == (A,)
 
 
-def test_effects_that_only_share_a_part_are_no_look_alikes() -> None:
+def test_effects_that_only_share_a_part_are_not_look_alikes() -> None:
     related = np.column_stack([APART[:, 0], APART[:, 0] + APART[:, 1], APART[:, 2:]])
     assert concluded({(A,): 0.95, (B,): 0.05}, related, log_prior_of_a=-1.0).sure == (A,)
 

@@ -294,7 +294,7 @@ def test_groups_scatter_in_the_unit_of_the_readings_however_exact_some_of_these_
     assert high - low > 2.0 / np.sqrt(12.0)
 
 
-def test_readings_far_out_are_no_pattern_although_rows_share_a_nuisance_parameter() -> None:
+def test_readings_far_out_are_not_a_pattern_although_rows_share_a_nuisance_parameter() -> None:
     alarms = 0
     for seed in range(12):
         rng = np.random.default_rng([18, seed])
@@ -365,7 +365,7 @@ def test_readings_without_noise_give_the_value_that_they_were_made_with(true: fl
     assert found.remainder_p == 1.0
 
 
-def test_rounding_in_readings_without_noise_is_no_cause() -> None:
+def test_rounding_in_readings_without_noise_is_not_a_cause() -> None:
     found = diagnose_simulation(
         lambda p: p["rate"] * RAMP + p["level"],
         RAMP + 0.3,

@@ -72,7 +72,7 @@ def test_a_cause_whose_column_is_not_planned_says_which() -> None:
     assert pressure.found_from_in is None
 
 
-def test_causes_that_physics_lets_push_apart_only_are_no_rivals() -> None:
+def test_causes_that_physics_lets_push_apart_only_are_not_rivals() -> None:
     oval = planned(*TWO_JOINTS)["oval_wear", "joint 3"]
     assert oval.nearest != "direction_not_worst_case joint 3"
     assert oval.told_apart_from_in is not None
@@ -84,7 +84,7 @@ def test_at_the_stated_distance_the_wrong_cause_is_ruled_out_four_times_in_five(
     assert norm.sf(Beliefs().odds, _APART**2 / 2.0, _APART) == pytest.approx(0.8, abs=0.001)
 
 
-def test_what_is_told_apart_is_no_smaller_than_what_is_found() -> None:
+def test_what_is_distinguished_is_not_smaller_than_what_is_found() -> None:
     for cause in planned(*TWO_JOINTS).values():
         if cause.told_apart_from_in is not None:
             assert cause.found_from_in is not None

@@ -104,7 +104,7 @@ def test_reading_makes_no_file(place: Path) -> None:
     assert not place.exists()
 
 
-def test_a_file_that_is_no_store_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_store_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text(
         "no store at all, but a long enough text to be read as one" * 30
     )

@@ -123,7 +123,7 @@ def test_minutes_and_parts_are_summed_over_the_fleet(store: Path) -> None:
     assert "(number of gears): #3 (1)." in told["work"]
 
 
-def test_a_plan_from_before_a_repair_is_no_work_that_is_left(store: Path, tmp_path: Path) -> None:
+def test_a_plan_from_before_a_repair_is_not_work_that_is_left(store: Path, tmp_path: Path) -> None:
     repaired = tmp_path / "repaired.sqlite"
     shutil.copy(store, repaired)
     repair = ("--joint", "3", "--date", "2026-06-30", "--store", repaired)

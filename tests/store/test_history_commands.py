@@ -313,7 +313,7 @@ def test_an_export_is_imported_with_its_chain(tmp_path: Path, place: Path) -> No
 
 
 @pytest.mark.parametrize("line", ["[" * 5000 + "]" * 5000, "9" * 5000, "[]", "{", "\x00"])
-def test_what_is_no_exported_record_is_refused_with_its_line(tmp_path: Path, line: str) -> None:
+def test_what_is_not_an_exported_record_is_refused_with_its_line(tmp_path: Path, line: str) -> None:
     (tmp_path / "chain.jsonl").write_text(line + "\n", encoding="utf-8")
     run = mlg("history", "import", tmp_path / "chain.jsonl", "--store", tmp_path / "other.sqlite")
     assert run.code == 5

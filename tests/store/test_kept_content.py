@@ -362,7 +362,7 @@ def test_a_packed_record_of_more_than_a_megabyte_is_not_fetched(place: Path) -> 
 
 
 @pytest.mark.parametrize("version", ["abc", -3, 0, 99])
-def test_a_schema_version_that_is_none_is_named(place: Path, version: object) -> None:
+def test_a_schema_version_that_is_not_valid_is_named(place: Path, version: object) -> None:
     tampered(place, "UPDATE mlg_meta SET schema_version = ?", version)
     run = mlg("history")
     assert run.code == 5

@@ -63,7 +63,7 @@ def test_95_percent_intervals_hold_the_exact_index_about_as_often(
     assert 0.85 <= inside / total <= 1.0
 
 
-def test_intervals_are_no_wider_than_the_errors_warrant(
+def test_intervals_are_not_wider_than_the_errors_warrant(
     on_cube: Response, exact: TensorIndices
 ) -> None:
     errors, widths = [], []

@@ -196,7 +196,9 @@ def test_one_reading_of_one_unit_is_enough_for_a_wide_forecast() -> None:
         ([0.0, 1.0], [0.0], "one value a usage|2 usages"),
     ],
 )
-def test_a_path_that_is_none_is_refused(usage: list[float], value: list[float], said: str) -> None:
+def test_a_path_that_is_not_valid_is_refused(
+    usage: list[float], value: list[float], said: str
+) -> None:
     with pytest.raises(UsageError, match=said):
         WearPath("a", usage, value)
 

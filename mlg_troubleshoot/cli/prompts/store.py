@@ -141,7 +141,7 @@ class SessionStore:
         return own + [draft for draft in found if draft.id not in {each.id for each in own}]
 
     def latest(self) -> Session | None:
-        """The last unfinished session; one without any reading only if there is no other."""
+        """The last unfinished session; one without any reading only if it is the only one."""
         open_ones = [draft for draft in self._newest_first() if not draft.complete]
         first = None
         for session in map(self._readable, open_ones):
