@@ -291,7 +291,11 @@ class _PlanBuilder:
         # What is over its limit already does not suffice, or there would be nothing to read. Where
         # nobody read any joint, two are restored on average.
         more = 1 if self.cases.measured[self.row].any() else 2
-        return self._try((*self.over, *likely[:more]), expected=True)
+        joints = (*self.over, *likely[:more])
+        without = [n for n in joints if not self.cases.restorable[self.row, self._place(n)]]
+        if without:
+            return self._restore_over_limit()._stop_for_today(without)
+        return self._try(joints, expected=True)
 
     def _repair(self) -> RepairSet | None:
         """The quickest repair after which a second one is at most as likely as the shop accepts;
@@ -465,10 +469,10 @@ class _PlanBuilder:
         self._step(Action.RETRACT, self.gear.retraction.value, sentences.RETRACT)
         return self._done()
 
-    def _stop_for_today(self) -> Plan:
-        """What is over its limit cannot be restored today."""
+    def _stop_for_today(self, if_worn: Sequence[int] = ()) -> Plan:
+        """What is over its limit, or may be found worn, cannot be restored today."""
         left = [n for n in self.over_limit if n not in self.over]
-        self._step(Action.CONTINUE, 0.0, sentences.stop_without_spares(left))
+        self._step(Action.CONTINUE, 0.0, sentences.stop_without_spares(left, if_worn))
         return Plan(tuple(self.steps), End.CANNOT_CLEAR)
 
     def _done(self) -> Plan:

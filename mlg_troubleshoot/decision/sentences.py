@@ -165,11 +165,13 @@ def never_read(unread: Sequence[int], minutes: float) -> str:
     return f"{what}: to know, measure {them} ({minutes:.0f} min)."
 
 
-def stop_without_spares(joints: Sequence[int]) -> str:
-    """Step CONTINUE where joints over their limit cannot be restored today."""
-    return (
-        f"{STOP}: {joint_list(joints)} must be restored but cannot be. Hand over what stays open."
-    )
+def stop_without_spares(joints: Sequence[int], if_worn: Sequence[int]) -> str:
+    """Step CONTINUE where joints over their limit, or that may be found worn, have to wait."""
+    if joints:
+        because = f": {joint_list(joints)} must be restored but cannot be"
+    else:
+        because = f" if the readings find {joint_list(if_worn)} worn, which cannot be restored"
+    return f"{STOP}{because}. Hand over what stays open."
 
 
 def does_not_fit(step: Step, left: float, before: str | None) -> str:

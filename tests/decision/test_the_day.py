@@ -133,6 +133,22 @@ def test_no_plunger_is_read_while_a_joint_over_its_limit_waits_for_its_spare(jud
     assert found.next_action.text.startswith("Stop for today: #3")
 
 
+def test_what_has_no_spare_is_not_expected_to_be_restored_once_it_is_read(judge: Judge) -> None:
+    unread = {n: c for n, c in every_joint(0.003, j2=0.0065).items() if n not in (1, 3, 6, 9)}
+    with_spare, without = (
+        judge(unread, **FAILED, no_spare=joints).plan.steps for joints in ((), (3,))
+    )
+    assert [(s.action, s.joints) for s in with_spare[:2]] == [
+        (Action.MEASURE, (3, 1)),
+        (Action.RESTORE, (3,)),
+    ]
+    assert [(s.action, s.joints) for s in without] == [
+        (Action.MEASURE, (3, 1)),
+        (Action.CONTINUE, ()),
+    ]
+    assert without[1].text.startswith("Stop for today if the readings find #3 worn")
+
+
 def test_an_expected_end_speaks_of_the_joints_that_will_have_been_read(judge: Judge) -> None:
     ends = [
         judge({n: c for n, c in every_joint(0.0003, j3=0.0148).items() if n not in left}, **FAILED)
