@@ -11,7 +11,7 @@ import pytest
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.case import plunger_u
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome
-from mlg_troubleshoot.decision.plan import Action, End
+from mlg_troubleshoot.decision.plan import Action, Basis, End
 from mlg_troubleshoot.decision.plunger_reading import disagreement
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.decision.conftest import Judge, every_joint, inspected
@@ -63,6 +63,15 @@ def test_a_joint_above_its_limit_does_not_change_the_verdict(judge: Judge) -> No
 def test_a_joint_at_its_limit_is_not_above_it_even_if_read_in_millimetres(judge: Judge) -> None:
     found = judge(every_joint(0.0, j7=0.1905 / 25.4))
     assert not any(joint.over_limit for joint in found.joints)
+
+
+@pytest.mark.parametrize("unit", [LengthUnit.INCH, LengthUnit.THOU, LengthUnit.MILLIMETRE])
+def test_a_plunger_at_its_margin_is_not_beyond_it_in_any_unit(
+    judge: Judge, unit: LengthUnit
+) -> None:
+    typed = {"in": 0.03, "thou": 30.0, "mm": 0.762}[unit.value]
+    found = judge(every_joint(0.004), readings_in=(unit.to_inches(typed),))
+    assert found.basis is Basis.PREDICTED
 
 
 def test_a_failure_within_the_margin_is_not_explained_by_clearances(judge: Judge) -> None:
