@@ -430,7 +430,11 @@ class _PlanBuilder:
             self._measure_again(self._joints(f.again[i]), float(f.again_u_in[i]))
             inside = self.judged.batch.lower.displacement_in[i] <= self.cases.margin_in[i]
             found = Verdict.WITHIN_MARGIN if inside else Verdict.OUTSIDE_MARGIN
-        ends = {Verdict.WITHIN_MARGIN: End.WITHIN, Verdict.OUTSIDE_MARGIN: End.OUTSIDE_NO_COMPLAINT}
+        ends = {
+            Verdict.WITHIN_MARGIN: End.WITHIN,
+            Verdict.OUTSIDE_MARGIN: End.OUTSIDE_NO_COMPLAINT,
+            Verdict.INCOMPLETE: End.CANNOT_CLEAR,
+        }
         return self._settled(ends.get(found, End.TOO_CLOSE))
 
     def _settled(self, where: End) -> Plan:
@@ -472,8 +476,16 @@ class _PlanBuilder:
     def _stop_for_today(self, if_worn: Sequence[int] = ()) -> Plan:
         """What is over its limit, or may be found worn, cannot be restored today."""
         left = [n for n in self.over_limit if n not in self.over]
-        self._step(Action.CONTINUE, 0.0, sentences.stop_without_spares(left, if_worn))
+        text = sentences.stop_for_today(left, if_worn, self._barred())
+        self._step(Action.CONTINUE, 0.0, text)
         return Plan(tuple(self.steps), End.CANNOT_CLEAR)
+
+    def _barred(self) -> tuple[int, ...]:
+        """Joints that the day keeps from being read, or restored on a gear that failed."""
+        cases = self.cases
+        i = self.row
+        unread = ~cases.measured[i] & ~cases.reachable[i]
+        return self._joints(unread | ~cases.restorable[i] if cases.failed[i] else unread)
 
     def _done(self) -> Plan:
         cases = self.cases
@@ -504,6 +516,8 @@ class _PlanBuilder:
 
     def _end(self, where: End) -> Plan:
         """Go on: the plan ends."""
+        if where is End.CANNOT_CLEAR and self._barred():
+            return self._stop_for_today()
         text = sentences.go_on(
             where,
             failed=bool(self.cases.failed[self.row]),
@@ -579,8 +593,6 @@ class _PlanBuilder:
         if left and found.steps[0].action in (Action.CONTINUE, Action.DONE):
             minutes = minutes_to_measure(self.gear, left, self.opened)
             never = sentences.never_read(left, minutes)
-        if found.end is End.WITHIN:
-            return never
         asked = {n for step in found.steps for n in step.joints}
         unread = self._joints(~cases.measured[i] & ~cases.reachable[i])
         over = self._joints(cases.over_limit[i] & ~cases.restorable[i])
@@ -657,7 +669,7 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
     off = off[:, None]
     fixed = (fixed + own.sum(axis=1))[:, None]
     for better in sorted(BETTER_GAUGES_IN):
-        eligible = some.measured & ~some.own_gauge & (some.gauge_u_in > better)
+        eligible = some.measured & some.reachable & ~some.own_gauge & (some.gauge_u_in > better)
         then = (slopes * better) ** 2
         worth = np.where(eligible, own - then, 0.0)
         order = np.argsort(-np.round(worth / cases.gear.access_minutes, 12), axis=1, kind="stable")
@@ -679,13 +691,14 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
 
 
 def _expected(cases: Cases, judged: Judged, ahead: Unread) -> list[Verdict]:
-    """The likeliest verdict once every joint is read."""
+    """The likeliest verdict once every joint that can be reached is read."""
     unread = ~cases.measured
     within = ahead.below(ahead.within_in, unread)
     close = ahead.too_close()
     words = (Verdict.WITHIN_MARGIN, Verdict.INCONCLUSIVE, Verdict.OUTSIDE_MARGIN)
     likeliest = np.argmax([within, close, 1.0 - within - close], axis=0)
-    known = cases.measured.all(axis=1) | ~np.isfinite(judged.batch.upper.displacement_in)
+    shut = (unread & ~cases.reachable & cases.gear.critical).any(axis=1)
+    known = shut | cases.measured.all(axis=1) | ~np.isfinite(judged.batch.upper.displacement_in)
     return [
         now if done else words[place]
         for now, done, place in zip(judged.verdicts, known, likeliest, strict=True)

@@ -165,12 +165,16 @@ def never_read(unread: Sequence[int], minutes: float) -> str:
     return f"{what}: to know, measure {them} ({minutes:.0f} min)."
 
 
-def stop_without_spares(joints: Sequence[int], if_worn: Sequence[int]) -> str:
-    """Step CONTINUE where joints over their limit, or that may be found worn, have to wait."""
-    if joints:
-        because = f": {joint_list(joints)} must be restored but cannot be"
-    else:
+def stop_for_today(over: Sequence[int], if_worn: Sequence[int], barred: Sequence[int]) -> str:
+    """Step CONTINUE: joints over their limit have to wait, or joints that may be found worn, or
+    joints that the day bars from being read or restored.
+    """
+    if over:
+        because = f": {joint_list(over)} must be restored but cannot be"
+    elif if_worn:
         because = f" if the readings find {joint_list(if_worn)} worn, which cannot be restored"
+    else:
+        because = f": {joint_list(barred)} would decide, but cannot be reached or restored"
     return f"{STOP}{because}. Hand over what stays open."
 
 

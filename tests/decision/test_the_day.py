@@ -35,6 +35,35 @@ def test_what_cannot_be_reached_stays_open_and_is_named(judge: Judge) -> None:
     assert "#4 cannot be reached" in (found.plan.open_question or "")
 
 
+@pytest.mark.parametrize("more", [{}, {"outcome": Outcome.RETRACTED}])
+def test_a_gear_whose_critical_joint_cannot_be_reached_is_handed_over(
+    judge: Judge, more: dict
+) -> None:
+    found = judge(BUT_FOUR, **more, cannot_reach=(4,))
+    assert found.next_action.text.startswith("Stop for today: #4 would decide")
+
+
+def test_reading_what_is_left_does_not_clear_a_gear_whose_critical_joint_is_out_of_reach(
+    judge: Judge,
+) -> None:
+    found = judge({1: 0.001, 2: 0.001}, cannot_reach=(3, 4, 5))
+    assert (found.next_action.action, found.end) == (Action.MEASURE, End.CANNOT_CLEAR)
+    assert "#4, #3, #5 cannot be reached" in (found.plan.open_question or "")
+
+
+def test_what_cannot_be_reached_is_named_on_a_gear_that_is_cleared_without_it(judge: Judge) -> None:
+    but_eight = {n: 0.0005 for n in range(1, 11) if n != 8}
+    found = judge(but_eight, cannot_reach=(8,))
+    assert found.end is End.WITHIN
+    assert "#8 cannot be reached" in (found.plan.open_question or "")
+
+
+def test_no_joint_out_of_reach_is_measured_again(judge: Judge) -> None:
+    gear = every_joint(0.0025)
+    assert judge(gear).next_action.action is Action.MEASURE_AGAIN
+    assert not asked(judge(gear, cannot_reach=(2, 3, 4))) & {2, 3, 4}
+
+
 def test_sound_joints_are_not_restored_for_one_that_cannot_be_reached(judge: Judge) -> None:
     found = judge(BUT_FOUR, **FAILED, cannot_reach=(4,))
     assert Action.RESTORE not in {step.action for step in found.plan.steps}
