@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -68,6 +69,7 @@ def fleet(
     """
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.life.folding import lives_of
     from mlg_troubleshoot.life.landings_left import Order
     from mlg_troubleshoot.life.unrecorded_work import suggestions
     from mlg_troubleshoot.reporting.life_json import FLEET_CSV, fleet_as_json
@@ -81,18 +83,26 @@ def fleet(
         outputs.append(OutputFile("--xlsx", xlsx, template.SHEETS))
     settings = shown.begin(records.gear, (), outputs, store=records.store)
     with stages(quiet=shown.quiet) as bar:
-        everything = show_fleet(records.kept, known, ahead=not no_forecast, progress=bar)
+        everything = show_fleet(
+            records.kept,
+            known,
+            ahead=not no_forecast,
+            whole=shown.report is not None or xlsx is not None,
+            compare=not shown.quiet,
+            progress=bar,
+        )
         order = Order(sort)
         found = everything.chosen(tail, only or (), order)
         bar("Comparing the last inspections", 0, None)
-        noted = [] if shown.quiet else suggestions(found.lives, found.model, known)
+        read = partial(lives_of, records.kept)
+        noted = suggestions(found.departures, read, found.model, known)
     for line in noted:
         output.say(f"Note: {line}")
     if shown.as_json:
-        output.write_json(fleet_as_json(found.lives, found.forecasts, order))
-    elif found.lives:
+        output.write_json(fleet_as_json(found.lines, found.forecasts, order))
+    elif found.lines:
         _show(found)
-    elif everything.lives:
+    elif everything.lines:
         output.console().print("No gear in the store has such a verdict.")
     else:
         output.console().print(history.no_records(records.kept.place))
@@ -109,7 +119,7 @@ def _show(found: Lives) -> None:
 
     console = output.console()
     gear = found.gear
-    lines = fleet_lines(found.lives, found.forecasts, found.order)
+    lines = fleet_lines(found.lines, found.forecasts, found.order)
     headings = (
         *("tail", "side", "last seen", "verdict", "inspect"),
         *("to limit", "to margin", "next due", "next action"),
@@ -138,7 +148,7 @@ def _show(found: Lives) -> None:
         " the limit of any joint, with the one that most likely reaches its limit first; to the"
         " margin by the worst-case bound. 'inspect' is the joint to inspect first today."
     )
-    history.show_warnings(console, found.lives)
+    history.show_warnings(console, found.lines)
     spare = ("inspect", "last seen", "to limit", "to margin")
     for shown in lines_of(console, headings, rows, "", spare):
         console.print(shown, no_wrap=True, overflow="ellipsis")

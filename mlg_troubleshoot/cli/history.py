@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.life.folding import GearLife
     from mlg_troubleshoot.life.forecast import Forecast
+    from mlg_troubleshoot.life.landings_left import FleetLine
     from mlg_troubleshoot.life.looking_back import Advice
     from mlg_troubleshoot.store import Record, Store
     from mlg_troubleshoot.workflows.history import Lives, Verified
@@ -82,11 +83,11 @@ def show(
                 "Give TAIL, or write the page of all gears: mlg fleet --report DIR",
             )
         with stages(quiet=shown.quiet) as bar:
-            everything = history.show_fleet(place, known, ahead=False, progress=bar).lives
+            everything = history.show_fleet(place, known, ahead=False, whole=False, progress=bar)
         if shown.as_json:
-            output.write_json(life_json.fleet_as_json(everything, {}))
+            output.write_json(life_json.fleet_as_json(everything.lines, {}))
         else:
-            _show_gears(everything, place.place)
+            _show_gears(everything.lines, place.place)
         return
     with stages(quiet=shown.quiet) as bar:
         ahead = not no_forecast
@@ -130,7 +131,7 @@ def no_records(place: str) -> str:
     return f"No records in {place}. Keep inspections with: mlg check FILE --keep"
 
 
-def _show_gears(found: Sequence[GearLife], place: str) -> None:
+def _show_gears(found: Sequence[FleetLine], place: str) -> None:
     from mlg_troubleshoot.life.looking_back import Advice
 
     console = output.console()
@@ -148,29 +149,29 @@ def _show_gears(found: Sequence[GearLife], place: str) -> None:
         "repairs",
     )
     table = output.plain_table(console, *headings, right=("landings", "seen", "repairs"))
-    for life in found:
+    for line in found:
         state = ["-", "-", "-", "-"]
-        if life.latest is not None:
+        if line.inspections:
             state = [
-                life.latest.record.day or "no date",
-                _count(life.latest.inspection.gear_landings),
-                str(life.latest.result.get("verdict")).removesuffix("_MARGIN"),
-                output.joint(life.latest.worst_joint),
+                line.inspection_date or "no date",
+                _count(line.gear_landings),
+                str(line.verdict).removesuffix("_MARGIN"),
+                output.joint(line.worst_joint),
             ]
-        seen = str(len(life.inspections)), str(len(life.repairs))
-        table.add_row(output.word(life.key[0]), life.key[1], *state, *seen)
+        seen = str(line.inspections), str(line.repairs)
+        table.add_row(output.word(line.tail_no), line.side, *state, *seen)
     show_warnings(console, found)
     console.print(table)
-    _show_advice(console, Advice.of(found))
+    _show_advice(console, Advice.total(line.advice for line in found))
 
 
 def _count(landings: float | None) -> str:
     return "-" if landings is None else f"{landings:g}"
 
 
-def show_warnings(console: output.DataConsole, found: Iterable[GearLife]) -> None:
-    for life in found:
-        for warning in life.warnings:
+def show_warnings(console: output.DataConsole, found: Iterable[GearLife | FleetLine]) -> None:
+    for each in found:
+        for warning in each.warnings:
             console.print(output.text(f"Warning: {warning}"))
 
 

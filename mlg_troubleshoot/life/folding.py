@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -69,13 +69,6 @@ class KeptInspection:
 
 
 Event = KeptInspection | Record
-# When the events of a gear took place, each at its place. [ISO 8601, landings]
-MomentsOf = Callable[[GearKey, Sequence[Event]], Sequence[Moment]]
-
-
-def moments_of(_key: GearKey, events: Sequence[Event]) -> list[Moment]:
-    """Read from their contents when events took place."""
-    return [_moment(event) for event in events]
 
 
 @dataclass(frozen=True)
@@ -118,20 +111,18 @@ def lives(
     return _lives(store.all() if tail is None else store.of_gear(tail, side))
 
 
-def lives_of(
-    store: Store, keys: Collection[GearKey], moments: MomentsOf = moments_of
-) -> dict[GearKey, GearLife]:
+def lives_of(store: Store, keys: Collection[GearKey]) -> dict[GearKey, GearLife]:
     """The lives of some gears."""
     wanted = set(keys)
     records = store.of_aircraft({tail for tail, _side in wanted})
-    return _lives((each for each in records if (each.tail_no, each.side) in wanted), moments)
+    return _lives(each for each in records if (each.tail_no, each.side) in wanted)
 
 
-def _lives(records: Iterable[Record], moments: MomentsOf = moments_of) -> dict[GearKey, GearLife]:
+def _lives(records: Iterable[Record]) -> dict[GearKey, GearLife]:
     by_gear: dict[GearKey, list[Record]] = {}
     for record in records:
         by_gear.setdefault((record.tail_no, record.side), []).append(record)
-    return {key: _life(key, own, moments) for key, own in sorted(by_gear.items())}
+    return {key: _life(key, own) for key, own in sorted(by_gear.items())}
 
 
 def life_of(store: Store, tail: str, side: str) -> GearLife:
@@ -199,7 +190,7 @@ def is_readable(record: Record) -> bool:
         return False
 
 
-def _life(key: GearKey, records: Sequence[Record], moments_of: MomentsOf) -> GearLife:
+def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     kept: dict[str, KeptInspection] = {}
     others: dict[str, Record] = {}
     records = _readable_or_not_void(records)
@@ -233,7 +224,7 @@ def _life(key: GearKey, records: Sequence[Record], moments_of: MomentsOf) -> Gea
     repairs = [r for r in others.values() if r.kind in work]
     events: list[Event] = [*kept.values(), *repairs]
     events.sort(key=lambda event: _record_of(event).seq)
-    moments = moments_of(key, events)
+    moments = [_moment(event) for event in events]
     return GearLife(
         key,
         tuple(records),

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 
@@ -17,52 +17,59 @@ from mlg_troubleshoot.decision.ranking import WORST_FIRST
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection
 from mlg_troubleshoot.life.forecast import Forecast, Quantiles
+from mlg_troubleshoot.life.looking_back import Advice
 
 
 @dataclass(frozen=True, slots=True)
 class FleetLine:
-    """One gear of a fleet as every output shows it: its latest inspection, its landings left."""
+    """One gear of a fleet as every output shows it: its latest inspection, and its landings left
+    once they are forecast.
 
-    life: GearLife
+    inspections, repairs: how many count. Numbers stand as they did in the record.
+    """
+
     tail_no: str
     side: str
-    record_id: str
-    inspection_date: str | None
-    gear_landings: float | None
-    verdict: str | None
-    worst_joint: int | None
+    inspections: int
     repairs: int
-    landings_to_limit: Quantiles | None
-    limit_joint: int | None
-    landings_to_margin: Quantiles | None
-    next_inspection_landings: float | None
-    due_date: str | None
-    predicted_displacement_in: float | None
-    margin_in: float | None
-    next_action: str | None
-    minutes: float
-    restore: tuple[int, ...]
+    warnings: tuple[str, ...]
+    advice: Advice
+    record_id: str = ""
+    inspection_date: str | None = None
+    gear_landings: int | float | None = None
+    verdict: str | None = None
+    worst_joint: int | None = None
+    predicted_displacement_in: int | float | None = None
+    margin_in: int | float | None = None
+    next_action: str | None = None
+    minutes: int | float = 0
+    restore: tuple[int, ...] = ()
+    landings_to_limit: Quantiles | None = None
+    limit_joint: int | None = None
+    landings_to_margin: Quantiles | None = None
+    next_inspection_landings: float | None = None
+    due_date: str | None = None
 
     @classmethod
-    def of(cls, life: GearLife, latest: KeptInspection, ahead: Forecast) -> FleetLine:
+    def of(cls, life: GearLife) -> FleetLine:
+        counts = len(life.inspections), len(life.repairs)
+        latest = life.latest
+        if latest is None:
+            return cls(*life.key, *counts, life.warnings, Advice.of([life]))
         result = latest.result
         # A plan that was made before a repair says nothing of the work that is left.
         done = any("" < latest.record.day < record.day for record in life.repairs)
         plan = () if done else result.get("plan", ())
         return cls(
-            life,
             *life.key,
+            *counts,
+            life.warnings,
+            Advice.of([life]),
             latest.record.record_id,
             latest.record.day or None,
             latest.inspection.gear_landings,
-            latest.result.get("verdict"),
+            result.get("verdict"),
             latest.worst_joint,
-            len(life.repairs),
-            ahead.landings_to_limit,
-            ahead.limit_joint,
-            ahead.landings_to_margin,
-            ahead.next_inspection_landings,
-            ahead.due_date,
             result.get("predicted_displacement_in"),
             result.get("margin_in"),
             "Repaired since then: check again" if done else _in_brief(latest),
@@ -70,13 +77,28 @@ class FleetLine:
             tuple(n for step in plan if step["action"] == Action.RESTORE for n in step["joints"]),
         )
 
+    def forecast(self, ahead: Forecast) -> FleetLine:
+        """The same gear with its landings left."""
+        return replace(
+            self,
+            landings_to_limit=ahead.landings_to_limit,
+            limit_joint=ahead.limit_joint,
+            landings_to_margin=ahead.landings_to_margin,
+            next_inspection_landings=ahead.next_inspection_landings,
+            due_date=ahead.due_date,
+        )
+
+    @property
+    def key(self) -> GearKey:
+        return self.tail_no, self.side
+
     @property
     def urgency(self) -> tuple[int, float, GearKey]:
         """By verdict, then by landings to the next inspection."""
         order = [verdict.value for verdict in WORST_FIRST]
         rank = order.index(self.verdict) if self.verdict in order else len(order)
         due = self.next_inspection_landings
-        return rank, float("inf") if due is None else due, self.life.key
+        return rank, float("inf") if due is None else due, self.key
 
 
 def _in_brief(kept: KeptInspection) -> str | None:
@@ -107,21 +129,21 @@ def _place_in(order: Order, line: FleetLine) -> tuple[float, tuple[int, float, G
         Order.TAIL: 0.0,
         Order.MINUTES: -line.minutes,
     }[order]
-    return first, (0, 0.0, line.life.key) if order is Order.TAIL else line.urgency
+    return first, (0, 0.0, line.key) if order is Order.TAIL else line.urgency
 
 
 def fleet_lines(
-    lives: Sequence[GearLife],
+    lines: Iterable[FleetLine],
     forecasts: Mapping[GearKey, Forecast],
     order: Order = Order.WORST,
 ) -> list[FleetLine]:
-    """One line per gear, worst first unless another order is asked for."""
-    lines = [
-        FleetLine.of(life, life.latest, forecasts.get(life.key, Forecast()))
-        for life in lives
-        if life.latest is not None
+    """The gears that were inspected, with their forecasts; worst first unless another order is
+    asked for.
+    """
+    seen = [
+        line.forecast(forecasts.get(line.key, Forecast())) for line in lines if line.inspections
     ]
-    return sorted(lines, key=partial(_place_in, order))
+    return sorted(seen, key=partial(_place_in, order))
 
 
 def work_sentence(lines: Sequence[FleetLine]) -> str:

@@ -43,6 +43,12 @@ class Advice:
                     right += joint in (kept.worst_joint, *advised)
         return cls(right, outcomes)
 
+    @classmethod
+    def total(cls, parts: Iterable[Advice]) -> Advice:
+        """Of several gears together."""
+        counts = [(each.right, each.outcomes) for each in parts]
+        return cls(*map(sum, zip(*counts, strict=True))) if counts else cls(0, 0)
+
     @property
     def interval(self) -> tuple[float, float] | None:
         """None where no outcome names a joint."""

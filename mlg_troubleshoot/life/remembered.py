@@ -1,9 +1,9 @@
 """What was read and forecast, remembered in the user's cache folder so as not to be done again.
 
-A file holds the last fit, others the forecasts of a store's gears and when their inspections took
-place, each under the hash of all that went into it: this program, the gear, and what was read.
+A file holds the last fit, others what a store's gears look like in their fleet, each under the hash
+of all that went into it: this program, the gear, and the records as they stand in the store.
 Without them, or where a hash differs, it is computed; the folder may be deleted at any time.
-Verdicts always come from the store.
+What is remembered of a gear is believed only while its records stand as they did.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ import numpy as np
 
 from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.chronology import Moment
-from mlg_troubleshoot.life.folding import Event, GearKey, GearLife, KeptInspection, moments_of
+from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast, forecast
+from mlg_troubleshoot.life.landings_left import FleetLine
+from mlg_troubleshoot.life.unrecorded_work import Departure, departures
 from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.store import Record, Store
+from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.wear import WearModel, WearPath, fit_wear
 
 T = TypeVar("T")
@@ -38,21 +39,12 @@ class _Fit(msgspec.Struct):
     learnt: dict[str, Any]
 
 
-class _Times(msgspec.Struct):
-    """Days and landings of a gear's inspections and repairs."""
-
-    mark: str
-    days: list[str]
-    landings: list[float | None]
-
-
 _Quantiles = dict[str, float | None]
 
 
 class _Ahead(msgspec.Struct):
     """The fields of a gear's forecast, its bands as the bytes of their arrays."""
 
-    mark: str
     joints: dict[int, _Quantiles]
     bands: dict[int, bytes]
     landings_to_limit: _Quantiles | None
@@ -63,10 +55,10 @@ class _Ahead(msgspec.Struct):
     due_date: str | None
 
     @classmethod
-    def of(cls, mark: str, ahead: Forecast) -> _Ahead:
+    def of(cls, ahead: Forecast) -> _Ahead:
         fields = {name: getattr(ahead, name) for name in Forecast.__dataclass_fields__}
         bands = {joint: np.asarray(band).tobytes() for joint, band in ahead.bands.items()}
-        return cls(mark, **{**fields, "bands": bands})
+        return cls(**{**fields, "bands": bands})
 
     @property
     def forecast(self) -> Forecast:
@@ -75,39 +67,45 @@ class _Ahead(msgspec.Struct):
         return Forecast(**{**fields, "bands": bands})
 
 
+class _Seen(msgspec.Struct):
+    """A gear in its fleet: what stands of it, and what a model says, if it was asked.
+
+    mark, model: hashes of its records and of what the model learnt from. departure: empty where
+    there is nothing to compare, None if nobody asked.
+    """
+
+    mark: str
+    line: FleetLine
+    due: _Ahead
+    model: str = ""
+    ahead: _Ahead | None = None
+    departure: Departure | None = None
+
+
 class Remembered:
-    """The fit and the forecasts of one store for one gear type."""
+    """The fit of one store for one gear type, and what is known of its gears."""
 
     def __init__(self, store: Store, gear: Gear) -> None:
+        self._store = store
         self._gear = gear
         of = gear.geometry_sha256, gear.ensemble_sha256, gear.joint_numbers, gear.limits_in
         bounds = gear.margin.value, gear.horizon.value, gear.accepted_chance.value
         # What the gate of the store judges contents by.
         judged = type(store.judge), gear.hard_limit, gear.confirm_above, gear.joints, gear.areas
         self._mark = _hash([_program(), *(repr(each).encode() for each in (of, bounds, judged))])
-        self._name = _hash([store.place.encode()])[:16]
+        self._file = _folder() / f"fleet-{_hash([store.place.encode()])[:16]}.msgpack"
         self._model_mark = ""
-        self._new: dict[str, _Ahead] = {}
-        self._new_times: dict[str, _Times] = {}
+        self._is_new = False
 
-    def moments(self, key: GearKey, events: Sequence[Event]) -> list[Moment]:
-        """Read when the events of a gear took place, or recall it without unpacking them."""
-        name = " ".join(key)
-        inspected = [isinstance(event, KeptInspection) for event in events]
-        records = [e.record if isinstance(e, KeptInspection) else e for e in events]
-        mark = _hash([self._mark.encode(), repr(inspected).encode(), _content(records)])
-        known = self._known_times.get(name)
-        if known is None or known.mark != mark:
-            found = moments_of(key, events)
-            days = [moment.day for moment in found]
-            landings = [moment.landings for moment in found]
-            known = self._new_times[name] = _Times(mark, days, landings)
-        return [*map(Moment, known.days, known.landings)]
+    @cached_property
+    def keys(self) -> list[GearKey]:
+        """The gears of the store, in order."""
+        return [*self._marks]
 
     def fit(self, paths: Sequence[WearPath]) -> WearModel:
         """Fit the wear of these paths, or recall it."""
         self._model_mark = mark = _hash(self._of_paths(paths))
-        file = self._file("fit")
+        file = _folder() / "fit.msgpack"
         known = _read(file, _Fit)
         if known is not None and known.mark == mark:
             return WearModel.from_learnt(known.learnt, paths)
@@ -115,44 +113,67 @@ class Remembered:
         _write(file, _Fit(mark, model.learnt()))
         return model
 
-    def forecast(
-        self, lives: Sequence[GearLife], model: WearModel | None
-    ) -> dict[GearKey, Forecast]:
-        """Forecast gears as `forecast` does, or recall what it said of those that have not
-        changed.
-        """
+    def lacking(
+        self, keys: Iterable[GearKey], model: WearModel | None, *, compare: bool
+    ) -> list[GearKey]:
+        """The gears of which not all is known that is asked for."""
+
+        def is_known(seen: _Seen) -> bool:
+            foreseen = model is None or seen.model == self._model_mark
+            return foreseen and (model is None or not compare or seen.departure is not None)
+
+        return [key for key in keys if key not in self._seen or not is_known(self._seen[key])]
+
+    def look(self, lives: Sequence[GearLife], model: WearModel | None, *, compare: bool) -> None:
+        """Find out what is asked for of gears and not known, and remember it."""
+        self._is_new = self._is_new or bool(lives)
+        new = [life for life in lives if life.key not in self._seen]
+        due = forecast(new, None, self._gear)
+        for life in new:
+            seen = _Seen(self._marks[life.key], FleetLine.of(life), _Ahead.of(due[life.key]))
+            self._seen[life.key] = seen
         if model is None:
-            return forecast(lives, model, self._gear)
-        made_by = f"{self._mark} {self._model_mark}".encode()
-        marks = {life.key: _hash([made_by, _content(life.records)]) for life in lives}
-        known = {life.key: self._known.get(" ".join(life.key)) for life in lives}
-        recalled = {
-            key: ahead.forecast
-            for key, ahead in known.items()
-            if ahead is not None and ahead.mark == marks[key]
-        }
-        computed = forecast([life for life in lives if life.key not in recalled], model, self._gear)
-        for key, ahead in computed.items():
-            self._new[" ".join(key)] = _Ahead.of(marks[key], ahead)
-        return {life.key: (recalled | computed)[life.key] for life in lives}
+            return
+        new = [life for life in lives if self._seen[life.key].model != self._model_mark]
+        for key, ahead in forecast(new, model, self._gear).items():
+            seen = self._seen[key]
+            seen.model, seen.ahead, seen.departure = self._model_mark, _Ahead.of(ahead), None
+        if compare:
+            new = [life for life in lives if self._seen[life.key].departure is None]
+            found = departures(new, model, self._gear)
+            for life in new:
+                self._seen[life.key].departure = found.get(life.key, Departure("", ()))
+
+    def line(self, key: GearKey) -> FleetLine:
+        return self._seen[key].line
+
+    def forecast(self, key: GearKey, model: WearModel | None) -> Forecast:
+        """The forecast of a gear; without a model only whether it is due now."""
+        seen = self._seen[key]
+        return (seen.due if model is None or seen.ahead is None else seen.ahead).forecast
+
+    def departure(self, key: GearKey) -> Departure | None:
+        """How far a gear departs from its wear; None where there is nothing to compare."""
+        found = self._seen[key].departure
+        return found if found is not None and found.scores else None
 
     def save(self) -> None:
         """Remember what is new; nothing happens where the folder cannot be written."""
-        if self._new:
-            _write(self._file("forecasts"), self._known | self._new)
-        if self._new_times:
-            _write(self._file("times"), self._known_times | self._new_times)
-
-    def _file(self, what: str) -> Path:
-        return _folder() / f"{what}-{self._name}.msgpack"
+        if self._is_new:
+            _write(self._file, (self._mark, [*self._seen.values()]))
 
     @cached_property
-    def _known(self) -> dict[str, _Ahead]:
-        return _read(self._file("forecasts"), dict[str, _Ahead]) or {}
+    def _marks(self) -> dict[GearKey, str]:
+        return self._store.marks()
 
     @cached_property
-    def _known_times(self) -> dict[str, _Times]:
-        return _read(self._file("times"), dict[str, _Times]) or {}
+    def _seen(self) -> dict[GearKey, _Seen]:
+        mark, gears = _read(self._file, tuple[str, list[_Seen]]) or ("", [])
+        return {
+            seen.line.key: seen
+            for seen in gears
+            if mark == self._mark and self._marks.get(seen.line.key) == seen.mark
+        }
 
     def _of_paths(self, paths: Iterable[WearPath]) -> Iterable[bytes]:
         yield self._mark.encode()
@@ -168,12 +189,6 @@ def _hash(parts: Iterable[bytes]) -> str:
         found.update(len(part).to_bytes(8, "big"))
         found.update(part)
     return found.hexdigest()
-
-
-def _content(records: Sequence[Record]) -> bytes:
-    """All that records of one gear say."""
-    columns = [(str(r.kind), r.record_id, r.day, r.digest, len(r.packed)) for r in records]
-    return b"".join([repr(columns).encode(), *(r.packed for r in records)])
 
 
 def _program() -> bytes:

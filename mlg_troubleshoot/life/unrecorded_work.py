@@ -4,8 +4,8 @@ exchanged.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearLife
+from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.wear_paths import wear_paths
 from mlg_troubleshoot.wear import WearModel, WearPath
 
@@ -31,13 +31,20 @@ _NO_FIT = 0.001
 _AT_ONCE = 100
 
 
-def suggestions(lives: Sequence[GearLife], model: WearModel | None, gear: Gear) -> list[str]:
-    """Name last inspections that look like an unrecorded restoration, or like two gears
-    exchanged.
+@dataclass(frozen=True, slots=True)
+class Departure:
+    """How far the last inspection of a gear, on a day, lies from what its history promised: each
+    joint in standard deviations, NaN where it was not read.
     """
-    if model is None:
-        return []
-    # Seen twice, the last time with its landings.
+
+    day: str
+    scores: tuple[float, ...]
+
+
+def departures(lives: Sequence[GearLife], model: WearModel, gear: Gear) -> dict[GearKey, Departure]:
+    """Compare the last inspections of gears that were seen twice, the last time with their
+    landings, with what was expected of them.
+    """
     known = [
         life
         for life in lives
@@ -46,57 +53,83 @@ def suggestions(lives: Sequence[GearLife], model: WearModel | None, gear: Gear) 
         and life.inspections[-1].inspection.gear_landings is not None
     ]
     scores = _departures([(life, life) for life in known], model, gear)
-    exchanged = _exchanged(known, scores, model, gear)
+    return {
+        life.key: Departure(life.inspections[-1].record.day, tuple(own.tolist()))
+        for life, own in zip(known, scores, strict=True)
+    }
+
+
+def suggestions(
+    found: Mapping[GearKey, Departure],
+    read: Callable[[Collection[GearKey]], Mapping[GearKey, GearLife]],
+    model: WearModel | None,
+    gear: Gear,
+) -> list[str]:
+    """Name last inspections that look like an unrecorded restoration, or like two gears exchanged.
+
+    read: the lives of those of the gears that may have been exchanged.
+    """
+    exchanged = [] if model is None else _exchanged(found, read, model, gear)
     sentences = [
-        f"The last inspections of {known[i].name} and {known[j].name} fit each other's wear: were"
+        f"The last inspections of {' '.join(one)} and {' '.join(other)} fit each other's wear: were"
         " they exchanged?"
-        for i, j in exchanged
+        for one, other in exchanged
     ]
-    explained = {place for pair in exchanged for place in pair}
-    for i, life in enumerate(known):
-        dropped = [n for n, z in zip(gear.joint_numbers, scores[i], strict=True) if z <= -_DROP]
-        if dropped and i not in explained:
-            listed = joint_list(dropped)
+    explained = {key for pair in exchanged for key in pair}
+    for key, departure in found.items():
+        scores = zip(gear.joint_numbers, departure.scores, strict=True)
+        dropped = [n for n, z in scores if z <= -_DROP]
+        if dropped and key not in explained:
+            name, listed = " ".join(key), joint_list(dropped)
             sentences.append(
-                f"{life.name}: {listed} read much tighter than before. Restored without a"
-                f" record? mlg history repair {life.name} --joint {dropped[0]} --date D"
+                f"{name}: {listed} read much tighter than before. Restored without a"
+                f" record? mlg history repair {name} --joint {dropped[0]} --date D"
             )
     return sentences
 
 
 def _exchanged(
-    known: Sequence[GearLife], scores: Sequence[Array], model: WearModel, gear: Gear
-) -> list[tuple[int, int]]:
-    """Places of gears that fit each other's wear and not their own, the clearest pair first."""
-    days = [life.inspections[-1].record.day for life in known]
+    found: Mapping[GearKey, Departure],
+    read: Callable[[Collection[GearKey]], Mapping[GearKey, GearLife]],
+    model: WearModel,
+    gear: Gear,
+) -> list[tuple[GearKey, GearKey]]:
+    """Gears that fit each other's wear and not their own, the clearest pair first."""
+    apart = np.array([departure.scores for departure in found.values()])
+    apart = apart.reshape(len(found), len(gear.joint_numbers))
+    scores = dict(zip(found, apart, strict=True))
     # Gears are exchanged on one aircraft, or by those who entered one day's sheets.
-    misfits = [i for i, z in enumerate(scores) if _fit(z) < _POOR_FIT]
+    misfits = [key for key, fits in zip(found, _fit(apart), strict=True) if fits < _POOR_FIT]
     pairs = [
-        (i, j)
-        for i, j in combinations(misfits, 2)
-        if known[i].key[0] == known[j].key[0] or days[i] == days[j]
+        (one, other)
+        for one, other in combinations(misfits, 2)
+        if one[0] == other[0] or found[one].day == found[other].day
     ]
+    lives = read({key for pair in pairs for key in pair})
     both_ways = [order for pair in pairs for order in permutations(pair)]
-    crossed = _departures([(known[a], known[b]) for a, b in both_ways], model, gear)
+    crossed = _departures([(lives[a], lives[b]) for a, b in both_ways], model, gear)
     gains = []
-    for n, (i, j) in enumerate(pairs):
+    for n, (one, other) in enumerate(pairs):
         others = crossed[2 * n : 2 * n + 2]
-        gain = (_square(scores[i], scores[j]) - _square(*others)) / 2.0
-        if gain > _EXCHANGED and min(map(_fit, others)) > _NO_FIT:
-            gains.append((gain, i, j))
-    found: list[tuple[int, int]] = []
+        gain = (_square(scores[one], scores[other]) - _square(*others)) / 2.0
+        if gain > _EXCHANGED and min(_fit(np.array(others))) > _NO_FIT:
+            gains.append((gain, one, other))
+    clearest: list[tuple[GearKey, GearKey]] = []
     # A gear was exchanged with one other at most.
-    for _gain, i, j in sorted(gains, reverse=True):
-        if not any(place in pair for pair in found for place in (i, j)):
-            found.append((i, j))
-    return found
+    for _gain, one, other in sorted(gains, reverse=True):
+        if not any(key in pair for pair in clearest for key in (one, other)):
+            clearest.append((one, other))
+    return clearest
 
 
-def _fit(scores: Array) -> float:
-    """Chance that an inspection of a gear lies as far from its forecasts as these scores do. [1]"""
+def _fit(scores: Array) -> Array:
+    """Chance that an inspection of a gear lies as far from its forecasts as its scores, the last
+    axis, do. [1]
+    """
     from scipy.special import chdtrc
 
-    return float(chdtrc(np.sum(np.isfinite(scores)), _square(scores)))
+    chance: Array = chdtrc(np.isfinite(scores).sum(axis=-1), np.nansum(scores**2, axis=-1))
+    return chance
 
 
 def _square(*scores: Array) -> float:

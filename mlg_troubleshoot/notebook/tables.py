@@ -17,6 +17,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Point
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.life.landings_left import FleetLine
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.records.frames import frame_of, label_of
 from mlg_troubleshoot.records.headers import Joints
@@ -107,7 +108,7 @@ def _(result: Catalogue) -> dict[str, Any]:
 
 @to_dict.register
 def _(result: Lives) -> dict[str, Any]:
-    return fleet_as_json(result.lives, result.forecasts)
+    return fleet_as_json(result.lines, result.forecasts)
 
 
 @singledispatch
@@ -208,7 +209,7 @@ def store_frame(store: Store, of: str) -> pd.DataFrame:
     """The inspections of a store that stand, or one line per gear in it."""
     found = lives(store).values()
     if of == "lives":
-        return _frame(fleet_as_json([*found], {})["gears"])
+        return _frame(fleet_as_json([*map(FleetLine.of, found)], {})["gears"])
     rows = [kept.inspection for life in found for kept in life.inspections]
     numbers = {joint for row in rows for joint in row.clearance_in}
     return frame_of(rows, Joints(tuple(sorted(numbers))))

@@ -4,14 +4,20 @@ side.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from markupsafe import Markup
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
-from mlg_troubleshoot.life.landings_left import Order, fleet_lines, outlook_sentence, work_sentence
+from mlg_troubleshoot.life.landings_left import (
+    FleetLine,
+    Order,
+    fleet_lines,
+    outlook_sentence,
+    work_sentence,
+)
 from mlg_troubleshoot.life.looking_back import Advice, side_by_side
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
 from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture, wear_figure
@@ -79,7 +85,7 @@ def _high(value_in: float, top_in: float) -> float:
 
 
 def fleet_document(
-    lives: Sequence[GearLife],
+    lives: Iterable[GearLife],
     forecasts: Mapping[GearKey, Forecast],
     gear: Gear,
     provenance: ReportProvenance,
@@ -90,19 +96,21 @@ def fleet_document(
     its inspections.
     """
     lengths = Lengths(unit)
-    gears = fleet_lines(lives, forecasts, order)
+    by_key = {life.key: life for life in lives}
+    every = [*map(FleetLine.of, by_key.values())]
+    gears = fleet_lines(every, forecasts, order)
     lines = [
         (
             line,
             interval_bar(line.landings_to_limit, gear.horizon.value),
-            _worst_cases(line.life, lengths),
-            f"{safe_stem('life', *line.life.key)}.html",
+            _worst_cases(by_key[line.key], lengths),
+            f"{safe_stem('life', *line.key)}.html",
         )
         for line in gears
     ]
     places = [
         GearInPicture(
-            line.life.name,
+            by_key[line.key].name,
             line.verdict,
             _share(line.predicted_displacement_in, line.margin_in),
             line.next_inspection_landings,
@@ -114,8 +122,8 @@ def fleet_document(
         "lines_of": lines,
         "picture": fleet_picture(places),
         "work": work_sentence(gears),
-        "advice": Advice.of(lives).sentence,
-        "notes": [warning for life in lives for warning in life.warnings],
+        "advice": Advice.total(line.advice for line in every).sentence,
+        "notes": [warning for line in every for warning in line.warnings],
     }
     return Document("fleet.html.j2", context, "fleet", landscape=True, script="table.js")
 

@@ -98,10 +98,11 @@ def written(kind: Any, record: Any = None, /, **given: Any) -> dict[str, Any]:
     """Return a record in the form of an output: each key as it is given, or as the record has
     it. The version of the schema stands in every output that has one.
     """
-    return cast("dict[str, Any]", plain(_filled(kind, record, **given)))
+    return cast("dict[str, Any]", plain(filled(kind, record, **given)))
 
 
-def _filled(kind: Any, record: Any, /, **given: Any) -> dict[str, Any]:
+def filled(kind: Any, record: Any, /, **given: Any) -> dict[str, Any]:
+    """The same with values as they stand, for a part of an output."""
     known = {"schema_version": SCHEMA_VERSION, **given}
     return {n: known[n] if n in known else getattr(record, n) for n in kind.__annotations__}
 
@@ -212,7 +213,7 @@ def _assessment(a: Assessment, joints: list[dict[str, Any]] | None = None) -> di
         "joints": [_joint(finding) for finding in a.joints] if joints is None else joints,
         "warnings": [*said, *a.warnings],
     }
-    return _filled(CheckedInspection, a, **_course(a.inspection, a), **own)
+    return filled(CheckedInspection, a, **_course(a.inspection, a), **own)
 
 
 def _course(row: Any, judgement: Judgement) -> dict[str, Any]:

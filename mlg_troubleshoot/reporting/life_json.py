@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mlg_troubleshoot.decision.sentences import joint_list
@@ -10,27 +10,27 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.json_outputs import FleetGear, FleetOutput, LifeOutput
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
-from mlg_troubleshoot.life.landings_left import Order, fleet_lines, work_sentence
+from mlg_troubleshoot.life.landings_left import FleetLine, Order, fleet_lines, work_sentence
 from mlg_troubleshoot.life.looking_back import Advice
 from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.outputs import OutputKind, csv_text
-from mlg_troubleshoot.reporting.json_form import written
+from mlg_troubleshoot.reporting.json_form import filled, written
 from mlg_troubleshoot.store import Record, RecordKind
 
 
 def fleet_as_json(
-    lives: Sequence[GearLife],
+    gears: Sequence[FleetLine],
     forecasts: Mapping[GearKey, Forecast],
     order: Order = Order.WORST,
 ) -> dict[str, Any]:
     """One line per gear, worst first unless another order is asked for."""
-    lines = fleet_lines(lives, forecasts, order)
+    lines = fleet_lines(gears, forecasts, order)
     return written(
         FleetOutput,
-        gears=[written(FleetGear, line) for line in lines],
+        gears=[filled(FleetGear, line) for line in lines],
         work=work_sentence(lines),
-        advice=_advice(lives),
-        warnings=[warning for life in lives for warning in life.warnings],
+        advice=_advice(Advice.total(gear.advice for gear in gears)),
+        warnings=[warning for gear in gears for warning in gear.warnings],
     )
 
 
@@ -55,14 +55,16 @@ FLEET_CSV = OutputKind.marked("is not a table of a fleet", csv_text(fleet_table(
 
 
 def fleet_sheets(
-    lives: Sequence[GearLife],
+    lives: Iterable[GearLife],
     forecasts: Mapping[GearKey, Forecast],
     gear: Gear,
     order: Order = Order.WORST,
 ) -> dict[str, tuple[list[str], list[list[Any]]]]:
     """The sheets of a fleet's workbook: gears, readings, landings left of each joint, records."""
-    lines = fleet_lines(lives, forecasts, order)
-    whole = [life_as_json(line.life, forecasts[line.life.key], gear) for line in lines]
+    by_key = {life.key: life for life in lives}
+    gears = [*map(FleetLine.of, by_key.values())]
+    lines = fleet_lines(gears, forecasts, order)
+    whole = [life_as_json(by_key[line.key], forecasts[line.key], gear) for line in lines]
     readings: list[list[Any]] = []
     left: list[list[Any]] = []
     events: list[list[Any]] = []
@@ -77,7 +79,7 @@ def fleet_sheets(
         events += [[*whose, *(event.get(name) for name in kept)] for event in life["events"]]
     identity = ["tail_no", "side", "joint", "limit_in"]
     return {
-        "Gears": fleet_table(fleet_as_json(lives, forecasts, order)["gears"]),
+        "Gears": fleet_table(fleet_as_json(gears, forecasts, order)["gears"]),
         "Readings": ([*identity, "gear_landings", "clearance_in"], readings),
         "Landings left": ([*identity, "p05", "p50", "p95"], left),
         "Records": ([*identity[:2], *kept], events),
@@ -105,7 +107,7 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
             }
             for number, between in stretches(life, gear.joint_numbers).items()
         ],
-        advice=_advice([life]),
+        advice=_advice(Advice.of([life])),
         warnings=life.warnings,
     )
 
@@ -132,8 +134,7 @@ def _event(record: Record, *, counts: bool) -> dict[str, Any]:
     return event | {name: value for name, value in body.items() if name != "landings"}
 
 
-def _advice(lives: Sequence[GearLife]) -> dict[str, int | float | None]:
+def _advice(advice: Advice) -> dict[str, int | float | None]:
     """The hit rate; its interval is null where no outcome names a joint."""
-    advice = Advice.of(lives)
     low, high = advice.interval or (None, None)
     return {"right": advice.right, "outcomes": advice.outcomes, "p05": low, "p95": high}

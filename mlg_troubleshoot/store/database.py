@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 import zlib
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -121,6 +122,15 @@ _BOUNDED = sql.case(
     (sql.func.length(_records.c.body) <= MOST_BYTES, _records.c.body), else_=None
 ).label("body")
 _COLUMNS = [_BOUNDED if column.name == "body" else column for column in _records.c]
+# What a record is known by, as bytes whatever another program wrote there.
+_MARKED = (
+    *(_records.c[name] for name in ("seq", "tail_no", "side")),
+    _records.c.kind + " " + _records.c.record_id + " " + _records.c.day,
+    *(
+        sql.func.coalesce(sql.cast(column, sql.LargeBinary), b"")
+        for column in (_records.c.hash, _BOUNDED)
+    ),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -596,6 +606,25 @@ class Store:
             pairs = sql.select(_records.c.tail_no, _records.c.side).distinct()
             rows = connection.execute(pairs)
             return sorted((str(row.tail_no), str(row.side)) for row in rows)
+
+    def marks(self) -> dict[tuple[str, str], str]:
+        """A hash of all that stands in the records of each gear, which are not unpacked."""
+        found: defaultdict[tuple[str, str], Any] = defaultdict(hashlib.sha256)
+        with self.transaction(writing=False) as connection:
+            wanted = sql.select(*_MARKED).order_by(_records.c.seq).limit(_AT_ONCE)
+            last = None
+            while self._ready:
+                after = wanted if last is None else wanted.where(_records.c.seq > last)
+                # Rows of the driver: those of SQLAlchemy take twice as long.
+                rows = connection.execute(after).cursor.fetchall()
+                for seq, tail_no, side, texts, digest, body in rows:
+                    found[str(tail_no), str(side)].update(
+                        b"%d %a %b%b" % (seq, texts, digest, body)
+                    )
+                if len(rows) < _AT_ONCE:
+                    break
+                last = rows[-1][0]
+        return {key: own.hexdigest() for key, own in sorted(found.items())}
 
     def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:
         """All records of a gear, or of both gears of an aircraft, in the order of the chain."""

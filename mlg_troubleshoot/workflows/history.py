@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -24,7 +24,7 @@ from mlg_troubleshoot.life.folding import (
     life_of,
     lives_of,
 )
-from mlg_troubleshoot.life.landings_left import Order
+from mlg_troubleshoot.life.landings_left import FleetLine, Order
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.records import ReadOptions, admit
 from mlg_troubleshoot.records.gate import judge_text
@@ -35,6 +35,7 @@ from mlg_troubleshoot.units import LengthUnit
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
     from mlg_troubleshoot.life.remembered import Remembered
+    from mlg_troubleshoot.life.unrecorded_work import Departure
     from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.wear import WearModel
 
@@ -56,7 +57,9 @@ class Lives(Result):
     gear : Gear
         The gear type.
     lives : tuple of GearLife
-        What is known of each gear.
+        What is known of each gear; empty where the whole was not asked for.
+    lines : tuple of FleetLine
+        Each gear in its fleet, without its forecast.
     forecasts : mapping of tail and side to Forecast
         Landings that each has left. [landings]
     model : WearModel or None
@@ -65,38 +68,41 @@ class Lives(Result):
         Wrong cells of the table that they were read from, if it was one.
     order : Order
         Order of the gears in tables and reports.
+    departures : mapping of tail and side to Departure
+        How far last inspections lie from what was expected of them, if that was asked for.
     """
 
     gear: Gear
     lives: tuple[GearLife, ...]
+    lines: tuple[FleetLine, ...]
     forecasts: Mapping[GearKey, Forecast]
     model: WearModel | None
     problems: tuple[Problem, ...] = ()
     order: Order = Order.WORST
+    departures: Mapping[GearKey, Departure] = field(default_factory=dict)
 
     def chosen(self, tail: str | None, verdicts: Collection[str], order: Order) -> Lives:
         """The gears of one aircraft, and those of which the last verdict is one of these; all of
         them where nothing is asked.
         """
         asked = None if tail is None else key_of(tail, "LH")[0]
-        if asked is not None and all(life.key[0] != asked for life in self.lives):
+        if asked is not None and all(line.tail_no != asked for line in self.lines):
             raise UsageError(f"no records of {asked}", "See which gears are kept: mlg history")
-        found = tuple(
-            life
-            for life in self.lives
-            if asked in (None, life.key[0])
-            and (
-                not verdicts
-                or (life.latest is not None and life.latest.result.get("verdict") in verdicts)
-            )
+        lines = tuple(
+            line
+            for line in self.lines
+            if asked in (None, line.tail_no) and (not verdicts or line.verdict in verdicts)
         )
-        return replace(self, lives=found, order=order)
+        keys = {line.key for line in lines}
+        lives = tuple(life for life in self.lives if life.key in keys)
+        apart = {key: each for key, each in self.departures.items() if key in keys}
+        return replace(self, lives=lives, lines=lines, departures=apart, order=order)
 
     def write_csv(self, file: Path) -> None:
         """Write the fleet as CSV, one line per gear."""
         from mlg_troubleshoot.reporting.life_json import fleet_as_json, fleet_table
 
-        gears = fleet_as_json(self.lives, self.forecasts, self.order)["gears"]
+        gears = fleet_as_json(self.lines, self.forecasts, self.order)["gears"]
         write_csv(file, *fleet_table(gears))
 
     def write_workbook(self, file: Path) -> None:
@@ -112,31 +118,46 @@ def show_fleet(
     gear: Gear,
     *,
     ahead: bool,
+    whole: bool = True,
+    compare: bool = False,
     progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
     problems: tuple[Problem, ...] = (),
 ) -> Lives:
-    """The life of every gear, with its forecast if asked for."""
+    """Every gear, with its forecast if asked for.
+
+    whole: with all of its records. compare: also its last inspection with what was expected of it.
+    """
     from mlg_troubleshoot.life.remembered import Remembered
 
-    keys = store.gears()
     remembered = Remembered(store, gear)
+    progress("Reading the store", 0, None)
+    keys = remembered.keys
     model = _taught(store, gear, keys, remembered, progress) if ahead else None
     doing = "Looking ahead" if ahead else "Reading the store"
     found: list[GearLife] = []
-    forecasts: dict[GearKey, Forecast] = {}
     try:
         # What was unpacked of one part is let go before the next one.
         for first in range(0, len(keys), _AT_ONCE):
             progress(doing, first, len(keys))
             asked = keys[first : first + _AT_ONCE]
-            part = tuple(lives_of(store, asked, remembered.moments).values())
-            found += part
-            forecasts |= remembered.forecast(part, model)
+            lacking = set(remembered.lacking(asked, model, compare=compare))
+            part = lives_of(store, asked if whole else lacking).values()
+            remembered.look([life for life in part if life.key in lacking], model, compare=compare)
+            found += part if whole else ()
     finally:
         # Also what was done until somebody lost patience.
         remembered.save()
     progress(doing, len(keys), len(keys))
-    return Lives(gear, tuple(found), forecasts, model, problems)
+    apart = ((key, remembered.departure(key)) for key in keys if compare)
+    return Lives(
+        gear,
+        tuple(found),
+        tuple(map(remembered.line, keys)),
+        {key: remembered.forecast(key, model) for key in keys},
+        model,
+        problems,
+        departures={key: each for key, each in apart if each is not None},
+    )
 
 
 def _taught(
@@ -178,7 +199,8 @@ def show_lives(
     if ahead:
         progress("Looking ahead", 0, None)
     found = tuple(lives_of(store, wanted).values())
-    return Lives(gear, found, forecast(found, model, gear), model)
+    lines = tuple(map(FleetLine.of, found))
+    return Lives(gear, found, lines, forecast(found, model, gear), model)
 
 
 def write_pages(

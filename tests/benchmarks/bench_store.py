@@ -31,7 +31,8 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import read_index_table
 from mlg_troubleshoot.life import folding
 from mlg_troubleshoot.life.forecast import fit_fleet, forecast
-from mlg_troubleshoot.life.unrecorded_work import suggestions
+from mlg_troubleshoot.life.landings_left import FleetLine
+from mlg_troubleshoot.life.unrecorded_work import departures, suggestions
 from mlg_troubleshoot.reporting.life_json import fleet_as_json
 from mlg_troubleshoot.store import Record, Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
@@ -148,8 +149,11 @@ def suggested(drawn: list[list[Inspection]], gear: Gear) -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         store = Store(Path(folder) / "store.sqlite")
         store.add([inspection_record(inspection) for own in drawn for inspection in own])
-        kept = list(folding.lives(store).values())
-    return suggestions(kept, fit_fleet(kept, gear), gear)
+        by_key = folding.lives(store)
+    kept = list(by_key.values())
+    model = fit_fleet(kept, gear)
+    apart = {} if model is None else departures(kept, model, gear)
+    return suggestions(apart, lambda _keys: by_key, model, gear)
 
 
 def main() -> None:
@@ -180,7 +184,7 @@ def main() -> None:
 
         def page() -> list[folding.GearLife]:
             found = list(folding.lives(store).values())
-            fleet_as_json(found, {})
+            fleet_as_json([*map(FleetLine.of, found)], {})
             return found
 
         found = timed("the fleet without forecasts", 10.0, page)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +20,14 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life import remembered
 from mlg_troubleshoot.life.chronology import Moment
-from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection, lives
+from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection, lives, lives_of
 from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
-from mlg_troubleshoot.life.unrecorded_work import _departures
+from mlg_troubleshoot.life.landings_left import FleetLine
+from mlg_troubleshoot.life.unrecorded_work import _departures, suggestions
+from mlg_troubleshoot.reporting.life_json import fleet_as_json
 from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
+from mlg_troubleshoot.wear import WearModel
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files, check_inspection
 from mlg_troubleshoot.workflows.history import Lives, show_fleet, show_lives, void
 from mlg_troubleshoot.workflows.keep import keep
@@ -172,23 +177,26 @@ def computed(monkeypatch: pytest.MonkeyPatch, store: Store) -> tuple[Lives, set[
     asked: set[GearKey] = set()
     found = remembered.forecast
 
-    def forecast(lives: Sequence[GearLife], *more: Any) -> Any:
-        asked.update(life.key for life in lives)
-        return found(lives, *more)
+    def forecast(lives: Sequence[GearLife], model: WearModel | None, gear: Gear) -> Any:
+        asked.update(life.key for life in lives if model is not None)
+        return found(lives, model, gear)
 
     with monkeypatch.context() as patch:
         patch.setattr(remembered, "forecast", forecast)
-        return show_fleet(store, load_gear(), ahead=True), asked
+        return show_fleet(store, load_gear(), ahead=True, compare=True), asked
 
 
-def one_more(store: Store, tail: str) -> None:
+WORN = {3: 0.004, 4: 0.003, 5: 0.004}
+
+
+def one_more(store: Store, tail: str, clearance_in: Mapping[int, float] = WORN) -> None:
     """Keep one new inspection of a gear."""
     last = Inspection(
         f"{tail}-4",
         tail,
         Side.LH,
         ClearanceConvention.RADIAL,
-        {3: 0.004, 4: 0.003, 5: 0.004},
+        clearance_in,
         inspection_date=date(2024, 1, 1),
         gear_landings=2000.0,
     )
@@ -299,7 +307,7 @@ def test_unpacked_contents_are_judged_by_the_gate_of_their_own_store(tmp_path: P
 
 
 def unpacked(monkeypatch: pytest.MonkeyPatch, store: Store, gear: Gear) -> tuple[Lives, set[str]]:
-    """A fleet without forecasts, and the inspections that were unpacked for their times."""
+    """The lines of a fleet without forecasts, and the inspections that were unpacked for them."""
     read: set[str] = set()
     found = KeptInspection.moment.fget
 
@@ -309,10 +317,10 @@ def unpacked(monkeypatch: pytest.MonkeyPatch, store: Store, gear: Gear) -> tuple
 
     with monkeypatch.context() as patch:
         patch.setattr(KeptInspection, "moment", property(moment))
-        return show_fleet(store, gear, ahead=False), read
+        return show_fleet(store, gear, ahead=False, whole=False), read
 
 
-def test_a_second_look_unpacks_the_times_of_the_gears_that_changed_only(
+def test_a_second_look_unpacks_the_gears_that_changed_only(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store, gear = fleet_of(tmp_path), load_gear()
@@ -324,10 +332,10 @@ def test_a_second_look_unpacks_the_times_of_the_gears_that_changed_only(
     one_more(store, TAILS[0])
     after, read = unpacked(monkeypatch, store, gear)
     assert read == {f"{TAILS[0]}-{visit}" for visit in (1, 2, 3, 4)}
-    assert after.lives == tuple(lives(store).values())
+    assert after.lines == tuple(map(FleetLine.of, lives(store).values()))
 
 
-def test_times_are_read_again_for_a_gear_file_that_allows_other_readings(
+def test_gears_are_read_again_for_a_gear_file_that_allows_other_readings(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store, gear = fleet_of(tmp_path), load_gear()
@@ -336,7 +344,7 @@ def test_times_are_read_again_for_a_gear_file_that_allows_other_readings(
     assert len(unpacked(monkeypatch, store, strict)[1]) == 3 * len(TAILS)
 
 
-def test_times_are_read_again_where_a_content_was_changed_under_its_old_hash(
+def test_a_gear_is_read_again_where_a_content_was_changed_under_its_old_hash(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store, gear = fleet_of(tmp_path), load_gear()
@@ -348,3 +356,51 @@ def test_times_are_read_again_where_a_content_was_changed_under_its_old_hash(
     file.commit()
     _, read = unpacked(monkeypatch, store, gear)
     assert read == {f"{TAILS[0]}-{visit}" for visit in (1, 2, 3)}
+
+
+def test_gears_are_read_again_by_another_version_of_the_program(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, gear = fleet_of(tmp_path), load_gear()
+    unpacked(monkeypatch, store, gear)
+    monkeypatch.setattr(remembered, "version", lambda name: f"another {name}")
+    assert len(unpacked(monkeypatch, store, gear)[1]) == 3 * len(TAILS)
+
+
+def test_a_look_without_forecasts_leaves_them_remembered(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    computed(monkeypatch, store)
+    show_fleet(store, load_gear(), ahead=False, whole=False)
+    assert not computed(monkeypatch, store)[1]
+
+
+def test_what_a_fleet_says_with_its_memory_is_what_it_says_without_to_the_last_digit(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, gear = fleet_of(tmp_path), load_gear()
+
+    def said() -> str:
+        found = show_fleet(store, gear, ahead=True, whole=False, compare=True)
+        apart = suggestions(found.departures, partial(lives_of, store), found.model, gear)
+        text = json.dumps(fleet_as_json(found.lines, found.forecasts))
+        return f"{text} {apart} {found.departures}"
+
+    said()
+    last = teachers_first(found for found in lives(store))[-2:]
+    for tail, _side in last:
+        one_more(store, tail, {3: 0.0, 4: 0.0, 5: 0.0})
+    remembering = said()
+    assert "Restored without a record" in remembering
+    shutil.rmtree(cache)
+    assert said() == remembering
+
+
+def test_notes_that_nobody_asked_for_before_are_made_from_what_stands_in_the_store(
+    tmp_path: Path, cache: Path
+) -> None:
+    store, gear = fleet_of(tmp_path), load_gear()
+    assert not show_fleet(store, gear, ahead=True).departures
+    asked = show_fleet(store, gear, ahead=True, compare=True).departures
+    assert set(asked) == {(tail, "LH") for tail in TAILS}

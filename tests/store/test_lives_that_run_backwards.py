@@ -19,8 +19,9 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import life_of, lives
 from mlg_troubleshoot.life.forecast import fit_fleet, forecast
+from mlg_troubleshoot.life.landings_left import FleetLine
 from mlg_troubleshoot.life.looking_back import side_by_side
-from mlg_troubleshoot.life.unrecorded_work import suggestions
+from mlg_troubleshoot.life.unrecorded_work import departures, suggestions
 from mlg_troubleshoot.life.wear_paths import wear_paths
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
 from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_record, packed
@@ -463,7 +464,9 @@ def suggested(*gears: tuple[float, float], tails: str = "AA", days: str = "11") 
     ]
     add(own)
     model = cast(WearModel, Steady())
-    return suggestions(list(lives(Store()).values()), model, load_gear("hawker-800xp"))
+    gear, found = load_gear("hawker-800xp"), lives(Store())
+    apart = departures([*found.values()], model, gear)
+    return suggestions(apart, lambda _keys: found, model, gear)
 
 
 @pytest.mark.parametrize(("deviations", "told"), [(3.0, 0), (5.0, 1)])
@@ -540,7 +543,8 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
     Store().add(records)
     gear, found = load_gear(), list(lives(Store()).values())
     model = fit_fleet(found[:5], gear)
-    fleet = fleet_as_json(found, forecast(found, model, gear))["gears"]
+    lines = [*map(FleetLine.of, found)]
+    fleet = fleet_as_json(lines, forecast(found, model, gear))["gears"]
     pages = [life_as_json(life, forecast([life], model, gear)[life.key], gear) for life in found]
     assert len(fleet) == len(pages) == 200
     assert max(value for told in (*fleet, *pages) for value in shown(told)) == 0.0
