@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
@@ -234,8 +233,9 @@ class _Streams:
 
     def __init__(self, seed: int, groups: int = 1) -> None:
         self._groups = groups
+        self._seed = np.random.SeedSequence(seed)
         # One for all, until what the groups ask for differs.
-        self._streams = [np.random.default_rng(seed)]
+        self._streams = [np.random.default_rng(self._seed)]
 
     def normal(self, count: int, shape: tuple[int, int, int]) -> Array:
         draws, units, repeats = shape
@@ -245,7 +245,11 @@ class _Streams:
 
     def gamma(self, shape: Array) -> Array:
         if len(self._streams) < self._groups:
-            self._streams = [deepcopy(self._streams[0]) for _ in range(self._groups)]
+            # Several times as fast as a deep copy.
+            state = self._streams[0].bit_generator.state
+            self._streams = [np.random.default_rng(self._seed) for _ in range(self._groups)]
+            for stream in self._streams:
+                stream.bit_generator.state = state
         shapes = np.split(shape, self._groups, axis=1)
         pairs = zip(self._streams, shapes, strict=True)
         parts = [stream.standard_gamma(part) for stream, part in pairs]
