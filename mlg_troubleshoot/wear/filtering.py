@@ -68,9 +68,9 @@ def clock(usage: Array, power: Array) -> Array:
     return np.where(power == 1.0, usage, np.maximum(usage, 0.0) ** power)
 
 
-def follow(steps: Steps, draws: Draws) -> tuple[Array, FilterState]:
-    """Filter the readings of every unit; return log likelihood (draws, units) and the state at the
-    end.
+def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Array, FilterState]:
+    """Filter the readings of every unit; return log likelihood (draws, units), zero where it is
+    not asked for, and the state at the end.
 
     Mean of level x, drift b and the unit's own drift u; their covariances are named by the pair.
     """
@@ -95,7 +95,8 @@ def follow(steps: Steps, draws: Draws) -> tuple[Array, FilterState]:
             xu = np.where(begins, 0.0, xu)
             bb = np.where(begins, uu + own, bb)
             bu = np.where(begins, uu, bu)
-        d = now - np.where(begins, 0.0, before)
+            before = np.where(begins, 0.0, before)
+        d = now - before
         before = now
         x = x + b * d
         w2 = draws.wander_sd**2 * d
@@ -109,7 +110,8 @@ def follow(steps: Steps, draws: Draws) -> tuple[Array, FilterState]:
         s = xx + reading + _LEAST_VARIANCE
         g = seen / s
         off = value - x
-        total = total - 0.5 * seen * (off * off / s + np.log(s) + _LOG_2PI)
+        if likelihood:
+            total = total - 0.5 * seen * (off * off / s + np.log(s) + _LOG_2PI)
         x = x + g * xx * off
         b = b + g * xb * off
         u = u + g * xu * off

@@ -221,7 +221,7 @@ class WearModel(Result):
         for is_gamma in (False, True):
             draws = every.take(every.gamma[:, 0] == is_gamma)
             if len(draws.start):
-                _, states = follow(steps, draws)
+                _, states = follow(steps, draws, likelihood=False)
                 ends.append(_Ends.drawn(draws, states, repeats, rng))
         return ends
 
