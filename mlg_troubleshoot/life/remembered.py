@@ -8,7 +8,7 @@ What is remembered of a gear is believed only while its records stand as they di
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from functools import cached_property
 from hashlib import sha256
@@ -102,14 +102,14 @@ class Remembered:
         """The gears of the store, in order."""
         return [*self._marks]
 
-    def fit(self, paths: Sequence[WearPath]) -> WearModel:
+    def fit(self, paths: Sequence[WearPath], progress: Callable[[int, int], None]) -> WearModel:
         """Fit the wear of these paths, or recall it."""
         self._model_mark = mark = _hash(self._of_paths(paths))
         file = _folder() / "fit.msgpack"
         known = _read(file, _Fit)
         if known is not None and known.mark == mark:
             return WearModel.from_learnt(known.learnt, paths)
-        model = fit_wear(paths)
+        model = fit_wear(paths, progress=progress)
         _write(file, _Fit(mark, model.learnt()))
         return model
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
@@ -362,7 +362,12 @@ def first_passage(at: Array, paths: Array, limit: float) -> Array:
     return np.where(over.any(axis=0), passed, np.inf)
 
 
-def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
+def fit_wear(
+    paths: Sequence[WearPath],
+    *,
+    seed: int = 0,
+    progress: Callable[[int, int], None] = lambda _done, _total: None,
+) -> WearModel:
     """Learn how a population of units wears, from readings of some of them.
 
     Each unit has a drift from the population's; increments are correlated along a path (Wiener,
@@ -377,6 +382,8 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
         Paths of all units; those of one unit in the order of time.
     seed : int
         Seed of the random numbers of the fit and of its forecasts.
+    progress : callable
+        Told how many kinds of wear were tried, and of how many. [1]
 
     Returns
     -------
@@ -410,7 +417,7 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
     )
     # Matrices this small only wait for other threads.
     with threadpool_limits(1, "blas"):
-        draws, shares = posterior(steps, scale, _DRAWS, rng, kinds)
+        draws, shares = posterior(steps, scale, _DRAWS, rng, kinds, progress)
     simulated = _PATHS if len(by_unit) <= _MANY else _PATHS_OF_MANY
     return WearModel(by_unit, shares, scale, draws, seed, simulated)
 

@@ -191,11 +191,19 @@ def _sample(
 
 
 def posterior(
-    steps: Steps, scale: Scale, count: int, rng: np.random.Generator, kinds: Sequence[Member]
+    steps: Steps,
+    scale: Scale,
+    count: int,
+    rng: np.random.Generator,
+    kinds: Sequence[Member],
+    progress: Callable[[int, int], None],
 ) -> tuple[Draws, dict[str, float]]:
     """Draw parameters over all kinds; return them and the posterior probability of each kind."""
     resolution = scale.resolution / abs(scale.value)
-    found = [_sample(member, _log_posterior(member, steps, resolution), rng) for member in kinds]
+    found = []
+    for done, member in enumerate(kinds):
+        progress(done, len(kinds))
+        found.append(_sample(member, _log_posterior(member, steps, resolution), rng))
     weights = np.concatenate([weight for _theta, weight in found])
     share = np.exp(weights - logsumexp(weights))
     counts = [len(weight) for _theta, weight in found]

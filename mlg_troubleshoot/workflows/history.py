@@ -170,11 +170,12 @@ def _taught(
     """How joints wear, from as many gears as are needed of a large fleet."""
     from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
 
-    progress("Learning how joints wear", 0, None)
+    learning = partial(progress, "Learning how joints wear")
+    learning(0, None)
     order = teachers_first(keys)
     parts = (order[first : first + TEACHERS] for first in range(0, len(order), TEACHERS))
     taught = (life for part in parts for life in lives_of(store, part).values())
-    return fit_fleet(taught, gear, remembered.fit)
+    return fit_fleet(taught, gear, partial(remembered.fit, progress=learning))
 
 
 def show_lives(

@@ -82,17 +82,22 @@ def test_how_far_a_gear_departs_from_its_wear_does_not_depend_on_other_gears(
     np.testing.assert_array_equal(_departures(pairs, fleet.model, fleet.gear)[-1:], alone)
 
 
-def test_the_life_of_one_gear_says_what_it_is_doing_while_wear_is_learnt(tmp_path: Path) -> None:
-    said: list[str] = []
+def test_the_life_of_one_gear_says_how_far_the_wear_of_its_fleet_is_learnt(tmp_path: Path) -> None:
+    said: dict[str, list[tuple[int, int | None]]] = {}
     show_lives(
         fleet_of(tmp_path),
         load_gear(),
         TAILS[0],
         "LH",
         ahead=True,
-        progress=lambda name, _done, _total: said.append(name),
+        progress=lambda name, *how_far: said.setdefault(name, []).append(how_far),
     )
-    assert said == ["Learning how joints wear", "Looking ahead"]
+    learning = said["Learning how joints wear"]
+    assert [*said] == ["Learning how joints wear", "Looking ahead"]
+    assert learning == [
+        (0, None),
+        *((done, len(learning) - 1) for done in range(len(learning) - 1)),
+    ]
 
 
 def test_the_life_of_one_gear_is_shown_without_reading_the_whole_store(
@@ -287,8 +292,8 @@ def test_what_was_forecast_until_it_was_interrupted_is_remembered(
 ) -> None:
     store = fleet_of(tmp_path)
 
-    def impatient(_name: str, done: int, _total: int | None) -> None:
-        if done:
+    def impatient(name: str, done: int, _total: int | None) -> None:
+        if done and name == "Looking ahead":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
