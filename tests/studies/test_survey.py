@@ -118,6 +118,13 @@ def test_the_posterior_of_the_four_bar_is_the_closed_forms_propagated_uncertaint
     )
 
 
+def test_readings_less_the_numbers_that_they_determine_are_the_degrees_of_freedom(
+    braced: Survey,
+) -> None:
+    numbers = len((CRANK, COUPLER, ROCKER, GROUND, TURN))
+    assert braced.degrees_of_freedom == pytest.approx(len(BRACED) - numbers, abs=0.01)
+
+
 def test_a_fit_tells_how_far_it_is(four_bar: Gear) -> None:
     told: list[tuple[int, int]] = []
     fit(
