@@ -71,12 +71,13 @@ class Rows:
     unread_in, shape (n, k): what joints that nobody read may add or lack in all rows together, each
     at one standard
         deviation. [in]
-    along_in, shape (n, k): what is not known of rows along the stroke, each at one standard
-    deviation. [in] u_read_in: standard deviation by the reading of clearances. [in] u_measured_in:
-    standard deviation of a row's measured displacement by the plunger gauge alone, 0 if unknown.
-    [in] drawn_in, shape (n,): by how much the prediction from the readings as they are lies above
-    the one with all of them
-        drawn to their expectation. [in]
+    along_in, shape (n, k): what is not known of rows along the stroke, and of digits that may be
+    cut off, each at one standard deviation. [in]
+    u_read_in: standard deviation by the reading of clearances. [in]
+    u_measured_in: standard deviation of a row's measured displacement by the plunger gauge alone, 0
+    if unknown. [in]
+    drawn_in, shape (n,): by how much the prediction from the readings as they are lies above the
+    one with all of them drawn to their expectation. [in]
     trends, habits, shape (n, k): shapes of trends and habits that are always there in some small
     measure. [1] readers, shape (n, k): rows of each gauge, and of each technician. [1]
     """

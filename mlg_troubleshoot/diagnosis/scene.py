@@ -23,6 +23,7 @@ from mlg_troubleshoot.diagnosis.wear import (
     likely_clearances,
     wear_of_gears,
 )
+from mlg_troubleshoot.diagnosis.written import cut_off
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
@@ -85,6 +86,7 @@ def _scene(
     if not np.nan_to_num(table.clearance_in).any():
         along = np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)])
         shared_in = np.zeros(len(table))
+    along = np.hstack([along, np.sum(slopes, axis=1, keepdims=True) * cut_off(table)])
     return scene, Rows(
         scene.over_in,
         table.tails,

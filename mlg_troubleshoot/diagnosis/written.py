@@ -39,6 +39,8 @@ _LED_BY = 3
 _PILED_BY_CHANCE = 0.01
 # How often a value stands that others are written as, over what its neighbours lead to. [1]
 _PILED = 1.5
+# How likely one who leaves out digits cuts them off: as likely as not. [1]
+_CUT_OFF = 1 / 2
 # Computing only: rounds in which the share that is written so settles.
 _ROUNDS = 10
 # Standard deviations beyond which a normal distribution has nothing. [1]
@@ -148,6 +150,24 @@ def steps_of(table: DiagnosisTable) -> Array:
         enough = np.count_nonzero(np.nan_to_num(mine)) >= _LEAST_VALUES
         found[own] = step_of(mine) if enough else every
     return found
+
+
+def coarse_steps(table: DiagnosisTable) -> Array:
+    """The same where half a step is the standard uncertainty of a reading or more, else 0."""
+    steps = steps_of(table)
+    return np.where(steps >= 2.0 * float(np.median(table.gauge_u_in)), steps, 0.0)
+
+
+def cut_off(table: DiagnosisTable) -> Array:
+    """What clearances lack where their technician cuts off digits, each column at one standard
+    deviation, shape (n, k). [in]
+
+    Then a value stands for the step above it, half a step more than where digits are rounded.
+    """
+    lacks_in = 0.5 * coarse_steps(table)
+    people = table.factors.get(TECHNICIAN_ID.variable, np.full(len(table), ""))
+    who = np.unique(people[lacks_in > 0.0])
+    return np.where(people[:, None] == who, np.sqrt(_CUT_OFF) * lacks_in[:, None], 0.0)
 
 
 def _read(table: DiagnosisTable) -> Array:

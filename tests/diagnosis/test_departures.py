@@ -63,6 +63,10 @@ def one_technician_twice(table: DiagnosisTable) -> DiagnosisTable:
     return replace(table, clearance_in=table.clearance_in * factor[:, None])
 
 
+def digits_cut_off(table: DiagnosisTable) -> DiagnosisTable:
+    return replace(table, clearance_in=np.floor(table.clearance_in * 1000.0) / 1000.0)
+
+
 def worn_with_landings(gear: Gear) -> DiagnosisTable:
     """A fleet with nothing wrong whose joints wear with landings, each gear's joint at a rate of
     its own.
@@ -179,6 +183,7 @@ FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
         gear.model, lambda _t, over: 0.1 * over, rows=200
     ),
     "convention": lambda gear: one_technician_twice(fleet(gear.model, rows=200)),
+    "digits cut off": lambda gear: digits_cut_off(fleet(gear.model, rows=200)),
     "unread": lambda gear: unread(worn_with_landings(gear)),
     "unread, worn with the read ones": lambda gear: unread(worn_together(gear)),
     "worn unread": worn_where_nobody_reads,
@@ -449,6 +454,10 @@ def test_what_the_joints_add_is_together_the_displacement(gear: Gear) -> None:
 
 def test_a_technician_who_writes_the_other_convention_is_named() -> None:
     assert named("convention") == {("convention_slip", "technician T-2")}
+
+
+def test_digits_that_everybody_cuts_off_are_no_cause() -> None:
+    assert found("digits cut off").verdict == "NONE"
 
 
 def test_an_oval_bore_is_named_beside_another_linkage() -> None:

@@ -11,7 +11,7 @@ from scipy.stats import truncnorm
 
 from mlg_troubleshoot.diagnosis import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import wear_history
-from mlg_troubleshoot.diagnosis.written import Written, piles, steps_of, written
+from mlg_troubleshoot.diagnosis.written import Written, cut_off, piles, steps_of, written
 from mlg_troubleshoot.gear.gear import Gear
 
 from .conftest import fleet
@@ -62,6 +62,16 @@ def test_each_technician_has_a_step_of_his_own(table: DiagnosisTable) -> None:
     steps = steps_of(replace(table, clearance_in=values))
     assert set(steps[first]) == {0.001}
     assert set(steps[~first]) == {0.0001}
+
+
+def test_only_who_writes_coarse_steps_may_have_cut_digits_off(table: DiagnosisTable) -> None:
+    people = table.factors["technician_id"]
+    coarse = people == people[0]
+    values = with_step(table.clearance_in, 0.0001)
+    values[coarse] = with_step(values[coarse], 0.001)
+    lacks = cut_off(replace(table, clearance_in=values))
+    assert lacks.shape == (len(table), 1)
+    assert lacks[:, 0] == pytest.approx(np.where(coarse, 0.0005 * np.sqrt(0.5), 0.0))
 
 
 def test_zero_is_anything_up_to_half_a_step(table: DiagnosisTable) -> None:

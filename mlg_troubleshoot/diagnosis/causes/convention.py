@@ -46,23 +46,35 @@ class ConventionSlip(Cause):
     separates: ClassVar[str] = "one joint measured again by another technician with another gauge"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield each group whose readings are far off the fleet's share of their prediction."""
+        """Yield each group whose readings are far off the fleet's share of their prediction; any
+        other group might have been.
+        """
         at_mid = ~scene.table.along
         measured = scene.table.measured_in / np.maximum(scene.over_in, 1e-3)
         usual = float(np.median(measured[at_mid])) if at_mid.any() else 0.0
-        for column, label in _LABELS.items():
-            texts = scene.table.factors.get(column)
-            if texts is None or usual <= 0.0:
-                continue
-            for value in levels(texts[at_mid], _LEAST_ROWS):
-                group = at_mid & (texts == value)
-                own = float(np.median(measured[group])) / usual
-                setting = {"column": column, "value": value}
-                if own * _DOUBT < 1.0 or own > _DOUBT:
-                    factor = 2.0 if own < 1.0 else 0.5
-                    yield Candidate(self, f"{label} {value}", setting | {"written_factor": factor})
-                for stretch, rarity in _stretches(scene, group, measured / usual):
-                    yield Candidate(self, f"{label} {value}", setting | stretch, rarity=rarity)
+        if usual <= 0.0:
+            return
+        groups = [
+            (column, label, value)
+            for column, label in _LABELS.items()
+            if column in scene.table.factors
+            for value in levels(scene.table.factors[column][at_mid], _LEAST_ROWS)
+        ]
+        found: list[Candidate] = []
+        for column, label, value in groups:
+            group = at_mid & (scene.table.factors[column] == value)
+            own = float(np.median(measured[group])) / usual
+            setting = {"column": column, "value": value}
+            target = f"{label} {value}"
+            if own * _DOUBT < 1.0 or own > _DOUBT:
+                factor = 2.0 if own < 1.0 else 0.5
+                found.append(Candidate(self, target, setting | {"written_factor": factor}))
+            for stretch, rarity in _stretches(scene, group, measured / usual):
+                found.append(Candidate(self, target, setting | stretch, rarity=rarity))
+        offered = len({candidate.target for candidate in found})
+        for candidate in found:
+            rarity = candidate.rarity + float(np.log(offered / len(groups)))
+            yield replace(candidate, rarity=rarity)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Take the group's clearances as they were meant, and what wear makes expect of all rows

@@ -357,6 +357,11 @@ def _walk(scene: Scene, state: State) -> Hidden:
     return ()
 
 
+def _read_as_diameters(scene: Scene, state: State) -> Hidden:
+    """What `_diametral` makes true of the sheet."""
+    return (("convention_slip", f"gauge {scene.usual(scene.design.gauge)}"),)
+
+
 def _repair(scene: Scene, state: State) -> Hidden:
     scene.repaired = scene.seen & (scene.rng.random(scene.seen.size) < scene.size(0.04, 0.16))
     rows = np.flatnonzero(scene.repaired)
@@ -650,7 +655,7 @@ LISTED = (
 FURTHER = (
     Blemish("unit_mixed", write=_millimetres, near=("convention_slip",)),
     Blemish("year_off", write=_year_off),
-    Blemish("diametral_month", write=_diametral, near=("convention_slip",)),
+    Blemish("diametral_month", act=_read_as_diameters, write=_diametral),
     Blemish("chopped", ("rounded",), write=_chopped),
     Blemish("sides_reversed", write=_sides_reversed),
     Blemish("zero_by_base", act=_zero_by_base),
