@@ -249,6 +249,17 @@ def test_a_gauge_reads_diametral_for_a_while() -> None:
     assert all(np.allclose(cells([b]), 2.0 * np.array(cells([a]))) for a, b in rows)
 
 
+def test_the_label_has_the_gauge_that_reads_diametral() -> None:
+    (gauge,) = {after["gauge_id"] for _, after in changed("diametral_month")}
+    assert drawn("diametral_month")[1].causes == (("convention_slip", f"gauge {gauge}"),)
+
+
+def test_the_label_has_the_bases_whose_zero_is_off() -> None:
+    moved = np.abs(shift("zero_by_base")) > 0.001
+    bases = {("modification", f"base {name}") for name in column("zero_by_base", "base")[moved]}
+    assert set(drawn("zero_by_base")[1].causes) == bases
+
+
 def test_the_end_of_the_gauge_clamps() -> None:
     assert max(cells(drawn("clamp")[0])) == 0.003
 

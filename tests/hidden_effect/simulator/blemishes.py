@@ -385,7 +385,7 @@ def _zero_by_base(scene: Scene, state: State) -> Hidden:
     zero = scene.size(0.0005, 0.003) * scene.rng.permutation([-1.0, 0.0, 1.0])
     state.offset += zero[scene.base]
     scene.columns["base"] = [f"B{number + 1}" for number in scene.base]
-    return ()
+    return tuple(("modification", f"base B{number + 1}") for number in np.flatnonzero(zero))
 
 
 def _cold_first(scene: Scene, state: State) -> Hidden:
