@@ -193,8 +193,14 @@ def step_of(values: Array) -> float:
 def piles(table: DiagnosisTable) -> list[Pile]:
     """Values that stand for what lies beyond them: an end of the gauge or of the sheet, or the size
     of a limit gauge.
+
+    Only rows on the usual step tell: whoever writes another one prefers its multiples.
     """
-    values = _read(table)[~table.along]
+    if table.along.all():
+        return []
+    steps = steps_of(table)
+    each, often = np.unique(steps[~table.along], return_counts=True)
+    values = _read(table)[~table.along & (steps == each[np.argmax(often)])]
     found, counts = np.unique(np.round(values[np.isfinite(values)], 7), return_counts=True)
     if len(found) < _LED_BY + 2:
         return []

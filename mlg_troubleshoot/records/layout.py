@@ -73,7 +73,7 @@ class Columns:
                 "there is no record_id: each inspection is named after the file, its row and its"
                 " content"
             )
-        carried = "not used, only carried to the report: " + ", ".join(self.carried)
+        carried = "unknown column, carried to the report: " + ", ".join(self.carried)
         return "; ".join(read), carried if self.carried else ""
 
 

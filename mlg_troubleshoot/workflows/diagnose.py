@@ -143,8 +143,8 @@ def diagnose_files(
     # What a check says of single rows is said of the data as a whole: landings that fall.
     of_rows = {warning for inspection in valid for warning in inspection.warnings}
     general = (note for note in read.notes if note not in of_rows)
-    notes = (*general, *_evidence_notes(once, len(valid) - len(once), gear))
     whole = table_from_inspections(once, gear, along=True)
+    notes = (*general, *_evidence_notes(once, len(valid) - len(once), gear, whole.own_factors))
     condition, aside = data_condition(whole, gear)
     table = replace(whole.take(~aside), doubt=doubt_of(condition))
     unused = _unused(read, whole, condition, aside)
@@ -288,8 +288,14 @@ def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
     return replace(fault, column=column, value=entered.text, suggested=suggested)
 
 
-def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:
-    """What a diagnosis cannot use: duplicate inspections, unmeasured joints."""
+def _evidence_notes(
+    inspections: Sequence[Inspection], again: int, gear: Gear, groups: Sequence[str]
+) -> Iterator[str]:
+    """What a diagnosis uses beyond the known columns, and what it cannot use: duplicate
+    inspections, unmeasured joints.
+    """
+    if groups:
+        yield f"rows are also compared by {', '.join(groups)}"
     if again:
         yield f"duplicate inspections count once; rows left out: {again}"
     unread = [

@@ -112,6 +112,15 @@ def test_no_limit_gauge_is_seen_where_none_was_used(table: DiagnosisTable) -> No
     assert piles(gauged(table, 0.0)) == []
 
 
+def test_no_limit_gauge_is_seen_in_the_multiples_of_a_coarser_step(table: DiagnosisTable) -> None:
+    values = with_step(
+        np.random.default_rng(0).gamma(2.0, 0.0006, table.clearance_in.shape), 0.0005
+    )
+    one = table.factors["technician_id"] == "T-1"
+    cut = np.where(one[:, None], np.floor(values * 1000.0) / 1000.0, values)
+    assert piles(replace(table, clearance_in=cut)) == []
+
+
 def test_wear_behind_readings_to_a_coarse_step_follows_the_landings_within_it() -> None:
     rng = np.random.default_rng(8)
     gears = np.repeat(np.arange(40), 8)

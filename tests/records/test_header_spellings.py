@@ -131,7 +131,7 @@ def test_identity_headers_as_people_write_them_are_understood(read, table):
 def test_an_unknown_column_is_kept_and_named(read, table):
     result = read(table((*HEADER, "clearance_3_in", "Stroke (mm)"), [(*GOOD, 0.013, 17)]))
     assert result.rows[0].carried == {"Stroke (mm)": "17"}
-    assert any('only carried to the report: "Stroke (mm)"' in note for note in result.notes)
+    assert any('carried to the report: "Stroke (mm)"' in note for note in result.notes)
 
 
 def test_a_column_of_remarks_about_a_joint_is_kept(read, table):
