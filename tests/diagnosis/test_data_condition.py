@@ -400,3 +400,21 @@ def test_a_gauge_that_was_read_as_a_diameter_for_a_time_is_named_with_its_dates(
     (cause,) = said["causes"]
     assert (cause["cause"], cause["target"][:5]) == ("convention_slip", "gauge")
     assert cause["parameters"]["since"] < cause["parameters"]["until"]
+    screen = " ".join(mlg("diagnose", tmp_path / "diametral.csv").out.split())
+    assert f"from {cause['parameters']['since']} to {cause['parameters']['until']}" in screen
+
+
+def test_blanks_that_may_account_for_a_misfit_are_said_with_what_to_record(tmp_path: Path) -> None:
+    rows, _truth = blemished_fleet("mnar", "strong", 61_000, rows=150)
+    write_rows(rows, tmp_path / "worn.csv")
+    screen = " ".join(mlg("diagnose", tmp_path / "worn.csv").out.split())
+    assert "Clearances that are blank or cut off may account for it." in screen
+    assert "To test causes of joints, record next time: every joint that was read" in screen
+    assert "Nothing to change" not in screen
+
+
+def test_a_column_of_its_own_that_groups_rows_is_said_to_be_compared(tmp_path: Path) -> None:
+    rows, _truth = blemished_fleet("zero_by_base", "mild", 61_000, rows=150)
+    write_rows(rows, tmp_path / "bases.csv")
+    said = mlg("diagnose", tmp_path / "bases.csv", "--json").json
+    assert "rows are also compared by base" in said["warnings"]
