@@ -228,7 +228,7 @@ class Finding:
         found = self.posterior
         alone: dict[Key, list[tuple[float, float]]] = {}
         names = found.effects.names
-        priors = found.effects.log_prior.tolist()
+        priors = (found.effects.log_prior - found.effects.rarity).tolist()
         for name, prior, odds in zip(names, priors, found.over_nothing.tolist(), strict=True):
             if name is not None:
                 alone.setdefault(name, []).append((prior, odds))

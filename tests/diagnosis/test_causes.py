@@ -103,15 +103,22 @@ def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(
     assert column == pytest.approx(slope, abs=0.03 * np.max(np.abs(slope)))
 
 
-def test_a_convention_slip_is_as_rare_in_a_group_as_in_any_other(gear: Gear) -> None:
-    table = fleet(gear.model)
-    twice = np.where(table.factors["technician_id"] == "T-2", 2.0, 1.0)
-    table = replace(table, clearance_in=table.clearance_in * twice[:, None])
-    scene = scene_of(gear.model, table, gear.discrepancies)
-    offered = list(BY_NAME["convention_slip"].candidates(scene))
-    whole = next(c for c in offered if c.target == "technician T-2" and "days" not in c.setting)
-    groups = sum(len(np.unique(table.factors[n])) for n in ("tail_no", "gauge_id", "technician_id"))
-    assert np.exp(whole.rarity) / len({c.target for c in offered}) == pytest.approx(1 / groups)
+def test_a_convention_slip_is_expected_where_the_clearances_look_twice_as_worn(gear: Gear) -> None:
+    plain = fleet(gear.model)
+    own = plain.factors["tail_no"] == "N103"
+    twice = replace(plain, clearance_in=plain.clearance_in * np.where(own, 2.0, 1.0)[:, None])
+    half = replace(plain, readings_in=plain.readings_in * np.where(own, 0.5, 1.0)[:, None])
+    written, read = (
+        next(
+            candidate.rarity
+            for candidate in BY_NAME["convention_slip"].candidates(
+                scene_of(gear.model, table, gear.discrepancies)
+            )
+            if candidate.target == "tail N103" and "days" not in candidate.setting
+        )
+        for table in (twice, half)
+    )
+    assert written > read + 4.0
 
 
 def test_tilt_shrinks_a_link_by_the_cosine_of_its_floats_over_the_span(scene: Scene) -> None:

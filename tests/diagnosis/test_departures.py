@@ -63,6 +63,11 @@ def one_technician_twice(table: DiagnosisTable) -> DiagnosisTable:
     return replace(table, clearance_in=table.clearance_in * factor[:, None])
 
 
+def half_in_one_tail(table: DiagnosisTable, over: Array) -> Array:
+    own = table.factors["tail_no"] == "N103"
+    return np.where(own, -0.5 * np.mean(over[own]), 0.0)
+
+
 def digits_cut_off(table: DiagnosisTable) -> DiagnosisTable:
     return replace(table, clearance_in=np.floor(table.clearance_in * 1000.0) / 1000.0)
 
@@ -183,6 +188,7 @@ FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
         gear.model, lambda _t, over: 0.1 * over, rows=200
     ),
     "convention": lambda gear: one_technician_twice(fleet(gear.model, rows=200)),
+    "re-rigged by half": lambda gear: fleet(gear.model, half_in_one_tail, rows=200),
     "digits cut off": lambda gear: digits_cut_off(fleet(gear.model, rows=200)),
     "unread": lambda gear: unread(worn_with_landings(gear)),
     "unread, worn with the read ones": lambda gear: unread(worn_together(gear)),
@@ -454,6 +460,10 @@ def test_what_the_joints_add_is_together_the_displacement(gear: Gear) -> None:
 
 def test_a_technician_who_writes_the_other_convention_is_named() -> None:
     assert named("convention") == {("convention_slip", "technician T-2")}
+
+
+def test_a_re_rigged_tail_that_reads_half_is_no_convention_slip() -> None:
+    assert named("re-rigged by half") == {("rigging_offset", "tail N103")}
 
 
 def test_digits_that_everybody_cuts_off_are_no_cause() -> None:

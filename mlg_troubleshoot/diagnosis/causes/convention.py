@@ -11,11 +11,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.decision.columns import LANDINGS
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, levels
 from mlg_troubleshoot.diagnosis.causes.reading import change_date
+from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import likely_clearances
+from mlg_troubleshoot.diagnosis.wear import gears_of, landings_of, likely_clearances
 from mlg_troubleshoot.gear.adjustment import Adjustment
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 
 # Rows from which a group can show a convention of its own.
 _LEAST_ROWS = 6
@@ -74,6 +77,7 @@ class ConventionSlip(Cause):
         offered = len({candidate.target for candidate in found})
         for candidate in found:
             rarity = candidate.rarity + float(np.log(offered / len(groups)))
+            rarity += _odds_of_wear(scene.table, candidate.setting)
             yield replace(candidate, rarity=rarity)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
@@ -120,12 +124,55 @@ def _stretches(
             )
 
 
-def as_meant(table: DiagnosisTable, setting: Any) -> DiagnosisTable:
-    """The table with the clearances of the group as they were meant."""
-    rows = table.factors[setting["column"]] == setting["value"]
+def _odds_of_wear(table: DiagnosisTable, setting: Any) -> float:
+    """Logarithm of how many times likelier the clearances themselves are if they were written so:
+    their joints look twice, or half, as worn as their landings make expect of the fleet.
+    """
+    rows = _rows_of(table, setting)
+    apart = _log_wear(table)
+    gears = gears_of(table)
+    known = np.isfinite(apart)
+    rows &= known
+    if not rows.any():
+        return 0.0
+    count = np.maximum(np.bincount(gears[known]), 1)
+    mean = np.bincount(gears[known], apart[known]) / count
+    within = np.sum((apart - mean[gears])[known] ** 2) / max(known.sum() - len(mean), 1)
+    share = np.bincount(gears[rows]) / rows.sum()
+    variance = robust_scale(mean) ** 2 * np.sum(share**2) + within / rows.sum()
+    variance += Beliefs().exact ** 2
+    slip = np.log(setting["written_factor"])
+    off = np.mean(apart[rows]) - np.median(apart[known])
+    return float(slip * (off - 0.5 * slip) / variance)
+
+
+def _log_wear(table: DiagnosisTable) -> Array:
+    """Logarithm of the clearances of each row over what its landings make expect of the fleet; NaN
+    where there is none, shape (n,). [1]
+    """
+    read = np.nan_to_num(table.clearance_in)
+    known = np.isfinite(table.clearance_in)
+    usual = read.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    worn = read.sum(axis=1) / np.maximum(known @ usual, np.finfo(float).tiny)
+    some = worn > 0.0
+    kilo = landings_of(table.quantities.get(LANDINGS.variable), gears_of(table))[0]
+    line = np.polyfit(kilo[some], worn[some], 1 if np.ptp(kilo[some]) > 0.0 else 0)
+    expected = np.maximum(np.polyval(line, kilo), worn[some].min())
+    return np.asarray(np.log(np.where(some, worn, np.nan) / expected))
+
+
+def _rows_of(table: DiagnosisTable, setting: Any) -> Mask:
+    """Rows of the group, within its days if it has some, shape (n,)."""
+    rows = np.asarray(table.factors[setting["column"]] == setting["value"])
     if "days" in setting:
         first, last = setting["days"]
         rows &= (table.quantities["day"] >= first) & (table.quantities["day"] <= last)
+    return rows
+
+
+def as_meant(table: DiagnosisTable, setting: Any) -> DiagnosisTable:
+    """The table with the clearances of the group as they were meant."""
+    rows = _rows_of(table, setting)
     factor: Array = np.where(rows, 1.0 / setting["written_factor"], 1.0)
     return replace(
         table,
