@@ -17,7 +17,7 @@ from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
 from mlg_troubleshoot.diagnosis.blanks import BY_CHANCE, LEAST_ROWS, blanks_by_wear
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import gears_of, visits
-from mlg_troubleshoot.diagnosis.written import coarse_steps, piles, step_of
+from mlg_troubleshoot.diagnosis.written import piles, step_of, steps_of
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
@@ -222,8 +222,9 @@ def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     """Values on a step of twice their standard uncertainty or more: half a step is as large."""
     use = rows & _at_mid(table)
     people = table.factors.get(TECHNICIAN_ID.variable, np.full(len(table), ""))
-    each = coarse_steps(table.take(rows))
-    steps = {str(p): float(s) for p, s in zip(people[rows], each, strict=True) if s > 0.0}
+    least = 2.0 * float(np.median(table.gauge_u_in))
+    each = steps_of(table.take(rows))
+    steps = {str(p): float(s) for p, s in zip(people[rows], each, strict=True) if s >= least}
     people_read = set(people[use].tolist())
     for step in sorted(set(steps.values())):
         own = sorted(p for p, s in steps.items() if s == step)

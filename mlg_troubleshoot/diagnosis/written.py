@@ -17,6 +17,7 @@ from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
 from mlg_troubleshoot.diagnosis.blanks import blanks_by_wear
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.units import MM_PER_IN
 
 # Steps to which people round, inches and millimetres; half an inch's where diameters are read. [in]
@@ -152,19 +153,15 @@ def steps_of(table: DiagnosisTable) -> Array:
     return found
 
 
-def coarse_steps(table: DiagnosisTable) -> Array:
-    """The same where half a step is the standard uncertainty of a reading or more, else 0."""
-    steps = steps_of(table)
-    return np.where(steps >= 2.0 * float(np.median(table.gauge_u_in)), steps, 0.0)
-
-
 def cut_off(table: DiagnosisTable) -> Array:
     """What clearances lack where their technician cuts off digits, each column at one standard
     deviation, shape (n, k). [in]
 
-    Then a value stands for the step above it, half a step more than where digits are rounded.
+    Then a value stands for the step above it, half a step more than where digits are rounded. A
+    step as fine as a gauge reads leaves out no digits.
     """
-    lacks_in = 0.5 * coarse_steps(table)
+    half = 0.5 * steps_of(table)
+    lacks_in = np.where(half >= DEFAULT_GAUGE_U_IN, half, 0.0)
     people = table.factors.get(TECHNICIAN_ID.variable, np.full(len(table), ""))
     who = np.unique(people[lacks_in > 0.0])
     return np.where(people[:, None] == who, np.sqrt(_CUT_OFF) * lacks_in[:, None], 0.0)

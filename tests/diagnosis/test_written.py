@@ -72,6 +72,8 @@ def test_only_who_writes_coarse_steps_may_have_cut_digits_off(table: DiagnosisTa
     lacks = cut_off(replace(table, clearance_in=values))
     assert lacks.shape == (len(table), 1)
     assert lacks[:, 0] == pytest.approx(np.where(coarse, 0.0005 * np.sqrt(0.5), 0.0))
+    fine = replace(table, clearance_in=with_step(table.clearance_in, 0.0005))
+    assert cut_off(fine).shape == (len(table), 0)
 
 
 def test_zero_is_anything_up_to_half_a_step(table: DiagnosisTable) -> None:
