@@ -173,6 +173,7 @@ class _PlanBuilder:
         self.inspection = self.cases.inspections[row]
         self.steps: list[Step] = []
         self.tried: RepairSet | None = None
+        self.taken_again = False
         self.opened: frozenset[str] = frozenset(self.inspection.open_areas)
         self.over_limit = self._joints(self.cases.over_limit[row])
         self.over = self._joints(facts.over[row])
@@ -198,7 +199,7 @@ class _PlanBuilder:
         if complained:
             return self._repaired()
         if self.inspection.is_repaired and not self.over:
-            return self._done()
+            return self._restore_over_limit()._done()
         if not self.judged.plunger.explained[self.row]:
             return self._restore_over_limit()._check_rigging()._end(End.NOT_EXPLAINED)
         if self.judged.verdicts[self.row] is Verdict.WITHIN_MARGIN:
@@ -212,7 +213,7 @@ class _PlanBuilder:
             return self._try(self.over)
         if self.over_limit:
             # The plunger is read after these are restored, whatever it reads before.
-            return self._stop_for_today()
+            return self._restore_over_limit()._stop_for_today()
         if self.read_plunger and beyond and not self._again():
             return self._failed()
         if not self.read_plunger or beyond:
@@ -255,15 +256,21 @@ class _PlanBuilder:
         if following:
             minutes = minutes_to_measure(self.gear, unread, self.opened)
         elif best is not None:
+            # In vain are the sound joints, and the plunger's reading after the repair.
             sound = [n for n in best.joints if n not in self.over_limit]
-            minutes = minutes_to_restore(self.gear, sound, self.opened) if sound else 0.0
+            minutes = minutes_to_restore(self.gear, sound, self.opened)
+            minutes += self.gear.plunger_reading.value
         else:
             minutes = np.inf
         if not self.looked and self.read_plunger:
             check = self.gear.rigging_check.value
             # No sound joint is restored before the rigging was looked at, unless it is excluded.
             tears = not following and best is not None and set(best.joints) > set(self.over_limit)
-            if rigging > _EXCLUDED and (tears or rigging * minutes > joints * check):
+            worth = rigging > _EXCLUDED and (tears or rigging * minutes > joints * check)
+            # What is over its limit is restored whatever the cause: a reading of it in doubt is
+            # taken again in any case, so before the check, which it may spare.
+            again = (worth or not following) and self._reread()
+            if worth and (rigging > 0.5 or not again):
                 self._check_rigging()
                 if rigging > 0.5:
                     return self._restore_over_limit()._end(End.NOT_EXPLAINED)
@@ -441,10 +448,9 @@ class _PlanBuilder:
         """Restore what is over its limit, and end; the joints are done with where some were, or
         where all were read on a gear that retracted.
         """
-        if self.over:
-            self._restore_over_limit()
-            return self._done()
-        done = bool(self.cases.retracted[self.row]) and not (self._left_unread() or self.over_limit)
+        if self.over_limit:
+            return self._restore_over_limit()._done()
+        done = bool(self.cases.retracted[self.row]) and not self._left_unread()
         return self._done() if done and where is End.WITHIN else self._end(where)
 
     def _left_unread(self) -> list[int]:
@@ -488,14 +494,13 @@ class _PlanBuilder:
         return self._joints(unread | ~cases.restorable[i] if cases.failed[i] else unread)
 
     def _done(self) -> Plan:
-        cases = self.cases
-        i = self.row
+        if self.over != self.over_limit:
+            return self._stop_for_today()
         restored = any(step.action is Action.RESTORE for step in self.steps)
         text = sentences.done(
             repaired=restored,
             recorded=self.inspection.is_repaired and not restored,
             unread=bool(self._left_unread()),
-            over=bool((cases.over_limit[i] & ~cases.restorable[i]).any()),
         )
         self._step(Action.DONE, 0.0, text)
         return Plan(tuple(self.steps), End.DONE)
@@ -557,9 +562,8 @@ class _PlanBuilder:
         self, joints: tuple[int, ...], best: RepairSet | None, *, expected: bool
     ) -> _PlanBuilder:
         """Restore joints; where a reading over the limit is in doubt it is taken again first."""
-        doubted = tuple(n for n in joints if self.facts.doubted[self.row, self._place(n)])
-        if doubted and not expected:
-            self._measure_again(doubted, BETTER_GAUGES_IN[-1])
+        if not expected:
+            self._reread()
         minutes = minutes_to_restore(self.gear, joints, self.opened)
         unread = not self.cases.measured[self.row].all()
         text = sentences.restore(joints, self.over, best, unread=unread, expected=expected)
@@ -567,7 +571,17 @@ class _PlanBuilder:
         self.opened = frozenset()
         return self
 
+    def _reread(self) -> bool:
+        """Take the readings in doubt again, once in a plan; whether there are any."""
+        doubted = self._joints(self.facts.doubted[self.row])
+        if doubted and not self.taken_again:
+            self._measure_again(doubted, BETTER_GAUGES_IN[-1])
+            self.taken_again = True
+        return self.taken_again
+
     def _restore_over_limit(self) -> _PlanBuilder:
+        """Restore what can be today; a reading in doubt is taken again also where it cannot."""
+        self._reread()
         return self._restore(self.over, None, expected=False) if self.over else self
 
     def _open(self, minutes: float, joints: tuple[int, ...]) -> float:

@@ -87,12 +87,11 @@ def go_on(end: End, *, failed: bool, beyond: bool, looked: bool, look_again: str
     return f"{GO_ON[end]} {look_again}".rstrip()
 
 
-def done(*, repaired: bool, recorded: bool, unread: bool, over: bool) -> str:
-    """Step DONE; `recorded`: the inspection names the repair already; `unread`, `over`: joints are
-    left that nobody read, or that are over their limit.
+def done(*, repaired: bool, recorded: bool, unread: bool) -> str:
+    """Step DONE; `recorded`: the inspection names the repair already; `unread`: some joints were
+    never read.
     """
-    others = f"{'The other joints' if over else 'The joints'}{' that were read' * unread}"
-    stands = f"{others if unread or over else 'Joints'} are within limits"
+    stands = f"{'The joints that were read' if unread else 'Joints'} are within limits"
     if recorded:
         then = ", and the repair is entered here: sign it off in the aircraft's records. This"
     elif repaired:

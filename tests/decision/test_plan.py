@@ -223,10 +223,45 @@ def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone
 ) -> None:
     read = every_joint(0.005, j3=0.0079)
     del read[4]
-    next_action = judge(read, readings_in=(0.031, 0.031), outcome=Outcome.FAILED).next_action
+    failed = {"outcome": Outcome.FAILED, "measured_again": (3,)}
+    next_action = judge(read, readings_in=(0.031, 0.031), **failed).next_action
     # Joint 3 is over its limit: the sidestay, in which #4 is read, will be opened in any case. To
     # open it for the reading alone takes longer than the reading saves.
     assert (next_action.action, next_action.joints) == (Action.MEASURE, (4,))
+
+
+def test_a_reading_in_doubt_is_taken_again_before_the_rigging_is_checked(judge: Judge) -> None:
+    read = every_joint(0.0015, j1=0.004, j2=0.0045, j3=0.009, j4=0.005, j5=0.0055)
+    doubtful, confirmed = (
+        judge(read, readings_in=(0.036,), outcome=Outcome.FAILED, measured_again=again)
+        for again in ((), (3,))
+    )
+    # It is needed whatever the cause, and with #3 worn hardly any chance is left to the rigging.
+    assert [step.action for step in doubtful.plan.steps][:2] == [
+        Action.MEASURE_AGAIN,
+        Action.RESTORE,
+    ]
+    assert confirmed.next_action.action is Action.RESTORE
+
+
+def test_a_reading_in_doubt_of_a_joint_that_hardly_moves_the_plunger_waits_for_the_others(
+    judge: Judge,
+) -> None:
+    read = {8: 0.0085} | dict.fromkeys((6, 7, 9, 10), 0.001)
+    steps = judge(read, readings_in=(0.036,), outcome=Outcome.FAILED).plan.steps
+    assert (steps[0].action, 8 in steps[0].joints) == (Action.MEASURE, False)
+
+
+def test_a_rigging_that_is_likely_wrong_is_checked_before_a_joint_that_hardly_matters_is_restored(
+    judge: Judge,
+) -> None:
+    found = judge(every_joint(0.001, j8=0.013), readings_in=(0.036,), outcome=Outcome.FAILED)
+    # The repair would be followed by a reading of the plunger in vain.
+    assert [step.action for step in found.plan.steps] == [
+        Action.CHECK_RIGGING,
+        Action.RESTORE,
+        Action.CONTINUE,
+    ]
 
 
 def test_no_joint_is_read_that_could_not_spare_the_sound_ones(judge: Judge) -> None:

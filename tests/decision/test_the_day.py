@@ -127,10 +127,19 @@ def test_done_does_not_say_that_joints_that_nobody_read_are_within_limits(judge:
     assert done.next_action.text.startswith("The joints that were read are within limits, and")
 
 
-def test_done_does_not_say_that_a_joint_without_a_spare_is_within_limits(judge: Judge) -> None:
-    repaired = {"restored_joints": (5,), "repair_date": datetime(2026, 3, 2, 9)}
-    found = judge(every_joint(0.0005, j3=0.009), **repaired, no_spare=(3,))
-    assert found.next_action.text.startswith("The other joints are within limits, and")
+@pytest.mark.parametrize(
+    "been",
+    [
+        {"outcome": Outcome.RETRACTED},
+        {"restored_joints": (5,), "repair_date": datetime(2026, 3, 2, 9)},
+    ],
+)
+def test_no_gear_is_done_while_a_joint_over_its_limit_waits_for_its_spare(
+    judge: Judge, been: dict
+) -> None:
+    found = judge(every_joint(0.0005, j3=0.009), **been, no_spare=(3,), measured_again=(3,))
+    assert found.next_action.text.startswith("Stop for today: #3 must be restored but cannot be.")
+    assert found.plan.open_question == "#3 is over the limit and cannot be restored today."
 
 
 def test_no_joint_is_read_where_the_one_that_explains_it_waits_for_its_spare(judge: Judge) -> None:
@@ -147,6 +156,13 @@ def test_joints_are_read_where_the_one_without_a_spare_does_not_explain_it(judge
     waits = judge(read, **FAILED, no_spare=(8,))
     assert waits.next_action.action is Action.MEASURE
     assert waits.next_action.joints == judge(read, **FAILED).next_action.joints
+
+
+def test_a_reading_in_doubt_is_taken_again_before_the_day_ends_for_want_of_a_spare(
+    judge: Judge,
+) -> None:
+    failed = {"outcome": Outcome.FAILED, "readings_in": (0.036,), "no_spare": (3,)}
+    assert judge(every_joint(0.002, j3=0.009), **failed).next_action.action is Action.MEASURE_AGAIN
 
 
 def test_what_has_a_spare_is_restored_today(judge: Judge) -> None:

@@ -288,13 +288,12 @@ def test_one_inspection_is_said_to_be_one(visit: Visit, capsys: pytest.CaptureFi
     assert "1 inspection kept" in capsys.readouterr().err
 
 
-def test_a_gear_is_followed_over_five_visits_to_done_with_half_the_keys(
+def test_a_gear_is_followed_over_four_visits_to_done_with_half_the_keys(
     visit: Visit, store: SessionStore
 ) -> None:
     visits = (
         FIRST,
         (*GEAR, "y", "36"),
-        (*GEAR, "y", "yes"),
         (*GEAR, "y", "18", "y", "", "3", "3"),
         (*GEAR, "y", "4", "y", "r"),
     )
@@ -337,7 +336,6 @@ def test_done_of_a_gear_that_needed_no_repair_speaks_of_none(visit: Visit) -> No
 def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
     visit(*GEAR, "y", "36")
-    visit(*GEAR, "y", "yes")
     visit(*GEAR, "y", "18", "y", "", "3", "3")
     screen = visit(*GEAR, "y", "4", "y", "r").screen
     assert "DONE. The repair is in the records. r writes the report to sign." in screen
@@ -367,7 +365,6 @@ def test_an_area_that_next_opened_stays_open_until_the_repair(
 ) -> None:
     visit(*FIRST)
     visit(*GEAR, "y", "36")
-    visit(*GEAR, "y", "yes")
     assert "again" in visit(*GEAR, "y", "18").screen
     assert life(store).inspections[-1].inspection.open_areas == ("sidestay",)
     visit(*GEAR, "n 3", "1")
