@@ -117,32 +117,35 @@ class Remembered:
         self, keys: Iterable[GearKey], model: WearModel | None, *, compare: bool
     ) -> list[GearKey]:
         """The gears of which not all is known that is asked for."""
-
-        def is_known(seen: _Seen) -> bool:
-            foreseen = model is None or seen.model == self._model_mark
-            return foreseen and (model is None or not compare or seen.departure is not None)
-
-        return [key for key in keys if key not in self._seen or not is_known(self._seen[key])]
+        compare = compare and model is not None
+        return [
+            key
+            for key in keys
+            if not self._is_foreseen(key, model) or (compare and self._seen[key].departure is None)
+        ]
 
     def look(self, lives: Sequence[GearLife], model: WearModel | None, *, compare: bool) -> None:
         """Find out what is asked for of gears and not known, and remember it."""
         self._is_new = self._is_new or bool(lives)
-        new = [life for life in lives if life.key not in self._seen]
-        due = forecast(new, None, self._gear)
+        new = [life for life in lives if not self._is_foreseen(life.key, model)]
+        found = forecast(new, model, self._gear)
         for life in new:
-            seen = _Seen(self._marks[life.key], FleetLine.of(life), _Ahead.of(due[life.key]))
+            ahead = found[life.key]
+            # Nothing else is known without a model.
+            due = _Ahead.of(ahead if ahead.due_now else Forecast())
+            seen = self._seen.get(life.key) or _Seen(self._marks[life.key], FleetLine.of(life), due)
+            if model is not None:
+                seen.model, seen.ahead, seen.departure = self._model_mark, _Ahead.of(ahead), None
             self._seen[life.key] = seen
-        if model is None:
-            return
-        new = [life for life in lives if self._seen[life.key].model != self._model_mark]
-        for key, ahead in forecast(new, model, self._gear).items():
-            seen = self._seen[key]
-            seen.model, seen.ahead, seen.departure = self._model_mark, _Ahead.of(ahead), None
-        if compare:
+        if model is not None and compare:
             new = [life for life in lives if self._seen[life.key].departure is None]
-            found = departures(new, model, self._gear)
+            apart = departures(new, model, self._gear)
             for life in new:
-                self._seen[life.key].departure = found.get(life.key, Departure("", ()))
+                self._seen[life.key].departure = apart.get(life.key, Departure("", ()))
+
+    def _is_foreseen(self, key: GearKey, model: WearModel | None) -> bool:
+        seen = self._seen.get(key)
+        return seen is not None and (model is None or seen.model == self._model_mark)
 
     def line(self, key: GearKey) -> FleetLine:
         return self._seen[key].line
