@@ -380,7 +380,6 @@ def diagnose(
 class _Case:
     """Candidates with their effects, the misfit and what the inference makes of it."""
 
-    problem: MisfitProblem
     finding: Finding
     scene: Scene
     chosen: tuple[int, ...]
@@ -389,9 +388,14 @@ class _Case:
     covariance: Array
 
     @property
+    def problem(self) -> MisfitProblem:
+        """The data, and all that may explain them."""
+        return self.finding.problem
+
+    @property
     def acts(self) -> bool:
         """True if some listed cause is likely to act."""
-        return self.finding.verdict in {Verdict.NAMED, Verdict.AMBIGUOUS}
+        return self.finding.follows.verdict in {Verdict.NAMED, Verdict.AMBIGUOUS}
 
     @property
     def columns(self) -> Array:
@@ -506,7 +510,7 @@ def _explained(
         finding.noise, columns.take(chosen), known, spread, problem.expected
     )
     count = len(chosen) + (0 if block is None else block.columns.shape[1])
-    return _Case(problem, finding, scene, chosen, block, values[:count], covariance[:count, :count])
+    return _Case(finding, scene, chosen, block, values[:count], covariance[:count, :count])
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
@@ -675,25 +679,26 @@ def _report(
     misfit = case.problem.misfit
     finding = case.finding
     causes, open_ = _told(case)
+    variables, unlisted_rms_in = finding.unlisted
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
     latent = np.where(seen, 0.0, case.scene.clearance_in)
     raw = predicted(model, table, np.where(read, table.clearance_in, latent))[0]
     raw_misfit = table.measured_in - raw
-    gain = _gain(case) if finding.verdict is Verdict.NAMED else None
+    gain = _gain(case) if finding.follows.verdict is Verdict.NAMED else None
     left = misfit - np.sum([cause.effect_in for cause in causes], axis=0)
     repeatability, source = estimate_repeatability(table)
     residual = float(np.std(left))
     expected = _expected_scatter(model, table, repeatability)
     chances = finding.posterior
     return Diagnosis(
-        verdict=finding.verdict,
+        verdict=finding.follows.verdict,
         causes=causes,
         also_possible=() if causes else open_,
         beside=open_ if causes else (),
         further=_further(case, open_),
-        unlisted_variables=finding.variables,
-        unlisted_rms_in=finding.unlisted_rms_in,
+        unlisted_variables=variables,
+        unlisted_rms_in=unlisted_rms_in,
         probabilities=finding.follows.listed,
         weighed=finding.weighed,
         p_nothing=chances.nothing,
@@ -743,7 +748,7 @@ def _gain(case: _Case) -> Gain:
     """
     noise = case.finding.noise
     block = case.block
-    said = case.finding.said
+    said = case.finding.follows.said
     keys = [case.problem.candidates[k].key for k in case.chosen]
     firm = [place for place, key in enumerate(keys) if key in said]
     others = [case.effect(place)[:, None] for place in range(len(keys)) if place not in firm]
@@ -794,8 +799,8 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
             value,
             _interval(value, error),
             case.effect(place),
-            finding.probability(key),
-            finding.class_probability(key),
+            finding.follows.probability(key),
+            finding.follows.class_probability(key),
         )
     if case.block is not None:
         k = len(case.chosen)
@@ -807,17 +812,19 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
             1.0,
             (1.0, 1.0),
             case.block.columns @ change,
-            finding.probability(key),
-            finding.class_probability(key),
+            finding.follows.probability(key),
+            finding.follows.class_probability(key),
         )
     none = np.zeros(len(case.problem.misfit))
 
     def found(key: Key) -> NamedCause:
         rival = case.problem.candidate(key, finding.posterior)
-        chances = (finding.probability(key), finding.class_probability(key))
+        chances = (finding.follows.probability(key), finding.follows.class_probability(key))
         return fitted.get(key) or NamedCause(rival, 0.0, (0.0, 0.0), none, *chances)
 
-    named = sorted((found(key) for key in finding.said), key=lambda cause: -cause.effect_rms_in)
+    named = sorted(
+        (found(key) for key in finding.follows.said), key=lambda cause: -cause.effect_rms_in
+    )
     return tuple(named), tuple(found(key) for key in finding.open)
 
 
@@ -832,7 +839,7 @@ def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections |
     rivals = [cause.candidate for cause in open_ if cause.candidate.key in single][:2]
     if not rivals:
         return None
-    chances = [finding.probability(rival.key) for rival in rivals]
+    chances = [finding.follows.probability(rival.key) for rival in rivals]
     if finding.posterior.nothing > min(chances[1:], default=0.0):
         rivals = rivals[:1]
         chances = [chances[0], finding.posterior.nothing]

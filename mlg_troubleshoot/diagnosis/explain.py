@@ -8,8 +8,8 @@ large stands in `Beliefs` and with each cause; the rest is arithmetic.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import erfc, sqrt
 
@@ -28,7 +28,6 @@ from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
 from mlg_troubleshoot.misfit.fitting import fit
 from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
-from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 # The noise is estimated again from the residual as long as that changes the likeliest explanation,
 # so often at most.
@@ -185,42 +184,59 @@ class WeighedCause:
 class Finding:
     """What the posterior says.
 
-    follows: the verdict, with the posterior that it follows from. said: names that are sure.
-    open: names of which something acts, or something more than what is sure. best: the explanation
-    that is reported.
-    variables: what an unlisted effect moves with. unlisted_rms_in: its root mean square. [in]
-    ruled_out: names
-    that would explain something alone, but hardly act, likeliest first. noise: the noise under
-    which all are compared. smallest_rms_in: root mean square of the smallest effect that is
-    detected with 80 % power. [in] left: probability that something else acts in addition to what is
-    sure. classes: names that these rows cannot tell from a name.
+    follows: the verdict, with the posterior that it follows from. noise: the noise under which all
+    are compared.
     """
 
+    problem: MisfitProblem
     follows: Conclusion
     noise: NoiseModel
-    best: Explanation
-    said: tuple[Key, ...]
-    open: tuple[Key, ...]
-    ruled_out: tuple[Key, ...]
-    variables: tuple[str, ...]
-    unlisted_rms_in: float
-    smallest_rms_in: float
-    left: float
-    classes: Mapping[Key, frozenset[Key]]
-
-    def class_probability(self, key: Key) -> float:
-        """Probability that something of this name acts, or what these rows cannot tell from it."""
-        alike = self.follows.any_of({key, *self.classes.get(key, ())})
-        return max(self.probability(key), alike)
-
-    def probability(self, key: Key) -> float:
-        """Probability that something of this name acts."""
-        return min(self.follows.any_of({key}), 1.0)
 
     @property
-    def verdict(self) -> Verdict:
-        """NONE, NAMED, AMBIGUOUS or UNLISTED."""
-        return self.follows.verdict
+    def posterior(self) -> MisfitPosterior:
+        """How likely each explanation is."""
+        return self.follows.posterior
+
+    @property
+    def open(self) -> tuple[Key, ...]:
+        """Names of which something acts, or something more than what is sure."""
+        return self.follows.open_beside(self.follows.said)
+
+    @property
+    def best(self) -> Explanation:
+        """The explanation that is reported."""
+        return self.follows.reported(self.follows.said)
+
+    @property
+    def left(self) -> float:
+        """Probability that something else acts in addition to what is sure."""
+        return self.follows.any_of(set(self.posterior.names) - set(self.follows.said))
+
+    @property
+    def ruled_out(self) -> tuple[Key, ...]:
+        """Names that would explain something alone, but hardly act, likeliest first."""
+        said = {*self.follows.said, *self.open}
+        over_nothing = self.posterior.over_nothing.tolist()
+        alone: dict[Key, float] = {}
+        for candidate, odds in zip(self.problem.candidates, over_nothing, strict=False):
+            alone[candidate.key] = max(alone.get(candidate.key, -np.inf), odds)
+        hardly = [name for name, odds in alone.items() if odds > 0.0 and name not in said]
+        return tuple(sorted(hardly, key=lambda name: -alone[name]))
+
+    @property
+    def smallest_rms_in(self) -> float:
+        """Root mean square of the smallest effect that is detected with 80 % power. [in]"""
+        n = len(self.problem.misfit)
+        effects = self.posterior.effects
+        beliefs = self.problem.beliefs
+        prior = effects.log_prior[effects.listed]
+        often = float(np.exp(np.median(prior))) if len(prior) else beliefs.expected
+        return beliefs.seen_from(often, n) * self.noise.scale_in / float(np.sqrt(n))
+
+    @property
+    def unlisted(self) -> tuple[tuple[str, ...], float]:
+        """What an unlisted effect moves with, and its root mean square, if one acts. [in]"""
+        return _unlisted(self.posterior) if self.follows.unlisted_acts else ((), 0.0)
 
     @property
     def weighed(self) -> tuple[WeighedCause, ...]:
@@ -246,11 +262,6 @@ class Finding:
         each.sort(key=lambda own: -own[0])
         return tuple(weighed for _odds, weighed in each)
 
-    @property
-    def posterior(self) -> MisfitPosterior:
-        """How likely each explanation is."""
-        return self.follows.posterior
-
 
 def explain(problem: MisfitProblem) -> Finding:
     """Say how likely each explanation of a table is, and what follows."""
@@ -269,7 +280,17 @@ def explain(problem: MisfitProblem) -> Finding:
         noise = left
         if settled:
             break
-    return _said(problem, found, noise)
+    finding = Finding(problem, _concluded(problem, found), noise)
+    return replace(finding, noise=_settled(finding))
+
+
+def _settled(finding: Finding) -> NoiseModel:
+    """Noise with the scatter between tails that is likeliest given what is reported."""
+    found = finding.posterior
+    held = finding.noise.with_effects(found.contexts[finding.best.context].independent_in)
+    columns = found.effects.kept.take(finding.best.members)
+    fitted = fit(held, columns, finding.problem.expected)
+    return finding.noise.with_tails(fitted.tail_ratio)
 
 
 def _same(one: MisfitPosterior, other: MisfitPosterior) -> bool:
@@ -289,54 +310,16 @@ def _noise_beside(problem: MisfitProblem, explained: Array) -> NoiseModel:
     return noise.with_effects(problem.beliefs.form * bent / np.sqrt(len(smooth)))
 
 
-def _said(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> Finding:
-    """What is sure, what is open, and what is ruled out."""
+def _concluded(problem: MisfitProblem, found: MisfitPosterior) -> Conclusion:
+    """What follows, what can only be a rival left aside."""
     rivals_only = {c.key for c in problem.candidates if c.stands_in}
     if problem.doubtful:
         rivals_only |= {(b.cause.name, None) for b in problem.blocks}
-    variables, size = _unlisted(found)
+    variables, _size = _unlisted(found)
     # What moves with a cause's own variable speaks against the cause's form.
     moved = {*variables, *(name.rstrip("_0123456789") for name in variables)}
     firm = frozenset(c.key for c in problem.candidates if c.own_variables.isdisjoint(moved))
-    follows = Conclusion(found, problem.beliefs, frozenset(rivals_only), firm)
-    said = follows.said
-    open_ = follows.open_beside(said)
-    alone: dict[Key, float] = {}
-    for k, candidate in enumerate(problem.candidates):
-        alone[candidate.key] = max(alone.get(candidate.key, -np.inf), found.over_nothing[k])
-    hardly = [n for n in alone if alone[n] > 0.0 and n not in {*said, *open_}]
-    return Finding(
-        follows,
-        noise,
-        follows.reported(said),
-        said,
-        open_,
-        tuple(sorted(hardly, key=lambda n: -alone[n])),
-        variables if follows.unlisted_acts else (),
-        size if follows.unlisted_acts else 0.0,
-        _smallest(problem, found, noise),
-        follows.any_of(set(found.names) - set(said)),
-        _classes(problem, found, [*said, *open_]),
-    )
-
-
-def _classes(
-    problem: MisfitProblem, found: MisfitPosterior, names: Sequence[Key]
-) -> dict[Key, frozenset[Key]]:
-    """Names whose likeliest effects have the direction of a name's own, by that name."""
-    keys = [c.key for c in problem.candidates]
-    best = {
-        key: max((k for k, own in enumerate(keys) if own == key), key=found.of_effect.item)
-        for key in dict.fromkeys(keys)
-    }
-    places = list(best.values())
-    columns = problem.columns.take([best[name] for name in names if name in best])
-    unit = problem.columns.onto(columns.T)[:, places] / np.linalg.norm(columns, axis=0)[:, None]
-    near = np.abs(unit) > problem.beliefs.alike * np.sqrt(problem.columns.squares)[places]
-    return {
-        name: frozenset(other for other, alike in zip(best, row, strict=True) if alike)
-        for name, row in zip((name for name in names if name in best), near, strict=True)
-    }
+    return Conclusion(found, problem.beliefs, frozenset(rivals_only), firm)
 
 
 def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
@@ -345,9 +328,8 @@ def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
     """
     shapes = problem.shapes
     fitted = fit(noise, np.ones((len(left), 1)), left)
-    settled = noise.with_tails(fitted.tail_ratio)
-    product, _log = settled.precision_times(left[:, None], fitted.tail_ratio)
-    spread = fitted.scale * np.sqrt(settled.squares(shapes)[0])
+    product, _log = noise.precision_times(left[:, None], fitted.tail_ratio)
+    spread = fitted.scale * np.sqrt(noise.squares(shapes)[0])
     largest = float(np.max(np.abs(shapes.onto(product.T)[0]) / spread))
     return float(min(1.0, shapes.p * erfc(largest / sqrt(2.0))))
 
@@ -365,11 +347,3 @@ def _unlisted(found: MisfitPosterior) -> tuple[tuple[str, ...], float]:
                 column = found.effects.kept.take([k])
                 return variables, float(abs(value) * np.sqrt(np.mean(column**2)))
     return variables, 0.0
-
-
-def _smallest(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> float:
-    """Root mean square of an effect that is likelier than nothing with 80 % power. [in]"""
-    n = len(problem.misfit)
-    prior = found.effects.log_prior[found.effects.listed]
-    often = float(np.exp(np.median(prior))) if len(prior) else problem.beliefs.expected
-    return problem.beliefs.seen_from(often, n) * noise.scale_in / float(np.sqrt(n))

@@ -19,7 +19,7 @@ from scipy.special import gammaln, logsumexp
 from mlg_troubleshoot.arrays import Array, Mask, Places, log_sum
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.causes.base import Scene
-from mlg_troubleshoot.diagnosis.noise import robust_scale
+from mlg_troubleshoot.diagnosis.noise import FREEDOM, robust_scale, student
 from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import fleet_history, inspection_of
@@ -36,8 +36,6 @@ _BEND_FAR = 6
 LEAST_ALONG = 8
 # Share of rows with an entry error, each kind as often. [1]
 _WRONG = 0.005
-# Wear and misfit have heavier tails than a normal distribution: degrees of freedom of Student's t.
-_FREEDOM = 8.0
 # No clearance, reading or misfit is expected more sharply than this. [in]
 _LEAST_SPREAD_IN = 0.0005
 # Supposed: no joint of a gear that still moves has a radial clearance as large as this, four times
@@ -135,16 +133,6 @@ class _Meant:
     evidence: float = 0.0
 
 
-def _surprise(off: Array) -> Array:
-    """Minus the log-density of Student's t over its middle, 0 where there is nothing. [1]"""
-    return np.nan_to_num(0.5 * (_FREEDOM + 1.0) * np.log1p(off**2 / _FREEDOM))
-
-
-def _density(off: Array, spread: Array | float) -> Array:
-    """Log-density of Student's t without its constant, 0 where there is nothing. [1]"""
-    return np.where(np.isnan(off), 0.0, -_surprise(off / spread) - np.log(spread))
-
-
 def _normal(off: Array, spread: Array | float) -> Array:
     """Log-density of a normal distribution. [1]"""
     return np.asarray(-0.5 * (off / spread) ** 2 - np.log(spread * np.sqrt(2.0 * np.pi)))
@@ -214,7 +202,7 @@ class _Screen:
         kept = weight > 0.0
         if not kept.any():
             return np.zeros(len(misfit))
-        density = _density(misfit[:, None] - self.rest[kept], self.scale_in)
+        density = student(misfit[:, None] - self.rest[kept], self.scale_in)
         density = log_sum((density + np.log(weight[kept] / weight.sum())).T)
         return np.asarray(np.where(np.isfinite(misfit), density, -np.inf))
 
@@ -242,10 +230,10 @@ class _Screen:
         apart = np.where(known, -2.0 * (wear + np.log(spread * np.sqrt(2.0 * np.pi))), 0.0)
         count = known.sum(axis=1)
         apart = np.maximum(apart.sum(axis=1), 0.0)
-        together = 0.5 * (_FREEDOM + count)
-        wear = gammaln(together) - together * np.log1p(apart / _FREEDOM)
-        wear -= 0.5 * count * np.log(_FREEDOM * np.pi) + np.where(known, np.log(spread), 0.0).sum(1)
-        repeats = _density(np.diff(np.sort(readings)), self.repeat_in)
+        together = 0.5 * (FREEDOM + count)
+        wear = gammaln(together) - together * np.log1p(apart / FREEDOM)
+        wear -= 0.5 * count * np.log(FREEDOM * np.pi) + np.where(known, np.log(spread), 0.0).sum(1)
+        repeats = student(np.diff(np.sort(readings)), self.repeat_in)
         own = np.array([row.evidence for row in meant])
         return np.asarray(own + wear + repeats.sum(axis=1))
 
@@ -329,7 +317,7 @@ class _Screen:
             nothing = _ANYTHING - float(np.log(abs(written[k]) + _LEAST_SPREAD_IN))
             yield readings("implausible", [k], np.full(1, np.nan), nothing)
         nothing = _ANYTHING - float(np.log(abs(float(np.nanmean(written))) + _LEAST_SPREAD_IN))
-        nothing += float(_density(np.diff(np.sort(row.readings)), self.repeat_in).sum())
+        nothing += float(student(np.diff(np.sort(row.readings)), self.repeat_in).sum())
         wrong = readings("implausible", present, np.full(len(present), np.nan), nothing)
         if along:
             at = row.extension
@@ -378,7 +366,7 @@ def screen_faults(
         {**table.quantities, ALONG: extension} if ALONG in table.quantities else table.quantities
     )
     repaired = replace(table, clearance_in=clearance, readings_in=readings, quantities=quantities)
-    swapped = swapped_sides(repaired)
+    swapped = swapped_sides(repaired, Beliefs().odds + np.log(_KINDS / _WRONG))
     faults += [
         DataFault.at(table, row, "side", "swapped_side", own, other) for row, own, other in swapped
     ]
@@ -448,11 +436,11 @@ def _mixture(left: Array, effect: Array, share: float) -> tuple[float, Array]:
     scatter = _scale(left)
     prior = np.log([1.0 - share, share]) if share else np.array([0.0, -np.inf])
     for _ in range(_MIXTURE_ROUNDS):
-        each = prior + _density(off - level, scatter)
+        each = prior + student(off - level, scatter)
         total = log_sum(each.T)
         chance = np.exp(each - total[:, None])
         # Rows far out in the tails of Student's t count less.
-        far = chance * (_FREEDOM + 1.0) / (_FREEDOM + ((off - level) / scatter) ** 2)
+        far = chance * (FREEDOM + 1.0) / (FREEDOM + ((off - level) / scatter) ** 2)
         level = float(np.sum(far * off) / far.sum())
         scatter = float(np.sqrt(np.sum(far * (off - level) ** 2) / len(left)))
         scatter = max(scatter, _LEAST_SPREAD_IN)
@@ -476,9 +464,9 @@ def _suspects(
     repeat = _scale(np.append(apart, -apart))
     screen = _Screen(model, table, usual, rest, named, scale, repeat, inspection_of(table))
     # An entry error is in one cell or in two, or in so many that any two of them show it.
-    lost = np.sort(_surprise(usual.off(table.clearance_in) / usual.spread))[:, -2:].sum(axis=1)
-    lost += _surprise((rest - np.nanmedian(rest)) / scale)
-    lost += _surprise(np.diff(np.sort(table.readings_in)) / screen.repeat_in).sum(axis=1)
+    lost = np.sort(-student(usual.off(table.clearance_in) / usual.spread, 1.0))[:, -2:].sum(axis=1)
+    lost -= student((rest - np.nanmedian(rest)) / scale, 1.0)
+    lost -= student(np.diff(np.sort(table.readings_in)) / screen.repeat_in, 1.0).sum(axis=1)
     suspects = (lost > np.log(_KINDS / _WRONG)) | ~np.isfinite(rest)
     suspects &= np.isfinite(table.readings_in).any(axis=1)
     return replace(screen, usual=_usual(table, ~suspects)), np.asarray(suspects)

@@ -27,20 +27,20 @@ from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 # bound by this share. [1]
 EXPECTED_SLOPE = -0.0045
 # Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the
-# slope [1]; twice that where clearances are read no better than the plunger.
+# slope [1].
 BIAS_IN = 0.0001
 SLOPE = 0.003
+# Wear, landings and misfits have heavier tails than a normal distribution: degrees of freedom of
+# Student's t. [1]
+FREEDOM = 8.0
 # Doubt whether clearances were read as well as declared: standard deviation of the share of the
 # declared error, and so of the drawing. [1]
 SHARE_DOUBT = 0.35
 # Scatter of a row is at least this share of the predictions' size: nothing is known better than
 # that. [1]
 LEAST_SCATTER = 0.01
-# What the errors of reading leave in the level of wear of each gear, in units of the scatter of a
-# row.
-READ_GEAR_RATIO = 0.28
 # Trends over a quantity, and habits of a side or an approach, that are not a cause yet, in the same
-# units; twice that likewise.
+# units.
 HABIT = 0.035
 # Scatter between the gears of a tail, between gauges, and between technicians, over that of a row,
 # before the data are looked at: median, and spread of its logarithm; and the ratios that are tried,
@@ -51,13 +51,12 @@ _RATIOS = USUAL_RATIO * np.exp(RATIO_SPREAD * np.linspace(-3, 4, 24))
 # Fewer levels do not determine it; of more the first are enough.
 _LEAST_LEVELS = 4
 _MOST_LEVELS = 400
-# Ratios of the scatter between tails to the scatter of a row that are tried, nodes of a sum: none,
-# and from one spread above the usual ratio on.
+# Ratios of the scatter between tails to the scatter of a row, nodes of a sum by that prior: as much
+# as usual or less, and one to five spreads more.
 TAIL_RATIOS = (0, *(USUAL_RATIO * np.exp(RATIO_SPREAD * np.arange(1, 6))).tolist())
+_TAIL_CHANCES = tuple(np.exp(-0.5 * np.arange(len(TAIL_RATIOS)) ** 2).tolist())
 # The first estimate of the scatter has all in it that effects of unknown size explain.
 _ROUNDS = 2
-# With fewer tails none of them can be left out.
-_LEAST_TAILS = 6
 
 
 @dataclass(frozen=True)
@@ -66,20 +65,13 @@ class Rows:
 
     predicted_in, shape (n,): prediction. [in] tails, gears, shape (n,): tail and single gear of
     each row. u_filled_in, u_shared_in, shape (n,): further standard deviation of a row by
-    clearances that were not read: its own,
-        and common to its gear's rows. [in]
-    unread_in, shape (n, k): what joints that nobody read may add or lack in all rows together, each
-    at one standard
-        deviation. [in]
-    along_in, shape (n, k): what is not known of rows along the stroke, and of digits that may be
-    cut off, each at one standard deviation. [in]
-    u_read_in: standard deviation by the reading of clearances. [in]
-    u_measured_in: standard deviation of a row's measured displacement by the plunger gauge alone, 0
-    if unknown. [in]
-    drawn_in, shape (n,): by how much the prediction from the readings as they are lies above the
-    one with all of them drawn to their expectation. [in]
-    trends, habits, shape (n, k): shapes of trends and habits that are always there in some small
-    measure. [1] readers, shape (n, k): rows of each gauge, and of each technician. [1]
+    clearances that were not read: its own, and common to its gear's rows. [in] unread_in, shape (n,
+    k): what joints that nobody read may add or lack in all rows together, each at one standard
+    deviation. [in] along_in, shape (n, k): what is not known of rows along the stroke, and of
+    digits that may be cut off, each at one standard deviation. [in] drawn_in, shape (n,): by how much the prediction from the readings as
+    they are lies above the one with all of them drawn to their expectation. [in] trends, shape (n,
+    k): shapes of trends and habits that are always there in some small measure. [1] readers, shape
+    (n, k): rows of each gauge, and of each technician. [1]
     """
 
     predicted_in: Array
@@ -89,11 +81,8 @@ class Rows:
     u_shared_in: Array
     unread_in: Array
     along_in: Array
-    u_read_in: float
-    u_measured_in: float
     drawn_in: Array
     trends: Array
-    habits: Array
     readers: tuple[Array, ...]
 
 
@@ -125,12 +114,18 @@ def robust_scale(values: Array) -> float:
     return float(1.4826 * np.median(np.abs(values - np.median(values))))
 
 
+def student(off: Array, spread: Array | float) -> Array:
+    """Log-density of Student's t without its constant, 0 where there is nothing. [1]"""
+    tails = 0.5 * (FREEDOM + 1.0) * np.log1p((off / spread) ** 2 / FREEDOM)
+    return np.where(np.isnan(off), 0.0, -tails - np.log(spread))
+
+
 def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> Wholes:
     """Number the tails in order of their names."""
     return np.unique(np.asarray(tails), return_inverse=True)[1].astype(np.int64)
 
 
-def small_trends(table: DiagnosisTable) -> tuple[Array, Array, tuple[Array, ...]]:
+def small_trends(table: DiagnosisTable) -> tuple[Array, tuple[Array, ...]]:
     """Trends and habits that are always there in some small measure: people, gauges, seasons,
     wear.
     """
@@ -141,14 +136,13 @@ def small_trends(table: DiagnosisTable) -> tuple[Array, Array, tuple[Array, ...]
             z = (values - np.mean(values[known])) / np.std(values[known])
             trends.append(np.where(known, z, 0.0))
             trends.append(np.where(known, z * z - 1.0, 0.0) / np.sqrt(2.0))
-    empty = np.empty((len(table), 0))
-    habits = np.hstack([empty, *(_levels(table, name) for name in ("side", "approach"))])
+    habits = [_levels(table, name) for name in ("side", "approach")]
     readers = tuple(
         levels
         for name in ("gauge_id", "technician_id")
         if (levels := _levels(table, name)).shape[1] > 1
     )
-    return np.column_stack(trends) if trends else empty, habits, readers
+    return np.column_stack([*trends, *habits]), readers
 
 
 def _levels(table: DiagnosisTable, name: str) -> Array:
@@ -160,14 +154,12 @@ def _levels(table: DiagnosisTable, name: str) -> Array:
     return np.asarray(texts[:, None] == levels[levels != ""], float)
 
 
-def build_noise(
-    misfit: Array, rows: Rows, explained: Array | None = None, effects_in: Array | None = None
-) -> NoiseModel:
+def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:
     """Estimate the noise from the misfit; effects of unknown size, and of the curve, are not
     scatter but its doubt.
     """
     rest = misfit if explained is None else misfit - explained
-    wide = rows.along_in if effects_in is None else np.hstack([rows.along_in, effects_in])
+    wide = rows.along_in
     noise = _scatter(rest, rest, rows)
     gears = tail_numbers(rows.gears)
     unread = rows.unread_in if rows.unread_in.any() else np.empty((len(rest), 0))
@@ -197,63 +189,43 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     relative = growth(centred, predicted)
     scale = max(robust_scale(centred / relative), least)
     gears = tail_numbers(rows.gears)
-    shared, own = _shared(rows.u_shared_in / scale, gears)
-    relative = np.sqrt(relative**2 + (rows.u_filled_in / scale) ** 2 + own**2)
+    relative = np.hypot(relative, rows.u_filled_in / scale)
     # Rows far out in the tails of the distribution count less, but never as nothing.
-    standard = np.minimum(np.abs(centred), _companion(alone, numbers)) / (scale * relative)
-    relative = relative * np.maximum(1.0, standard / FAR)
-    # Clearances cannot scatter more than the misfit does beyond the plunger gauge.
-    room = np.sqrt(max(scale**2 - rows.u_measured_in**2, 0.0))
-    read = min(rows.u_read_in, room) / scale
-    small = 1.0 + read
+    relative = relative * np.maximum(1.0, np.abs(centred) / (scale * relative) / FAR)
     bias = [
-        np.full(len(rest), small * BIAS_IN / scale),
-        small * SLOPE * predicted / scale,
+        np.full(len(rest), BIAS_IN / scale),
+        SLOPE * predicted / scale,
         SHARE_DOUBT * rows.drawn_in / scale,
     ]
-    trends = small * HABIT * rows.trends
-    habits = small * HABIT * rows.habits
-    gear_ratio = float(np.hypot(USUAL_RATIO, read * READ_GEAR_RATIO))
-    ratios = _tail_ratios(rest / (scale * relative), numbers, gear_ratio)
-    loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, trends, habits])
+    loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, HABIT * rows.trends])
     noise = NoiseModel(
         relative,
         numbers,
         gears,
         loadings,
         0.5 * least,
-        gear_ratio,
-        ratios,
+        USUAL_RATIO,
+        TAIL_RATIOS,
         scale,
-        of_gear=shared if shared.any() else None,
+        tail_chances=_TAIL_CHANCES,
+        of_gear=rows.u_shared_in / scale if rows.u_shared_in.any() else None,
     )
     standard = rest / scale
-    each_own = [USUAL_RATIO] * len(rows.readers)
+    usual = [USUAL_RATIO * levels for levels in rows.readers]
+    each_own = []
     for place, levels in enumerate(rows.readers):
-        others = [USUAL_RATIO * other for k, other in enumerate(rows.readers) if k != place]
+        others = usual[:place] + usual[place + 1 :]
         with_others = replace(noise, loadings=np.hstack([loadings, *others]))
-        each_own[place] = _ratio(with_others, levels, standard, USUAL_RATIO, RATIO_SPREAD)
-    loadings = np.hstack(
-        [loadings, *(ratio * levels for ratio, levels in zip(each_own, rows.readers, strict=True))]
-    )
+        each_own.append(_ratio(with_others, levels, standard) * levels)
+    loadings = np.hstack([loadings, *each_own])
     alike = replace(noise, loadings=loadings, gear_ratio=0.0)
     some = gears < _MOST_LEVELS
     each = (gears[some][:, None] == np.arange(min(gears.max() + 1, _MOST_LEVELS))).astype(float)
-    ratio = _ratio(alike.take(some), each, standard[some], gear_ratio, RATIO_SPREAD)
+    ratio = _ratio(alike.take(some), each, standard[some])
     return replace(noise, loadings=loadings, gear_ratio=ratio)
 
 
-def _shared(relative: Array, gears: Wholes) -> tuple[Array, Array]:
-    """Scatter that the rows of a gear have in common because its unread joints make all of them
-    wrong alike, and, where that is small, each row's own. [1]
-    """
-    largest = np.zeros(gears.max() + 1)
-    np.maximum.at(largest, gears, relative)
-    alike = largest[gears] > USUAL_RATIO
-    return np.where(alike, relative, 0.0), np.where(alike, 0.0, relative)
-
-
-def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, spread: float) -> float:
+def _ratio(noise: NoiseModel, levels: Array, rest: Array) -> float:
     """Scatter between the levels of a factor over that of a row. [1]
 
     Restricted likelihood with the fleet's level and the one that stands out most left free, because
@@ -263,7 +235,7 @@ def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, sprea
     """
     count = levels.shape[1]
     if count < _LEAST_LEVELS:
-        return expected
+        return USUAL_RATIO
     held = np.column_stack([np.ones(len(rest)), levels])
     product, _log = noise.precision_times(np.column_stack([held, rest]), noise.tail_ratios[-1])
     inner = held.T @ product[:, :-1]
@@ -275,7 +247,7 @@ def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, sprea
     weight = np.maximum(values, 0.0) * _RATIOS[:, None] ** 2
     pull = (vectors.T @ score) ** 2 * _RATIOS[:, None] ** 2
     likelihood = 0.5 * np.sum(pull / (1.0 + weight) - np.log1p(weight), axis=1)
-    likelihood -= 0.5 * (np.log(_RATIOS / expected) / spread) ** 2
+    likelihood -= 0.5 * (np.log(_RATIOS / USUAL_RATIO) / RATIO_SPREAD) ** 2
     chance = np.exp(likelihood - likelihood.max())
     largest = float(ndtri(1.0 - 0.25 / count)) ** 2 / count
     return float(np.sqrt(chance @ _RATIOS**2 / chance.sum() / (1.0 - largest)))
@@ -291,41 +263,6 @@ def _apart(inner: Array, along: Array, free: int) -> tuple[Array, Array]:
         inner[np.ix_(kept, kept)] - np.outer(share, inner[free, kept]),
         along[kept] - share * along[free],
     )
-
-
-def _tail_ratios(standard: Array, tails: Wholes, gear_ratio: float) -> tuple[float, ...]:
-    """Scatter between tails that is likely, over that of a row: from none to its estimate. [1]
-
-    By moments, about the fleet's level, without the tail that stands out most, which may be an
-    effect, and enlarged by what the largest of as many normal tails carries on average.
-    """
-    count = np.bincount(tails).astype(float)
-    if len(count) < _LEAST_TAILS:
-        return TAIL_RATIOS
-    mean = np.bincount(tails, standard) / count
-    chance = 1.0 / count + 0.5 * gear_ratio**2
-    level = float(np.median(mean))
-    square = (mean - level) ** 2
-    kept = np.ones(len(count), bool)
-    kept[np.argmax(square / (chance + np.median(square)))] = False
-    largest = float(ndtri(1.0 - 0.25 / len(count))) ** 2 / len(count)
-    between = float(np.mean(square[kept])) / (1.0 - largest)
-    most = float(np.sqrt(max(between - float(np.mean(chance[kept])), 0.0)))
-    return (*(ratio for ratio in TAIL_RATIOS if ratio < most), most) if most > 0.0 else (0.0,)
-
-
-def _companion(values: Array, tails: Wholes) -> Array:
-    """Distance of each row to the nearest other row of its tail: rows that stand out together are
-    not outliers. [in]
-    """
-    nearest = np.full(len(values), np.inf)
-    for tail in range(tails.max() + 1):
-        rows = np.flatnonzero(tails == tail)
-        if len(rows) > 1:
-            apart = np.abs(values[rows][:, None] - values[rows])
-            np.fill_diagonal(apart, np.inf)
-            nearest[rows] = apart.min(axis=1)
-    return nearest
 
 
 def growth(centred: Array, predicted: Array) -> Array:

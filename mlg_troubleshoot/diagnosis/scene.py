@@ -13,7 +13,6 @@ from mlg_troubleshoot.diagnosis.noise import (
     SHARE_DOUBT,
     Rows,
     build_noise,
-    measured_uncertainty,
     small_trends,
 )
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -76,12 +75,10 @@ def _scene(
         slopes[:, j] = (
             displaced(model, table, links_from(moved, scene.directions)) - scene.over_in
         ) / 1e-5
-    filled_in, shared_in, read_in = (
-        np.sqrt(np.sum((slopes * u) ** 2, axis=1))
-        for u in (worn.u_row_in, worn.u_gear_in, worn.u_read_in)
+    filled_in, shared_in = (
+        np.sqrt(np.sum((slopes * u) ** 2, axis=1)) for u in (worn.u_row_in, worn.u_gear_in)
     )
     fleet_in = slopes * worn.u_fleet_in
-    u_read = share * float(np.sqrt(np.nanmean(read_in**2)))
     along = unknown_along(model, table, clearance, scene.over_in, scene.directions)
     if not np.nan_to_num(table.clearance_in).any():
         along = np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)])
@@ -95,8 +92,6 @@ def _scene(
         shared_in,
         np.hstack([fleet_in, np.sum(fleet_in, axis=1, keepdims=True) * worn.together]),
         along,
-        u_read,
-        measured_uncertainty(table),
         np.nan_to_num(-drawn),
         *small_trends(table),
     )

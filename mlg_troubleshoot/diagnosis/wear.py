@@ -94,7 +94,6 @@ class LikelyClearances:
     u_fleet_in, shape (n, n_joints): standard uncertainty of what was not read: of each row, common
         to a gear's rows, common to all rows; where no wear was read, that of the gear is all that
         is supposed. [in]
-    u_read_in, shape (n, n_joints): standard uncertainty of what was read. [in]
     shown_in, shape (n, n_joints): what the gauge most likely showed. [in]
     together, shape (n, k): further changes of u_fleet_in, of all joints that nobody read alike. [1]
     """
@@ -103,7 +102,6 @@ class LikelyClearances:
     u_row_in: Array
     u_gear_in: Array
     u_fleet_in: Array
-    u_read_in: Array
     shown_in: Array
     together: Array
 
@@ -124,7 +122,7 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
         none = np.zeros_like(readings)
         unread = np.where(np.isfinite(readings), 0.0, unread_in)
         return LikelyClearances(
-            landed_share(table)[:, None] * unread, none, unread, none, none, readings, none[:, :0]
+            landed_share(table)[:, None] * unread, none, unread, none, readings, none[:, :0]
         )
     history, kilo, landed = fleet_history(table)
     known = np.isfinite(readings)
@@ -144,7 +142,6 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     variance = np.where(told, trust * noise + trust**2 * history.written_in2, history.scatter_in2)
     spread = np.where(known, 0.0, np.sqrt(variance))
     shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))
-    left = np.where(known, np.sqrt(variance + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
     common = np.zeros_like(readings)
     together = np.empty((len(readings), 0))
     seen = np.isfinite(readings).any(axis=0)
@@ -169,7 +166,7 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
             np.hstack([FOLLOWS * further, bent - np.mean(bent), BENT * np.mean(worn) / line])
             / JOINTS_APART
         )
-    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left, read, together)
+    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, read, together)
 
 
 def gears_of(table: DiagnosisTable) -> Places:

@@ -63,30 +63,39 @@ class Conclusion:
         return tuple(n for n, p in self.listed.items() if p >= sure and n not in self.never)
 
     @cached_property
+    def _likeliest_effect(self) -> dict[Key, int]:
+        """Place of the likeliest effect of each listed name."""
+        effects = self.posterior.effects
+        listed = np.flatnonzero(effects.listed)[::-1].tolist()
+        ascending = sorted(listed, key=self.posterior.of_effect.item)
+        return {name: k for k in ascending if (name := effects.names[k]) is not None}
+
+    def class_of(self, name: Key) -> set[Key]:
+        """A name with those that these rows cannot tell from it, each by its likeliest effect."""
+        columns = self.posterior.effects.kept
+        best = self._likeliest_effect
+        if name not in best:
+            return {name}
+        own = columns.take([best[name]])
+        places = list(best.values())
+        along = columns.onto(own.T)[0, places] / np.linalg.norm(own)
+        near = np.abs(along) > self.beliefs.alike * np.sqrt(columns.squares)[places]
+        return {other for other, alike in zip(best, near, strict=True) if alike}
+
+    @cached_property
     def _alike(self) -> set[Key]:
         """Names that these rows cannot tell from each other, one of which is sure: what is believed
         of them beforehand must not decide.
         """
-        found = self.posterior
         effects = self.posterior.effects
-        places = np.flatnonzero(effects.listed).tolist()
-        names = [effects.names[k] for k in places]
-        if not self._standing_out:
-            return set()
-        prior = (effects.log_prior - effects.rarity)[places]
-        size = np.sqrt(effects.kept.squares)[places]
-        evidence = np.log(np.maximum(found.of_effect[places], 1e-300)) - prior
+        believed = effects.log_prior - effects.rarity
+        evidence = np.log(np.maximum(self.posterior.of_effect, 1e-300)) - believed
+        best = self._likeliest_effect
         alike: set[Key] = set()
         for name in self._standing_out:
-            own = [k for k, other in enumerate(names) if other == name]
-            if not own:
-                continue
-            best = max(own, key=lambda k: found.of_effect[places[k]])
-            along = effects.kept.onto(effects.kept.take([places[best]]).T)[0, places]
-            near = np.abs(along) > self.beliefs.alike * size * size[best]
-            near &= evidence > evidence[best] - self.beliefs.odds
-            others = {key for k in np.flatnonzero(near) if (key := names[k]) and key != name}
-            alike |= others | ({name} if others else set())
+            least = evidence[best[name]] - self.beliefs.odds if name in best else np.inf
+            own = {other for other in self.class_of(name) - {name} if evidence[best[other]] > least}
+            alike |= own | ({name} if own else set())
         return alike
 
     @cached_property
@@ -109,6 +118,14 @@ class Conclusion:
         if self.verdict in {Verdict.NAMED, Verdict.AMBIGUOUS}:
             names += [n for n in rest if n in self._alike and n not in names]
         return tuple(names)
+
+    def class_probability(self, name: Key) -> float:
+        """Probability that something of this name acts, or what these rows cannot tell from it."""
+        return self.any_of(self.class_of(name) | {name})
+
+    def probability(self, name: Key) -> float:
+        """Probability that something of this name acts."""
+        return min(self.any_of({name}), 1.0)
 
     def any_of(self, names: Collection[Key]) -> float:
         """Probability that something of these names acts."""

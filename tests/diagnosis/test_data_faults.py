@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis import DiagnosisTable, diagnose
 from mlg_troubleshoot.diagnosis.faults import screen_faults
-from mlg_troubleshoot.diagnosis.sides import _slopes_without
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
@@ -268,6 +267,14 @@ def test_a_gear_inspected_twice_on_its_day_is_not_a_swapped_side_where_aircraft_
     assert faults(gear, with_side(again, 17, "LH")) == []
 
 
+def test_landings_that_begin_anew_are_not_those_of_the_other_side(gear: Gear) -> None:
+    table = paired(gear, [10.0, 150.0, 300.0, 450.0])
+    landings = table.quantities["gear_landings"].copy()
+    landings[37] = 695.0
+    anew = replace(table, quantities={**table.quantities, "gear_landings": landings})
+    assert faults(gear, anew) == []
+
+
 def test_a_row_in_millimetres_is_found_in_its_clearances(gear: Gear, sound: DiagnosisTable) -> None:
     values = sound.clearance_in.copy()
     values[ROW] *= 25.4
@@ -353,15 +360,3 @@ def test_rows_that_a_named_cause_lowers_were_not_restored(gear: Gear) -> None:
         return np.where(table.factors["tail_no"] == "N103", -0.01, 0.0)
 
     assert restored(gear, fleet(gear.model, re_rigged, noise_in=0.0008)) == set()
-
-
-def test_the_line_without_a_point_is_the_median_line_of_the_others() -> None:
-    rng = np.random.default_rng(8)
-    x = rng.integers(0, 12, 25).astype(float)
-    y = 3.0 * x + rng.normal(0.0, 4.0, 25)
-    without = _slopes_without(x, y)
-    for k in range(25):
-        (i, j), rest = np.triu_indices(24, 1), np.delete(np.arange(25), k)
-        apart = x[rest][j] != x[rest][i]
-        slopes = (y[rest][j] - y[rest][i])[apart] / (x[rest][j] - x[rest][i])[apart]
-        assert without(k) == pytest.approx(np.median(slopes))

@@ -21,7 +21,7 @@ from mlg_troubleshoot.diagnosis.causes.base import (
     share_never_read,
 )
 from mlg_troubleshoot.diagnosis.causes.reading import change_date, days_since
-from mlg_troubleshoot.diagnosis.noise import growth
+from mlg_troubleshoot.diagnosis.noise import FREEDOM, growth
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.units import DAYS_PER_YEAR
@@ -32,8 +32,6 @@ _MONTHS = 12
 _LEAST_AIRCRAFT = 3
 _TURNS = 20
 _TAILS = "tails "
-# Misfits have heavier tails than a normal distribution: degrees of freedom of Student's t. [1]
-_FREEDOM = 8.0
 # Times in which a beginner comes down to a third of what he was off, from two months on, each
 # twice the last. [d]
 _LEARNING_DAYS = DAYS_PER_YEAR / 6 * 2 ** np.arange(4)
@@ -280,8 +278,8 @@ def _two_levels(values: Array, relative: Array, weight: Array) -> tuple[Array, A
     off = values - middle[:, None]
     scatter = np.sqrt(np.sum(weight * off**2) / len(values))
     square = (off / (scatter * relative)) ** 2
-    density = -0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM) - np.log(scatter)
-    return density, (_FREEDOM + 1.0) / (_FREEDOM + square)
+    density = -0.5 * (FREEDOM + 1.0) * np.log1p(square / FREEDOM) - np.log(scatter)
+    return density, (FREEDOM + 1.0) / (FREEDOM + square)
 
 
 def _of_value(scene: Scene, factor: str, candidate: Candidate) -> Mask:
