@@ -11,7 +11,7 @@ from mlg_troubleshoot.arrays import Mask
 from mlg_troubleshoot.decision.columns import LANDINGS, TECHNICIAN_ID
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
-# Share of rows that show a habit, that may be exceptions. [1]
+# Share of rows that show a habit, and of values on a step, that may be exceptions. [1]
 EXCEPTIONS = 0.05
 # With fewer rows nothing is said of them. [1]
 LEAST_ROWS = 5

@@ -24,6 +24,7 @@ from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import fleet_history, inspection_of
 from mlg_troubleshoot.diagnosis.written import steps_of
+from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.units import SLIPS
@@ -36,8 +37,8 @@ _BEND_FAR = 6
 LEAST_ALONG = 8
 # Share of rows with an entry error, each kind as often. [1]
 _WRONG = 0.005
-# No clearance, reading or misfit is expected more sharply than this. [in]
-_LEAST_SPREAD_IN = 0.0005
+# No clearance, reading or misfit is expected more sharply than a gauge reads. [in]
+_LEAST_SPREAD_IN = DEFAULT_GAUGE_U_IN
 # Supposed: no joint of a gear that still moves has a radial clearance as large as this, four times
 # its limit. [in]
 _WORN_OUT_IN = 0.0325

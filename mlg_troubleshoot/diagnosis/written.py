@@ -15,7 +15,7 @@ from scipy.special import ndtr, ndtri
 
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
-from mlg_troubleshoot.diagnosis.blanks import blanks_by_wear
+from mlg_troubleshoot.diagnosis.blanks import EXCEPTIONS, blanks_by_wear
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.units import MM_PER_IN
@@ -29,8 +29,7 @@ _STEPS_IN = tuple(
         )
     )
 )
-# Share of values on a step that may be exceptions; a value is a multiple within this share of it.
-_EXCEPTIONS = 0.05
+# A value is a multiple of a step within this share of it. [1]
 _ON_STEP = 0.02
 # With fewer values nothing is said of them. [1]
 _LEAST_VALUES = 20
@@ -182,7 +181,7 @@ def step_of(values: Array) -> float:
     on = [
         step
         for step in _STEPS_IN
-        if np.mean(np.abs(values / step - np.rint(values / step)) > _ON_STEP) <= _EXCEPTIONS
+        if np.mean(np.abs(values / step - np.rint(values / step)) > _ON_STEP) <= EXCEPTIONS
     ]
     return max(on, default=0.0)
 

@@ -18,11 +18,8 @@ from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Expl
 from mlg_troubleshoot.misfit.fitting import Fit, fit
 from mlg_troubleshoot.misfit.posterior import posterior
 from mlg_troubleshoot.misfit.runner import Fitted, Runner, least_squares
-from mlg_troubleshoot.misfit.scatter import Readings, smooth_shapes
+from mlg_troubleshoot.misfit.scatter import SIZES, Readings, smooth_shapes
 
-# Sizes of a suspect that does not state its own, over the usual one: equally likely, as nobody
-# knows them.
-_SIZES = tuple((3.0 ** np.arange(-1, 5)).tolist())
 # Share of the largest reading or effect that a number of it does not hold.
 _DIGITS = 1e-9
 # Residual over such a number's digits below which it is rounding, and says nothing.
@@ -31,7 +28,7 @@ _ROUNDED = 0.01
 _MOST = 12
 _ROUNDS = 8
 # Computing only: where a nominal value may be far off, in trials, and how many of these are tried.
-_FAR_TRIALS = tuple(way * size for size in _SIZES[2:5] for way in (-1, 1))
+_FAR_TRIALS = tuple(way * size for size in SIZES[2:5] for way in (-1, 1))
 _STARTS = 3
 # Correlation of rows that follow each other at most, and how near the likeliest one is sought.
 _CORRELATED = 0.99
@@ -333,7 +330,7 @@ class Study:
         tried = set[tuple[int, ...]]()
         free = start.columns[:, self.nuisance]
         scale = self.readings.first_scale(start.columns, free, start.rest)
-        beliefs = replace(self.beliefs, sizes=_SIZES)
+        beliefs = replace(self.beliefs, sizes=SIZES)
         while True:
             at = self._likeliest(point, scale, beliefs)
             found = at.follows.posterior

@@ -17,10 +17,12 @@ from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 from mlg_troubleshoot.misfit.design import basis_of
 from mlg_troubleshoot.misfit.runner import least_squares
 
+# What is tried of a size that nobody knows, over the usual one; of a suspect that does not state
+# its own all are equally likely.
+SIZES = tuple((3.0 ** np.arange(-1, 5)).tolist())
 # Scatter between groups over that of a reading: its median beforehand, about which its logarithm
-# has a standard deviation of one, and what is tried.
+# has a standard deviation of one.
 _GROUP_RATIO = 0.15
-_GROUP_RATIOS = tuple((_GROUP_RATIO * 3.0 ** np.arange(-1, 5)).tolist())
 # Share of the variance of a reading that grows with the square of the prediction: what is tried.
 _GROWING = tuple(1 - 1 / k for k in (2, 10, 100))
 # Standard deviation of nuisance parameters, over the scatter of a reading: whatever they are.
@@ -67,8 +69,8 @@ class Readings:
                 tails[index] = self.group[self.row[index]] * len(self.outputs) + place
         relative = scale / unit
         grouped = self.group is not None
-        away = np.log(np.array(_GROUP_RATIOS) / _GROUP_RATIO)
-        chances = np.exp(-0.5 * away**2) / np.sum(np.exp(-0.5 * away**2))
+        sizes = np.array(SIZES)
+        chances = np.exp(-0.5 * np.log(sizes) ** 2)
         basis = basis_of(free / scale[:, None])
         noise = NoiseModel(
             relative=relative,
@@ -77,10 +79,10 @@ class Readings:
             loadings=_WIDE * relative[:, None] * basis,
             floor_in=1e-9,
             gear_ratio=0.0,
-            tail_ratios=_GROUP_RATIOS if grouped else (0.0,),
+            tail_ratios=tuple((_GROUP_RATIO * sizes).tolist()) if grouped else (0.0,),
             scale_in=1.0,
             absorbed=basis.shape[1],
-            tail_chances=tuple(chances.tolist()) if grouped else (),
+            tail_chances=tuple((chances / chances.sum()).tolist()) if grouped else (),
             chain=chain,
             time=None if self.series is None else self.series[1][self.row],
             correlation=correlation,
