@@ -480,7 +480,7 @@ def _explained(
 
     @cache
     def columns_in(other: LinkageModel) -> EffectColumns:
-        changed = scene_at(other, table, scene.where, scene.clearance_in, scene.drawn_share)
+        changed = scene_at(other, table, scene.where, scene.clearance_in)
         return EffectColumns.made(len(table), map(np.nan_to_num, effects_of(changed, moving)))
 
     problem = MisfitProblem(

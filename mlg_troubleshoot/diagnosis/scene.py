@@ -10,7 +10,6 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unknown_along
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
 from mlg_troubleshoot.diagnosis.noise import (
-    SHARE_DOUBT,
     Rows,
     build_noise,
     small_trends,
@@ -36,10 +35,8 @@ def build_scene(
     """Predict every row with the plain model; what is known of the rows before their misfit is
     looked at.
 
-    Readings of clearances are drawn to their expectation as far as the measured displacements say
-    that they scatter as declared: a gauge that reads better than declared is believed more. Where
-    no wear was read at all, moderate wear is supposed, or heavy wear where that is clearly
-    likelier.
+    Readings of clearances are drawn to their expectation. Where no wear was read at all, moderate
+    wear is supposed, or heavy wear where that is clearly likelier.
     """
     if np.nan_to_num(table.clearance_in).any():
         return _scene(model, table, where, likely_clearances(table))
@@ -61,13 +58,10 @@ def _likelihood(scene: Scene, rows: Rows) -> float:
 def _scene(
     model: LinkageModel, table: DiagnosisTable, where: Discrepancies, worn: LikelyClearances
 ) -> tuple[Scene, Rows]:
-    likely = worn.likely_in
-    as_read = np.where(np.isfinite(table.clearance_in), worn.shown_in, likely)
+    clearance = worn.likely_in
+    as_read = np.where(np.isfinite(table.clearance_in), worn.shown_in, clearance)
     read = predicted(model, table, as_read)[0]
-    drawn = predicted(model, table, likely)[0] - read
-    share = _share_of_declared(table.measured_in - read, drawn)
-    clearance = as_read + share * (likely - as_read)
-    scene = scene_at(model, table, where, clearance, share)
+    scene = scene_at(model, table, where, clearance)
     slopes = np.empty_like(clearance)
     for j in range(clearance.shape[1]):
         moved = clearance.copy()
@@ -92,7 +86,7 @@ def _scene(
         shared_in,
         np.hstack([fleet_in, np.sum(fleet_in, axis=1, keepdims=True) * worn.together]),
         along,
-        np.nan_to_num(-drawn),
+        np.nan_to_num(read - scene.over_in),
         *small_trends(table),
     )
 
@@ -102,7 +96,6 @@ def scene_at(
     table: DiagnosisTable,
     where: Discrepancies,
     clearance_in: Array,
-    share: float = 1.0,
 ) -> Scene:
     """The rows with the clearances that act: worst directions, displacement, and what each joint
     adds to it.
@@ -122,34 +115,7 @@ def scene_at(
         over,
         directions,
         contribution,
-        share,
     )
-
-
-def _share_of_declared(misfit: Array, drawn: Array) -> float:
-    """Share of the declared error of clearances that the misfit shows, 0 to 1. [1]
-
-    What the error of a reading adds to the prediction, drawing takes off in part; so the misfit
-    against the readings as they are follows the drawing, all of it if they scatter as declared,
-    nothing if they do not.
-    """
-    known = np.isfinite(misfit) & np.isfinite(drawn)
-    y = misfit[known]
-    d = drawn[known]
-    if len(y) < 3 or np.ptp(d) == 0.0:
-        return 1.0
-    share = 1.0
-    level = float(np.median(y - d))
-    for _ in range(20):
-        rest = y - level - share * d
-        scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-9)
-        weight = np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(rest), 1e-12))
-        middle = float(weight @ d / weight.sum())
-        level = float(weight @ (y - share * d) / weight.sum())
-        information = float(weight @ (d - middle) ** 2) / scale**2
-        slope = float(weight @ ((d - middle) * y)) / scale**2
-        share = (slope + 1.0 / SHARE_DOUBT**2) / (information + 1.0 / SHARE_DOUBT**2)
-    return float(np.clip(share, 0.0, 1.0))
 
 
 def effect(scene: Scene, adjustment: Adjustment) -> Array:

@@ -56,14 +56,15 @@ def swapped_sides(table: DiagnosisTable, odds: float) -> list[tuple[int, str, st
 
 
 def _off_line(day: Array, landings: Array, row: int, visits: Places, rate: float) -> float:
-    """How far a row lies off the line through the two visits of a gear that are nearest in time;
-    one visit alone has the usual slope.
+    """How far a row lies off what the visit of a gear that is nearest in time leads to, at the
+    median rate of its visits; one visit alone has the usual rate.
     """
-    first, *second = visits[np.argsort(np.abs(day[visits] - day[row]), kind="stable")[:2]]
-    slope = rate
-    if second and day[second[0]] != day[first]:
-        slope = (landings[second[0]] - landings[first]) / (day[second[0]] - day[first])
-    return float(landings[row] - landings[first] - slope * (day[row] - day[first]))
+    visits = visits[np.argsort(day[visits], kind="stable")]
+    step = np.diff(day[visits])
+    if step.any():
+        rate = float(np.median(np.diff(landings[visits])[step > 0.0] / step[step > 0.0]))
+    nearest = visits[np.argmin(np.abs(day[visits] - day[row]))]
+    return float(landings[row] - landings[nearest] - rate * (day[row] - day[nearest]))
 
 
 def _by_visits(table: DiagnosisTable) -> Array:

@@ -201,12 +201,3 @@ def test_a_reading_that_is_too_large_by_chance_predicts_too_much(
     table = replace(plain, clearance_in=clearance, gauge_u_in=np.full(len(plain), 0.001))
     _scene, found = build_scene(gear.model, table, gear.discrepancies)
     assert found.drawn_in[5] > 0.0003
-
-
-def test_a_gauge_that_reads_better_than_declared_is_believed(
-    gear: Gear, plain: DiagnosisTable
-) -> None:
-    # The displacements of this fleet follow its readings of clearance exactly.
-    declared = replace(plain, gauge_u_in=np.full(len(plain), 0.0005))
-    scene, _found = build_scene(gear.model, declared, gear.discrepancies)
-    assert scene.drawn_share < 0.35

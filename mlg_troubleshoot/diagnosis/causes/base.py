@@ -39,8 +39,6 @@ class Scene:
         Directions that give it. [rad]
     contribution_in : ndarray, shape (n, n_joints)
         What each joint's clearance adds to it, directions held. [in]
-    drawn_share : float
-        How far read clearances were drawn to what wear makes expect. [1]
     """
 
     model: LinkageModel
@@ -51,7 +49,6 @@ class Scene:
     over_in: Array
     directions: Array
     contribution_in: Array
-    drawn_share: float = 1.0
 
     def place(self, joint: int) -> int:
         """Return the column of a joint."""

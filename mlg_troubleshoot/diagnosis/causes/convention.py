@@ -84,10 +84,7 @@ class ConventionSlip(Cause):
         """Take the group's clearances as they were meant, and what wear makes expect of all rows
         with them.
         """
-        meant = as_meant(scene.table, candidate.setting)
-        likely = likely_clearances(meant).likely_in
-        read = np.where(np.isfinite(meant.clearance_in), meant.clearance_in, likely)
-        right = read + scene.drawn_share * (likely - read)
+        right = likely_clearances(as_meant(scene.table, candidate.setting)).likely_in
         return Adjustment(
             np.maximum(scene.clearance_in + value * (right - scene.clearance_in), 0.0)
         )
