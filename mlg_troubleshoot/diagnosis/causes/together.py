@@ -116,8 +116,9 @@ class Block:
         return Candidate(self.cause, None, {**setting, **sides})
 
 
-# Correlation of two factors from which only their sum is known. [1]
-_TOGETHER = -0.7
+# Correlation of two factors from which only their sum is known: half of the variance of either
+# goes with the other. [1]
+_TOGETHER = -1 / np.sqrt(2)
 
 
 class JointFactors(Cause):
