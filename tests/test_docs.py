@@ -15,7 +15,7 @@ from pytest_examples import CodeExample, EvalExample, find_examples
 
 from mlg_troubleshoot.decision.columns import COLUMNS, Column
 from mlg_troubleshoot.diagnosis import CATALOGUE
-from tests import docs_examples
+from tests import docs_examples, numbers_page
 from tests.docs_examples import PAGES, PICTURES, README, ROOT
 
 TEXT = README.read_text(encoding="utf-8")
@@ -236,6 +236,15 @@ def test_a_place_that_contributors_are_sent_to_exists(path: str) -> None:
 def test_contributors_are_sent_to_every_room_that_holds_a_rule() -> None:
     rooms = {path.split("/")[1] for path in NAMED_PATHS if path.startswith("mlg_troubleshoot/")}
     assert {"cli", "decision", "diagnosis", "gear", "misfit", "records", "store"} <= rooms
+
+
+def test_the_table_of_numbers_is_current() -> None:
+    written = numbers_page.PAGE.read_text(encoding="utf-8")
+    assert numbers_page.page() == written, "run: python tests/numbers_page.py"
+
+
+def test_every_number_of_the_diagnosis_has_a_meaning() -> None:
+    assert [c.name for c in numbers_page.chosen() if not c.meaning] == []
 
 
 def test_the_readme_is_not_a_book() -> None:

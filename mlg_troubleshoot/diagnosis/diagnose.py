@@ -611,15 +611,11 @@ def _explained_by_clearances(
     one = measured[:, None] - simple * (measured @ simple / np.sum(simple**2, axis=0))
     unexplained = np.mean(left[near] ** 2)
     constant = np.var(measured)
+    alone = constant if no_sign_slip else min(np.mean(one**2, axis=0).min(), constant)
+    beyond_chance = chdtri(contribution_in.shape[1], BY_CHANCE)
+    surely = len(measured) * np.log(alone / unexplained) > beyond_chance
     if no_sign_slip:
-        return bool(
-            len(measured) * np.log(constant / unexplained)
-            > chdtri(contribution_in.shape[1], BY_CHANCE)
-        )
-    alone = min(np.mean(one**2, axis=0).min(), constant)
-    surely = len(measured) * np.log(alone / unexplained) > chdtri(
-        contribution_in.shape[1], BY_CHANCE
-    )
+        return bool(surely)
     return bool(unexplained < _CLEARLY_LESS * alone or (surely and alone > _NO_SCALE * constant))
 
 
@@ -787,45 +783,27 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
     """The causes that are named, by effect, and those of which something acts, the likeliest
     first.
     """
-    finding = case.finding
-    candidates = case.problem.candidates
-    fitted: dict[Key, NamedCause] = {}
+    follows = case.finding.follows
+    fitted: dict[Key, tuple[Candidate, float, tuple[float, float], Array]] = {}
     for place, k in enumerate(case.chosen):
+        candidate = case.problem.candidates[k]
         value = float(case.values[place])
         error = float(np.sqrt(case.covariance[place, place]))
-        key = candidates[k].key
-        fitted[key] = NamedCause(
-            candidates[k],
-            value,
-            _interval(value, error),
-            case.effect(place),
-            finding.follows.probability(key),
-            finding.follows.class_probability(key),
-        )
+        fitted[candidate.key] = candidate, value, _interval(value, error), case.effect(place)
     if case.block is not None:
         k = len(case.chosen)
-        key = (case.block.cause.name, None)
         change = case.values[k:]
         candidate = case.block.candidate(change, case.covariance[k:, k:])
-        fitted[key] = NamedCause(
-            candidate,
-            1.0,
-            (1.0, 1.0),
-            case.block.columns @ change,
-            finding.follows.probability(key),
-            finding.follows.class_probability(key),
-        )
+        fitted[candidate.key] = candidate, 1.0, (1.0, 1.0), case.block.columns @ change
     none = np.zeros(len(case.problem.misfit))
 
     def found(key: Key) -> NamedCause:
-        rival = case.problem.candidate(key, finding.posterior)
-        chances = (finding.follows.probability(key), finding.follows.class_probability(key))
-        return fitted.get(key) or NamedCause(rival, 0.0, (0.0, 0.0), none, *chances)
+        rival = case.problem.candidate(key, case.finding.posterior)
+        own = fitted.get(key, (rival, 0.0, (0.0, 0.0), none))
+        return NamedCause(*own, follows.probability(key), follows.class_probability(key))
 
-    named = sorted(
-        (found(key) for key in finding.follows.said), key=lambda cause: -cause.effect_rms_in
-    )
-    return tuple(named), tuple(found(key) for key in finding.open)
+    named = sorted((found(key) for key in follows.said), key=lambda cause: -cause.effect_rms_in)
+    return tuple(named), tuple(found(key) for key in case.finding.open)
 
 
 def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections | None:

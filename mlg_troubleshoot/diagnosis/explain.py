@@ -275,7 +275,9 @@ def explain(problem: MisfitProblem) -> Finding:
         again = posterior(
             left, data, problem.effects(left), contexts, problem.beliefs, found.likeliest[:1]
         )
-        settled = _same(found, again)
+        before = found.likeliest[0]
+        after = again.likeliest[0]
+        settled = (before.context, before.members) == (after.context, after.members)
         found = again
         noise = left
         if settled:
@@ -291,13 +293,6 @@ def _settled(finding: Finding) -> NoiseModel:
     columns = found.effects.kept.take(finding.best.members)
     fitted = fit(held, columns, finding.problem.expected)
     return finding.noise.with_tails(fitted.tail_ratio)
-
-
-def _same(one: MisfitPosterior, other: MisfitPosterior) -> bool:
-    """Tell whether two posteriors have one likeliest explanation."""
-    first = one.likeliest[0]
-    second = other.likeliest[0]
-    return (first.context, set(first.members)) == (second.context, set(second.members))
 
 
 def _noise_beside(problem: MisfitProblem, explained: Array) -> NoiseModel:

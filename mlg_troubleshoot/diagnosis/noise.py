@@ -39,8 +39,8 @@ SHARE_DOUBT = 0.35
 # Scatter of a row is at least this share of the predictions' size: nothing is known better than
 # that. [1]
 LEAST_SCATTER = 0.01
-# Trends over a quantity, and habits of a side or an approach, that are not a cause yet, in the same
-# units.
+# Trends over a quantity, and habits of a side or an approach, that are not a cause yet: standard
+# deviation over the scatter of a row. [1]
 HABIT = 0.035
 # Scatter between the gears of a tail, between gauges, and between technicians, over that of a row,
 # before the data are looked at: median, and spread of its logarithm; and the ratios that are tried,
@@ -54,7 +54,7 @@ _MOST_LEVELS = 400
 # Ratios of the scatter between tails to the scatter of a row, nodes of a sum by that prior: as much
 # as usual or less, and one to five spreads more.
 TAIL_RATIOS = (0, *(USUAL_RATIO * np.exp(RATIO_SPREAD * np.arange(1, 6))).tolist())
-_TAIL_CHANCES = tuple(np.exp(-0.5 * np.arange(len(TAIL_RATIOS)) ** 2).tolist())
+_TAIL_CHANCES = tuple(np.exp(-(np.arange(len(TAIL_RATIOS)) ** 2) / 2).tolist())
 # The first estimate of the scatter has all in it that effects of unknown size explain.
 _ROUNDS = 2
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -141,7 +141,3 @@ class Explanation:
     members: tuple[int, ...]
     log_posterior: float
     values: Array
-
-    def with_posterior(self, log_posterior: float) -> Explanation:
-        """The same, as likely as is said."""
-        return replace(self, log_posterior=log_posterior)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -291,7 +291,7 @@ class _Search:
         return MisfitPosterior(
             self.effects,
             self.contexts,
-            tuple(e.with_posterior(e.log_posterior - whole) for e in order),
+            tuple(replace(e, log_posterior=e.log_posterior - whole) for e in order),
             names,
             together,
             of_effect,
