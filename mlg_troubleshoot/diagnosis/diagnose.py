@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -42,7 +41,7 @@ from mlg_troubleshoot.diagnosis.noise import (
     measured_uncertainty,
     robust_scale,
 )
-from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of, scene_at
+from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import visits
 from mlg_troubleshoot.errors import InconclusiveDataError
@@ -478,11 +477,6 @@ def _explained(
     ]
     _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
 
-    @cache
-    def columns_in(other: LinkageModel) -> EffectColumns:
-        changed = scene_at(other, table, scene.where, scene.clearance_in)
-        return EffectColumns.made(len(table), map(np.nan_to_num, effects_of(changed, moving)))
-
     problem = MisfitProblem(
         table.measured_in - scene.over_in,
         rows,
@@ -491,7 +485,6 @@ def _explained(
         build_bank(scene, columns),
         blocks,
         (*testable, *blind),
-        columns_in,
         beliefs,
         bool(table.doubt),
     )

@@ -8,9 +8,9 @@ large stands in `Beliefs` and with each cause; the rest is arithmetic.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from math import erfc, sqrt
 
 import numpy as np
@@ -20,7 +20,6 @@ from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
-from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.conclusion import Conclusion
@@ -45,7 +44,6 @@ class MisfitProblem:
     columns: effects of the candidates. [in / unit]
     blocks: all-joint effects.
     causes: all causes, those that the table cannot test included.
-    columns_in: effects of the candidates in another linkage. [in / unit]
     doubtful: True if all-joint effects cannot be named, because clearances are missing or cut off.
     """
 
@@ -56,7 +54,6 @@ class MisfitProblem:
     bank: Bank
     blocks: Sequence[Block]
     causes: Sequence[Cause]
-    columns_in: Callable[[LinkageModel], EffectColumns]
     beliefs: Beliefs
     doubtful: bool = False
 
@@ -136,7 +133,6 @@ class MisfitProblem:
                     (b.cause.name, None),
                     float(np.log(shares[b.cause.name] * b.share)),
                     b.columns,
-                    None if b.model is None else partial(self.columns_in, b.model),
                     None if b.changes is None else b.skew,
                     b.root,
                 )

@@ -85,23 +85,6 @@ class EffectColumns:
             return EffectColumns.of(np.hstack([part.take(np.arange(part.p)) for part in parts]))
         return EffectColumns(n, tuple(blocks))
 
-    def replaced(self, changed: Places, columns: Array) -> EffectColumns:
-        """The same with some columns, in the order of their places, in the place of others."""
-        kept = [(np.isin(places, changed, invert=True), places, b) for places, b in self.blocks]
-        others = [(places[k], block[:, k]) for k, places, block in kept]
-        return EffectColumns(self.n, (*others, (changed, columns)))
-
-    def unlike(self, other: EffectColumns) -> Places:
-        """Places of the first columns that are not the same in the other, which has as many or
-        fewer.
-        """
-        found = []
-        for begin in range(0, other.p, _AT_ONCE):
-            places = np.arange(begin, min(begin + _AT_ONCE, other.p))
-            differs = np.any(self.take(places) != other.take(places), axis=0)
-            found.append(places[differs])
-        return np.concatenate(found) if found else np.empty(0, np.intp)
-
     @property
     def p(self) -> int:
         """Number of columns."""

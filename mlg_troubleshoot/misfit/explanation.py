@@ -99,8 +99,7 @@ class Context:
     name: what is wrong if it acts, None where nothing does. log_prior: logarithm of how often it is
     expected. shared_in, shape (n, j): its effects, each per unit of its size. root, shape (j, k):
     of the covariance of these sizes; None if they are independent, with one standard deviation
-    each. columns: the effects of an `Effects` where it acts, if they differ there; asked for only
-    where it is likely. correction: what its true prior adds to the log-likelihood of the normal
+    each. correction: what its true prior adds to the log-likelihood of the normal
     one, given what rows say of its sizes, aᵀx − xᵀQx / 2. listed: True if it stands on the list of
     causes.
     """
@@ -108,7 +107,6 @@ class Context:
     name: Key | None
     log_prior: float
     shared_in: Array
-    columns: Callable[[], EffectColumns] | None = None
     correction: Callable[[Array, Array], float] | None = None
     root: Array | None = None
     listed: bool = True

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import log_ndtr
 
-from mlg_troubleshoot.arrays import Array, Places, log_sum
+from mlg_troubleshoot.arrays import Array, log_sum
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.covariance import NoiseModel
@@ -38,7 +38,8 @@ class Products:
         self._weighted_data = weighted[:, :, 0]
         self.rest = self._weighted_data @ data
         self.log = np.array(log) - 2.0 * np.array([chance for _r, chance in noise.tail_levels])
-        self.square, self.along = self._of(self.columns)
+        self.square = noise.squares(self.columns)
+        self.along = self.columns.onto(self._weighted_data)
         self._cross: dict[int, Array] = {}
         self._onto: dict[bytes, Array] = {}
 
@@ -46,20 +47,6 @@ class Products:
         """Columns times the inverse covariance of each level, (levels, n, k)."""
         found = [self.noise.precision_times(columns, ratio) for ratio, _c in self.noise.tail_levels]
         return np.array([product for product, _log in found]), [log for _product, log in found]
-
-    def _of(self, columns: EffectColumns) -> tuple[Array, Array]:
-        return self.noise.squares(columns), columns.onto(self._weighted_data)
-
-    def replaced(self, changed: Places, columns: Array) -> Products:
-        """The same for effects of which some are others."""
-        other = object.__new__(Products)
-        other.__dict__.update(self.__dict__)
-        other.columns = self.columns.replaced(changed, columns)
-        other.square, other.along = self.square.copy(), self.along.copy()
-        other.square[:, changed], other.along[:, changed] = self._of(EffectColumns.of(columns))
-        other._cross = {}
-        other._onto = {}
-        return other
 
     def cross(self, member: int) -> Array:
         """Products of all effects with one of them, shape (levels, p)."""

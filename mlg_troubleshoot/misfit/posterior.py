@@ -18,11 +18,9 @@ from mlg_troubleshoot.misfit.marginal import Marginal, Products
 MOST = 4
 BEAM = 16
 _LEADING = 6
-# Log-likelihood behind the likeliest set from which one is not extended; half of it is that from
-# which the own effects of a context are not asked for. Of what lies twice as far behind the sets
-# are not kept.
+# Log-likelihood behind the likeliest set from which one is not extended. Of what lies twice as far
+# behind the sets are not kept.
 REACH = float(np.log(10_000))
-OWN = REACH / 2
 _TRACE = float(np.exp(-2 * REACH))
 
 
@@ -105,7 +103,7 @@ class _Search:
         self.once, self.number = self.effects.numbered
 
     def marginal(self, context: int) -> Marginal:
-        """The likelihoods in a context, with the effects that it changes."""
+        """The likelihoods in a context."""
         if context not in self._marginals:
             self._marginals[context] = Marginal(
                 self.products, self.effects, self.contexts[context], self.beliefs
@@ -155,32 +153,10 @@ class _Search:
             self.extend(context, none)
         for found in start:
             self.extend(found.context, frozenset(found.members))
-        self._own_columns()
         for _ in range(self.most):
             self._beams()
             if not self._neighbours():
                 break
-
-    def _own_columns(self) -> None:
-        """Where a context that changes the effects themselves is likely, look again with these."""
-        for context, about in enumerate(self.contexts):
-            found = self.extended[context, frozenset[int]()]
-            likely = max(found.own.log_posterior, float(np.max(found.further, initial=-np.inf)))
-            top = max(
-                float(np.max(other.further, initial=other.own.log_posterior))
-                for other in self.extended.values()
-            )
-            if about.columns is None or likely < top - OWN:
-                continue
-            columns = about.columns()
-            changed = self.effects.kept.unlike(columns)
-            own = self.products.replaced(changed, columns.take(changed))
-            self._marginals[context] = Marginal(own, self.effects, about, self.beliefs)
-            stale = [key for key in (*self.extended, *self._alone) if key[0] == context]
-            for key in stale:
-                self.extended.pop(key, None)
-                self._alone.pop(key, None)
-            self.extend(context, frozenset())
 
     def _beams(self) -> None:
         """Extend the likeliest sets that are not yet, those in a context and those in none."""

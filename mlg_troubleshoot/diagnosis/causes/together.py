@@ -57,8 +57,7 @@ class Block:
         effects. [in]
     covariance, shape (k, k): covariance of the changes of the factors about none. [1] share:
     how likely it is of the blocks of its cause. [1] changes, shape (m,): equally likely changes
-    of a joint, skewed: most lose little, a few lose much. [1] model: the linkage that they are the
-    way to, if they are the way to a certain one.
+    of a joint, skewed: most lose little, a few lose much. [1]
     """
 
     cause: JointFactors
@@ -67,7 +66,6 @@ class Block:
     covariance: Array
     share: float
     changes: Array | None = None
-    model: LinkageModel | None = None
 
     def skew(self, along: Array, square: Array) -> float:
         """Log-likelihood by which the skewed prior beats the normal one, for exp(aᵀx − xᵀQx/2) of
@@ -250,7 +248,6 @@ class OtherGeometry(JointFactors):
         closes = np.isfinite(bent).all(axis=1)
         bent = bent[closes]
         apart = apart[closes]
-        closing = [ensemble[k] for k in np.flatnonzero(closes).tolist()]
         curves = _curves(scene, ensemble)
         columns = np.column_stack([found[0].columns, *bent, curves])
         even = block_diag(np.eye(len(bent)) / max(len(bent), 1), np.eye(curves.shape[1]))
@@ -270,9 +267,8 @@ class OtherGeometry(JointFactors):
                 covariance=np.outer([*own, 1.0], [*own, 1.0])
                 + np.diag([NEAR**2] * len(own) + [1e-9]),
                 share=0.5 / len(bent),
-                model=other,
             )
-            for bend, own, other in zip(bent, apart, closing, strict=True)
+            for bend, own in zip(bent, apart, strict=True)
         ]
         return [*between, *members]
 
