@@ -68,10 +68,11 @@ class Rows:
     clearances that were not read: its own, and common to its gear's rows. [in] unread_in, shape (n,
     k): what joints that nobody read may add or lack in all rows together, each at one standard
     deviation. [in] along_in, shape (n, k): what is not known of rows along the stroke, and of
-    digits that may be cut off, each at one standard deviation. [in] drawn_in, shape (n,): by how much the prediction from the readings as
-    they are lies above the one with all of them drawn to their expectation. [in] trends, shape (n,
-    k): shapes of trends and habits that are always there in some small measure. [1] readers, shape
-    (n, k): rows of each gauge, and of each technician. [1]
+    digits that may be cut off, each at one standard deviation. [in] drawn_in, shape (n,): by how
+    much the prediction from the readings as they are lies above the one with all of them drawn to
+    their expectation. [in] trends, shape (n, k): shapes of trends and habits that are always there
+    in some small measure. [1] readers, shape (n, k): rows of each gauge, and of each technician.
+    [1]
     """
 
     predicted_in: Array
