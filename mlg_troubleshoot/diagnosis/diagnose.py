@@ -639,7 +639,8 @@ def _enough(table: DiagnosisTable) -> None:
         return
     if len(table) < LEAST_ROWS:
         raise InconclusiveDataError(
-            f"{len(table)} usable rows are too few: a cause would be a guess",
+            f"{len(table)} usable row{' is' if len(table) == 1 else 's are'} too few: a cause would"
+            " be a guess",
             f"Record at least {LEAST_ROWS} inspections with measured displacements; 100 and more"
             " are better.",
         )

@@ -466,7 +466,8 @@ def _suspects(
     screen = _Screen(model, table, usual, rest, named, scale, repeat, inspection_of(table))
     # An entry error is in one cell or in two, or in so many that any two of them show it.
     lost = np.sort(-student(usual.off(table.clearance_in) / usual.spread, 1.0))[:, -2:].sum(axis=1)
-    lost -= student((rest - np.nanmedian(rest)) / scale, 1.0)
+    middle = np.median(rest[np.isfinite(rest)]) if np.isfinite(rest).any() else 0.0
+    lost -= student((rest - middle) / scale, 1.0)
     lost -= student(np.diff(np.sort(table.readings_in)) / screen.repeat_in, 1.0).sum(axis=1)
     suspects = (lost > np.log(_KINDS / _WRONG)) | ~np.isfinite(rest)
     suspects &= np.isfinite(table.readings_in).any(axis=1)

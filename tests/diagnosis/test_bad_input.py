@@ -284,6 +284,14 @@ def test_what_a_refused_table_lost_is_said(tmp_path: Path) -> None:
     assert any("1 with an error" in said for said in warnings)
 
 
+def test_a_table_whose_only_linkage_does_not_close_is_refused_in_words(tmp_path: Path) -> None:
+    (row,) = inspections(1, 0.02)
+    row[5] = 5.0
+    found = run(str(write(tmp_path / "t.csv", [row], "plunger_displacement_in")))
+    assert found.exit_code == 3
+    assert "1 usable row is too few" in found.stderr
+
+
 def test_a_header_can_be_named(tmp_path: Path) -> None:
     rows = [[*row, 0.02 + 0.001 * k] for k, row in enumerate(inspections(5))]
     file = write(tmp_path / "t.csv", rows, "Weg")
