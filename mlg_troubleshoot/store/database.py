@@ -608,7 +608,9 @@ class Store:
             return sorted((str(row.tail_no), str(row.side)) for row in rows)
 
     def marks(self) -> dict[tuple[str, str], str]:
-        """A hash of all that stands in the records of each gear, which are not unpacked."""
+        """A hash of all that stands in the records of each gear, which are not unpacked;
+        `StoreError` where a tail number or a side cannot be read.
+        """
         found: defaultdict[tuple[str, str], Any] = defaultdict(hashlib.sha256)
         with self.transaction(writing=False) as connection:
             wanted = sql.select(*_MARKED).order_by(_records.c.seq).limit(_AT_ONCE)
@@ -618,12 +620,13 @@ class Store:
                 # Rows of the driver: those of SQLAlchemy take twice as long.
                 rows = connection.execute(after).cursor.fetchall()
                 for seq, tail_no, side, texts, digest, body in rows:
-                    found[str(tail_no), str(side)].update(
-                        b"%d %a %b%b" % (seq, texts, digest, body)
-                    )
+                    found[tail_no, side].update(b"%d %a %b%b" % (seq, texts, digest, body))
                 if len(rows) < _AT_ONCE:
                     break
                 last = rows[-1][0]
+        if any(type(text) is not str for key in found for text in key):
+            # Reading the records names the one that is damaged.
+            self.all()
         return {key: own.hexdigest() for key, own in sorted(found.items())}
 
     def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:

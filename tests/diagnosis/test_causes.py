@@ -121,6 +121,16 @@ def test_a_convention_slip_is_expected_where_the_clearances_look_twice_as_worn(g
     assert written > read + 4.0
 
 
+def test_a_gear_that_was_never_read_hides_no_convention_slip(gear: Gear) -> None:
+    plain = fleet(gear.model)
+    own = plain.factors["tail_no"] == "N103"
+    twice = plain.clearance_in * np.where(own, 2.0, 1.0)[:, None]
+    unread = plain.gears == sorted(plain.gears)[-1]
+    twice[unread] = np.nan
+    scene = scene_of(gear.model, replace(plain, clearance_in=twice), gear.discrepancies)
+    assert "tail N103" in {each.target for each in BY_NAME["convention_slip"].candidates(scene)}
+
+
 def test_tilt_shrinks_a_link_by_the_cosine_of_its_floats_over_the_span(scene: Scene) -> None:
     cause, span = OutOfPlaneTilt(), 1.5
     factors = cause.adjust(scene, only(cause, scene), 1.0 / span**2).scaled["length.3-5"]

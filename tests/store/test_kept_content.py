@@ -256,6 +256,7 @@ READ_WRONGLY: dict[str, tuple[str, tuple[object, ...]]] = {
     "a body that is none": ("UPDATE mlg_records SET body = ? WHERE seq = 1", (b"\x00\x01",)),
     "a body that is a number": ("UPDATE mlg_records SET body = 99999999999 WHERE seq = 1", ()),
     "a body that is a text": ("UPDATE mlg_records SET body = 'text' WHERE seq = 1", ()),
+    "a tail that is not text": ("UPDATE mlg_records SET tail_no = ? WHERE seq = 1", (b"\x8c",)),
     "a hash that is a number": ("UPDATE mlg_records SET hash = 99999999999 WHERE seq = 1", ()),
 }
 NOT_A_CHAIN: dict[str, tuple[str, tuple[object, ...]]] = {

@@ -125,21 +125,20 @@ def _odds_of_wear(table: DiagnosisTable, setting: Any) -> float:
     """Logarithm of how many times likelier the clearances themselves are if they were written so:
     their joints look twice, or half, as worn as their landings make expect of the fleet.
     """
-    rows = _rows_of(table, setting)
     apart = _log_wear(table)
-    gears = gears_of(table)
     known = np.isfinite(apart)
-    rows &= known
+    rows = _rows_of(table, setting)[known]
     if not rows.any():
         return 0.0
-    count = np.maximum(np.bincount(gears[known]), 1)
-    mean = np.bincount(gears[known], apart[known]) / count
-    within = np.sum((apart - mean[gears])[known] ** 2) / max(known.sum() - len(mean), 1)
+    apart = apart[known]
+    gears = np.unique(gears_of(table)[known], return_inverse=True)[1]
+    mean = np.bincount(gears, apart) / np.bincount(gears)
+    within = np.sum((apart - mean[gears]) ** 2) / max(len(apart) - len(mean), 1)
     share = np.bincount(gears[rows]) / rows.sum()
     variance = robust_scale(mean) ** 2 * np.sum(share**2) + within / rows.sum()
     variance += Beliefs().exact ** 2
     slip = np.log(setting["written_factor"])
-    off = np.mean(apart[rows]) - np.median(apart[known])
+    off = np.mean(apart[rows]) - np.median(apart)
     return float(slip * (off - 0.5 * slip) / variance)
 
 
