@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from mlg_troubleshoot.cli.output import say_written
+from mlg_troubleshoot.errors import OutputError
+from mlg_troubleshoot.reporting.publish import WrittenReport
 from mlg_troubleshoot.workflows import check as task
 from tests.cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 
@@ -61,6 +64,14 @@ def occupied(tmp_path: Path) -> Path:
     path = tmp_path / "occupied"
     path.write_text("", encoding="utf-8")
     return path
+
+
+def test_reports_of_which_no_file_could_be_made_end_with_the_notes_that_say_why(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(OutputError, match="no report could be written"):
+        say_written([WrittenReport(None, None, ("no PDF: the engine stopped",))])
+    assert "Note: no PDF: the engine stopped" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("option", ["--report", "--csv", "--annotate"])
