@@ -68,7 +68,7 @@ class Import:
 
     @property
     def other(self) -> str:
-        """The room that it is taken from; a file at the top level is none."""
+        """The room that it is taken from; a file at the top level has no room."""
         first = (*self.module, self.name)[0]
         return first if (PACKAGE / first).is_dir() else ""
 

@@ -194,7 +194,7 @@ def word(data: str | None, style: str = "") -> Text:
 
 
 def joint(number: int | None) -> str:
-    """Return a joint for a cell: ``#3``, and a dash where there is none."""
+    """Return a joint for a cell: ``#3``, and a dash without one."""
     return "-" if number is None else f"#{number}"
 
 

@@ -121,7 +121,7 @@ class _Sheet:
         return dict(zip(self.header, self.rows[place], strict=False))
 
     def _read(self, place: int) -> str:
-        """The reading of a row with its unit; empty if there is none."""
+        """The reading of a row with its unit; empty without a reading."""
         known = (
             f"{text} {name.removeprefix('value_')}"
             for name, text in self._row(place).items()

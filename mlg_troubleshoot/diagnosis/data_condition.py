@@ -104,7 +104,7 @@ def doubt_of(found: tuple[DataCondition, ...]) -> str:
     Returns
     -------
     str
-        The reason, empty if there is none.
+        The reason, empty without one.
     """
     cut = [c.where for c in found if c.doubtful]
     if not cut:
@@ -162,7 +162,7 @@ def _duplicates(table: DiagnosisTable) -> Mask:
 
 
 def _before(table: DiagnosisTable) -> Places:
-    """The gear's inspection before each row's, -1 where there is none, shape (n,)."""
+    """The gear's inspection before each row's, -1 for the first, shape (n,)."""
     found = np.full(len(table), -1)
     for rows in visits(table).values():
         found[rows[1:]] = rows[:-1]

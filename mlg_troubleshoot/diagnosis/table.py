@@ -92,7 +92,7 @@ class DiagnosisTable(Result):
 
     @property
     def measured_in(self) -> Array:
-        """Mean of the readings of each row, shape (n,); NaN where there is none. [in]"""
+        """Mean of the readings of each row, shape (n,); NaN without readings. [in]"""
         count = np.isfinite(self.readings_in).sum(axis=1)
         total = np.nansum(self.readings_in, axis=1)
         return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -295,7 +295,7 @@ def wear_history(
     """Expect joints in each row from what was read of them, of its gear and of the fleet; each
     joint on its own.
 
-    reading_in, shape (n,) or (n, n_joints): readings, NaN where there is none. [in]
+    reading_in, shape (n,) or (n, n_joints): readings, NaN if not read. [in]
     gears, kilo, shape (n,): gear of each row, and its landings in thousands.
     reading_in2: variance of each reading as declared, of the same shape. [in²]
     says: intervals of what the gauge showed, where readings were rounded.

@@ -50,7 +50,7 @@ class Indices:
 
     @property
     def half_width(self) -> float:
-        """Largest half width of all intervals; NaN if there are none. [1]"""
+        """Largest half width of all intervals; NaN without any. [1]"""
         widths = [
             np.diff(i, axis=1) for i in (self.first_order_interval, self.total_order_interval)
         ]

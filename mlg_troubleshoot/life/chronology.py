@@ -17,7 +17,7 @@ _MOST_NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Date (ISO 8601, empty if there is none) and landings of one inspection or repair."""
+    """Date (ISO 8601, empty if not known) and landings of one inspection or repair."""
 
     day: str
     landings: float | None

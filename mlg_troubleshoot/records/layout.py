@@ -39,7 +39,7 @@ class Header:
 
     row: its row (the lower one of two), counted from 1. texts: one for each field, trailing blanks
     included. rows_used: the rows that belong to it: one, or two where the header has two rows or a
-    row of units below. units: unit of each column from a row of units; empty if there is none.
+    row of units below. units: unit of each column from a row of units; empty without one.
     """
 
     row: int
@@ -93,7 +93,7 @@ def header_score(cells: Cells, options: ReadOptions) -> int:
             doubtful += mapped or bool(found.reason)
     columns = {column for column, _ in known}
     core = len(columns & {*IDENTITY, CLEARANCE}) + bool(doubtful)
-    # A table of clearances alone is a table, too: what it lacks is then named column by column.
+    # A table of clearances alone is also a table: what it lacks is then named column by column.
     clearances = sum(column is CLEARANCE and number is not None for column, number in known)
     if clearances < 2 and (core < 2 or len(known) + doubtful < 3):
         return 0

@@ -111,7 +111,7 @@ class WearInTime:
 
     @classmethod
     def of(cls, life: GearLife, ahead: Forecast, gear: Gear) -> WearInTime | None:
-        """The joints that were read at known landings; None if there is none."""
+        """The joints that were read at known landings; None without any."""
         from mlg_troubleshoot.life.wear_paths import stretches
 
         known = stretches(life, gear.joint_numbers)

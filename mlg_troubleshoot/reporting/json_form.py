@@ -135,8 +135,8 @@ def kept_as_json(assessment: Assessment) -> dict[str, Any]:
 
 
 class CheckText:
-    """The same form as JSON text, block by block, one inspection a line: a large batch never stands
-    in memory. `begin`, the lines of each block, `end`.
+    """The same form as JSON text, block by block, one inspection per line: a large batch never
+    stands in memory. `begin`, the lines of each block, `end`.
     """
 
     def __init__(

@@ -54,7 +54,7 @@ class Schematic:
     """The linkage drawn in its planes, all at one scale.
 
     panels: name of each plane, its drawing and the drawing's width [canvas units]. exaggeration:
-    how many times larger than life the virtual links are drawn; None if there are none.
+    how many times larger than life the virtual links are drawn; None without any.
     """
 
     panels: tuple[tuple[str, Markup, float], ...]

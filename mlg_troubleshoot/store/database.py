@@ -173,7 +173,7 @@ class Record:
 
     @property
     def identity_hash(self) -> bytes:
-        """Hash of the identity, or of the whole content where there is none."""
+        """Hash of the identity, or of the whole content without one."""
         what = self.identity or (
             self.record_id,
             self.tail_no,

@@ -79,7 +79,7 @@ class Drafts:
             return [Draft(*row) for row in rows]
 
     def discard(self, draft_id: str) -> None:
-        """Delete a draft; nothing happens if there is none."""
+        """Delete a draft; nothing happens if it does not exist."""
         if self.store.is_new:
             return
         with self.store.transaction(writing=True) as connection:

@@ -43,7 +43,7 @@ class Samples(Result):
     Parameters
     ----------
     samples : ndarray, shape (..., n_samples)
-        Samples on the last axis, before it one axis a question. [as asked]
+        Samples on the last axis, before it one axis per question. [as asked]
     """
 
     samples: Array

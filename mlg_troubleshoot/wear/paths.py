@@ -108,7 +108,7 @@ class Steps:
 
 
 def grid_step(values: Array) -> float:
-    """Step of the grid that all readings lie on, 0 if there is none."""
+    """Step of the grid that all readings lie on, 0 without one."""
     unique = np.unique(np.round(values, _DECIMALS))
     if len(unique) < 3:
         return 0.0

@@ -54,22 +54,25 @@ def test_a_value_that_smaller_ones_are_written_as_is_a_mixture() -> None:
     assert (mean[0, 0], variance[0, 0]) == pytest.approx((said.mean(), said.var()), rel=0.02)
 
 
-def test_each_technician_has_a_step_of_his_own(table: DiagnosisTable) -> None:
+def with_a_coarse_technician(table: DiagnosisTable) -> tuple[DiagnosisTable, np.ndarray]:
+    """Clearances to 0.0001 in, those of the first technician to 0.001 in; his rows."""
     people = table.factors["technician_id"]
-    first = people == people[0]
+    his = people == people[0]
     values = with_step(table.clearance_in, 0.0001)
-    values[first] = with_step(values[first], 0.001)
-    steps = steps_of(replace(table, clearance_in=values))
-    assert set(steps[first]) == {0.001}
-    assert set(steps[~first]) == {0.0001}
+    values[his] = with_step(values[his], 0.001)
+    return replace(table, clearance_in=values), his
+
+
+def test_each_technician_has_a_step_of_his_own(table: DiagnosisTable) -> None:
+    written, coarse = with_a_coarse_technician(table)
+    steps = steps_of(written)
+    assert set(steps[coarse]) == {0.001}
+    assert set(steps[~coarse]) == {0.0001}
 
 
 def test_only_who_writes_coarse_steps_may_have_cut_digits_off(table: DiagnosisTable) -> None:
-    people = table.factors["technician_id"]
-    coarse = people == people[0]
-    values = with_step(table.clearance_in, 0.0001)
-    values[coarse] = with_step(values[coarse], 0.001)
-    lacks = cut_off(replace(table, clearance_in=values))
+    written, coarse = with_a_coarse_technician(table)
+    lacks = cut_off(written)
     assert lacks.shape == (len(table), 1)
     assert lacks[:, 0] == pytest.approx(np.where(coarse, 0.0005 * np.sqrt(0.5), 0.0))
     fine = replace(table, clearance_in=with_step(table.clearance_in, 0.0005))

@@ -163,7 +163,7 @@ class Desk:
         return self.write(name, damaged(whole, self.rng))
 
     def special(self, name: str) -> str:
-        """Make something that is no regular file: a pipe that nobody writes to, or a folder."""
+        """Make something that is not a regular file: a pipe that nobody writes to, or a folder."""
         path = self.work / name
         if self.rng.random() < 0.5:
             os.mkfifo(path)

@@ -2,7 +2,7 @@
 coordinates.
 
 Each loop of the mechanism is closed numerically in three dimensions: five unknowns (four lever
-angles and the plunger's travel), five residuals (one a loop), a general root finder. There is no
+angles and the plunger's travel), five residuals (one per loop), a general root finder. There is no
 law of cosines, no reduction to a plane and no order of the mechanism in it.
 """
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from tests.hidden_effect import departures, study
 
-# The studies set one thread a worker before numpy is loaded.
+# The studies set one thread per worker before numpy is loaded.
 import numpy as np  # isort: skip
 
 from tests.hidden_effect import simulator

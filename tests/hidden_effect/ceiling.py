@@ -3,8 +3,8 @@ nearest rival's.
 
     python -m tests.hidden_effect.ceiling --write
 
-Two effects that look alike are told apart, at best, by the likelihood ratio of the true effect and
-the rival that fits it best. In normal noise, with its size, the scatter between tails and
+Two effects that look alike are distinguished, at best, by the likelihood ratio of the true effect
+and the rival that fits it best. In normal noise, with its size, the scatter between tails and
 everything else known, the logarithm of that ratio has mean g and variance 2 g, with g half the
 squared distance of the two in units of the noise. So the best test prefers the true effect with
 the probability Φ(√(g / 2)), and is as sure of it as a name needs, both being equally likely

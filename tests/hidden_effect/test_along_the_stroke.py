@@ -2,7 +2,7 @@
 is enough.
 
 What was hidden is compared after the diagnosis, which reads the CSV file that the simulator wrote.
-The seeds of what one position cannot tell apart are those of eight at which it could not, those of
+The seeds of what one position cannot distinguish are those of eight at which it could not, those of
 a fleet without clearances once failed (one was AMBIGUOUS, one has a far reading that no slip
 explains, in one something was named, in one the rate was not); the others are the first ones tried.
 """

@@ -37,7 +37,7 @@ made = {"blank lines": b"\\n" * 60_000_000,
 import io
 start = time.process_time()
 found = read_inspections(io.BytesIO(made), ReadOptions(), name="t.csv")
-# what rusage gives is the parent's, too
+# what rusage gives is also the parent's
 peak = int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0])
 print(len(found.problems), time.process_time() - start, peak / 1000)
 """

@@ -150,7 +150,7 @@ def forged(place: Path, column: str, seq: int) -> Iterator[object]:
         changed = as_bytes[:at] + bytes([as_bytes[at] ^ 1]) + as_bytes[at + 1 :]
         yield changed.decode() if isinstance(value, str) else changed
     if isinstance(value, str):
-        # No text at all, and a text with a byte that is none.
+        # No text at all, and a text with a byte that is not text.
         yield b"\xff" + as_bytes
 
 

@@ -52,19 +52,19 @@ WRONG_INSPECTIONS = {
     "landings as a list": with_field(gear_landings=[1]),
     "a whole number of 400 digits": with_field(gear_landings=10**400),
     "another side than its record": with_field(side="RH"),
-    "a side that is none": with_field(side="XX"),
+    "a side that is not valid": with_field(side="XX"),
     "a side that is half a character": with_field(side="\ud800"),
-    "a convention that is none": with_field(convention="GUESSED"),
-    "a day that is none": with_field(inspection_date="9999-99-99"),
+    "a convention that is not valid": with_field(convention="GUESSED"),
+    "a day that is not valid": with_field(inspection_date="9999-99-99"),
     "a margin of zero": with_field(margin_in=0.0),
     "an uncertainty of zero": with_field(gauge_u_by_joint_in={"3": 0.0}),
     "a reading that no cell may hold": with_field(readings_in=[0.51]),
     "a number as a text": with_field(gear_landings="400"),
     "another day than its record": with_field(inspection_date="2026-01-03"),
     "an entry without a unit": with_field(entered={"3": ["4"]}),
-    "an entry with an end that is none": with_field(entered={"3": ["4", "thou", "~"]}),
-    "a source that is none": with_field(source=["file"]),
-    "remarks that are no texts": with_field(carried={"remarks": 3}),
+    "an entry with an end that is not valid": with_field(entered={"3": ["4", "thou", "~"]}),
+    "a source that is not valid": with_field(source=["file"]),
+    "remarks that are not text": with_field(carried={"remarks": 3}),
     "no tail": {
         "inspection": {k: v for k, v in SOUND.body["inspection"].items() if k != "tail_no"}
     },
@@ -72,11 +72,11 @@ WRONG_INSPECTIONS = {
 OTHERS: dict[str, tuple[RecordKind, Any]] = {
     "a correction of nothing": (RecordKind.CORRECTION, with_field()),
     "an assessment without a result": (RecordKind.ASSESSMENT, {"verdict": "WITHIN_MARGIN"}),
-    "an assessment with a verdict that is none": (
+    "an assessment with a verdict that is not valid": (
         RecordKind.ASSESSMENT,
         {"result": {**NUMBER, "verdict": "FINE"}},
     ),
-    "an assessment with joints that are none": (
+    "an assessment with joints that are not valid": (
         RecordKind.ASSESSMENT,
         {"result": {**NUMBER, "joints": [3]}},
     ),
@@ -85,7 +85,10 @@ OTHERS: dict[str, tuple[RecordKind, Any]] = {
         {"result": {**NUMBER, "next_action": "3"}},
     ),
     "a repair without joints": (RecordKind.REPAIR, {"landings": None}),
-    "a repair of a joint that is none": (RecordKind.REPAIR, {"joints": [99], "landings": None}),
+    "a repair of a joint that is not valid": (
+        RecordKind.REPAIR,
+        {"joints": [99], "landings": None},
+    ),
     "a repair of a joint that is true": (RecordKind.REPAIR, {"joints": [True], "landings": None}),
     "a repair at endless landings": (RecordKind.REPAIR, {"joints": [3], "landings": 1e308}),
     "a re-rigging at endless landings": (RecordKind.RERIG, {"landings": 1e308}),
@@ -252,8 +255,8 @@ COMMANDS: list[tuple[object, ...]] = [
     ("history", "repair", "N1", "LH", "--joint", "3", "--date", "2026-02-01"),
 ]
 READ_WRONGLY: dict[str, tuple[str, tuple[object, ...]]] = {
-    "a kind that is none": ("UPDATE mlg_records SET kind = 'inspektion' WHERE seq = 1", ()),
-    "a body that is none": ("UPDATE mlg_records SET body = ? WHERE seq = 1", (b"\x00\x01",)),
+    "a kind that is not valid": ("UPDATE mlg_records SET kind = 'inspektion' WHERE seq = 1", ()),
+    "a body that is not valid": ("UPDATE mlg_records SET body = ? WHERE seq = 1", (b"\x00\x01",)),
     "a body that is a number": ("UPDATE mlg_records SET body = 99999999999 WHERE seq = 1", ()),
     "a body that is a text": ("UPDATE mlg_records SET body = 'text' WHERE seq = 1", ()),
     "a tail that is not text": ("UPDATE mlg_records SET tail_no = ? WHERE seq = 1", (b"\x8c",)),

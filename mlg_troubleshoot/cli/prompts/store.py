@@ -187,7 +187,7 @@ class SessionStore:
             self.discard(session_id)
 
     def discard(self, session_id: str) -> None:
-        """Delete a session; nothing happens if there is none."""
+        """Delete a session; nothing happens if it does not exist."""
         for drafts in (*self._waiting, self._kept):
             with suppress(OutputError):
                 drafts.discard(session_id)

@@ -144,7 +144,7 @@ def _odds_of_wear(table: DiagnosisTable, setting: Any) -> float:
 
 def _log_wear(table: DiagnosisTable) -> Array:
     """Logarithm of the clearances of each row over what its landings make expect of the fleet; NaN
-    where there is none, shape (n,). [1]
+    without clearances, shape (n,). [1]
     """
     read = np.nan_to_num(table.clearance_in)
     known = np.isfinite(table.clearance_in)

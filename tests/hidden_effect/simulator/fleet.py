@@ -247,7 +247,7 @@ def _assign(
 
 
 def _tie(rng: np.random.Generator, alias: str, fleet: dict[str, Any]) -> dict[str, Any]:
-    """Rearrange gauges, technicians or sides so that two causes cannot be told apart."""
+    """Rearrange gauges, technicians or sides so that two causes cannot be distinguished."""
     tail, side, day = fleet["tail"], fleet["side"], fleet["day"]
     gauge, technician = fleet["gauge"].copy(), fleet["technician"].copy()
     result: dict[str, Any] = {}
