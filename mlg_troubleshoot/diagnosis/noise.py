@@ -17,6 +17,7 @@ from scipy.special import ndtri
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 
 # What is not a cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy
@@ -72,7 +73,8 @@ class Rows:
     much the prediction from the readings as they are lies above the one with all of them drawn to
     their expectation. [in] trends, shape (n, k): shapes of trends and habits that are always there
     in some small measure. [1] readers, shape (n, k): rows of each gauge, and of each technician.
-    [1]
+    [1] own, shape (n, k): rows of each value of a column that only this table has, which may be
+    shifted: that is not scatter between readers. [1]
     """
 
     predicted_in: Array
@@ -85,6 +87,7 @@ class Rows:
     drawn_in: Array
     trends: Array
     readers: tuple[Array, ...]
+    own: Array
 
 
 def estimate_repeatability(table: DiagnosisTable) -> tuple[float, str]:
@@ -126,9 +129,9 @@ def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> Wholes:
     return np.unique(np.asarray(tails), return_inverse=True)[1].astype(np.int64)
 
 
-def small_trends(table: DiagnosisTable) -> tuple[Array, tuple[Array, ...]]:
+def small_trends(table: DiagnosisTable) -> tuple[Array, tuple[Array, ...], Array]:
     """Trends and habits that are always there in some small measure: people, gauges, seasons,
-    wear.
+    wear; rows of each reader, and of each value of the table's own columns.
     """
     trends = []
     for values in table.quantities.values():
@@ -143,7 +146,8 @@ def small_trends(table: DiagnosisTable) -> tuple[Array, tuple[Array, ...]]:
         for name in ("gauge_id", "technician_id")
         if (levels := _levels(table, name)).shape[1] > 1
     )
-    return np.column_stack([*trends, *habits]), readers
+    own = np.hstack([habits[0][:, :0], *(_levels(table, name) for name in table.own_factors)])
+    return np.column_stack([*trends, *habits]), readers, own
 
 
 def _levels(table: DiagnosisTable, name: str) -> Array:
@@ -213,10 +217,11 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     )
     standard = rest / scale
     usual = [USUAL_RATIO * levels for levels in rows.readers]
+    shifted = Beliefs().shape_size * rows.own
     each_own = []
     for place, levels in enumerate(rows.readers):
         others = usual[:place] + usual[place + 1 :]
-        with_others = replace(noise, loadings=np.hstack([loadings, *others]))
+        with_others = replace(noise, loadings=np.hstack([loadings, *others, shifted]))
         each_own.append(_ratio(with_others, levels, standard) * levels)
     loadings = np.hstack([loadings, *each_own])
     alike = replace(noise, loadings=loadings, gear_ratio=0.0)

@@ -89,6 +89,13 @@ def test_a_column_of_the_tables_own_is_named_with_its_value(gear: Gear) -> None:
     assert names(gear, own_column(table, np.zeros(200))) == [("modification", "mod_status POST")]
 
 
+def test_bases_that_differ_are_not_scatter_of_the_readers_who_work_there(tmp_path: Path) -> None:
+    rows, truth = blemished_fleet("zero_by_base", "strong", 61_001, rows=150)
+    write_rows(rows, tmp_path / "bases.csv")
+    said = mlg("diagnose", tmp_path / "bases.csv", "--json").json
+    assert {(c["cause"], c["target"]) for c in said["causes"]} == set(truth.causes)
+
+
 def test_a_step_of_all_aircraft_is_not_a_modification(gear: Gear) -> None:
     def all_from(table: DiagnosisTable, _over: Array) -> Array:
         return 0.006 * (table.quantities["day"] >= 350)
