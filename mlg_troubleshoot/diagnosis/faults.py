@@ -9,11 +9,13 @@ fleet: rows that stand out together are an effect and stay.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, log_sum
@@ -54,6 +56,8 @@ _FACTORS = tuple(
 )
 _TOO_LARGE = tuple((kind, factor) for kind, factor in _FACTORS if factor < 1)
 _KINDS = 4
+# Computing only: rows of which all errors are weighed together.
+_AT_ONCE = 64
 # A new joint is as tight as this share of its readings; shares of rows in which the worst joint was
 # restored between its reading and that of the plunger, each as likely (of a scale: evenly in its
 # logarithm); rounds to fit level and scatter. [1]
@@ -108,45 +112,70 @@ class _Usual:
     expected: Array
     spread: Array
 
-    def off(self, clearance: Array, place: slice | int = slice(None)) -> Array:
-        """How far clearances lie off what is usual; by their logarithm if they are less. [in]"""
-        apart = clearance - self.expected[place]
-        size = self.expected[place] + _LEAST_SPREAD_IN
-        less = size * np.log((clearance + _LEAST_SPREAD_IN) / size)
-        return np.where(apart < 0.0, less, apart)
-
 
 @dataclass(frozen=True)
-class _Meant:
-    """What a row was meant to be, NaN where that is not known.
+class _Errors:
+    """The entry errors that a row may hold, none first, as what undoes them.
 
-    kind: entry error that made what is written of it; none if it is as written.
-    cells: what is wrong in the readings: column, what is written, what was meant; of the likeliest
-    one also in the clearances.
-    evidence: log-density of what is written given what was meant. [1]
+    kind, shape (n_errors,): kind of the error; empty for none.
+    order, shape (n_errors, n_cells): cell that each value belongs to; clearances, readings and the
+        extension stand in a row.
+    factor, shape (n_errors, n_cells): of these values, NaN where they mean nothing. [1]
+    changed, shape (n_errors, n_cells): 1 where an error made another value of one.
+    value, shape (n_errors, n_joints): place in `values` of the clearance of each joint.
+    values, shape (n_values, 3): every clearance that some error makes of a joint: joint, the joint
+        that it is read of, and factor.
     """
 
-    clearance: Array
-    readings: Array
-    extension: float
-    kind: str = ""
-    cells: tuple[tuple[str, float, float | None], ...] = ()
-    evidence: float = 0.0
+    kind: NDArray[np.str_]
+    order: Places
+    factor: Array
+    changed: Array
+    value: Places
+    values: Array
+
+    @classmethod
+    def of(cls, n_joints: int, n_readings: int) -> _Errors:
+        """The errors in a row of so many joints and readings."""
+        cells = np.arange(n_joints + n_readings + 1)
+        alone = list(cells[:-1, None])
+        joints = cells[:n_joints]
+        readings = cells[n_joints:-1]
+        repeated = [readings] if n_readings > 1 else []
+        # A gear may be worn less than any other: then all its clearances are small.
+        scaled = [(places, *error) for places in (*alone, *repeated) for error in _FACTORS]
+        too_large = [joints, cells[-1:]] if n_joints > 1 else [cells[-1:]]
+        scaled += [(places, *error) for places in too_large for error in _TOO_LARGE]
+        scaled += [(places, "implausible", np.nan) for places in (*alone, *repeated)]
+        pairs = list(combinations(joints.tolist(), 2))
+        kind = ["", *(kind for _places, kind, _factor in scaled), *["swapped_joints"] * len(pairs)]
+        factor = np.ones((len(kind), len(cells)))
+        order = np.tile(cells, (len(kind), 1))
+        for error, (places, _kind, by) in enumerate(scaled, 1):
+            factor[error, places] = by
+        for error, (a, b) in enumerate(pairs, 1 + len(scaled)):
+            order[error, [a, b]] = b, a
+        changed = (factor != 1.0).astype(float)
+        # Along the stroke an extension means nothing without the reading.
+        factor[np.isnan(factor[:, readings]).any(axis=1), -1] = np.nan
+        made = np.stack(np.broadcast_arrays(joints, order[:, joints], factor[:, joints]), axis=2)
+        made = np.nan_to_num(made, nan=np.inf)
+        values, value = np.unique(made.reshape(-1, 3), axis=0, return_inverse=True)
+        values[np.isinf(values)] = np.nan
+        return cls(np.array(kind), order, factor, changed, value.reshape(-1, n_joints), values)
+
+
+def _off(clearance: Array, expected: Array) -> Array:
+    """How far clearances lie off what is usual; by their logarithm if they are less. [in]"""
+    apart = clearance - expected
+    size = expected + _LEAST_SPREAD_IN
+    less = size * np.log((clearance + _LEAST_SPREAD_IN) / size)
+    return np.where(apart < 0.0, less, apart)
 
 
 def _normal(off: Array, spread: Array | float) -> Array:
     """Log-density of a normal distribution. [1]"""
     return np.asarray(-0.5 * (off / spread) ** 2 - np.log(spread * np.sqrt(2.0 * np.pi)))
-
-
-def _cells(
-    column: list[str], written: Array, meant: Array
-) -> tuple[tuple[str, float, float | None], ...]:
-    """Cells that are not what was meant."""
-    return tuple(
-        (column[k], float(written[k]), float(meant[k]) if np.isfinite(meant[k]) else None)
-        for k in np.flatnonzero(np.isfinite(written) & (written != meant))
-    )
 
 
 @dataclass(frozen=True)
@@ -169,21 +198,37 @@ class _Screen:
     repeat_in: float
     inspection: Places
 
-    def as_written(self, place: int) -> _Meant:
-        """A row as it is written."""
-        table = self.table
-        return _Meant(
-            table.clearance_in[place], table.readings_in[place], float(table.extension_in[place])
-        )
+    @cached_property
+    def errors(self) -> _Errors:
+        """What may be wrong in a row."""
+        return _Errors.of(self.table.clearance_in.shape[1], self.table.readings_in.shape[1])
 
-    def misfit_of(self, place: int, meant: list[_Meant]) -> Array:
-        """Misfit beyond what is explained, if the row was meant so. [in]"""
-        rows = self.table.take(np.full(len(meant), place))
-        extension = np.array([row.extension for row in meant])
-        readings = np.array([row.readings for row in meant])
-        quantities = {**rows.quantities, ALONG: extension}
+    def readings_of(self, cells: Array, along: Mask) -> Array:
+        """Readings that the cells of rows make, along the stroke less the position at rest. [in]"""
+        readings = cells[..., self.table.clearance_in.shape[1] : -1]
+        if not along.any():
+            return readings
+        at_rest = np.where(along, np.nan_to_num(self.model.plunger(cells[..., -1])), 0.0)
+        return np.asarray(readings - at_rest[..., None])
+
+    def written(self, places: Places) -> Array:
+        """Cells of rows as they are written, shape (n_places, n_cells)."""
+        table = self.table
+        along = table.along[places]
+        extension = table.extension_in[places]
+        readings = table.readings_in[places]
+        if along.any():
+            at_rest = np.nan_to_num(self.model.plunger(extension))
+            readings = readings + np.where(along, at_rest, 0.0)[:, None]
+        return np.column_stack([table.clearance_in[places], readings, extension])
+
+    def misfit_of(self, place: int, cells: Array) -> Array:
+        """Misfit beyond what is explained, if the cells of a row were meant so. [in]"""
+        rows = self.table.take(np.full(len(cells), place))
+        quantities = {**rows.quantities, ALONG: cells[:, -1]}
+        readings = self.readings_of(cells, rows.along)
         rows = replace(rows, readings_in=readings, quantities=quantities)
-        clearance = np.array([row.clearance for row in meant])
+        clearance = cells[:, : self.usual.expected.shape[1]]
         clearance = np.where(np.isfinite(clearance), clearance, self.usual.expected[place])
         over = predicted(self.model, rows, clearance)[0]
         return np.asarray(rows.measured_in - over - self.explained[place])
@@ -207,133 +252,109 @@ class _Screen:
         density = log_sum((density + np.log(weight[kept] / weight.sum())).T)
         return np.asarray(np.where(np.isfinite(misfit), density, -np.inf))
 
-    def evidence(self, place: int, meant: list[_Meant]) -> Array:
-        """Log-likelihood of a row but its misfit under each of what it may have been meant to be.
-        [1]
-        """
-        clearance = np.array([row.clearance for row in meant])
-        readings = np.array([row.readings for row in meant])
-        spread = self.usual.spread[place]
+    def wear(self, places: Places, written: Array) -> Array:
+        """Log-density of clearances by the wear of their gears, shape (n_places, n_errors). [1]"""
+        joint, source, factor = self.errors.values.T
+        joint = joint.astype(np.intp)
+        clearance = written[:, source.astype(np.intp)] * factor
+        spread = self.usual.spread[places][:, joint]
+        expected = self.usual.expected[places][:, joint]
         known = np.isfinite(clearance)
-        clearance = np.where(known, clearance, self.usual.expected[place])
-        wear = _normal(self.usual.off(clearance, place), spread)
-        others = self.inspection == self.inspection[place]
-        again = self.table.clearance_in[others & (self.table.row != self.table.row[place])]
-        if len(again):
+        clearance = np.where(known, clearance, expected)
+        wear = _normal(_off(clearance, expected), spread)
+        for row, place in enumerate(places):
+            others = self.inspection == self.inspection[place]
+            again = self.table.clearance_in[others & (self.table.row != self.table.row[place])]
             # Two rows do not hold the same slip: what both read of a joint that still moves is so.
-            off = clearance[:, None] - np.where(again < _WORN_OUT_IN, again, np.inf)
+            off = clearance[row] - np.where(again < _WORN_OUT_IN, again, np.inf)[:, joint]
             same = np.where(np.isfinite(off), _normal(off, _LEAST_SPREAD_IN), -np.inf)
-            wear = np.logaddexp(wear, logsumexp(same, axis=1)) - np.log1p(len(again))
+            wear[row] = log_sum(np.vstack([wear[row], same])) - np.log1p(len(again))
         # One of the joints may be worn out, as rarely as there is an entry error of one kind.
-        rare = np.log(_WRONG / _KINDS / clearance.shape[1] / _WORN_OUT_IN)
+        rare = np.log(_WRONG / _KINDS / self.usual.expected.shape[1] / _WORN_OUT_IN)
         wear = np.logaddexp(wear, np.where(clearance < _WORN_OUT_IN, rare, -np.inf))
         # A row that lies off the wear of its gear altogether says little of two of its joints.
         apart = np.where(known, -2.0 * (wear + np.log(spread * np.sqrt(2.0 * np.pi))), 0.0)
-        count = known.sum(axis=1)
-        apart = np.maximum(apart.sum(axis=1), 0.0)
-        together = 0.5 * (FREEDOM + count)
-        wear = gammaln(together) - together * np.log1p(apart / FREEDOM)
-        wear -= 0.5 * count * np.log(FREEDOM * np.pi) + np.where(known, np.log(spread), 0.0).sum(1)
-        repeats = student(np.diff(np.sort(readings)), self.repeat_in)
-        own = np.array([row.evidence for row in meant])
-        return np.asarray(own + wear + repeats.sum(axis=1))
+        apart, size, counted = (
+            each[:, self.errors.value].sum(axis=-1)
+            for each in (apart, np.where(known, np.log(spread), 0.0), known)
+        )
+        together = 0.5 * (FREEDOM + counted)
+        found = gammaln(together) - together * np.log1p(np.maximum(apart, 0.0) / FREEDOM)
+        return np.asarray(found - 0.5 * counted * np.log(FREEDOM * np.pi) - size)
 
-    def best(self, place: int) -> _Meant | None:
-        """The likeliest entry error of a row, if one is likely."""
-        meant = [self.as_written(place), *self.errors(place)]
-        often = Counter(row.kind for row in meant)
-        prior = [1.0 - _WRONG, *(_WRONG / _KINDS / often[row.kind] for row in meant[1:])]
-        found = np.log(prior) + self.evidence(place, meant)
-        read = np.array([np.isfinite(row.readings).any() for row in meant])
-        written = found[0] + self.near(place, self.rest[[place]])[0]
-        # The misfit need only be known of what may be likelier with the best one that there is.
-        possible = found - np.where(read, np.log(self.scale_in), 0.0) > written + np.log(_WRONG)
-        possible[0] = False
-        kept = np.flatnonzero(possible)
-        if not len(kept):
-            return None
-        meant = [meant[k] for k in kept]
-        found = found[kept]
-        read = read[kept]
-        found += np.where(read, self.near(place, self.misfit_of(place, meant)), 0.0)
-        if logsumexp(found) - written < Beliefs().odds:
-            return None
-        best = meant[int(np.argmax(found))]
-        written = self.table.clearance_in[place]
-        column = [f"clearance_{number}_in" for number in self.model.joint_numbers]
-        return replace(best, cells=(*_cells(column, written, best.clearance), *best.cells))
+    def repeats(self, readings: Array) -> Array:
+        """Log-density of the differences between the readings of a row. [1]"""
+        return np.asarray(student(np.diff(np.sort(readings)), self.repeat_in).sum(axis=-1))
 
-    def errors(self, place: int) -> Iterator[_Meant]:
-        """Every entry error that a row may hold."""
-        row = self.as_written(place)
-        written = row.clearance
-        known = [int(j) for j in np.flatnonzero(written > 0.0)]
-
-        def clearances(kind: str, joints: list[int], right: Array, evidence: float) -> _Meant:
-            meant = written.copy()
-            meant[joints] = right
-            return _Meant(meant, row.readings, row.extension, kind, (), evidence)
-
-        for joints in [*([j] for j in known), *([known] if len(known) > 1 else [])]:
-            # A gear may be worn less than any other: then all its clearances are small.
-            for kind, factor in _FACTORS if len(joints) == 1 else _TOO_LARGE:
-                size = len(joints) * min(float(np.log(factor)), 0.0)
-                yield clearances(kind, joints, written[joints] * factor, size)
+    def made(self, places: Places, cells: Array) -> Array:
+        """Log-density of the errors that made what is written in rows, and how often they occur;
+        none where there is nothing that can be so wrong. [1]
+        """
+        errors = self.errors
+        along = self.table.along[places]
+        written = np.isfinite(cells)
+        clearance, readings, extension = np.split(
+            cells, [self.usual.expected.shape[1], cells.shape[1] - 1], axis=1
+        )
+        end = _REACH * self.model.stroke[1]
+        far = ~along[:, None] | (
+            np.abs(readings) > _REACH * self.model.plunger(self.model.stroke[1])
+        )
+        size = np.hstack([clearance > 0.0, np.isfinite(readings) & far, extension > end])
         # A value that means nothing is large: a small one is what a restored joint has.
-        for j in [j for j in known if written[j] > self.usual.expected[place, j]]:
-            nothing = _ANYTHING - float(np.log(written[j]))
-            yield clearances("implausible", [j], np.full(1, np.nan), nothing)
-        known = [int(j) for j in np.flatnonzero(np.isfinite(written))]
-        for i, a in enumerate(known):
-            for b in known[i + 1 :]:
-                yield clearances("swapped_joints", [a, b], written[[b, a]], 0.0)
-        yield from self.reading_errors(place, row)
+        large = (clearance > 0.0) & (clearance > self.usual.expected[places])
+        nothing = np.hstack([large, np.isfinite(readings), np.zeros_like(extension, bool)])
+        lost = errors.kind == "implausible"
+        changed = errors.changed
+        count = np.where(lost, nothing @ changed.T, size @ changed.T)
+        moved = (errors.order != errors.order[0]).astype(float)
+        can = (count >= np.minimum(changed.sum(axis=1), 2.0)) & (written @ moved.T == moved.sum(1))
+        smaller = size @ np.nan_to_num(np.minimum(np.log(errors.factor), 0.0)).T
+        mean = np.abs(np.nan_to_num(cells) @ changed.T) / np.maximum(count, 1.0)
+        anything = _ANYTHING - np.log(mean + _LEAST_SPREAD_IN)
+        anything += (changed.sum(axis=1) > 1.0) * self.repeats(readings)[:, None]
+        often = np.maximum(can @ (errors.kind[:, None] == errors.kind).astype(float), 1.0)
+        prior = np.log(np.where(errors.kind == "", 1.0 - _WRONG, _WRONG / _KINDS / often))
+        return np.where(can, prior + np.where(lost, anything, smaller), -np.inf)
 
-    def reading_errors(self, place: int, row: _Meant) -> Iterator[_Meant]:
-        """Every entry error in the readings of a row, or in its extension."""
-        along = bool(self.table.along[place])
-        at_rest = float(np.nan_to_num(self.model.plunger(row.extension))) if along else 0.0
-        written = row.readings + at_rest
-        present = [int(k) for k in np.flatnonzero(np.isfinite(written))]
-        column = [
-            f"plunger_displacement{'' if k == 0 else f'_{k + 1}'}_in" for k in range(len(written))
-        ]
-        if along:
-            column = ["plunger_position_in"]
-
-        def readings(kind: str, places: list[int], right: Array, evidence: float) -> _Meant:
-            meant = written.copy()
-            meant[places] = right
-            cells = _cells(column, written, meant)
-            return replace(row, readings=meant - at_rest, kind=kind, cells=cells, evidence=evidence)
-
-        end = _REACH * float(self.model.plunger(self.model.stroke[1]))
-        for places in [*([k] for k in present), *([present] if len(present) > 1 else [])]:
-            if along and abs(float(written[places[0]])) <= end:
+    def best(self, places: Places) -> Iterator[tuple[int, str, Array]]:
+        """The likeliest entry error of each of some rows if one is likely, and the cells as they
+        were meant.
+        """
+        written = self.written(places)
+        meant = written[:, self.errors.order] * self.errors.factor
+        readings = self.readings_of(meant, self.table.along[places][:, None])
+        found = self.made(places, written) + self.repeats(readings)
+        found += self.wear(places, written)
+        read = np.asarray(np.isfinite(readings).any(axis=-1))
+        for place, likely, cells, known in zip(places.tolist(), found, meant, read, strict=True):
+            as_written = likely[0] + self.near(place, self.rest[[place]])[0]
+            # The misfit need only be known of what may be likelier with the best one that there is.
+            bound = likely - np.where(known, np.log(self.scale_in), 0.0)
+            kept = 1 + np.flatnonzero(bound[1:] > as_written + np.log(_WRONG))
+            if not len(kept):
                 continue
-            for kind, factor in _FACTORS:
-                size = len(places) * min(float(np.log(factor)), 0.0)
-                yield readings(kind, places, written[places] * factor, size)
-        for k in present if len(present) > 1 else []:
-            nothing = _ANYTHING - float(np.log(abs(written[k]) + _LEAST_SPREAD_IN))
-            yield readings("implausible", [k], np.full(1, np.nan), nothing)
-        nothing = _ANYTHING - float(np.log(abs(float(np.nanmean(written))) + _LEAST_SPREAD_IN))
-        nothing += float(student(np.diff(np.sort(row.readings)), self.repeat_in).sum())
-        wrong = readings("implausible", present, np.full(len(present), np.nan), nothing)
-        if along:
-            at = row.extension
-            wrong = replace(wrong, cells=(*wrong.cells, (ALONG, at, None)))
-            for kind, factor in _FACTORS if at > _REACH * self.model.stroke[1] else ():
-                there = at * factor
-                yield replace(
-                    row,
-                    readings=written - float(self.model.plunger(there)),
-                    extension=there,
-                    kind=kind,
-                    cells=((ALONG, at, there),),
-                    evidence=float(np.log(factor)),
-                )
-        yield wrong
+            near = self.near(place, self.misfit_of(place, cells[kept]))
+            weighed = likely[kept] + np.where(known[kept], near, 0.0)
+            if logsumexp(weighed) - as_written >= Beliefs().odds:
+                best = kept[np.argmax(weighed)]
+                yield place, str(self.errors.kind[best]), cells[best]
+
+    def faults(self, place: int, kind: str, cells: Array) -> Iterator[DataFault]:
+        """The cells of a row that are not as they were meant."""
+        along = bool(self.table.along[place])
+        reading = "plunger_position" if along else "plunger_displacement"
+        columns = [f"clearance_{number}_in" for number in self.model.joint_numbers]
+        columns += [
+            f"{reading}{f'_{k}' if k > 1 else ''}_in"
+            for k in range(1, 1 + self.table.readings_in.shape[1])
+        ]
+        written = self.written(np.array([place]))[0]
+        values = zip((*columns, ALONG), written.tolist(), cells.tolist(), strict=True)
+        for column, value, right in values:
+            if np.isfinite(value) and value != right:
+                suggested = f"{right:.4g}" if np.isfinite(right) else None
+                yield DataFault.at(self.table, place, column, kind, f"{value:g}", suggested)
 
 
 def screen_faults(
@@ -345,23 +366,13 @@ def screen_faults(
     readings = table.readings_in.copy()
     extension = table.extension_in.copy()
     faults: list[DataFault] = []
-    for place in np.flatnonzero(suspects):
-        meant = screen.best(int(place))
-        if meant is None:
-            continue
-        clearance[place], readings[place] = meant.clearance, meant.readings
-        extension[place] = meant.extension
-        faults += [
-            DataFault.at(
-                table,
-                int(place),
-                column,
-                meant.kind,
-                f"{written:g}",
-                None if right is None else f"{right:.4g}",
-            )
-            for column, written, right in meant.cells
-        ]
+    places = np.flatnonzero(suspects)
+    for some in np.array_split(places, 1 + len(places) // _AT_ONCE):
+        for place, kind, cells in screen.best(some):
+            faults += screen.faults(place, kind, cells)
+            clearance[place] = cells[: clearance.shape[1]]
+            readings[place] = screen.readings_of(cells, table.along[place])
+            extension[place] = cells[-1]
     usable = np.asarray(np.isfinite(readings).any(axis=1))
     quantities = (
         {**table.quantities, ALONG: extension} if ALONG in table.quantities else table.quantities
@@ -465,7 +476,9 @@ def _suspects(
     repeat = _scale(np.append(apart, -apart))
     screen = _Screen(model, table, usual, rest, named, scale, repeat, inspection_of(table))
     # An entry error is in one cell or in two, or in so many that any two of them show it.
-    lost = np.sort(-student(usual.off(table.clearance_in) / usual.spread, 1.0))[:, -2:].sum(axis=1)
+    lost = np.sort(-student(_off(table.clearance_in, usual.expected) / usual.spread, 1.0))[
+        :, -2:
+    ].sum(axis=1)
     middle = np.median(rest[np.isfinite(rest)]) if np.isfinite(rest).any() else 0.0
     lost -= student((rest - middle) / scale, 1.0)
     lost -= student(np.diff(np.sort(table.readings_in)) / screen.repeat_in, 1.0).sum(axis=1)

@@ -17,6 +17,8 @@ from mlg_troubleshoot.diagnosis.noise import robust_scale, student
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
 _SIDES = ("LH", "RH")
+# Computing only: rows that are compared together.
+_AT_ONCE = 64
 
 
 def swapped_sides(table: DiagnosisTable, odds: float) -> list[tuple[int, str, str]]:
@@ -35,9 +37,14 @@ def swapped_sides(table: DiagnosisTable, odds: float) -> list[tuple[int, str, st
     for name in np.unique(tail[known]):
         gears = [np.flatnonzero(known & (tail == name) & (side == s)) for s in _SIDES]
         for mine, theirs in (gears, gears[::-1]):
-            for row in mine if len(mine) > 1 and len(theirs) else ():
-                own[row] = _off_line(day, landings, int(row), mine[mine != row], rate)
-                other[row] = _off_line(day, landings, int(row), theirs, rate)
+            if len(mine) < 2 or not len(theirs):
+                continue
+            for rows in np.array_split(mine, 1 + len(mine) // _AT_ONCE):
+                apart = mine != rows[:, None]
+                visits = np.broadcast_to(mine, apart.shape)[apart].reshape(len(rows), -1)
+                own[rows] = _off_line(day, landings, rows, visits, rate)
+                visits = np.broadcast_to(theirs, (len(rows), len(theirs)))
+                other[rows] = _off_line(day, landings, rows, visits, rate)
     judged = np.isfinite(own)
     if not judged.any():
         return []
@@ -55,16 +62,26 @@ def swapped_sides(table: DiagnosisTable, odds: float) -> list[tuple[int, str, st
     return swapped
 
 
-def _off_line(day: Array, landings: Array, row: int, visits: Places, rate: float) -> float:
-    """How far a row lies off what the visit of a gear that is nearest in time leads to, at the
+def _off_line(day: Array, landings: Array, rows: Places, visits: Places, rate: float) -> Array:
+    """How far each row lies off what the visit of a gear that is nearest in time leads to, at the
     median rate of its visits; one visit alone has the usual rate.
+
+    visits, shape (n_rows, n_visits): visits of the gear, for each row.
     """
-    visits = visits[np.argsort(day[visits], kind="stable")]
+    order = np.argsort(day[visits], axis=1, kind="stable")
+    visits = np.take_along_axis(visits, order, axis=1)
     step = np.diff(day[visits])
-    if step.any():
-        rate = float(np.median(np.diff(landings[visits])[step > 0.0] / step[step > 0.0]))
-    nearest = visits[np.argmin(np.abs(day[visits] - day[row]))]
-    return float(landings[row] - landings[nearest] - rate * (day[row] - day[nearest]))
+    later = step > 0.0
+    rates = np.full(visits.shape, np.inf)
+    np.divide(np.diff(landings[visits]), step, out=rates[:, 1:], where=later)
+    rates.sort(axis=1)
+    count = later.sum(axis=1, keepdims=True)
+    middle = np.maximum(np.hstack([count - 1, count]) // 2, 0)
+    median = np.take_along_axis(rates, middle, axis=1).mean(axis=1)
+    nearest = np.abs(day[visits] - day[rows, None]).argmin(axis=1)
+    at = visits[np.arange(len(rows)), nearest]
+    passed = np.where(count[:, 0] > 0, median, rate) * (day[rows] - day[at])
+    return np.asarray(landings[rows] - landings[at] - passed)
 
 
 def _by_visits(table: DiagnosisTable) -> Array:
