@@ -416,7 +416,7 @@ def allowances(cases: Cases, lower: Prediction) -> Array:
         worn = start[:, None, :] + wear[:, :, None] * np.eye(start.shape[1])
         senses = np.repeat(sense[:, 0], start.shape[1])
         links = reference.worst_links(worn.reshape(-1, start.shape[1]), senses)
-        exact = (senses * gear.model.displacement(list(links.T))).reshape(wear.shape)
+        exact = (senses * gear.model.displacement(list(links))).reshape(wear.shape)
         wear = np.clip(
             wear + (cases.margin_in[:, None] - exact) / np.maximum(slopes, 1e-9), 0.0, room
         )

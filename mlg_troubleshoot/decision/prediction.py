@@ -132,8 +132,8 @@ def predict(
 def _members(gear: Gear, adjustment: Adjustment, extension: Extension | None) -> list[Array]:
     """Worst case of the other linkages of the ensemble. [in]
 
-    Where clearances are small the expansion gives the directions at once; the displacement in them
-    is exact.
+    Where clearances are small the expansion gives the sense that governs and the directions at
+    once; the displacement in them is exact.
     """
     clearance = adjustment.clearance_in
     others = gear.ensemble_models[1:]
@@ -142,10 +142,9 @@ def _members(gear: Gear, adjustment: Adjustment, extension: Extension | None) ->
     rows = np.flatnonzero(~small)
     for model, response in zip(others, responses(gear)[1:], strict=True):
         member = np.empty(len(clearance))
-        part = np.concatenate([clearance[small], clearance[small]])
-        sense = np.repeat([1.0, -1.0], len(part) // 2)
-        sides = sense * model.displacement(list(response.worst_links(part, sense).T))
-        member[small] = np.maximum(*np.split(sides, 2))
+        part = clearance[small]
+        sense = response.sense(part)
+        member[small] = sense * model.displacement(list(response.worst_links(part, sense)))
         if len(rows):
             member[rows] = adjusted_worst_case(model, adjustment.take(rows)).magnitude_in
         members.append(member)

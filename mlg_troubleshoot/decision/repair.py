@@ -19,9 +19,9 @@ from mlg_troubleshoot.decision.second_order import Response, responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
 
-# Repair sets that are shown, and gears searched at once. [1]
+# Repair sets that are shown, and gears searched at once: more do not fit the cache. [1]
 _SHOWN = 5
-_ROWS = 256
+_ROWS = 32
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
 # may be off. [in]
 _ABOUT_IN = 5e-4
@@ -33,8 +33,8 @@ _AS_NEW_IN = 1e-4
 class Subsets:
     """All subsets of a gear's joints, the quickest to restore first, then the smallest.
 
-    weights: the same as 0 and 1, for sums; terms: with 1 where both joints of a pair are members,
-    the pairs as in an upper triangle. [1]
+    weights: the same as 0 and 1, for sums. [1]
+    binary: each as a number, its joints being the digits from the last on.
     alike: the same number for subsets of equally many joints in equal minutes.
     joints: numbers of the joints of each.
     to_measure: minutes to read them.
@@ -43,8 +43,8 @@ class Subsets:
     members: Mask
     weights: Array
     minutes: Array
+    binary: Places
     alike: Places
-    terms: Array
     joints: Sequence[tuple[int, ...]]
     to_measure: Sequence[float]
 
@@ -60,15 +60,14 @@ def subsets_of(gear: Gear) -> Subsets:
     members = members[order]
     minutes = minutes[order]
     joints = [tuple(numbers[row].tolist()) for row in members]
-    first, second = np.triu_indices(n)
     keys = np.column_stack([np.round(minutes, 6), members.sum(axis=1)])
     alike = np.cumsum(np.r_[0, np.any(np.diff(keys, axis=0) != 0.0, axis=1)])
     return Subsets(
         members,
         members.astype(float),
         minutes,
+        order,
         alike,
-        np.hstack([members, members[:, first] & members[:, second]]).astype(float),
         joints,
         [minutes_to_measure(gear, each) for each in joints],
     )
@@ -137,31 +136,49 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
         part = slice(start, start + _ROWS)
         some = now[part]
         gone = less[part]
-        members = [_restored_worst(linkage, table, some, gone) for linkage in linkages]
-        falls = members[0][:, :1] - members[0]
-        after = worst_in[part, None] - falls
+        members = _restored_worst(linkages, some, gone)
+        geometry = _variance(members)[table.binary]
+        first = members[0, table.binary]
+        falls = first[0] - first
+        after = worst_in[part] - falls
         # What the expansion misses grows with the square of the drop.
-        square = (falls / np.maximum(falls[:, -1:], 1e-12)) ** 2
-        after += _third_order(cases, some - gone, after[:, -1])[:, None] * square
-        geometry = _variance(members)
+        square = (falls / np.maximum(falls[-1], 1e-12)) ** 2
+        after += _third_order(cases, some - gone, after[-1]) * square
         model = model_uncertainty(after, cases.residual_u_in)
-        gauges = u_clearances_in[part, None] ** 2 - _variance_drop(
+        gauges = u_clearances_in[part] ** 2 - _variance_drop(
             linkages[0], table, some, gone, readings[part]
         )
-        u = np.sqrt(
-            np.maximum(gauges, 0.0) + cases.margin_u_in[part, None] ** 2 + geometry + model**2
-        )
-        slack[part] = cases.margin_in[part, None] - after - SCORE * u
+        u = np.sqrt(np.maximum(gauges, 0.0) + cases.margin_u_in[part] ** 2 + geometry + model**2)
+        slack[part] = (cases.margin_in[part] - after - SCORE * u).T
     return Search(table, np.where(barred | ~np.isfinite(slack), -np.inf, slack))
 
 
-def _restored_worst(linkage: Response, table: Subsets, now_in: Array, less_in: Array) -> Array:
-    """Worst case with each subset restored, by the expansion. [in]"""
-    first, second = np.triu_indices(less_in.shape[1])
-    curved = linkage.worst_curvature[first, second] * np.where(first == second, 0.5, 1.0)
-    curved = linkage.sense(now_in)[:, None] * curved * less_in[:, first] * less_in[:, second]
-    terms = np.hstack([-less_in * linkage.slopes(now_in), curved])
-    return np.asarray(linkage.magnitude(now_in)[:, None] + terms @ table.terms.T)
+def _restored_worst(linkages: Sequence[Response], now_in: Array, less_in: Array) -> Array:
+    """Worst case with each subset restored, by the expansion, (linkages, subsets, n): the subsets
+    as binary numbers, each made of the one without its last joint. [in]
+    """
+    sense, magnitude, slopes, curvature = (
+        np.array(each)
+        for each in (
+            [linkage.sense(now_in) for linkage in linkages],
+            [linkage.magnitude(now_in) for linkage in linkages],
+            [linkage.slopes(now_in) for linkage in linkages],
+            [linkage.worst_curvature for linkage in linkages],
+        )
+    )
+    less = less_in.T
+    count = len(less)
+    worst = np.empty((len(linkages), 2**count, len(now_in)))
+    worst[:, 0] = magnitude
+    added = np.empty_like(worst[:, : 2 ** (count - 1)])
+    for j in range(count):
+        bend = sense * less[j]
+        added[:, 0] = (0.5 * bend * curvature[:, j, j, None] - slopes[:, :, j]) * less[j]
+        for k in range(j):
+            pair = bend * curvature[:, k, j, None] * less[k]
+            np.add(added[:, : 2**k], pair[:, None], out=added[:, 2**k : 2 ** (k + 1)])
+        np.add(worst[:, : 2**j], added[:, : 2**j], out=worst[:, 2**j : 2 ** (j + 1)])
+    return worst
 
 
 def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
@@ -171,7 +188,7 @@ def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
     reference = responses(cases.gear)[0]
     sense = reference.sense(least_in)
     links = reference.worst_links(least_in, sense)
-    missed = sense * cases.gear.model.displacement(list(links.T)) - expanded_in
+    missed = sense * cases.gear.model.displacement(list(links)) - expanded_in
     return np.where(np.isfinite(missed), missed, 0.0)
 
 
@@ -182,10 +199,10 @@ def _variance_drop(
     [in²]
     """
     turned = (variance_in2 * linkage.slopes(clearance_in)) @ linkage.worst_curvature
-    return 2.0 * linkage.sense(clearance_in)[:, None] * ((less_in * turned) @ table.weights.T)
+    return 2.0 * linkage.sense(clearance_in) * (table.weights @ (less_in * turned).T)
 
 
-def _variance(members: Sequence[Array]) -> Array:
+def _variance(members: Array) -> Array:
     """Variance over the ensemble, without a copy of all of it. [in²]"""
     n = len(members)
     total = np.zeros_like(members[0])
@@ -194,7 +211,7 @@ def _variance(members: Sequence[Array]) -> Array:
         off = member - members[0]
         total += off
         square += np.multiply(off, off, out=off)
-    return np.maximum(square - total * total / n, 0.0) / max(n - 1, 1)
+    return np.asarray(np.maximum(square - total * total / n, 0.0) / max(n - 1, 1))
 
 
 def calibrated(cases: Cases, found: Search) -> Search:

@@ -70,17 +70,20 @@ class Response:
 
     def worst_links(self, clearance_in: Array, sense: Array | float) -> Array:
         """Virtual links in the worst directions of one sense, each along the gradient where the
-        others lead. [in]
+        others lead, (components, n). [in]
         """
-        towards = np.reshape(sense, (-1, 1))
+        # Gears run along the last axis: every operation then works on long rows of memory.
+        towards = sense * np.ascontiguousarray(clearance_in.T)
         # Without links the gradient is the same for every gear.
-        links = np.zeros((1, self.gradient.size))
+        links = np.zeros((self.gradient.size, 1))
         for _ in range(5):
-            gradient = towards * (self.gradient + links @ self.curvature)
-            x = gradient[:, 0::2]
-            y = gradient[:, 1::2]
-            length = np.maximum(np.sqrt(x * x + y * y), 1e-300)
-            links = np.repeat(clearance_in / length, 2, axis=1) * gradient
+            gradient = self.gradient[:, None] + self.curvature @ links
+            x = gradient[0::2]
+            y = gradient[1::2]
+            length = towards / np.maximum(np.sqrt(x * x + y * y), 1e-300)
+            links = np.empty((self.gradient.size, len(clearance_in)))
+            links[0::2] = length * x
+            links[1::2] = length * y
         return links
 
     def chance_beyond(self, clearance_in: Array, margin_in: Array, n: int) -> Array:

@@ -14,6 +14,7 @@ from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import allowances
 from mlg_troubleshoot.decision.plan import minutes_to_measure
 from mlg_troubleshoot.decision.prediction import predict
+from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
@@ -51,6 +52,20 @@ def probabilities_after(gear: Gear, *repairs: tuple[int, ...]) -> np.ndarray:
     )
     found = predict(gear, [inspected({})] * n, rows, np.ones((n, 10), bool), np.full(n, 0.0005))
     return found.probability_within(np.full(n, MARGIN_IN), np.zeros(n))
+
+
+def test_every_subset_is_expanded_at_the_clearances_that_it_leaves(gear: Gear) -> None:
+    now = np.random.default_rng(5).uniform(0.001, 0.01, (3, 10))
+    less = now - 0.0005
+    linkages = responses(gear)
+    found = repair._restored_worst(linkages, now, less)
+    table = repair.subsets_of(gear)
+    for place, members in zip(table.binary, table.members, strict=True):
+        left = np.where(members, now - less, now)
+        for linkage, worst in zip(linkages, found[:, place], strict=True):
+            over, under = linkage.worst(left)
+            expected = np.where(linkage.sense(now) > 0.0, over, -under)
+            np.testing.assert_allclose(worst, expected, rtol=0, atol=1e-14)
 
 
 def test_only_what_is_measured_and_worn_beyond_a_new_part_can_be_restored_with_a_gain(
