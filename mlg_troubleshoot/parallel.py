@@ -10,17 +10,20 @@ import pickle
 import signal
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache, partial
+from importlib import import_module
 from itertools import chain, islice
 from tempfile import SpooledTemporaryFile
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 from weakref import finalize
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
 
 _Item = TypeVar("_Item")
 _Part = TypeVar("_Part")
 _Found = TypeVar("_Found")
 
-# The task of a process of the pool: it travels there once, not with every part.
-_held: list[Callable[[Any], Any]] = []
 # Parts that are handed out to each process before one comes back: it never waits. [1]
 _AHEAD = 2
 # What is shorter stays in memory. [bytes]
@@ -70,10 +73,63 @@ def packed(make: Callable[[_Part], Sequence[Any]], part: _Part) -> tuple[bytes, 
     return pickle.dumps(made), len(made)
 
 
+class Processes:
+    """At most so many processes of this machine. They start with the first parts, or before while
+    parts are still being made: each takes as long to load this program as to judge some hundred
+    rows.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self._pool: Executor | None = None
+        self._ahead = 0
+
+    def start(self, count: int, module: str) -> None:
+        """Start as many as there will be parts at least, and load a module in each."""
+        while self.count > 1 and self._ahead < min(count, self.count):
+            self.submit(import_module, module)
+            self._ahead += 1
+
+    def submit(self, call: Callable[..., Any], *given: Any) -> Future[Any]:
+        if self._pool is None:
+            # Not loaded by what never starts one: a check of one gear.
+            from concurrent.futures import ProcessPoolExecutor
+            from multiprocessing import get_context
+
+            # Forking a process that has threads of its own can hang; a fresh interpreter cannot.
+            ignored = signal.SIGINT, signal.SIG_IGN
+            self._pool = ProcessPoolExecutor(
+                self.count, get_context("spawn"), initializer=signal.signal, initargs=ignored
+            )
+        # Ctrl-C reaches every process of the terminal: the one that asked ends the others. What
+        # starts here inherits that it is blocked.
+        if not hasattr(signal, "pthread_sigmask"):
+            return self._pool.submit(call, *given)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return self._pool.submit(call, *given)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if self._pool is None:
+            return
+        if kind is not None:
+            from multiprocessing import active_children
+
+            for child in active_children():
+                # Interrupted: the parts that are being computed are not needed.
+                child.terminate()
+        self._pool.shutdown(cancel_futures=True)
+
+
 def spread(
     task: Callable[[_Part], _Found],
     parts: Iterable[_Part],
-    workers: int = 1,
+    workers: int | Processes = 1,
     scheduler: Any = None,
     *,
     threads: bool = False,
@@ -81,18 +137,24 @@ def spread(
     """Compute each part; the results are handed out in the order of the parts, which are taken as
     they are needed.
 
-    workers: cores of this machine, unless `scheduler`, a Dask client, computes. threads: the task
-    releases the interpreter's lock, so that threads do, which share its memory.
+    workers: cores of this machine, or its processes, unless `scheduler`, a Dask client, computes.
+    threads: the task releases the interpreter's lock, so that threads do, which share its memory.
     """
     each = iter(parts)
     first = list(islice(each, 2))
     parts = chain(first, each)
+    count = workers.count if isinstance(workers, Processes) else workers
     if scheduler is not None:
         yield from _on_cluster(task, parts, scheduler)
-    elif workers > 1 and len(first) > 1:
-        yield from _on_this_machine(task, parts, workers, threads)
-    else:
+    elif count <= 1 or len(first) <= 1:
         yield from map(task, parts)
+    elif threads:
+        yield from _in_threads(task, parts, count)
+    elif isinstance(workers, Processes):
+        yield from _in_processes(task, parts, workers)
+    else:
+        with Processes(workers) as processes:
+            yield from _in_processes(task, parts, processes)
 
 
 def _on_cluster(
@@ -107,31 +169,24 @@ def _on_cluster(
         client.cancel(list(waiting))
 
 
-def _on_this_machine(
-    task: Callable[[_Part], _Found], parts: Iterable[_Part], workers: int, threads: bool
+def _in_threads(
+    task: Callable[[_Part], _Found], parts: Iterable[_Part], count: int
 ) -> Iterator[_Found]:
-    # Not loaded by what never starts a pool: a check of one gear.
-    from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-    from multiprocessing import active_children, get_context
+    from concurrent.futures import ThreadPoolExecutor
 
-    pool: Executor
-    if threads:
-        pool = ThreadPoolExecutor(workers)
-    else:
-        # Forking a process that has threads of its own can hang; a fresh interpreter cannot.
-        pool = ProcessPoolExecutor(
-            workers, mp_context=get_context("spawn"), initializer=_hold, initargs=(task,)
-        )
-    called: Callable[[Any], Any] = task if threads else _of_held
-    asked = (pool.submit(called, part) for part in parts)
-    waiting: deque[Future[Any]] = deque()
+    pool = ThreadPoolExecutor(count)
     try:
-        yield from _in_order(asked, _AHEAD * workers, waiting)
+        yield from _in_order((pool.submit(task, part) for part in parts), _AHEAD * count, deque())
     finally:
-        for child in active_children() if waiting and not threads else ():
-            # Interrupted: the parts that are being computed are not needed.
-            child.terminate()
         pool.shutdown(cancel_futures=True)
+
+
+def _in_processes(
+    task: Callable[[_Part], _Found], parts: Iterable[_Part], processes: Processes
+) -> Iterator[_Found]:
+    called = partial(_call_packed, pickle.dumps(task))
+    asked = (processes.submit(called, part) for part in parts)
+    yield from _in_order(asked, _AHEAD * processes.count, deque())
 
 
 def _in_order(asked: Iterator[Any], ahead: int, waiting: deque[Any]) -> Iterator[Any]:
@@ -148,11 +203,12 @@ def _called(task: Callable[[_Part], _Found], part: _Part) -> _Found:
     return task(part)
 
 
-def _hold(task: Callable[[Any], Any]) -> None:
-    # Ctrl-C reaches every process of the terminal: the one that asked ends the others.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _held[:] = [task]
+def _call_packed(task: bytes, part: Any) -> Any:
+    return _unpacked(task)(part)
 
 
-def _of_held(part: Any) -> Any:
-    return _held[0](part)
+@lru_cache(maxsize=1)
+def _unpacked(task: bytes) -> Callable[[Any], Any]:
+    """The task of a process: what it has worked out of a gear serves its next part."""
+    found: Callable[[Any], Any] = pickle.loads(task)
+    return found

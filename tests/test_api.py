@@ -101,6 +101,10 @@ def test_importing_the_package_loads_no_other_one() -> None:
     assert packages_of(loaded_by("import mlg_troubleshoot")) == {"mlg_troubleshoot"}
 
 
+def test_a_process_that_judges_rows_loads_no_command() -> None:
+    assert "mlg_troubleshoot.cli.app" not in loaded_by("import mlg_troubleshoot.__main__")
+
+
 @pytest.mark.parametrize("asked", [["--help"], ["check", "-h"], []])
 def test_help_loads_no_more_than_a_command_line_needs(asked: list[str]) -> None:
     assert packages_of(modules_of(*asked)) <= COMMAND_LINE

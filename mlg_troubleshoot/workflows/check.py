@@ -25,7 +25,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_lines, write_text
-from mlg_troubleshoot.parallel import spread
+from mlg_troubleshoot.parallel import Processes, spread
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from mlg_troubleshoot.workflows.index_tables import load_index_table
@@ -164,20 +164,28 @@ def check_files(
 
     options = options or CheckOptions()
     gear = load_gear(options.gear)
-    read = read_many(sources, ReadOptions.of(gear, options), progress=on_read)
-    rows = list(read.rows)
-    if outputs is not None:
-        read = replace(read, rows=())
-    found = CheckResult(
-        gear=gear,
-        judgements=(),
-        problems=read.problems,
-        notes=read.notes,
-        inputs_sha256=read.inputs_sha256,
-        read=read,
-        seed=options.seed,
-    )
-    return _judge(found, rows, options, on_judged, store, outputs)
+    with Processes(options.workers if options.scheduler is None else 1) as processes:
+
+        def counted(done: int, total: int | None) -> None:
+            if done > AT_ONCE:
+                processes.start(-(-done // AT_ONCE), __name__)
+            if on_read is not None:
+                on_read(done, total)
+
+        read = read_many(sources, ReadOptions.of(gear, options), progress=counted)
+        rows = list(read.rows)
+        if outputs is not None:
+            read = replace(read, rows=())
+        found = CheckResult(
+            gear=gear,
+            judgements=(),
+            problems=read.problems,
+            notes=read.notes,
+            inputs_sha256=read.inputs_sha256,
+            read=read,
+            seed=options.seed,
+        )
+        return _judge(found, rows, options, on_judged, store, outputs, processes)
 
 
 def check_inspection(
@@ -388,6 +396,7 @@ def _judge(
     on_judged: Callable[[int, int], None] | None = None,
     store: Store | None = None,
     outputs: Callable[[CheckResult, int], Sequence[BlockOutput]] | None = None,
+    processes: Processes | int = 1,
 ) -> CheckResult:
     """Judge rows; the list is empty afterwards."""
     total = len(rows)
@@ -421,11 +430,8 @@ def _judge(
         [output.make for output in wanted],
     )
     done = 0
-    single = len(waiting) == 1
-    judged = (
-        map(task, waiting) if single else spread(task, waiting, options.workers, options.scheduler)
-    )
-    for count, made in judged:
+    scheduler = options.scheduler if len(waiting) > 1 else None
+    for count, made in spread(task, waiting, processes, scheduler):
         for output, each in zip(wanted, made, strict=True):
             output.take(each)
         done += count

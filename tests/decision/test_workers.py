@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Judgement
-from mlg_troubleshoot.parallel import Blocks, spread
+from mlg_troubleshoot.parallel import Blocks, Processes, spread
 from mlg_troubleshoot.reporting.json_form import inspection_lines
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.check import BlockOutput, CheckOptions, check_files
@@ -80,6 +80,18 @@ def test_what_is_written_of_a_block_is_made_where_it_is_judged() -> None:
     )
     assert [count for _process, count in made] == [20, 20, 6]
     assert os.getpid() not in dict(made)
+
+
+def test_processes_start_while_a_long_table_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    header, *rows = BATCH.read_text(encoding="utf-8").splitlines()
+    long = tmp_path / "long.csv"
+    long.write_text("\n".join([header, *(rows * 14)]), encoding="utf-8")
+    started: list[int] = []
+    monkeypatch.setattr(Processes, "start", lambda _self, count, _module: started.append(count))
+    check_files([long], CheckOptions(workers=1), on_judged=lambda *_: started.append(0))
+    assert started == [2, 0, 0]
 
 
 @pytest.mark.usefixtures("many_parts")

@@ -227,7 +227,8 @@ def _in_the_child(
 
 
 def _called(line: Sequence[str]) -> int:
-    from mlg_troubleshoot.cli import app, prepare_streams
+    from mlg_troubleshoot.cli.app import app
+    from mlg_troubleshoot.cli.output import prepare_streams
 
     prepare_streams()
     try:
