@@ -12,4 +12,4 @@ def main() -> None:
     app(prog_name="mlg")
 
 
-__all__ = ["main"]
+__all__ = ["main", "remembered"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -164,14 +165,9 @@ def check_files(
 
     options = options or CheckOptions()
     gear = load_gear(options.gear)
-    with Processes(options.workers if options.scheduler is None else 1) as processes:
-
-        def counted(done: int, total: int | None) -> None:
-            if done > AT_ONCE:
-                processes.start(-(-done // AT_ONCE), __name__)
-            if on_read is not None:
-                on_read(done, total)
-
+    alone = options.workers <= 1 or options.scheduler is not None
+    with nullcontext() if alone else Processes(options.workers) as processes:
+        counted = on_read if processes is None else partial(_start, processes, on_read)
         read = read_many(sources, ReadOptions.of(gear, options), progress=counted)
         rows = list(read.rows)
         if outputs is not None:
@@ -186,6 +182,19 @@ def check_files(
             seed=options.seed,
         )
         return _judge(found, rows, options, on_judged, store, outputs, processes)
+
+
+def _start(
+    processes: Processes,
+    on_read: Callable[[int, int | None], None] | None,
+    done: int,
+    total: int | None,
+) -> None:
+    """Start processes for the blocks of rows that were read."""
+    if done > AT_ONCE:
+        processes.start(-(-done // AT_ONCE), __name__)
+    if on_read is not None:
+        on_read(done, total)
 
 
 def check_inspection(
@@ -396,7 +405,7 @@ def _judge(
     on_judged: Callable[[int, int], None] | None = None,
     store: Store | None = None,
     outputs: Callable[[CheckResult, int], Sequence[BlockOutput]] | None = None,
-    processes: Processes | int = 1,
+    processes: Processes | None = None,
 ) -> CheckResult:
     """Judge rows; the list is empty afterwards."""
     total = len(rows)
@@ -430,8 +439,11 @@ def _judge(
         [output.make for output in wanted],
     )
     done = 0
-    scheduler = options.scheduler if len(waiting) > 1 else None
-    for count, made in spread(task, waiting, processes, scheduler):
+    single = len(waiting) == 1
+    judged = (
+        map(task, waiting) if single else spread(task, waiting, processes or 1, options.scheduler)
+    )
+    for count, made in judged:
         for output, each in zip(wanted, made, strict=True):
             output.take(each)
         done += count

@@ -90,7 +90,7 @@ def test_processes_start_while_a_long_table_is_read(
     long.write_text("\n".join([header, *(rows * 14)]), encoding="utf-8")
     started: list[int] = []
     monkeypatch.setattr(Processes, "start", lambda _self, count, _module: started.append(count))
-    check_files([long], CheckOptions(workers=1), on_judged=lambda *_: started.append(0))
+    check_files([long], CheckOptions(workers=2), on_judged=lambda *_: started.append(0))
     assert started == [2, 0, 0]
 
 
