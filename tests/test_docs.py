@@ -62,7 +62,7 @@ def test_exit_code_1_is_explained_beside_the_command() -> None:
 
 
 # Pages of many long commands: run with the slow part.
-LONG = {"life-of-a-gear.md", "diagnosis-solution.md"}
+LONG = {"life-of-a-gear.md", "diagnosis-solution.md", "robot-arm.md", "groundwater-heads.md"}
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,14 @@ def test_there_are_sessions() -> None:
     assert len(SESSIONS) > 5
 
 
-@pytest.mark.parametrize("example", list(find_examples(*PAGES)), ids=str)
+@pytest.mark.parametrize(
+    "example",
+    [
+        pytest.param(example, marks=[pytest.mark.slow] * (example.path.name in LONG))
+        for example in find_examples(*PAGES)
+    ],
+    ids=str,
+)
 def test_the_python_examples_are_true(example: CodeExample, eval_example: EvalExample) -> None:
     eval_example.run_print_check(example)
 

@@ -109,6 +109,7 @@ def test_the_sense_of_the_displacement_tells_little(gear: Gear) -> None:
     )
 
 
+@pytest.mark.slow
 def test_ninety_percent_intervals_cover_the_clearances_of_a_simulated_fleet(gear: Gear) -> None:
     rng = np.random.default_rng(11)
     fleet = worn_gears.explained_fleet(120, rng)

@@ -74,6 +74,7 @@ def test_no_repaired_failure_is_sent_elsewhere_by_what_its_row_says_from_before(
     assert sent_elsewhere == 0
 
 
+@pytest.mark.slow
 def test_another_gauge_spares_the_joints_that_one_reads_too_high(tmp_path: Path) -> None:
     found, _hangar = counted(_BY_NAME["D gravity, gauge x1.2"], 120, 1905, tmp_path)
     assert found.figures["sound of restored"] <= 0.08

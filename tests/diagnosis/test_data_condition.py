@@ -348,6 +348,7 @@ def test_a_dated_change_needs_two_days_on_either_side(gear: Gear) -> None:
     assert begins == set(days[2:5])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "form"), [("mnar", "strong"), ("gonogo", "strong")])
 def test_what_depends_on_clearances_that_are_cut_off_is_not_named(
     case: str, form: str, tmp_path: Path

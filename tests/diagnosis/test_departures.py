@@ -397,6 +397,7 @@ def test_readings_against_the_prediction_that_no_clearance_tells_of_are_refused(
         )
 
 
+@pytest.mark.slow
 def test_small_readings_that_the_clearances_explain_are_directions_and_no_wrong_unit(
     gear: Gear,
 ) -> None:
@@ -474,6 +475,7 @@ def test_an_oval_bore_is_named_beside_another_linkage() -> None:
     assert named("oval on another linkage") == {("oval_wear", "joint 4"), ("geometry", None)}
 
 
+@pytest.mark.slow
 def test_one_pin_beside_its_worst_direction_in_another_linkage_stays_possible() -> None:
     chances = found("one pin turned on another linkage").probabilities
     assert chances[("direction_not_worst_case", "joint 4")] > 0.3

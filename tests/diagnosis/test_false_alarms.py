@@ -73,6 +73,7 @@ def habits(gear: Gear, seed: int, column: str) -> DiagnosisTable:
     return fleet(gear.model, lambda _t, _o: habit, rows=2 * ROWS, seed=seed, factors=factors)
 
 
+@pytest.mark.slow
 @every_day_and_slow
 @pytest.mark.parametrize("column", ["gauge_id", "technician_id", "tail_no"])
 def test_readers_and_aircraft_that_all_differ_a_little_are_not_a_cause(
@@ -107,6 +108,7 @@ def worn_apart(gear: Gear, seed: int) -> DiagnosisTable:
     return replace(table, clearance_in=np.maximum(read_in, 0.0))
 
 
+@pytest.mark.slow
 @every_day_and_slow
 def test_gears_that_wear_from_different_levels_at_different_rates_are_not_a_cause(
     seeds: range, allowed: int, gear: Gear

@@ -57,6 +57,7 @@ def test_the_mean_over_angles_is_that_of_a_fine_grid() -> None:
     assert np.mean(found) == pytest.approx(grid, abs=0.15)
 
 
+@pytest.mark.slow
 def test_an_error_of_the_rate_is_swallowed_by_the_linkage_and_a_gauge_is_not() -> None:
     place = list(departures.simulator.CATALOGUE).index
     rate, gauge = (
@@ -67,6 +68,7 @@ def test_an_error_of_the_rate_is_swallowed_by_the_linkage_and_a_gauge_is_not() -
     assert gauge["left, spread"] > 0.8 * gauge["left, linkage"] and gauge["spread"] > 50.0
 
 
+@pytest.mark.slow
 def test_directions_lead_in_their_own_fleet_and_what_else_is_hidden_in_the_others() -> None:
     found = directions(("loads:40", 5, 6_200_005))
     assert min(found["directions"].values()) > 0.0

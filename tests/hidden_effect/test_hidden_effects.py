@@ -179,11 +179,13 @@ def test_causes_that_cannot_be_distinguished_do_not_extend_the_model() -> None:
     assert case("aliased").extension is None
 
 
+@pytest.mark.slow
 def test_two_hidden_causes_are_both_named() -> None:
     found = case("double")
     assert (found.diagnosis.verdict, found.named) == ("NAMED", found.hidden)
 
 
+@pytest.mark.slow
 def test_of_three_hidden_causes_each_is_named_or_in_the_set() -> None:
     found = case("triple")
     open_ = {(c.candidate.cause.name, c.candidate.target) for c in found.diagnosis.beside}
@@ -245,6 +247,7 @@ def test_what_an_unlisted_effect_has_of_a_listed_cause_is_not_put_down_to_that(
     assert sum(p for (cause, _target), p in found.probabilities.items() if cause == part) < 0.5
 
 
+@pytest.mark.slow
 def test_a_cause_that_predicts_held_out_rows_worse_does_not_extend_the_model(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -63,7 +63,8 @@ def arm(session: int) -> SimulationDiagnosis:
     return diagnose_simulation(rig.predict, rig.measured, rig.offsets, rig.nuisance, rig.place)
 
 
-@pytest.mark.parametrize("session", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("session", [1, 2])
 def test_the_arm_has_joint_4_wrong_first_and_5_and_6_after_it(session: int) -> None:
     found = arm(session)
     assert found.causes[0].name == "joint_4"
@@ -71,7 +72,8 @@ def test_the_arm_has_joint_4_wrong_first_and_5_and_6_after_it(session: int) -> N
     assert {"joint_5", "joint_6"} <= {cause.name for cause in found.causes[1:]}
 
 
-@pytest.mark.parametrize("session", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("session", [1, 2])
 def test_the_arms_first_joint_and_what_the_tool_absorbs_cannot_be_tested(session: int) -> None:
     assert set(arm(session).untestable) == {"joint_1", "joint_7"}
 
@@ -86,7 +88,8 @@ def test_both_sessions_of_the_arm_name_the_same_causes() -> None:
         assert value == pytest.approx(second[name], abs=0.12)
 
 
-@pytest.mark.parametrize("session", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("session", [1, 2])
 def test_trained_on_some_places_the_arms_misfit_at_another_falls_by_80_percent(
     session: int,
 ) -> None:

@@ -31,6 +31,7 @@ def diagnosed(rate: float, seed: int, trial: float = 0.1) -> SimulationDiagnosis
     return diagnose_simulation(straight, read, suspects, [Suspect("level", 0.0, 0.1)])
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_true_value_nineteen_times_in_twenty() -> None:
     held = []
     for seed in range(40):
@@ -57,6 +58,7 @@ def test_nor_does_it_decide_the_value_of_a_rival() -> None:
     assert said[1] == pytest.approx(said[0], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_smallest_effect_is_found_four_times_in_five() -> None:
     smallest = np.mean([diagnosed(1.0, seed).smallest_detectable_rms for seed in range(5)])
     said = [
@@ -109,6 +111,7 @@ def test_scatter_between_groups_is_small_beforehand_and_may_be_large() -> None:
     assert 0.0 < sum(p for ratio, p in chance.items() if ratio > 3.0) < 0.01
 
 
+@pytest.mark.slow
 def test_the_residual_of_noise_has_a_p_value_that_is_seldom_small() -> None:
     small = [diagnosed(1.0, seed).remainder_p < 0.05 for seed in range(60)]
     assert np.mean(small) <= 0.12
@@ -139,6 +142,7 @@ def test_probabilities_of_nothing_and_of_what_is_unlisted_say_which_verdict_it_i
     assert found.p_unlisted > 0.99 > 10.0 * wrong.p_unlisted
 
 
+@pytest.mark.slow
 def test_of_suspects_named_at_nine_in_ten_nine_in_ten_are_wrong() -> None:
     right = []
     for seed in range(40):

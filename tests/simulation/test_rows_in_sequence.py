@@ -86,17 +86,20 @@ def test_what_is_new_in_each_row_is_independent_and_of_unit_size(noise: NoiseMod
     assert root @ alone @ root.T == pytest.approx(np.eye(9), abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.7])
 def test_the_correlation_of_rows_is_estimated(correlation: float) -> None:
     found = [diagnosed(seed, correlation).correlation for seed in range(8)]
     assert np.mean(found) == pytest.approx(correlation, abs=0.16)
 
 
+@pytest.mark.slow
 def test_rows_that_remember_each_other_name_nothing_where_nothing_is_wrong() -> None:
     named = [diagnosed(seed, 0.7).verdict is Verdict.NAMED for seed in range(15)]
     assert not any(named)
 
 
+@pytest.mark.slow
 def test_intervals_of_correlated_rows_hold_the_true_value() -> None:
     held = []
     for seed in range(20):
@@ -120,6 +123,7 @@ def test_stretches_of_a_series_are_held_out_together() -> None:
     assert diagnosed(1, 0.7, 2.0).gain.held_out_by == "block"
 
 
+@pytest.mark.slow
 def test_a_smooth_discrepancy_of_a_series_stays_unlisted() -> None:
     scatter = 0.02 * np.random.default_rng(5).standard_normal(N)
     read = line({"level": 0.0, "rate": 1.0, "wave": 0.0})[:, 0] + 0.3 * np.cos(9.0 * T**2) + scatter

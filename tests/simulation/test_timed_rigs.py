@@ -62,11 +62,13 @@ def summed(kind: str, size: float, rigs: tuple[str, ...], count: int) -> Counter
 FAST = ("beam", "pump")
 
 
+@pytest.mark.slow
 def test_correlated_rows_with_nothing_wrong_name_nothing() -> None:
     total = summed("AR .7", 0.0, FAST, 2)
     assert (total["draws"], total["a cause"], total["NAMED"]) == (4, 0, 0)
 
 
+@pytest.mark.slow
 def test_a_large_change_is_in_the_set_and_nothing_else_is_named() -> None:
     total = summed("AR .7", 40.0, FAST, 2)
     assert total["draws"] + total["untestable"] == 4

@@ -24,6 +24,7 @@ def proved(gear: Gear, model: LinkageModel) -> CertifiedBound:
     return certified_bound(model, gear.limits_in)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_the_bound_at_the_limits_is_reached_to_1e_6(
     gear: Gear, model: LinkageModel, sense: float
@@ -58,6 +59,7 @@ def test_differential_evolution_finds_what_is_proved(gear: Gear) -> None:
     assert found.searched_in == pytest.approx(found.proved.found_in, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_the_sequential_rule_is_within_a_thousandth_of_the_proved_worst(
     gear: Gear, model: LinkageModel, proved: CertifiedBound
 ) -> None:
@@ -78,5 +80,6 @@ def test_no_random_directions_lengths_and_positions_exceed_the_bound(
         assert float(model.displacement(each, None, position).max()) <= proved.bound_in
 
 
+@pytest.mark.slow
 def test_a_linkage_that_may_not_close_has_no_bound(gear: Gear) -> None:
     assert certified_bound(gear.model, np.full(10, 0.2), 1.0, most_boxes=300).bound_in == np.inf

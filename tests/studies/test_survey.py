@@ -374,6 +374,7 @@ def test_every_draw_moves_over_the_whole_stroke(slipped: tuple[Survey, int]) -> 
     assert found.linkage.closes(found.draws).all()
 
 
+@pytest.mark.slow
 def test_a_few_readings_leave_many_linkages_all_of_which_move(
     gear: Gear, read: tuple[SurveyReading, ...]
 ) -> None:
