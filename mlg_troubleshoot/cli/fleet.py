@@ -88,14 +88,13 @@ def fleet(
             known,
             ahead=not no_forecast,
             whole=shown.report is not None or xlsx is not None,
-            compare=not shown.quiet,
             progress=bar,
         )
         order = Order(sort)
         found = everything.chosen(tail, only or (), order)
         bar("Comparing the last inspections", 0, None)
         read = partial(lives_of, records.kept)
-        noted = suggestions(found.departures, read, found.model, known)
+        noted = suggestions(found.lines, found.forecasts, read, found.model, known)
     for line in noted:
         output.say(f"Note: {line}")
     if shown.as_json:

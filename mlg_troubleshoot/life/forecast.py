@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import date
@@ -54,6 +54,9 @@ class Forecast:
     limit_joint: the joint that most often is the first at its limit.
     due_now: why nothing remains, in words; empty where something may.
     due_date: the day of the next inspection, None where it is not known.
+    departures: how far the last reading of each joint lies from what its readings before promised,
+    of joints read twice since they were restored, the last time at the last inspection. [standard
+    deviations]
     """
 
     joints: Mapping[int, Quantiles] = field(default_factory=dict)
@@ -64,6 +67,7 @@ class Forecast:
     next_inspection_landings: float | None = None
     due_now: str = ""
     due_date: str | None = None
+    departures: Mapping[int, float] = field(default_factory=dict)
 
 
 def _quantiles(samples: Array) -> Quantiles:
@@ -127,18 +131,21 @@ def forecast(
         life
         for life in lives
         if life.key in forecasts
-        and not (forecasts[life.key].due_now or life.warnings)
+        and not life.warnings
         and life.inspections[-1].inspection.gear_landings is not None
     ]
     if model is not None:
         done = 0
         parts = [known[at : at + _GEARS_AT_ONCE] for at in range(0, len(known), _GEARS_AT_ONCE)]
+
+        def looked_at(part: Sequence[GearLife]) -> dict[GearKey, Forecast]:
+            return _forecast_part(part, forecasts, model, gear)
+
         # NumPy lets others work meanwhile.
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            ahead = pool.map(lambda part: [*_forecast_part(part, model, gear)], parts)
-            for part, of_part in zip(parts, ahead, strict=True):
-                forecasts.update(zip((life.key for life in part), of_part, strict=True))
-                done += len(part)
+            for ahead in pool.map(looked_at, parts):
+                forecasts.update(ahead)
+                done += len(ahead)
                 progress("Looking ahead", done, len(known))
     found = ((life, forecasts.get(life.key, Forecast())) for life in lives)
     return {life.key: replace(ahead, due_date=_due_date(life, ahead)) for life, ahead in found}
@@ -202,20 +209,33 @@ def _over_limit(clearance_in: Mapping[int, float], gear: Gear) -> dict[int, floa
     return {n: c for n, c in clearance_in.items() if gear.joint(n).is_over_limit(c)}
 
 
-def _forecast_part(part: Sequence[GearLife], model: WearModel, gear: Gear) -> Iterator[Forecast]:
+def _forecast_part(
+    part: Sequence[GearLife], so_far: Mapping[GearKey, Forecast], model: WearModel, gear: Gear
+) -> dict[GearKey, Forecast]:
     numbers = gear.joint_numbers
     ahead = gear.horizon.value * _AHEAD
+    fitted, begun = _asked_about(part, model, gear)
+    apart = _departures(part, fitted, gear)
+    found = {
+        life.key: replace(so_far[life.key], departures=of_life)
+        for life, of_life in zip(part, apart, strict=True)
+    }
+    going_on = [life for life in part if not found[life.key].due_now]
+    if not going_on:
+        return found
     read = np.array(
         [
             [any(n in kept.inspection.clearance_in for kept in life.inspections) for n in numbers]
-            for life in part
+            for life in going_on
         ]
     )
+    wear = _wear_ahead(going_on, begun, fitted, gear)
     # A joint that was never read counts as it does in the prediction: not at all.
-    wear = _wear_ahead(part, model, gear, ahead)
-    wear = np.where(read[:, :, None, None], wear, 0.0)
-    displacement = _worst_case_of(wear, gear)
-    for g, life in enumerate(part):
+    wear[~read] = 0.0
+    asked = wear[:, :, _ASKED]
+    displacement = _worst_case_of(wear, asked, gear)
+    bands = np.quantile(asked, [0.05, 0.5, 0.95], axis=3)
+    for g, life in enumerate(going_on):
         margin = life.inspections[-1].inspection.margin_in
         to_limit = np.stack(
             [first_passage(ahead, wear[g, j], limit) for j, limit in enumerate(gear.limits_in)]
@@ -226,49 +246,94 @@ def _forecast_part(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
         )
         to_either = Samples(np.minimum(to_any, to_margin))
         due = float(to_either.quantile(gear.accepted_chance.value))
-        asked = wear[g][:, _ASKED]
-        bands = np.quantile(asked, [0.05, 0.5, 0.95], axis=2)
         known = [(j, number) for j, number in enumerate(numbers) if read[g, j]]
         first = to_limit.argmin(axis=0)[np.isfinite(to_any)]
-        yield Forecast(
+        found[life.key] = Forecast(
             {number: _quantiles(to_limit[j]) for j, number in known},
-            {number: bands[:, j] for j, number in known},
+            {number: bands[:, g, j] for j, number in known},
             _quantiles(to_any),
             numbers[int(np.bincount(first).argmax())] if len(first) else None,
             _quantiles(to_margin),
             due if np.isfinite(due) else None,
+            departures=found[life.key].departures,
         )
+    return found
 
 
-def _wear_ahead(part: Sequence[GearLife], model: WearModel, gear: Gear, ahead: Array) -> Array:
+def _asked_about(
+    part: Sequence[GearLife], model: WearModel, gear: Gear
+) -> tuple[WearModel, dict[GearKey, list[float]]]:
+    """The model asked about the joints of some gears, and the landings at which the current path of
+    each began.
+    """
+    paths: list[WearPath] = []
+    begun: dict[GearKey, list[float]] = {}
+    for life in part:
+        of_joints = wear_paths(life, gear.joint_numbers).values()
+        paths += [path for own, _begun in of_joints for path in own]
+        begun[life.key] = [since for _own, since in of_joints]
+    return model.of(paths), begun
+
+
+def departures(
+    lives: Sequence[GearLife], model: WearModel, gear: Gear
+) -> list[Mapping[int, float]]:
+    """How far the last inspection of each gear lies from what its history promised, as its forecast
+    says it; of gears that state the landings of their last inspection.
+    """
+    return _departures(lives, _asked_about(lives, model, gear)[0], gear)
+
+
+def _departures(
+    lives: Sequence[GearLife], fitted: WearModel, gear: Gear
+) -> list[Mapping[int, float]]:
+    units = {
+        (life.key, number): unit
+        for life in lives
+        for number in gear.joint_numbers
+        if number in life.inspections[-1].inspection.clearance_in
+        and fitted.paths[unit := unit_of(life.key, number)][-1].n_readings > 1
+    }
+    scores = dict(zip(units, fitted.scores([*units.values()]).tolist(), strict=True))
+    return [
+        {n: scores[life.key, n] for n in gear.joint_numbers if (life.key, n) in scores}
+        for life in lives
+    ]
+
+
+def _wear_ahead(
+    lives: Sequence[GearLife],
+    begun: Mapping[GearKey, Sequence[float]],
+    fitted: WearModel,
+    gear: Gear,
+) -> Array:
     """Simulated clearances (gears, joints, ahead, samples). [in]
 
     Each gear from the model's seed: its forecast is the same whoever else is asked for.
     """
-    numbers = gear.joint_numbers
-    paths: list[WearPath] = []
-    usage = []
-    for life in part:
-        now = life.inspections[-1].inspection.gear_landings or 0.0
-        for own, begun in wear_paths(life, numbers).values():
-            paths += own
-            usage.append(np.maximum(now + ahead - begun, 0.0))
-    units = [unit_of(life.key, number) for life in part for number in numbers]
-    fitted = model.of(paths)
-    found = fitted.forecast(units, usage, reading=False, together=len(numbers)).samples
-    wear = np.maximum(found, 0.0)
-    return wear.reshape(len(part), len(numbers), *wear.shape[1:])
+    ahead = gear.horizon.value * _AHEAD
+    usage = [
+        np.maximum((life.inspections[-1].inspection.gear_landings or 0.0) + ahead - since, 0.0)
+        for life in lives
+        for since in begun[life.key]
+    ]
+    units = [unit_of(life.key, number) for life in lives for number in gear.joint_numbers]
+    joints = len(gear.joint_numbers)
+    found = fitted.forecast(units, usage, reading=False, together=joints).samples
+    np.maximum(found, 0.0, out=found)
+    return found.reshape(len(lives), joints, *found.shape[1:])
 
 
-def _worst_case_of(wear: Array, gear: Gear) -> Array:
-    """Worst-case displacement (gears, ahead, samples) of simulated clearances. [in]
+def _worst_case_of(wear: Array, asked: Array, gear: Gear) -> Array:
+    """Worst-case displacement (gears, ahead, samples) of simulated clearances, some of them as they
+    are `asked` about. [in]
 
     The sum of amplified clearances, times how far the model's worst case of the median clearances
     departs from their sum.
     """
     amplification = gear.model.plunger_amplification()
     straight = np.einsum("j,gjts->gts", amplification, wear)
-    middle = np.median(wear[:, :, _ASKED, :], axis=3)
+    middle = np.median(asked, axis=3)
     clearances = np.moveaxis(middle, 1, 2)
     rows = clearances.reshape(-1, clearances.shape[-1])
     predicted = worst_case(gear.model, rows).magnitude_in

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
@@ -24,7 +25,6 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast, forecast
 from mlg_troubleshoot.life.landings_left import FleetLine
-from mlg_troubleshoot.life.unrecorded_work import Departure, departures
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.wear import WearModel, WearPath, fit_wear
@@ -53,6 +53,7 @@ class _Ahead(msgspec.Struct):
     next_inspection_landings: float | None
     due_now: str
     due_date: str | None
+    departures: dict[int, float]
 
     @classmethod
     def of(cls, ahead: Forecast) -> _Ahead:
@@ -70,8 +71,7 @@ class _Ahead(msgspec.Struct):
 class _Seen(msgspec.Struct):
     """A gear in its fleet: what stands of it, and what a model says, if it was asked.
 
-    mark, model: hashes of its records and of what the model learnt from. departure: empty where
-    there is nothing to compare, None if nobody asked.
+    mark, model: hashes of its records and of what the model learnt from.
     """
 
     mark: str
@@ -79,7 +79,6 @@ class _Seen(msgspec.Struct):
     due: _Ahead
     model: str = ""
     ahead: _Ahead | None = None
-    departure: Departure | None = None
 
 
 class Remembered:
@@ -113,39 +112,23 @@ class Remembered:
         _write(file, _Fit(mark, model.learnt()))
         return model
 
-    def lacking(
-        self, keys: Iterable[GearKey], model: WearModel | None, *, compare: bool
-    ) -> list[GearKey]:
-        """The gears of which not all is known that is asked for."""
-        compare = compare and model is not None
-        return [
-            key
-            for key in keys
-            if not self._is_foreseen(key, model) or (compare and self._seen[key].departure is None)
-        ]
-
-    def look(self, lives: Sequence[GearLife], model: WearModel | None, *, compare: bool) -> None:
-        """Find out what is asked for of gears and not known, and remember it."""
-        self._is_new = self._is_new or bool(lives)
-        new = [life for life in lives if not self._is_foreseen(life.key, model)]
-        found = forecast(new, model, self._gear)
-        for life in new:
-            ahead = found[life.key]
-            # Nothing else is known without a model.
-            due = _Ahead.of(ahead if ahead.due_now else Forecast())
-            seen = self._seen.get(life.key) or _Seen(self._marks[life.key], FleetLine.of(life), due)
-            if model is not None:
-                seen.model, seen.ahead, seen.departure = self._model_mark, _Ahead.of(ahead), None
-            self._seen[life.key] = seen
-        if model is not None and compare:
-            new = [life for life in lives if self._seen[life.key].departure is None]
-            apart = departures(new, model, self._gear)
-            for life in new:
-                self._seen[life.key].departure = apart.get(life.key, Departure("", ()))
-
-    def _is_foreseen(self, key: GearKey, model: WearModel | None) -> bool:
+    def is_known(self, key: GearKey, model: WearModel | None) -> bool:
+        """Whether a gear's line is known, and what the model says of it, if there is one."""
         seen = self._seen.get(key)
         return seen is not None and (model is None or seen.model == self._model_mark)
+
+    def look(self, lives: Sequence[GearLife], model: WearModel | None) -> None:
+        """Find out what is not known of gears, and remember it."""
+        self._is_new = self._is_new or bool(lives)
+        found = forecast(lives, model, self._gear)
+        for life in lives:
+            ahead = found[life.key]
+            # Nothing else is known without a model.
+            due = _Ahead.of(replace(ahead, departures={}) if ahead.due_now else Forecast())
+            seen = _Seen(self._marks[life.key], FleetLine.of(life), due)
+            if model is not None:
+                seen.model, seen.ahead = self._model_mark, _Ahead.of(ahead)
+            self._seen[life.key] = seen
 
     def line(self, key: GearKey) -> FleetLine:
         return self._seen[key].line
@@ -154,11 +137,6 @@ class Remembered:
         """The forecast of a gear; without a model only whether it is due now."""
         seen = self._seen[key]
         return (seen.due if model is None or seen.ahead is None else seen.ahead).forecast
-
-    def departure(self, key: GearKey) -> Departure | None:
-        """How far a gear departs from its wear; None where there is nothing to compare."""
-        found = self._seen[key].departure
-        return found if found is not None and found.scores else None
 
     def save(self) -> None:
         """Remember what is new; nothing happens where the folder cannot be written."""

@@ -34,9 +34,10 @@ def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]
     for event in life.events:
         if isinstance(event, KeptInspection):
             read = event.inspection
-            for joint in found.keys() & read.clearance_in.keys():
-                reading = (read.gear_landings, read.clearance_in[joint], read.gauge_u_of(joint))
-                found[joint][-1].readings.append(reading)
+            for joint, clearance in read.clearance_in.items():
+                if joint in found:
+                    reading = (read.gear_landings, clearance, read.gauge_u_of(joint))
+                    found[joint][-1].readings.append(reading)
         elif event.kind is RecordKind.REPAIR:
             at = _landings_of(event, life)
             for joint in found.keys() & set(event.body["joints"]):
@@ -72,7 +73,9 @@ def wear_paths(life: GearLife, joints: Sequence[int]) -> dict[int, tuple[list[We
         for stretch in between:
             placed = stretch.placed
             reading_u = placed[-1][2] if placed else reading_u
-            usage = [max(at - stretch.begun, 0.0) for at, _value, _u in placed]
+            landings = [max(at - stretch.begun, 0.0) for at, _value, _u in placed]
+            # Only those of another gear's inspection fall.
+            usage = np.maximum.accumulate(landings)
             value = [value for _at, value, _u in placed]
             paths.append(WearPath(unit_of(life.key, joint), usage, value, reading_u))
         found[joint] = paths, between[-1].begun

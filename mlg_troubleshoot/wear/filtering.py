@@ -17,6 +17,7 @@ far: s² d E[b²] = s² d (mean² + variance of the drift).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -54,71 +55,145 @@ class Draws:
 
 @dataclass(frozen=True, slots=True)
 class FilterState:
-    """Mean and covariance of level and drift at the last step, arrays (draws, units)."""
+    """Mean and covariance of level and drift at the last step, arrays (draws, units); and what the
+    readings before it promised of its own: mean, variance and drift.
+    """
 
     level: Array
     drift: Array
     level_var: Array
     both_cov: Array
     drift_var: Array
+    promised: Array
+    promised_var: Array
+    promised_drift: Array
+
+    def take(self, units: Places) -> FilterState:
+        return FilterState(*(getattr(self, name)[:, units] for name in self.__dataclass_fields__))
 
 
 def clock(usage: Array, power: Array) -> Array:
     """Turn usage into the time that drift and increments count."""
-    return np.where(power == 1.0, usage, np.maximum(usage, 0.0) ** power)
+    bent = power.ravel() != 1.0
+    if not bent.any():
+        return usage
+    time = np.broadcast_to(usage, np.broadcast_shapes(usage.shape, power.shape)).copy()
+    time[bent] = np.maximum(usage, 0.0) ** power[bent]
+    return time
+
+
+class _Covariances:
+    """Of level x, drift b and the unit's own drift u, named by the pair, arrays (draws, units)."""
+
+    def __init__(self, draws: Draws, units: int) -> None:
+        self._draws = draws
+        self._wanders = bool(draws.wander_sd.any())
+        self._own = (1.0 - draws.kept) * draws.drift_sd**2
+        kept = draws.kept * draws.drift_sd**2
+        shape = (len(draws.start), units)
+        self.xx = np.broadcast_to(draws.start_sd**2, shape)
+        self.xb = self._xu = np.zeros(shape)
+        self.bb = np.broadcast_to(self._own + kept, shape)
+        self._bu = self._uu = np.broadcast_to(kept, shape)
+
+    def restore(self, restored: Mask) -> None:
+        """Begin new paths of some units."""
+        self.xx = np.where(restored, self._draws.start_sd**2, self.xx)
+        self.xb = np.where(restored, 0.0, self.xb)
+        self._xu = np.where(restored, 0.0, self._xu)
+        self.bb = np.where(restored, self._uu + self._own, self.bb)
+        self._bu = np.where(restored, self._uu, self._bu)
+
+    def run(self, d: Array, drift: Array | None) -> None:
+        """Let the clock run by d; a drift is that of gamma increments."""
+        s2 = self._draws.increment_sd**2 * d
+        if drift is not None:
+            s2 = s2 * (drift * drift + self.bb)
+        self.xx = self.xx + d * (2.0 * self.xb + d * self.bb) + s2
+        self.xb = self.xb + d * self.bb
+        if self._wanders:
+            w2 = self._draws.wander_sd**2 * d
+            self.xx = self.xx + w2 * d * d / 3.0
+            self.xb = self.xb + w2 * d / 2.0
+            self.bb = self.bb + w2
+        self._xu = self._xu + d * self._bu
+
+    def read(self, g: Array, *, own: bool) -> tuple[Array, Array, Array | None]:
+        """Take in a reading of weight g; return the gains of x, b and, if the own drift will be
+        asked for, u.
+        """
+        to_x = g * self.xx
+        to_b = g * self.xb
+        to_u = None
+        if own:
+            to_u = g * self._xu
+            self._bu = self._bu - to_b * self._xu
+            self._uu = self._uu - to_u * self._xu
+            self._xu = self._xu - to_x * self._xu
+        self.bb = self.bb - to_b * self.xb
+        self.xb = self.xb - to_x * self.xb
+        self.xx = self.xx - to_x * self.xx
+        return to_x, to_b, to_u
 
 
 def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Array, FilterState]:
-    """Filter the readings of every unit; return log likelihood (draws, units), zero where it is
-    not asked for, and the state at the end.
+    """Filter the readings of every unit with draws that are all gamma or none; return log
+    likelihood (draws, units), zero where it is not asked for, and the state at the end.
 
-    Mean of level x, drift b and the unit's own drift u; their covariances are named by the pair.
+    Mean of level x, drift b and the unit's own drift u.
     """
+    is_gamma = bool(draws.gamma.any())
+    # Covariances depend on what was read with gamma increments only: otherwise once for all units
+    # that were read at the same usages, as the joints of one gear are.
+    first, owner = (None, None) if is_gamma else _alike(steps)
+
+    def alike(of_units: Any) -> Any:
+        return of_units if first is None else of_units[..., first]
+
+    def each(of_alike: Array) -> Array:
+        return of_alike if owner is None else of_alike.take(owner, axis=-1)
+
+    seens, usages, known_r2 = map(alike, (steps.seen, steps.usage, steps.known_r2))
     shape = (len(draws.start), steps.seen.shape[1])
-    own = (1.0 - draws.kept) * draws.drift_sd**2
-    kept = draws.kept * draws.drift_sd**2
-    x = np.broadcast_to(draws.start, shape)
-    b = u = np.broadcast_to(draws.drift, shape)
-    xx = np.broadcast_to(draws.start_sd**2, shape)
-    xb = xu = total = before = np.zeros(shape)
-    bb = np.broadcast_to(own + kept, shape)
-    bu = uu = np.broadcast_to(kept, shape)
-    for begins, seen, usage, value, known in zip(
-        steps.begins, steps.seen, steps.usage, steps.value, steps.known_r2, strict=True
-    ):
-        now = clock(usage, draws.power)
+    x = promised = np.broadcast_to(draws.start, shape)
+    b = u = promised_drift = np.broadcast_to(draws.drift, shape)
+    total = np.zeros(shape)
+    covariances = _Covariances(draws, seens.shape[1])
+    s = covariances.xx
+    before = np.zeros_like(s)
+    again = steps.begins & (np.cumsum(steps.begins, axis=0) > 1)
+    # After that the own drift decides nothing.
+    last = np.flatnonzero(again.any(axis=1)).max(initial=-1)
+    for i, (begins, value) in enumerate(zip(again, steps.value, strict=True)):
+        now = clock(usages[i], draws.power)
         if begins.any():
             x = np.where(begins, draws.start, x)
             b = np.where(begins, u, b)
-            xx = np.where(begins, draws.start_sd**2, xx)
-            xb = np.where(begins, 0.0, xb)
-            xu = np.where(begins, 0.0, xu)
-            bb = np.where(begins, uu + own, bb)
-            bu = np.where(begins, uu, bu)
-            before = np.where(begins, 0.0, before)
+            before = np.where(alike(begins), 0.0, before)
+            covariances.restore(alike(begins))
         d = now - before
         before = now
-        x = x + b * d
-        w2 = draws.wander_sd**2 * d
-        s2 = draws.increment_sd**2 * d
-        s2 = np.where(draws.gamma, s2 * (b * b + bb), s2)
-        xx = xx + d * (2.0 * xb + d * bb) + s2 + w2 * d * d / 3.0
-        xb = xb + d * bb + w2 * d / 2.0
-        bb = bb + w2
-        xu = xu + d * bu
-        reading = np.where(np.isnan(known), draws.reading_sd**2, known)
-        s = xx + reading + _LEAST_VARIANCE
-        g = seen / s
+        promised_drift = b
+        covariances.run(d, b if is_gamma else None)
+        x = promised = x + b * each(d)
+        reading = np.where(np.isnan(known_r2[i]), draws.reading_sd**2, known_r2[i])
+        s = covariances.xx + reading + _LEAST_VARIANCE
         off = value - x
         if likelihood:
-            total = total - 0.5 * seen * (off * off / s + np.log(s) + _LOG_2PI)
-        x = x + g * xx * off
-        b = b + g * xb * off
-        u = u + g * xu * off
-        bb = bb - g * xb * xb
-        bu = bu - g * xb * xu
-        uu = uu - g * xu * xu
-        xb = xb - g * xx * xb
-        xu = xu - g * xx * xu
-        xx = xx - g * xx * xx
-    return total, FilterState(x, b, xx, xb, bb)
+            misfit = off * off / each(s) + each(np.log(s)) + _LOG_2PI
+            total = total - 0.5 * steps.seen[i] * misfit
+        to_x, to_b, to_u = covariances.read(seens[i] / s, own=i < last)
+        x = x + each(to_x) * off
+        b = b + each(to_b) * off
+        if to_u is not None:
+            u = u + each(to_u) * off
+    xx, xb, bb, s = map(each, (covariances.xx, covariances.xb, covariances.bb, s))
+    return total, FilterState(x, b, xx, xb, bb, promised, s, promised_drift)
+
+
+def _alike(steps: Steps) -> tuple[Places, Places]:
+    """The first of the units that were read alike, and which of these stands for each unit."""
+    known = np.nan_to_num(steps.known_r2, nan=-1.0)
+    when = np.concatenate([steps.begins, steps.seen, steps.usage, known])
+    _when, first, owner = np.unique(when, axis=1, return_index=True, return_inverse=True)
+    return first, owner.ravel()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -65,7 +66,7 @@ class Samples(Result):
             return np.where(is_low, low, low + share * (high - low))
 
 
-@dataclass(frozen=True, slots=True, repr=False, eq=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class WearModel(Result):
     """Wear of units from one population.
 
@@ -144,6 +145,7 @@ class WearModel(Result):
             raise UsageError("a usage to forecast is negative or not finite", "Give usages from 0.")
         wanted = np.atleast_1d(asked)
         wanted = np.broadcast_to(wanted, (len(units), wanted.shape[-1]))
+        repeats = self.simulated // sum(len(draws.start) for draws, _state in self._followed)
         rng = _Streams(self.seed)
         parts = []
         for chosen in self._chunks(len(units), together or 1):
@@ -154,16 +156,47 @@ class WearModel(Result):
             ascending = np.take_along_axis(wanted[chosen], order, axis=1) / self.scale.usage
             last = self._last(names)
             known = self._known_reading(names)
-            ends = self._ends(names, rng)
-            found = np.concatenate(
-                [end.follow(ascending, last, known, rng, reading=reading) for end in ends]
-            )
-            ordered = found.transpose(1, 3, 0, 2)
-            samples = ordered.reshape(*ascending.shape, -1)
-            places = np.argsort(order, axis=1)
-            back = np.take_along_axis(samples, places[:, :, None], axis=1)
-            parts.append(self.scale.start + self.scale.value * back)
-        return Samples(parts[0][0] if isinstance(unit, str) else np.concatenate(parts))
+            places = self._places(names)
+            ends = [
+                _Ends.drawn(draws, state.take(places), repeats, rng)
+                for draws, state in self._followed
+            ]
+            # The draws of all kinds behind each other, without a copy for each.
+            samples = np.empty((*ascending.shape, sum(end.level[:, 0].size for end in ends)))
+            each = np.arange(len(names))
+            first = 0
+            for end in ends:
+                own = slice(first, first + end.level[:, 0].size)
+                first = own.stop
+                followed = end.follow(ascending, last, known, rng, reading=reading)
+                for at, path in zip(order.T, followed, strict=True):
+                    samples[each, at, own] = path.swapaxes(0, 1).reshape(len(names), -1)
+            samples *= self.scale.value
+            samples += self.scale.start
+            parts.append(samples)
+        if isinstance(unit, str):
+            return Samples(parts[0][0])
+        return Samples(parts[0] if len(parts) == 1 else np.concatenate(parts))
+
+    def scores(self, units: Sequence[str]) -> Array:
+        """How far the last reading of each unit lies from what those before it promised, of units
+        read twice since their restoration, shape (n,). [standard deviations]
+        """
+        places = self._places(units)
+        usage = np.array([np.asarray(self.paths[u][-1].usage)[-2:] for u in units]).reshape(-1, 2).T
+        before, last = usage / self.scale.usage
+        value = np.array([np.asarray(self.paths[u][-1].value)[-1] for u in units])
+        promised, variance = [], []
+        for draws, state in self._followed:
+            beyond = clock(last, draws.power) - clock(np.maximum(before, 1.0), draws.power)
+            doubt = _DOUBT * state.promised_drift[:, places] * np.maximum(beyond, 0.0)
+            promised.append(state.promised[:, places])
+            variance.append(state.promised_var[:, places] + doubt**2)
+        mean = np.concatenate(promised)
+        total = np.concatenate(variance).mean(axis=0) + mean.var(axis=0)
+        apart = (value - self.scale.start) / self.scale.value - mean.mean(axis=0)
+        scores: Array = np.sign(self.scale.value) * apart / np.sqrt(total)
+        return scores
 
     def usage_to_limit(self, unit: str | Sequence[str], limit: ArrayLike) -> Samples:
         """Forecast the usage at which the wear itself of one unit or n, not a reading of it,
@@ -210,20 +243,26 @@ class WearModel(Result):
         last = [self.paths[u][-1].reading_u if u in self.paths else default for u in units]
         return np.array([np.nan if u is None else (u / self.scale.value) ** 2 for u in last])
 
-    def _ends(self, units: Sequence[str], rng: _Streams) -> list[_Ends]:
-        steps = lay_out([self._paths(unit) for unit in units], self.scale)
+    def _places(self, units: Sequence[str]) -> Places:
+        places = {unit: place for place, unit in enumerate(self.paths)}
+        return np.array([places.get(unit, len(places)) for unit in units], int)
+
+    @cached_property
+    def _followed(self) -> list[tuple[Draws, FilterState]]:
+        """What was read of each unit says so much of it, and at the end of a new one, by draws
+        with gamma increments and by others.
+        """
+        steps = lay_out([*self.paths.values(), (WearPath("", (), ()),)], self.scale)
         every = self.draws
         if self.simulated <= _PATHS_OF_MANY:
             # Draws stand kind by kind: every second one keeps their shares.
             every = every.take(np.arange(0, _DRAWS, 2))
-        repeats = self.simulated // len(every.start)
-        ends = []
-        for is_gamma in (False, True):
-            draws = every.take(every.gamma[:, 0] == is_gamma)
-            if len(draws.start):
-                _, states = follow(steps, draws, likelihood=False)
-                ends.append(_Ends.drawn(draws, states, repeats, rng))
-        return ends
+        kinds = [every.take(every.gamma[:, 0] == is_gamma) for is_gamma in (False, True)]
+        return [
+            (draws, follow(steps, draws, likelihood=False)[1])
+            for draws in kinds
+            if len(draws.start)
+        ]
 
 
 class _Streams:
@@ -293,9 +332,9 @@ class _Ends:
 
     def follow(
         self, usage: Array, last: Array, known: Array, rng: _Streams, *, reading: bool
-    ) -> Array:
-        """Simulate the paths on to ascending usages (units, m); return (draws, units, repeats,
-        m).
+    ) -> Iterator[Array]:
+        """Simulate the paths on to ascending usages (units, m), one after the other (draws, units,
+        repeats).
         """
         power = self._column("power")
         s = self._column("increment_sd")
@@ -308,7 +347,6 @@ class _Ends:
         x = self.level
         b = self.drift
         before = np.zeros_like(x)
-        out = np.empty((*x.shape, usage.shape[1]))
         for j in range(usage.shape[1]):
             at = clock(usage[None, :, j, None], power)
             beyond = np.maximum(at - bend, 0.0)
@@ -325,10 +363,7 @@ class _Ends:
                 sway = np.sqrt(v * v * span**3 / 12.0 + s * s * span)
                 x = x + b * d + v * span**1.5 * one / 2.0 + sway * two
                 b = b + v * np.sqrt(span) * one
-            out[..., j] = x
-            if reading:
-                out[..., j] += sd * rng.normal(1, x.shape)[0]
-        return out
+            yield x + sd * rng.normal(1, x.shape)[0] if reading else x
 
 
 def first_passage(at: Array, paths: Array, limit: float) -> Array:

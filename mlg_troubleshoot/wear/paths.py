@@ -51,18 +51,18 @@ class WearPath(Result):
         return len(np.asarray(self.usage))
 
     def __post_init__(self) -> None:
-        usage = np.array(self.usage, float).ravel()
-        value = np.array(self.value, float).ravel()
+        usage = frozen(self.usage).ravel()
+        value = frozen(self.value).ravel()
         if len(usage) != len(value):
             raise UsageError(
                 f"path of {self.unit}: {len(usage)} usages and {len(value)} values",
                 "Give one value per usage.",
             )
-        if not np.isfinite([usage, value]).all():
+        if not (np.isfinite(usage).all() and np.isfinite(value).all()):
             raise UsageError(
                 f"path of {self.unit}: a usage or a value is not a finite number", "Leave it out."
             )
-        if (usage < 0.0).any() or (np.diff(usage) < 0.0).any():
+        if (usage < 0.0).any() or (usage[1:] < usage[:-1]).any():
             raise UsageError(
                 f"path of {self.unit}: usage must ascend from 0, not"
                 f" {', '.join(f'{u:g}' for u in usage[:8])}",
@@ -75,8 +75,8 @@ class WearPath(Result):
                 f"path of {self.unit}: reading_u is {self.reading_u:g}",
                 "Give zero or more, or None.",
             )
-        object.__setattr__(self, "usage", frozen(usage))
-        object.__setattr__(self, "value", frozen(value))
+        object.__setattr__(self, "usage", usage)
+        object.__setattr__(self, "value", value)
 
 
 @dataclass(frozen=True, slots=True)

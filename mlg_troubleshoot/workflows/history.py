@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -35,7 +35,6 @@ from mlg_troubleshoot.units import LengthUnit
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
     from mlg_troubleshoot.life.remembered import Remembered
-    from mlg_troubleshoot.life.unrecorded_work import Departure
     from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.wear import WearModel
 
@@ -68,8 +67,6 @@ class Lives(Result):
         Wrong cells of the table that they were read from, if it was one.
     order : Order
         Order of the gears in tables and reports.
-    departures : mapping of tail and side to Departure
-        How far last inspections lie from what was expected of them, if that was asked for.
     """
 
     gear: Gear
@@ -79,7 +76,6 @@ class Lives(Result):
     model: WearModel | None
     problems: tuple[Problem, ...] = ()
     order: Order = Order.WORST
-    departures: Mapping[GearKey, Departure] = field(default_factory=dict)
 
     def chosen(self, tail: str | None, verdicts: Collection[str], order: Order) -> Lives:
         """The gears of one aircraft, and those of which the last verdict is one of these; all of
@@ -95,8 +91,7 @@ class Lives(Result):
         )
         keys = {line.key for line in lines}
         lives = tuple(life for life in self.lives if life.key in keys)
-        apart = {key: each for key, each in self.departures.items() if key in keys}
-        return replace(self, lives=lives, lines=lines, departures=apart, order=order)
+        return replace(self, lives=lives, lines=lines, order=order)
 
     def write_csv(self, file: Path) -> None:
         """Write the fleet as CSV, one line per gear."""
@@ -119,14 +114,10 @@ def show_fleet(
     *,
     ahead: bool,
     whole: bool = True,
-    compare: bool = False,
     progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
     problems: tuple[Problem, ...] = (),
 ) -> Lives:
-    """Every gear, with its forecast if asked for.
-
-    whole: with all of its records. compare: also its last inspection with what was expected of it.
-    """
+    """Every gear, with its forecast if asked for; `whole`, with all of its records."""
     from mlg_troubleshoot.life.remembered import Remembered
 
     remembered = Remembered(store, gear)
@@ -140,15 +131,14 @@ def show_fleet(
         for first in range(0, len(keys), _AT_ONCE):
             progress(doing, first, len(keys))
             asked = keys[first : first + _AT_ONCE]
-            lacking = set(remembered.lacking(asked, model, compare=compare))
+            lacking = {key for key in asked if not remembered.is_known(key, model)}
             part = lives_of(store, asked if whole else lacking).values()
-            remembered.look([life for life in part if life.key in lacking], model, compare=compare)
+            remembered.look([life for life in part if life.key in lacking], model)
             found += part if whole else ()
     finally:
         # Also what was done until somebody lost patience.
         remembered.save()
     progress(doing, len(keys), len(keys))
-    apart = ((key, remembered.departure(key)) for key in keys if compare)
     return Lives(
         gear,
         tuple(found),
@@ -156,7 +146,6 @@ def show_fleet(
         {key: remembered.forecast(key, model) for key in keys},
         model,
         problems,
-        departures={key: each for key, each in apart if each is not None},
     )
 
 

@@ -32,7 +32,7 @@ from mlg_troubleshoot.indices.index_table import read_index_table
 from mlg_troubleshoot.life import folding
 from mlg_troubleshoot.life.forecast import fit_fleet, forecast
 from mlg_troubleshoot.life.landings_left import FleetLine
-from mlg_troubleshoot.life.unrecorded_work import departures, suggestions
+from mlg_troubleshoot.life.unrecorded_work import suggestions
 from mlg_troubleshoot.reporting.life_json import fleet_as_json
 from mlg_troubleshoot.store import Record, Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
@@ -152,8 +152,8 @@ def suggested(drawn: list[list[Inspection]], gear: Gear) -> list[str]:
         by_key = folding.lives(store)
     kept = list(by_key.values())
     model = fit_fleet(kept, gear)
-    apart = {} if model is None else departures(kept, model, gear)
-    return suggestions(apart, lambda _keys: by_key, model, gear)
+    forecasts = forecast(kept, model, gear)
+    return suggestions(map(FleetLine.of, kept), forecasts, lambda _keys: by_key, model, gear)
 
 
 def main() -> None:

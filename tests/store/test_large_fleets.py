@@ -21,9 +21,9 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life import remembered
 from mlg_troubleshoot.life.chronology import Moment
 from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection, lives, lives_of
-from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
+from mlg_troubleshoot.life.forecast import TEACHERS, departures, fit_fleet, teachers_first
 from mlg_troubleshoot.life.landings_left import FleetLine
-from mlg_troubleshoot.life.unrecorded_work import _departures, suggestions
+from mlg_troubleshoot.life.unrecorded_work import suggestions
 from mlg_troubleshoot.reporting.life_json import fleet_as_json
 from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
@@ -76,10 +76,9 @@ def test_how_far_a_gear_departs_from_its_wear_does_not_depend_on_other_gears(
 ) -> None:
     fleet = show_fleet(fleet_of(tmp_path), load_gear(), ahead=True)
     assert fleet.model is not None
-    pairs = [(life, life) for life in fleet.lives]
-    alone = _departures(pairs[-1:], fleet.model, fleet.gear)
-    assert np.isfinite(alone).any()
-    np.testing.assert_array_equal(_departures(pairs, fleet.model, fleet.gear)[-1:], alone)
+    key = fleet.lives[-1].key
+    alone = departures(fleet.lives[-1:], fleet.model, fleet.gear)
+    assert alone == [fleet.forecasts[key].departures] != [{}]
 
 
 def test_the_life_of_one_gear_says_how_far_the_wear_of_its_fleet_is_learnt(tmp_path: Path) -> None:
@@ -188,7 +187,7 @@ def computed(monkeypatch: pytest.MonkeyPatch, store: Store) -> tuple[Lives, set[
 
     with monkeypatch.context() as patch:
         patch.setattr(remembered, "forecast", forecast)
-        return show_fleet(store, load_gear(), ahead=True, compare=True), asked
+        return show_fleet(store, load_gear(), ahead=True), asked
 
 
 WORN = {3: 0.004, 4: 0.003, 5: 0.004}
@@ -387,10 +386,11 @@ def test_what_a_fleet_says_with_its_memory_is_what_it_says_without_to_the_last_d
     store, gear = fleet_of(tmp_path), load_gear()
 
     def said() -> str:
-        found = show_fleet(store, gear, ahead=True, whole=False, compare=True)
-        apart = suggestions(found.departures, partial(lives_of, store), found.model, gear)
+        found = show_fleet(store, gear, ahead=True, whole=False)
+        read = partial(lives_of, store)
+        noted = suggestions(found.lines, found.forecasts, read, found.model, gear)
         text = json.dumps(fleet_as_json(found.lines, found.forecasts))
-        return f"{text} {apart} {found.departures}"
+        return f"{text} {noted} {[each.departures for each in found.forecasts.values()]}"
 
     said()
     last = teachers_first(found for found in lives(store))[-2:]
@@ -400,12 +400,3 @@ def test_what_a_fleet_says_with_its_memory_is_what_it_says_without_to_the_last_d
     assert "Restored without a record" in remembering
     shutil.rmtree(cache)
     assert said() == remembering
-
-
-def test_notes_that_nobody_asked_for_before_are_made_from_what_stands_in_the_store(
-    tmp_path: Path, cache: Path
-) -> None:
-    store, gear = fleet_of(tmp_path), load_gear()
-    assert not show_fleet(store, gear, ahead=True).departures
-    asked = show_fleet(store, gear, ahead=True, compare=True).departures
-    assert set(asked) == {(tail, "LH") for tail in TAILS}

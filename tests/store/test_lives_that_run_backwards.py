@@ -18,15 +18,15 @@ import pytest
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import life_of, lives
-from mlg_troubleshoot.life.forecast import fit_fleet, forecast
+from mlg_troubleshoot.life.forecast import Forecast, departures, fit_fleet, forecast
 from mlg_troubleshoot.life.landings_left import FleetLine
 from mlg_troubleshoot.life.looking_back import side_by_side
-from mlg_troubleshoot.life.unrecorded_work import departures, suggestions
+from mlg_troubleshoot.life.unrecorded_work import suggestions
 from mlg_troubleshoot.life.wear_paths import wear_paths
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
 from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
-from mlg_troubleshoot.wear import Samples, WearModel, WearPath
+from mlg_troubleshoot.wear import WearModel, WearPath
 from tests.cli.conftest import mlg, row
 
 View = Callable[[], Mapping[str, Any]]
@@ -439,10 +439,11 @@ class Steady:
 
     paths: Mapping[str, Sequence[WearPath]] = field(default_factory=dict)
 
-    def forecast(self, units: Sequence[str], _usage: np.ndarray, *, together: int) -> Samples:
-        assert together == 1
-        last = [np.asarray(self.paths[unit][-1].value)[-1] for unit in units]
-        return Samples(np.add.outer(last, np.array([[-0.001, 0.001]])))
+    def of(self, paths: Sequence[WearPath]) -> Steady:
+        return Steady({path.unit: [path] for path in paths})
+
+    def scores(self, units: Sequence[str]) -> np.ndarray:
+        return np.array([np.diff(self.paths[unit][-1].value)[-1] / 0.001 for unit in units])
 
 
 def suggested(*gears: tuple[float, float], tails: str = "AA", days: str = "11") -> list[str]:
@@ -465,8 +466,10 @@ def suggested(*gears: tuple[float, float], tails: str = "AA", days: str = "11") 
     add(own)
     model = cast(WearModel, Steady())
     gear, found = load_gear("hawker-800xp"), lives(Store())
-    apart = departures([*found.values()], model, gear)
-    return suggestions(apart, lambda _keys: found, model, gear)
+    scores = departures([*found.values()], model, gear)
+    forecasts = {key: Forecast(departures=of) for key, of in zip(found, scores, strict=True)}
+    lines = map(FleetLine.of, found.values())
+    return suggestions(lines, forecasts, lambda _keys: found, model, gear)
 
 
 @pytest.mark.parametrize(("deviations", "told"), [(3.0, 0), (5.0, 1)])

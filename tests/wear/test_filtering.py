@@ -73,6 +73,22 @@ def test_a_longer_unit_beside_it_changes_nothing_for_a_unit() -> None:
     )
 
 
+@pytest.mark.parametrize("is_gamma", [False, True])
+def test_units_that_were_read_at_the_same_usages_are_filtered_as_each_alone(
+    *, is_gamma: bool
+) -> None:
+    units = [
+        [WearPath("a", FIRST, read[:3]), WearPath("a", SECOND, read[3:])]
+        for read in (READ, READ[::-1])
+    ]
+    draws = replace(parameters(increment_sd=0.4), gamma=np.array([[is_gamma]]))
+    both, state = follow(lay_out([*units, [WearPath("b", [0.5], [0.6])]], AS_IT_IS), draws)
+    for place, unit in enumerate(units):
+        alone, own = follow(lay_out([unit], AS_IT_IS), draws)
+        assert both[:, [place]] == pytest.approx(alone, abs=1e-12)
+        assert state.take(np.array([place])) == own
+
+
 @pytest.mark.parametrize(
     ("values", "step"),
     [([0.9, 0.95, 1.3, 2.0], 0.05), ([0.1, 0.1, 0.2], 0.0), ([0.1234567, 0.98, 2.0 / 3.0], 0.0)],
@@ -97,7 +113,7 @@ def test_gamma_increments_scatter_as_simulated_ones_whose_drift_is_not_known() -
 
 def test_level_and_drift_are_sampled_together() -> None:
     one = np.ones((1, 1))
-    state = FilterState(one, one, one, 0.8 * one, one)
+    state = FilterState(one, one, one, 0.8 * one, *[one] * 4)
     ends = _Ends.drawn(parameters(), state, 200_000, _Streams(1))
     assert np.cov(ends.level.ravel(), ends.drift.ravel()) == pytest.approx(
         np.array([[1.0, 0.8], [0.8, 1.0]]), abs=0.02
@@ -107,11 +123,11 @@ def test_level_and_drift_are_sampled_together() -> None:
 def test_beyond_what_any_unit_has_reached_the_pace_is_a_quarter_uncertain() -> None:
     zero, one = np.zeros((1, 1)), np.ones((1, 1))
     sharp = parameters(increment_sd=0.0, power=1.0)
-    ends = _Ends.drawn(sharp, FilterState(one, one, zero, zero, zero), 50_000, _Streams(1))
+    ends = _Ends.drawn(sharp, FilterState(one, one, *[zero] * 6), 50_000, _Streams(1))
     found = ends.follow(
         np.array([[1.0, 3.0]]), np.array([0.5]), np.array([0.0]), _Streams(2), reading=False
     )
-    assert np.std(found[0, 0], axis=0) == pytest.approx([0.0, 0.25 * 2.0], abs=0.01)
+    assert [*map(np.std, found)] == pytest.approx([0.0, 0.25 * 2.0], abs=0.01)
 
 
 def test_a_declared_error_is_scaled_as_the_readings_are() -> None:
@@ -130,7 +146,7 @@ def test_a_path_is_followed_with_the_variance_of_its_increments_and_of_its_wande
     increment_sd: float, wander_sd: float
 ) -> None:
     draws = parameters(increment_sd=increment_sd, wander_sd=wander_sd, power=1.0)
-    found = ends(0.3, 0.8, draws, 100_000).follow(
+    [found] = ends(0.3, 0.8, draws, 100_000).follow(
         np.array([[2.5]]), np.array([0.5]), np.array([0.0]), _Streams(1), reading=False
     )
     assert np.mean(found) == pytest.approx(0.3 + 0.8 * 2.0, abs=0.02)
@@ -141,7 +157,7 @@ def test_a_path_is_followed_with_the_variance_of_its_increments_and_of_its_wande
 
 def test_a_gamma_path_follows_the_moments_of_its_increments_and_the_error_of_a_reading() -> None:
     draws = replace(parameters(increment_sd=0.6, power=1.0), gamma=np.array([[True]]))
-    wear, read = (
+    [wear], [read] = (
         ends(0.3, 0.8, draws, 200_000).follow(
             np.array([[2.5]]),
             np.array([0.5]),

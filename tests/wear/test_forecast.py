@@ -35,6 +35,18 @@ def width(samples: Samples) -> float:
     return float(np.mean(high - low))
 
 
+def test_a_last_reading_is_scored_by_what_is_forecast_from_those_before_it(
+    model: WearModel,
+) -> None:
+    usage, value = [0.5, 1.0, 1.5, 2.0], [0.6, 1.2, 1.6, 1.0]
+    before = model.of([WearPath("a", usage[:3], value[:3])])
+    samples = before.forecast("a", usage[3:]).samples[0]
+    expected = (value[3] - np.mean(samples)) / np.std(samples)
+    assert expected < -3.0
+    found = model.of([WearPath("a", usage, value)]).scores(["a"])
+    assert found == pytest.approx([expected], rel=0.05)
+
+
 def test_quantiles_come_one_row_a_usage(model: WearModel) -> None:
     assert model.forecast("part 1", [1.6, 1.8]).quantile(ENDS).shape == (2, 3)
     assert model.usage_to_limit("part 1", 2.5).quantile(ENDS).shape == (3,)
