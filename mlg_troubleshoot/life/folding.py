@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from math import inf
 from typing import Any
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
@@ -111,11 +112,20 @@ def lives(
     return _lives(store.all() if tail is None else store.of_gear(tail, side))
 
 
-def lives_of(store: Store, keys: Collection[GearKey]) -> dict[GearKey, GearLife]:
-    """The lives of some gears."""
+def lives_of(
+    store: Store, keys: Collection[GearKey], up_to: float = inf
+) -> dict[GearKey, GearLife]:
+    """The lives of some gears; of their records up to a number, as they were corrected or voided
+    since.
+    """
     wanted = set(keys)
     records = store.of_aircraft({tail for tail, _side in wanted})
-    return _lives(each for each in records if (each.tail_no, each.side) in wanted)
+    later = (RecordKind.CORRECTION, RecordKind.VOID)
+    return _lives(
+        each
+        for each in records
+        if (each.tail_no, each.side) in wanted and (each.seq <= up_to or each.kind in later)
+    )
 
 
 def _lives(records: Iterable[Record]) -> dict[GearKey, GearLife]:

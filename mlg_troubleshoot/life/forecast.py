@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from datetime import date
 from hashlib import sha256
 from itertools import islice
+from math import inf
 from operator import attrgetter
 
 import numpy as np
@@ -20,6 +21,7 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.wear_paths import newest_readings, placed_in_time, unit_of, wear_paths
+from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.wear import (
     Samples,
     WearModel,
@@ -90,6 +92,17 @@ def teachers_first(keys: Iterable[GearKey]) -> list[GearKey]:
     return sorted(keys, key=lambda key: sha256("\0".join(key).encode()).digest())
 
 
+def taught_up_to(store: Store, gears: int) -> float:
+    """Number of the newest record that the wear of a store's gears is learnt from: in a large fleet
+    that of the newest record rounded down to two digits, so that it is learnt again seldom.
+    """
+    if gears <= TEACHERS:
+        return inf
+    newest = store.count()
+    step: int = 10 ** max(len(str(newest)) - 2, 0)
+    return newest // step * step
+
+
 def fit_fleet(
     lives: Iterable[GearLife],
     gear: Gear,
@@ -99,7 +112,7 @@ def fit_fleet(
     agree; None if none states its landings.
     """
     paths: list[WearPath] = []
-    asked = iter(lives)
+    asked = (life for life in lives if life.inspections)
     while part := sorted(islice(asked, TEACHERS), key=attrgetter("key")):
         paths += [
             path

@@ -607,6 +607,12 @@ class Store:
             rows = connection.execute(pairs)
             return sorted((str(row.tail_no), str(row.side)) for row in rows)
 
+    def count(self) -> int:
+        """Number of records, which is that of the newest one."""
+        with self.transaction(writing=False) as connection:
+            newest = sql.select(sql.func.max(_records.c.seq))
+            return int(connection.scalar(newest) or 0) if self._ready else 0
+
     def marks(self) -> dict[tuple[str, str], str]:
         """A hash of all that stands in the records of each gear, which are not unpacked;
         `StoreError` where a tail number or a side cannot be read.

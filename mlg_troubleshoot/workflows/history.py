@@ -157,13 +157,25 @@ def _taught(
     progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
 ) -> WearModel | None:
     """How joints wear, from as many gears as are needed of a large fleet."""
-    from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
+    from mlg_troubleshoot.life.forecast import (
+        TEACHERS,
+        fit_fleet,
+        taught_up_to,
+        teachers_first,
+    )
 
     learning = partial(progress, "Learning how joints wear")
     learning(0, None)
     order = teachers_first(keys)
+    up_to = taught_up_to(store, len(keys))
     parts = (order[first : first + TEACHERS] for first in range(0, len(order), TEACHERS))
-    taught = (life for part in parts for life in lives_of(store, part).values())
+    taught = (
+        found[key]
+        for part in parts
+        for found in (lives_of(store, part, up_to),)
+        for key in part
+        if key in found
+    )
     return fit_fleet(taught, gear, partial(remembered.fit, progress=learning))
 
 

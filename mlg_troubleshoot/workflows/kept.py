@@ -47,9 +47,9 @@ _NUMBER = Annotated[float, Meta(ge=-(10**12), le=10**12)]
 _PLAIN: dict[Holds, Any] = {Holds.YES_NO: bool, Holds.AREAS: tuple[str, ...]}
 # What is read of a text must be what stands there.
 _READ: dict[Holds, tuple[str, Callable[[str], str]]] = {
-    Holds.TEXT: ("a text", lambda text: text if read_text(text, "") else ""),
+    # A store has few aircraft and days, and many records of each.
+    Holds.TEXT: ("a text", lru_cache(1024)(lambda text: text if read_text(text, "") else "")),
     Holds.AREAS: ("texts", lambda text: text if read_text(text, "") else ""),
-    # A store has few days and many records of each.
     Holds.DATE: ("a date", lru_cache(1024)(lambda text: read_date(text).isoformat())),
     Holds.MOMENT: ("a date, with its time if known", lambda text: read_moment(text).isoformat()),
 }

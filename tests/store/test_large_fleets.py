@@ -21,7 +21,13 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life import remembered
 from mlg_troubleshoot.life.chronology import Moment
 from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection, lives, lives_of
-from mlg_troubleshoot.life.forecast import TEACHERS, departures, fit_fleet, teachers_first
+from mlg_troubleshoot.life.forecast import (
+    TEACHERS,
+    departures,
+    fit_fleet,
+    taught_up_to,
+    teachers_first,
+)
 from mlg_troubleshoot.life.landings_left import FleetLine
 from mlg_troubleshoot.life.unrecorded_work import suggestions
 from mlg_troubleshoot.reporting.life_json import fleet_as_json
@@ -235,15 +241,61 @@ def test_after_one_new_inspection_only_its_gear_is_forecast_again(
     assert found.forecasts[key] != before.forecasts[key]
 
 
-def test_what_the_fleet_learnt_from_a_gear_is_learnt_again_when_it_is_inspected(
+def test_a_new_inspection_of_a_gear_that_wear_is_learnt_from_changes_its_own_forecast_only(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = fleet_of(tmp_path)
     before, _ = computed(monkeypatch, store)
-    one_more(store, teachers_first(before.forecasts)[0][0])
+    key = teachers_first(before.forecasts)[0]
+    one_more(store, key[0])
+    found, asked = computed(monkeypatch, store)
+    assert asked == {key}
+    assert found.forecasts[key] != before.forecasts[key]
+    shutil.rmtree(cache)
+    assert computed(monkeypatch, store)[0] == found
+
+
+def test_wear_is_learnt_again_when_the_number_of_records_reaches_its_next_two_digits(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    before, _ = computed(monkeypatch, store)
+    order = [tail for tail, _side in teachers_first(before.forecasts)]
+    for tail in (order[0], *order[-8:]):
+        one_more(store, tail)
+    assert store.count() == 399
+    assert len(computed(monkeypatch, store)[1]) == 9
+    one_more(store, order[-9])
     found, asked = computed(monkeypatch, store)
     assert len(asked) == len(TAILS)
     assert found.model != before.model
+
+
+def test_an_inspection_that_wear_was_learnt_from_is_not_once_it_is_void(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    before, _ = computed(monkeypatch, store)
+    void(store, f"{teachers_first(before.forecasts)[0][0]}-3", "wrong gear")
+    assert len(computed(monkeypatch, store)[1]) == len(TAILS)
+
+
+def test_a_new_gear_does_not_take_the_place_of_one_that_wear_is_learnt_from(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = fleet_of(tmp_path)
+    before, _ = computed(monkeypatch, store)
+    named = ((f"NEW{n}", "LH") for n in range(1000))
+    [new] = [key for key in named if teachers_first([key, *before.forecasts])[0] == key][:1]
+    one_more(store, new[0])
+    assert computed(monkeypatch, store)[1] == {new}
+
+
+def test_the_wear_of_a_small_fleet_is_learnt_from_every_record(tmp_path: Path) -> None:
+    store = fleet_of(tmp_path)
+    one_more(store, TAILS[0])
+    assert taught_up_to(store, TEACHERS) >= store.count() == 391
+    assert taught_up_to(store, TEACHERS + 1) == 390
 
 
 def test_a_void_inspection_is_not_remembered(
