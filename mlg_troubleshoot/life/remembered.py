@@ -3,7 +3,8 @@
 A file holds the last fit, others what a store's gears look like in their fleet, each under the hash
 of all that went into it: this program, the gear, and the records as they stand in the store.
 Without them, or where a hash differs, it is computed; the folder may be deleted at any time.
-What is remembered of a gear is believed only while its records stand as they did.
+What is remembered of gears is believed only while all records stand as they did, and of a gear
+only until it has a new one.
 """
 
 from __future__ import annotations
@@ -71,10 +72,9 @@ class _Ahead(msgspec.Struct):
 class _Seen(msgspec.Struct):
     """A gear in its fleet: what stands of it, and what a model says, if it was asked.
 
-    mark, model: hashes of its records and of what the model learnt from.
+    model: hash of what the model learnt from.
     """
 
-    mark: str
     line: FleetLine
     due: _Ahead
     model: str = ""
@@ -95,11 +95,8 @@ class Remembered:
         self._file = _folder() / f"fleet-{_hash([store.place.encode()])[:16]}.msgpack"
         self._model_mark = ""
         self._is_new = False
-
-    @cached_property
-    def keys(self) -> list[GearKey]:
-        """The gears of the store, in order."""
-        return [*self._marks]
+        # Records that what is known stands on: the newest number, and the hash of all of them.
+        self._stands_on = 0, ""
 
     def fit(self, paths: Sequence[WearPath], progress: Callable[[int, int], None]) -> WearModel:
         """Fit the wear of these paths, or recall it."""
@@ -125,7 +122,7 @@ class Remembered:
             ahead = found[life.key]
             # Nothing else is known without a model.
             due = _Ahead.of(replace(ahead, departures={}) if ahead.due_now else Forecast())
-            seen = _Seen(self._marks[life.key], FleetLine.of(life), due)
+            seen = _Seen(FleetLine.of(life), due)
             if model is not None:
                 seen.model, seen.ahead = self._model_mark, _Ahead.of(ahead)
             self._seen[life.key] = seen
@@ -141,20 +138,22 @@ class Remembered:
     def save(self) -> None:
         """Remember what is new; nothing happens where the folder cannot be written."""
         if self._is_new:
-            _write(self._file, (self._mark, [*self._seen.values()]))
-
-    @cached_property
-    def _marks(self) -> dict[GearKey, str]:
-        return self._store.marks()
+            _write(self._file, (self._mark, *self._stands_on, [*self._seen.values()]))
 
     @cached_property
     def _seen(self) -> dict[GearKey, _Seen]:
-        mark, gears = _read(self._file, tuple[str, list[_Seen]]) or ("", [])
-        return {
-            seen.line.key: seen
-            for seen in gears
-            if mark == self._mark and self._marks.get(seen.line.key) == seen.mark
-        }
+        nothing: tuple[str, int, str, list[_Seen]] = "", 0, "", []
+        mark, up_to, digest, gears = _read(self._file, tuple[str, int, str, list[_Seen]]) or nothing
+        newest = self._store.count()
+        hashed = sha256()
+        for block in self._store.raw(0, up_to):
+            hashed.update(block)
+        stands = (mark, digest) == (self._mark, hashed.hexdigest())
+        for block in self._store.raw(up_to, newest):
+            hashed.update(block)
+        self._stands_on = newest, hashed.hexdigest()
+        changed = set(self._store.gears(after=up_to))
+        return {seen.line.key: seen for seen in gears if stands and seen.line.key not in changed}
 
     def _of_paths(self, paths: Iterable[WearPath]) -> Iterable[bytes]:
         yield self._mark.encode()

@@ -12,12 +12,11 @@ import hashlib
 import json
 import os
 import zlib
-from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from functools import partial
+from functools import partial, reduce
 from itertools import islice
 from pathlib import Path
 from sys import intern
@@ -43,6 +42,8 @@ _PATIENCE_S = 120
 # Any number that other programs on the same server hardly use for their advisory locks. [1]
 _ADVISORY_LOCK = 0x6D6C675F73746F72
 _AT_ONCE = 500
+# Raw records that a server sends at once: 10 MB. [1]
+_RAW_AT_ONCE = 40_000
 # The content of a record, packed and unpacked. [bytes]
 MOST_BYTES = 1_000_000
 # How many of the newest records are walked before another is added: 0.1 s and 6 MB from a server;
@@ -124,8 +125,8 @@ _BOUNDED = sql.case(
 _COLUMNS = [_BOUNDED if column.name == "body" else column for column in _records.c]
 # What a record is known by, as bytes whatever another program wrote there.
 _MARKED = (
-    *(_records.c[name] for name in ("seq", "tail_no", "side")),
-    _records.c.kind + " " + _records.c.record_id + " " + _records.c.day,
+    _records.c.seq,
+    reduce(lambda texts, name: texts + "\n" + _records.c[name], _TEXTS[1:], _records.c.kind + ""),
     *(
         sql.func.coalesce(sql.cast(column, sql.LargeBinary), b"")
         for column in (_records.c.hash, _BOUNDED)
@@ -598,14 +599,21 @@ class Store:
                 known[bytes(row.identity)] = self._record(row)
         return known
 
-    def gears(self) -> list[tuple[str, str]]:
-        """Tail and side of every gear that has a record."""
+    def gears(self, after: int = 0) -> list[tuple[str, str]]:
+        """Tail and side of every gear that has a record after a number; `StoreError` where they
+        cannot be read.
+        """
+        pairs = sql.select(_records.c.tail_no, _records.c.side).distinct()
         with self.transaction(writing=False) as connection:
             if not self._ready:
                 return []
-            pairs = sql.select(_records.c.tail_no, _records.c.side).distinct()
-            rows = connection.execute(pairs)
-            return sorted((str(row.tail_no), str(row.side)) for row in rows)
+            # The index alone is faster than with a condition that is always true.
+            rows = connection.execute(pairs.where(_records.c.seq > after) if after else pairs)
+            found = [(row.tail_no, row.side) for row in rows]
+        if any(type(text) is not str for key in found for text in key):
+            # Reading the records names the one that is damaged.
+            self.all()
+        return sorted(found)
 
     def count(self) -> int:
         """Number of records, which is that of the newest one."""
@@ -613,27 +621,19 @@ class Store:
             newest = sql.select(sql.func.max(_records.c.seq))
             return int(connection.scalar(newest) or 0) if self._ready else 0
 
-    def marks(self) -> dict[tuple[str, str], str]:
-        """A hash of all that stands in the records of each gear, which are not unpacked;
-        `StoreError` where a tail number or a side cannot be read.
-        """
-        found: defaultdict[tuple[str, str], Any] = defaultdict(hashlib.sha256)
+    def raw(self, after: int, up_to: int) -> Iterator[bytes]:
+        """All that stands in the records after a number, up to another, which are not unpacked."""
+        wanted = sql.select(*_MARKED).where(_records.c.seq <= up_to).order_by(_records.c.seq)
+        last = after if after < up_to else None
         with self.transaction(writing=False) as connection:
-            wanted = sql.select(*_MARKED).order_by(_records.c.seq).limit(_AT_ONCE)
-            last = None
-            while self._ready:
-                after = wanted if last is None else wanted.where(_records.c.seq > last)
+            while self._ready and last is not None:
+                following = wanted.where(_records.c.seq > last).limit(_RAW_AT_ONCE)
                 # Rows of the driver: those of SQLAlchemy take twice as long.
-                rows = connection.execute(after).cursor.fetchall()
-                for seq, tail_no, side, texts, digest, body in rows:
-                    found[tail_no, side].update(b"%d %a %b%b" % (seq, texts, digest, body))
-                if len(rows) < _AT_ONCE:
-                    break
-                last = rows[-1][0]
-        if any(type(text) is not str for key in found for text in key):
-            # Reading the records names the one that is damaged.
-            self.all()
-        return {key: own.hexdigest() for key, own in sorted(found.items())}
+                rows = connection.execute(following).cursor
+                last = None
+                while block := rows.fetchmany(_AT_ONCE):
+                    yield b"".join([b"%d %a %b%b" % tuple(row) for row in block])
+                    last = block[-1][0]
 
     def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:
         """All records of a gear, or of both gears of an aircraft, in the order of the chain."""

@@ -122,7 +122,7 @@ def show_fleet(
 
     remembered = Remembered(store, gear)
     progress("Reading the store", 0, None)
-    keys = remembered.keys
+    keys = store.gears()
     model = _taught(store, gear, keys, remembered, progress) if ahead else None
     doing = "Looking ahead" if ahead else "Reading the store"
     found: list[GearLife] = []

@@ -400,7 +400,7 @@ def test_gears_are_read_again_for_a_gear_file_that_allows_other_readings(
     assert len(unpacked(monkeypatch, store, strict)[1]) == 3 * len(TAILS)
 
 
-def test_a_gear_is_read_again_where_a_content_was_changed_under_its_old_hash(
+def test_gears_are_read_again_where_a_content_was_changed_under_its_old_hash(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store, gear = fleet_of(tmp_path), load_gear()
@@ -410,8 +410,7 @@ def test_a_gear_is_read_again_where_a_content_was_changed_under_its_old_hash(
     file.execute("DROP TRIGGER mlg_no_update")
     file.execute("UPDATE mlg_records SET body = ? WHERE seq = 1", (packed(wrong),))
     file.commit()
-    _, read = unpacked(monkeypatch, store, gear)
-    assert read == {f"{TAILS[0]}-{visit}" for visit in (1, 2, 3)}
+    assert len(unpacked(monkeypatch, store, gear)[1]) == 3 * len(TAILS)
 
 
 def test_gears_are_read_again_by_another_version_of_the_program(
