@@ -225,7 +225,7 @@ class Diagnosis(Result):
     unread_in, unread_u_in : float
         What they add to the prediction on average, and how far the fleet may lie off that. [in]
     mean_in, rms_in : float
-        Misfit before anything is changed. [in]
+        Misfit before anything is changed, clearances that were not read as expected. [in]
     repeatability_in : float or None
         Standard deviation of one reading. [in]
     repeatability_source : str
@@ -672,8 +672,8 @@ def _report(
     variables, unlisted_rms_in = finding.unlisted
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
-    latent = np.where(seen, 0.0, case.scene.clearance_in)
-    raw = predicted(model, table, np.where(read, table.clearance_in, latent))[0]
+    as_read = np.where(read, table.clearance_in, case.scene.clearance_in)
+    raw = predicted(model, table, as_read)[0]
     raw_misfit = table.measured_in - raw
     gain = _gain(case) if finding.follows.verdict is Verdict.NAMED else None
     left = misfit - np.sum([cause.effect_in for cause in causes], axis=0)

@@ -537,6 +537,14 @@ def test_joints_that_nobody_read_are_said_with_what_they_add() -> None:
     assert 0.0 < d.unread_u_in < d.unread_in
 
 
+def test_a_blank_does_not_count_as_no_wear_in_the_misfit(gear: Gear) -> None:
+    plain = fleet(gear.model, rows=200)
+    blank = np.random.default_rng(5).random(plain.clearance_in.shape) < 0.3
+    blanked = replace(plain, clearance_in=np.where(blank, np.nan, plain.clearance_in))
+    whole, partly = (diagnose(gear.model, table, gear.discrepancies) for table in (plain, blanked))
+    assert partly.mean_in == pytest.approx(whole.mean_in, abs=0.001)
+
+
 def test_an_effect_of_one_tail_alone_is_unlisted_with_its_variable() -> None:
     assert (found("one tail").verdict, set(found("one tail").unlisted_variables)) == (
         "UNLISTED",
