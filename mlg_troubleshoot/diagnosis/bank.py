@@ -63,10 +63,7 @@ def _shapes(scene: Scene, smooth: Mapping[str, Array]) -> Iterator[tuple[Array, 
         day = np.nan_to_num(scene.table.quantities["day"])
         for period in _PERIODS_DAYS:
             phase = 2.0 * np.pi * day / period
-            yield from (
-                (np.cos(phase - turn), ("day",))
-                for turn in (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4)
-            )
+            yield from ((np.cos(phase - turn), ("day",)) for turn in np.pi * np.arange(8) / 8)
     # What one of two directions or sides does, the other may undo.
     either = {
         name: np.sign((texts == known[0]).astype(float) - (texts == known[1]))

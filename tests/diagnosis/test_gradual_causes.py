@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.diagnosis import CATALOGUE, diagnose
+from mlg_troubleshoot.diagnosis import CATALOGUE, Scene, diagnose
+from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.misfit.columns import EffectColumns
+from mlg_troubleshoot.units import DAYS_PER_YEAR
 from mlg_troubleshoot.units import ClearanceConvention as Convention
 from tests.cli.conftest import mlg
 from tests.hidden_effect.simulator import blemished_fleet, write_rows
@@ -52,6 +55,14 @@ def approaching(table: DiagnosisTable, _over: Array) -> Array:
 def own_column(table: DiagnosisTable, over: Array) -> DiagnosisTable:
     texts = np.where(modified(table, over) > 0.0, "POST", "PRE")
     return replace(table, factors={**table.factors, "mod_status": texts})
+
+
+@pytest.mark.parametrize("phase", np.pi * np.linspace(0.0, 1.0, 7))
+def test_a_season_of_any_phase_is_nearly_a_shape_of_the_bank(scene: Scene, phase: float) -> None:
+    shapes = build_bank(scene, EffectColumns.of(np.empty((len(scene.table), 0)))).columns
+    season = np.cos(2.0 * np.pi * scene.table.quantities["day"] / DAYS_PER_YEAR - phase)
+    along = np.abs(shapes.onto(season[None])[0]) / np.linalg.norm(season) / np.sqrt(shapes.squares)
+    assert along.max() > 0.97
 
 
 def test_a_gauge_that_creeps_is_named(gear: Gear) -> None:
