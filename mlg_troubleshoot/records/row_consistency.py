@@ -165,7 +165,10 @@ def order_warnings(
             return ", ".join([where(source), *cells])
 
         for n, said in contradictions([Moment.of(row) for _place, row in seen], name).items():
-            found[seen[n][0]] = f"{tail} {side}: {said}. Correct the landings or the date."
+            found[seen[n][0]] = (
+                f"{tail} {side}: {said}. Unless the gear was overhauled in between, correct the"
+                " landings or the date."
+            )
     return found
 
 

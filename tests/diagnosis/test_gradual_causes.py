@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.misfit.columns import EffectColumns
+from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
 from mlg_troubleshoot.units import DAYS_PER_YEAR
 from mlg_troubleshoot.units import ClearanceConvention as Convention
 from tests.cli.conftest import mlg
@@ -67,6 +69,11 @@ def test_a_season_of_any_phase_is_nearly_a_shape_of_the_bank(scene: Scene, phase
 
 def test_a_gauge_that_creeps_is_named(gear: Gear) -> None:
     assert names(gear, fleet(gear.model, creeping, rows=200)) == [("gauge_drift", "gauge G-2")]
+
+
+def test_a_creep_is_said_as_a_length_per_year(gear: Gear) -> None:
+    found = diagnose(gear.model, fleet(gear.model, creeping, rows=200), gear.discrepancies)
+    assert re.search(r"drift \d+\.\d+ thou per year", seven_lines(found)[3].text)
 
 
 def test_a_technician_who_learns_is_named(gear: Gear) -> None:
