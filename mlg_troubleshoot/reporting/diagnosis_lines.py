@@ -157,14 +157,14 @@ def fitted_numbers(d: Diagnosis, lengths: Lengths) -> tuple[str, ...]:
     for c in d.causes:
         for name, value in c.parameters.items():
             words, _, per = name.partition("_in_per_")
-            is_length = (bool(per) or name.endswith("_in")) and not isinstance(value, str)
+            is_length = name.endswith("_in") and not isinstance(value, str)
 
             def said(number: float, is_length: bool = is_length) -> str:
                 return lengths.bare(number, fine=1) if is_length else f"{number:.4g}"
 
             interval = c.interval_shown.get(name)
             band = "" if interval is None else f" (95 % {said(interval[0])} to {said(interval[1])})"
-            unit = f" {lengths.unit}{f' per {per}' if per else ''}" if is_length else ""
+            unit = f" {lengths.unit}" if is_length else f" in per {per}" if per else ""
             shown = value if isinstance(value, str) else said(value) + unit
             parts.append(f"{name_words(words.removesuffix('_in'))} {shown}{band}")
     return tuple(parts)

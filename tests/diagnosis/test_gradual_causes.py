@@ -73,7 +73,7 @@ def test_a_gauge_that_creeps_is_named(gear: Gear) -> None:
 
 def test_a_creep_is_said_as_a_length_per_year(gear: Gear) -> None:
     found = diagnose(gear.model, fleet(gear.model, creeping, rows=200), gear.discrepancies)
-    assert re.search(r"drift \d+\.\d+ thou per year", seven_lines(found)[3].text)
+    assert re.search(r"drift 0\.\d+ in per year", seven_lines(found)[3].text)
 
 
 def test_a_technician_who_learns_is_named(gear: Gear) -> None:
