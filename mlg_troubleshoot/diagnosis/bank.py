@@ -77,9 +77,6 @@ def _shapes(scene: Scene, smooth: Mapping[str, Array]) -> Iterator[tuple[Array, 
     names = list(main)
     for i, a in enumerate(names):
         yield from ((main[a] * main[b], (a, b)) for b in names[i + 1 :])
-    joint = [name for name in smooth if name.startswith("clearance_")]
-    for i, a in enumerate(joint):
-        yield from ((smooth[a] * smooth[b], (a, b)) for b in joint[i + 1 :])
     keys = list(classes)
     for i, key in enumerate(keys):
         yield from ((classes[key] * z, (key[0], b)) for z, b in begins if b != key[0])
