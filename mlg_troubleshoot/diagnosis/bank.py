@@ -27,7 +27,7 @@ _PERIODS_DAYS = DAYS_PER_YEAR / np.linspace(1, 3, 6)
 class Bank:
     """Shapes and the variables that each moves with.
 
-    columns: shapes, each of unit root mean square. [1]
+    columns: shapes, each of unit root mean square over the rows in which it acts. [1]
     variables: names of the columns of the table behind each shape.
     smooth, shape (n,): the quantities, each of mean 0 and standard deviation 1. [1]
     """
@@ -130,10 +130,11 @@ def _distinct(
 
     def varied() -> Iterator[Array]:
         for shape, names in shapes:
-            size = float(np.sqrt(np.mean(shape**2)))
-            if size > 0.0 and np.std(shape) > 1e-9 * size:
+            spread = float(np.std(shape))
+            if spread > 1e-9 * float(np.max(np.abs(shape))):
+                size = float(np.sqrt(np.mean(shape[shape != 0.0] ** 2)))
                 variables.append(names)
-                spreads.append(float(np.std(shape)) / size)
+                spreads.append(spread / size)
                 yield shape / size
 
     columns = EffectColumns.made(n, varied())

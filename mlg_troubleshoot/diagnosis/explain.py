@@ -64,10 +64,9 @@ class MisfitProblem:
 
     @cached_property
     def shapes(self) -> EffectColumns:
-        """What no list has, the same in all rows last, of unit size where it acts."""
+        """What no list has, the same in all rows last."""
         constant = EffectColumns.of(np.ones((len(self.misfit), 1)))
-        every = EffectColumns.joined([self.bank.columns, constant])
-        return every.scaled(1.0 / every.acting)
+        return EffectColumns.joined([self.bank.columns, constant])
 
     def candidate(self, key: Key, found: MisfitPosterior | None = None) -> Candidate:
         """The likeliest candidate of a name, or all-joint effects."""
@@ -267,16 +266,11 @@ def explain(problem: MisfitProblem) -> Finding:
     contexts = problem.contexts()
     found = posterior(noise, data, problem.effects(noise), contexts, problem.beliefs)
     for _ in range(_ROUNDS - 1):
-        left = _noise_beside(problem, found.expected_in)
-        again = posterior(
-            left, data, problem.effects(left), contexts, problem.beliefs, found.likeliest[:1]
-        )
         before = found.likeliest[0]
-        after = again.likeliest[0]
-        settled = (before.context, before.members) == (after.context, after.members)
-        found = again
-        noise = left
-        if settled:
+        noise = _noise_beside(problem, found.expected_in)
+        found = posterior(noise, data, problem.effects(noise), contexts, problem.beliefs, [before])
+        after = found.likeliest[0]
+        if (before.context, before.members) == (after.context, after.members):
             break
     finding = Finding(problem, _concluded(problem, found), noise)
     return replace(finding, noise=_settled(finding))

@@ -17,7 +17,7 @@ from mlg_troubleshoot.arrays import Array, Places
 ColumnBlock = Array | csc_array
 # Computing only: numbers from which a block is large; a column that acts in fewer than one row of
 # so many is kept by these rows.
-_LARGE = 1_000_000
+_LARGE = 200_000
 _FEW = 5
 # Columns that are written out together.
 _AT_ONCE = 64
@@ -150,22 +150,9 @@ class EffectColumns:
         rows = self.sums(_rows_of)
         return np.asarray(np.sqrt(self.squares / np.maximum(rows, 1.0)))
 
-    def scaled(self, factors: Array) -> EffectColumns:
-        """Each column so many times."""
-        return EffectColumns(
-            self.n, tuple((at, _times(block, factors[at])) for at, block in self.blocks)
-        )
-
 
 def _rows_of(block: ColumnBlock) -> Array:
     """Number of rows in which each column acts."""
     if isinstance(block, np.ndarray):
         return np.asarray(np.count_nonzero(block, axis=0), float)
     return np.asarray(np.diff(block.indptr), float)
-
-
-def _times(block: ColumnBlock, factors: Array) -> ColumnBlock:
-    if isinstance(block, np.ndarray):
-        return np.asarray(block * factors)
-    values = block.data * np.repeat(factors, np.diff(block.indptr))
-    return csc_array((values, block.indices, block.indptr), block.shape)
