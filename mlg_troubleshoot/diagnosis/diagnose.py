@@ -340,7 +340,9 @@ def diagnose(
         report_progress = progress or (lambda _share: None)
         read = len(table)
         table = _answerable(table)
-        (scene, rows), faults = _without_faults(model, table, where, None)
+        screened = screen_faults(model, table)
+        faults = screened[1]
+        scene, rows = _scene_of(model, screened, where)
         catalogue = with_own(own_causes)
         # What never varies cannot be distinguished from a linkage of other dimensions.
         same = {
@@ -358,9 +360,10 @@ def diagnose(
         report_progress(0.6)
         if case.acts:
             # A large effect hides slips of single cells: look again with what is likely taken out.
-            again, more = _without_faults(model, scene.table, where, case.explained)
-            if more:
-                faults = (*faults, *more)
+            screened = screen_faults(model, scene.table, case.explained)
+            if screened[1]:
+                faults = (*faults, *screened[1])
+                again = _scene_of(model, screened, where)
                 case = _explained(*again, told_by, ensemble, beliefs)
         if not table.doubt:
             # Rows that are taken for a cause hide others: look again.
@@ -426,15 +429,16 @@ class _Case:
         return np.asarray(self.columns[:, place] * self.values[place])
 
 
-def _without_faults(
-    model: LinkageModel, table: DiagnosisTable, where: Discrepancies, explained: Array | None
-) -> tuple[tuple[Scene, Rows], tuple[DataFault, ...]]:
+def _scene_of(
+    model: LinkageModel,
+    screened: tuple[DiagnosisTable, tuple[DataFault, ...], Mask],
+    where: Discrepancies,
+) -> tuple[Scene, Rows]:
     """Predict the rows, those with data faults repaired or set aside, without rows whose linkage
     does not close.
     """
-    read = len(table)
-    table, faults, usable = screen_faults(model, table, explained)
-    _single_slips(faults, read)
+    table, faults, usable = screened
+    _single_slips(faults, len(table))
     table = table.take(usable & np.isfinite(table.measured_in))
     _enough(table)
     plain = build_scene(model, table, where)
@@ -444,7 +448,7 @@ def _without_faults(
         table = table.take(closes)
         _enough(table)
         plain = build_scene(model, table, where)
-    return plain, faults
+    return plain
 
 
 def _explained(
