@@ -306,24 +306,22 @@ def _believed(
         known[doubted.rows[of], j] = doubts[of] @ unread.by_share[j]
     flat = unread.unread.reshape(len(LEVELS), -1)
     waves = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
-    sums = np.prod(known, axis=1)
-    unseen = np.flatnonzero(~np.isfinite(cases.mean_in) & ~read.all(axis=1))
-    sums[unseen] = sum(
-        levels[unseen, k, None] * np.prod(np.where(read[unseen, :, None], known[unseen], each), 1)
-        for k, each in enumerate(unread.unread)
-    )
     worn = np.repeat((levels @ BEYOND.sum(axis=1))[:, None], read.shape[1], axis=1)
     fits = np.ones(len(cases))
     likely = levels.copy()
     by_share = np.ones(doubted.chances.shape)
+    of_read = np.prod(np.where(read[:, :, None], known, 1.0), axis=1)
+    sums = of_read * _LINKAGE
+    for same, joints in _alike(read):
+        sums[same] *= np.einsum("nl,lt->nt", levels[same], np.prod(unread.unread[:, joints], 1))
     rows = np.flatnonzero(np.isfinite(cases.mean_in))
     if len(rows):
         at = np.exp(-1j * FREQUENCIES * np.abs(cases.mean_in[rows])[:, None])
         at = (at if pins is HELD else at.real) * blur(u[rows]) * _LINKAGE
         whole = np.zeros((len(cases), len(FREQUENCIES)), at.dtype)
         whole[rows] = at
-        fits[rows], likely[rows], worn[rows], sums[rows] = _given_plunger(
-            unread, read[rows], known[rows], levels[rows], at
+        fits[rows], likely[rows], worn[rows] = _given_plunger(
+            unread, read[rows], of_read[rows] * at, levels[rows]
         )
         rest = waves[doubted.rows]
         rest[np.arange(len(rest)), doubted.joints] = 1.0
@@ -333,46 +331,42 @@ def _believed(
         by_share = np.maximum(pins.sense * (0.5 + by_share), 0.0)
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
-    sums *= _LINKAGE
     exceeds = 1.0 - inside(sums, cases.margin_in)
     usually = float(unread.exceeds @ (cases.fleet.levels or np.full(len(LEVELS), 1 / len(LEVELS))))
     return _Believed(unread, fits, likely, worn, waves, sums, exceeds, usually, by_share)
 
 
+def _alike(read: Mask) -> list[tuple[Places, Places]]:
+    """Gears of which the same joints were not read, and those joints."""
+    patterns, of = np.unique(read, axis=0, return_inverse=True)
+    return [
+        (np.flatnonzero(of.ravel() == k), np.flatnonzero(~each)) for k, each in enumerate(patterns)
+    ]
+
+
 def _given_plunger(
-    unread: _Unread, read: Mask, known: Array, levels: Array, at: Array
-) -> tuple[Array, Array, Array, Array]:
+    unread: _Unread, read: Mask, through: Array, levels: Array
+) -> tuple[Array, Array, Array]:
     """Density of the plunger's reading, and given it chances of the levels, and of each unread
-    joint being worn; characteristic function of the sum of all joints, not given it.
+    joint being worn; through: characteristic function of the joints that were read, at the reading.
     """
-    count = read.shape[1]
-    beyond = BEYOND.sum(axis=1)
     fits = np.empty_like(levels)
-    worn = np.zeros((len(at), len(LEVELS), count))
-    # Where every joint was read, no level changes anything, and no joint is asked about.
-    whole = read.all(axis=1)
-    sums = np.prod(known, axis=1)
-    through = sums[whole] * at[whole]
-    fits[whole] = 0.5 + np.sum(through.real, axis=1)[:, None]
-    some = np.flatnonzero(~whole)
-    sums[some] = 0.0
-    for k in range(len(LEVELS)):
-        waves = np.where(read[some, :, None], known[some], unread.unread[k])
-        ahead, behind = _products(waves)
-        sums[some] += levels[some, k, None] * ahead[-1]
-        fits[some, k] = 0.5 + np.sum((ahead[-1] * at[some]).real, axis=1)
-        for j in range(count):
-            asked = np.flatnonzero(~read[some, j])
-            rest = np.zeros_like(at)
-            rest[some[asked]] = ahead[j][asked] * behind[j + 1][asked] * at[some[asked]]
-            worn[:, k, j] = 0.5 * beyond[k] + (rest @ unread.worn[k, j]).real
+    worn = np.zeros((len(read), len(LEVELS), read.shape[1]))
+    for same, joints in _alike(read):
+        here = through[same]
+        all_unread = np.prod(unread.unread[:, joints], axis=1)
+        fits[same] = 0.5 + np.einsum("nt,lt->nl", here, all_unread).real
+        for j in joints:
+            others = np.prod(unread.unread[:, joints[joints != j]], axis=1) * unread.worn[:, j]
+            density_if_worn = 0.5 * BEYOND.sum(axis=1) + np.einsum("nt,lt->nl", here, others).real
+            worn[same, :, j] = density_if_worn
     fits = np.maximum(fits, 1e-12)
     worn = np.maximum(worn, 0.0)
     likely = levels * fits
     total = likely.sum(axis=1, keepdims=True)
     likely /= total
     worn = np.sum(likely[:, :, None] * worn / fits[:, :, None], axis=1)
-    return unread.pins.sense * total[:, 0], likely, worn, sums
+    return unread.pins.sense * total[:, 0], likely, worn
 
 
 def _weighed(
@@ -452,14 +446,3 @@ def _weighed(
         u_in=u,
         by_pins=both,
     )
-
-
-def _products(waves: Array) -> tuple[list[Array], list[Array]]:
-    """Products of the characteristic functions before each joint, and from each joint on."""
-    count = waves.shape[1]
-    ahead = [np.ones_like(waves[:, 0])]
-    behind = [np.ones_like(waves[:, 0])]
-    for j in range(count):
-        ahead.append(ahead[-1] * waves[:, j])
-        behind.append(behind[-1] * waves[:, count - 1 - j])
-    return ahead, behind[::-1]

@@ -17,7 +17,7 @@ from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.priors import PRIORS
-from mlg_troubleshoot.decision.wear_levels import LEVELS
+from mlg_troubleshoot.decision.wear_levels import DENSITIES, LEVELS, SHARES, level_chances
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import every_joint, inspected
@@ -52,6 +52,40 @@ def test_a_joint_that_was_read_twice_is_known_to_be_worn_or_not(gear: Gear) -> N
     found = causes_of(gear, {3: 0.013, 5: 0.001}, readings_in=(0.036,), measured_again=(3,))
     assert found.worn[0, [2, 4]].tolist() == [1.0, 0.0]
     assert ((found.worn[0, [0, 6]] > 0.0) & (found.worn[0, [0, 6]] < 1.0)).all()
+
+
+def test_gears_with_other_joints_unread_are_believed_as_each_alone(gear: Gear) -> None:
+    rows = [
+        inspected({j: v for j, v in WORN.items() if j not in left}, readings_in=readings)
+        for left in ((), (2,), (3, 7))
+        for readings in ((), (0.03,))
+    ]
+    together = believed(Cases.of(gear, rows))
+    for place, row in enumerate(rows):
+        alone = believed(Cases.of(gear, [row]))
+        for name in ("worn", "levels", "exceeds", "joints"):
+            np.testing.assert_allclose(
+                getattr(together, name)[place], getattr(alone, name)[0], rtol=1e-9
+            )
+
+
+def test_how_likely_an_unread_joint_is_worn_is_what_drawn_gears_with_its_reading_say(
+    gear: Gear,
+) -> None:
+    read = {joint: 0.002 for joint in range(1, 11) if joint not in (2, 3, 4, 5)}
+    case = Cases.of(gear, [inspected(read, readings_in=(0.045,))], fleet=Fleet(loaded=0.0))
+    rng = np.random.default_rng(11)
+    n = 2_000_000
+    level = rng.choice(len(LEVELS), n, p=level_chances(case)[0])
+    clearance = np.full((n, 10), 0.002)
+    for place in range(1, 5):
+        places = np.sum(rng.random(n)[:, None] > np.cumsum(DENSITIES, axis=1)[level], axis=1)
+        clearance[:, place] = SHARES[np.minimum(places, len(SHARES) - 1)] * gear.limits_in[place]
+    turned = gear.model.plunger_amplification() * np.cos(rng.uniform(0.0, 2.0 * np.pi, (n, 10)))
+    stands = np.sum(clearance * turned, axis=1) + rng.normal(0.0, PRIORS.linkage_u_in, n)
+    near = np.abs(np.abs(stands) - 0.045) < 0.001
+    drawn = np.mean(clearance[near][:, 1:5] > gear.limits_in[1:5], axis=0)
+    np.testing.assert_allclose(believed(case).worn[0, 1:5], drawn, atol=0.03)
 
 
 def test_a_large_displacement_says_that_unread_joints_are_worn_more(gear: Gear) -> None:
