@@ -312,7 +312,12 @@ def _believed(
     by_share = np.ones(doubted.chances.shape)
     of_read = np.prod(np.where(read[:, :, None], known, 1.0), axis=1)
     sums = of_read * _LINKAGE
-    for same, joints in _alike(read):
+    # Gears of which the same joints were not read, and those joints.
+    patterns, of = np.unique(read, axis=0, return_inverse=True)
+    alike = [
+        (np.flatnonzero(of.ravel() == k), np.flatnonzero(~each)) for k, each in enumerate(patterns)
+    ]
+    for same, joints in alike:
         sums[same] *= np.einsum("nl,lt->nt", levels[same], np.prod(unread.unread[:, joints], 1))
     rows = np.flatnonzero(np.isfinite(cases.mean_in))
     if len(rows):
@@ -320,9 +325,8 @@ def _believed(
         at = (at if pins is HELD else at.real) * blur(u[rows]) * _LINKAGE
         whole = np.zeros((len(cases), len(FREQUENCIES)), at.dtype)
         whole[rows] = at
-        fits[rows], likely[rows], worn[rows] = _given_plunger(
-            unread, read[rows], of_read[rows] * at, levels[rows]
-        )
+        given = _given_plunger(unread, alike, of_read * whole, levels)
+        fits[rows], likely[rows], worn[rows] = (each[rows] for each in given)
         rest = waves[doubted.rows]
         rest[np.arange(len(rest)), doubted.joints] = 1.0
         rest = np.prod(rest, axis=1) * whole[doubted.rows]
@@ -336,23 +340,15 @@ def _believed(
     return _Believed(unread, fits, likely, worn, waves, sums, exceeds, usually, by_share)
 
 
-def _alike(read: Mask) -> list[tuple[Places, Places]]:
-    """Gears of which the same joints were not read, and those joints."""
-    patterns, of = np.unique(read, axis=0, return_inverse=True)
-    return [
-        (np.flatnonzero(of.ravel() == k), np.flatnonzero(~each)) for k, each in enumerate(patterns)
-    ]
-
-
 def _given_plunger(
-    unread: _Unread, read: Mask, through: Array, levels: Array
+    unread: _Unread, alike: Sequence[tuple[Places, Places]], through: Array, levels: Array
 ) -> tuple[Array, Array, Array]:
     """Density of the plunger's reading, and given it chances of the levels, and of each unread
     joint being worn; through: characteristic function of the joints that were read, at the reading.
     """
     fits = np.empty_like(levels)
-    worn = np.zeros((len(read), len(LEVELS), read.shape[1]))
-    for same, joints in _alike(read):
+    worn = np.zeros((len(levels), *unread.worn.shape[:2]))
+    for same, joints in alike:
         here = through[same]
         all_unread = np.prod(unread.unread[:, joints], axis=1)
         fits[same] = 0.5 + np.einsum("nt,lt->nl", here, all_unread).real
