@@ -336,7 +336,7 @@ def _believed(
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
     exceeds = 1.0 - inside(sums, cases.margin_in)
-    usually = float(unread.exceeds @ (cases.fleet.levels or np.full(len(LEVELS), 1 / len(LEVELS))))
+    usually = float(unread.exceeds @ (cases.fleet.levels or LEVELS))
     return _Believed(unread, fits, likely, worn, waves, sums, exceeds, usually, by_share)
 
 

@@ -45,12 +45,12 @@ def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:
     """
     known = Cases.of(gear, inspections)
     read = known.measured.any(axis=1)
-    fits = level_chances(known)[read]
-    levels = np.full(len(LEVELS), 1.0 / len(LEVELS))
+    fits = level_chances(known)[read] / LEVELS
+    levels = LEVELS
     for _ in range(_ROUNDS):
         each = fits * levels
         each /= each.sum(axis=1, keepdims=True)
-        levels = (1.0 + each.sum(axis=0)) / (len(LEVELS) + len(fits))
+        levels = (len(LEVELS) * LEVELS + each.sum(axis=0)) / (len(LEVELS) + len(fits))
     whole = np.flatnonzero(known.measured.all(axis=1) & np.isfinite(known.mean_in))
     share = betaincinv(PRIORS.loaded, 1.0 - PRIORS.loaded, _QUANTILES)
     likely = np.zeros(len(share))

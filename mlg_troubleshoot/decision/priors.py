@@ -26,7 +26,8 @@ class Priors:
     standard deviation of their angles then. [1, deg]
     linkage_u_in: standard deviation of what the linkage of this gear adds to a sum of random
     directions. [in]
-    levels: least and largest level of wear of one gear, in units of the limit. [1]
+    levels: least and largest level of wear, in units of the limit. [1] alike: chance that the
+    joints of one gear have their level in common: as likely as not. [1]
     worn_out: chance that a joint is worn out for a reason of its own, to between its limit and
     twice its limit, at the least and at the largest level. Of prior wear that differs in scale and
     shape from gear to gear (six kinds, drawn by other code), it left the least surprise (log loss)
@@ -45,6 +46,7 @@ class Priors:
     scatter_deg: float = 20.0
     linkage_u_in: float = 0.0015
     levels: tuple[float, float] = (0.06, 1.2)
+    alike: float = 0.5
     worn_out: tuple[float, float] = (0.05, 0.12)
     gauge_scale: float = 0.1
     wrong_readings: float = Beliefs().expected

@@ -2,9 +2,9 @@
 A verdict takes unread joints at their bounds.
 
 No wear rate of this gear is public, so the prior knows no fleet: the shares of one gear's joints
-are exponential about a level that they have in common, up to the limit at which an overhaul
-restores them; a few joints are worn out for reasons of their own, more on gears that are worn more.
-What was read on a gear tells its level, and through it what to expect of the rest.
+are exponential about a level, up to the limit at which an overhaul restores them; a few joints are
+worn out for reasons of their own, more on gears that are worn more. The joints of a gear have their
+level in common, and what was read tells what to expect of the rest; or each joint has its own.
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import SCORE, tabled_normal_cdf
 
-# Levels of wear of one gear, in units of the limit, each as likely. [1]
-LEVELS = np.geomspace(*PRIORS.levels, 7)
 # Shares of its limit that a joint may be worn to, and how wide each is. [1]
 SHARE = 0.04
 SHARES = (np.arange(50) + 0.5) * SHARE
@@ -32,19 +30,25 @@ TOO_CLOSE = 0.8
 
 
 def _densities() -> Array:
+    levels = np.geomspace(*PRIORS.levels, 6)[:, None]
     out = np.where(SHARES > 1.0, 1.0, 0.0)
-    even = np.exp(-SHARES / LEVELS[:, None]) * (1.0 - out)
+    even = np.exp(-SHARES / levels) * (1.0 - out)
     even /= even.sum(axis=1, keepdims=True)
-    chance = np.geomspace(*PRIORS.worn_out, len(LEVELS))[:, None]
-    return np.asarray((1.0 - chance) * even + chance * out / out.sum())
+    chance = np.geomspace(*PRIORS.worn_out, len(levels))[:, None]
+    alike = (1.0 - chance) * even + chance * out / out.sum()
+    return np.vstack([alike, alike.mean(axis=0)])
 
 
-# Chance of each share at each level, (levels, shares); of those beyond the limit; mean and variance
-# of the share, by level. [1]
+# Chance of each share, (levels, shares): at each level that the joints of a gear have in common, in
+# the last row where each joint has its own; of those beyond the limit; mean and variance of the
+# share, by level. [1]
 DENSITIES = _densities()
 BEYOND = DENSITIES * (SHARES > 1)
 MEAN = DENSITIES @ SHARES
 VARIANCE = DENSITIES @ SHARES**2 - MEAN**2
+# Chances of the levels before any gear of the fleet is known, each common one as likely. [1]
+LEVELS = np.full(len(DENSITIES), PRIORS.alike / (len(DENSITIES) - 1))
+LEVELS[-1] = 1.0 - PRIORS.alike
 
 
 def level_chances(cases: Cases) -> Array:
@@ -52,7 +56,7 @@ def level_chances(cases: Cases) -> Array:
     share = np.clip(cases.filled(0.0) / cases.gear.limits_in, 0.0, 2.0)
     each = np.array([np.interp(share, SHARES, level) for level in np.log(DENSITIES / SHARE)])
     total = np.sum(np.where(cases.measured, each, 0.0), axis=2).T
-    chances = np.exp(total - total.max(axis=1, keepdims=True)) * (cases.fleet.levels or 1.0)
+    chances = np.exp(total - total.max(axis=1, keepdims=True)) * (cases.fleet.levels or LEVELS)
     return np.asarray(chances / chances.sum(axis=1, keepdims=True))
 
 

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 CLEARANCE, OTHER, NONE, MISRIGGED = range(4)
 KINDS = ("clearance", "other", "not failed", "mis-rigged")
 MARGIN_IN, GAUGE_U_IN = 0.03, 0.0005
-MOST_ROUNDS = 16
+MOST_ROUNDS = 20
 _RAW = tomllib.loads(
     (Path(mlg_troubleshoot.__file__).parent / "gear" / "data" / "hawker-800xp.toml").read_text(
         encoding="utf-8"

@@ -152,7 +152,7 @@ def test_what_was_not_asked_for_is_null(form: dict) -> None:
 
 
 def test_with_advice_the_posterior_names_groups_and_intervals(gear: Gear, judge: Judge) -> None:
-    judged = judge({3: 0.013, 5: 0.007}, advice=True, readings_in=(0.041,))
+    judged = judge({3: 0.01, 5: 0.007}, advice=True, readings_in=(0.041,))
     (row,) = check_as_json(gear, [judged], [], [])["inspections"]
     assert row["posterior"]["groups"][0]["joints"] == [3, 5]
     assert [interval["joint"] for interval in row["posterior"]["intervals"]] == list(range(1, 11))

@@ -21,6 +21,7 @@ from mlg_troubleshoot.decision.next_joint import (
 )
 from mlg_troubleshoot.decision.plan import minutes_to_measure
 from mlg_troubleshoot.decision.prediction import predict
+from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.second_order import expand, responses
 from mlg_troubleshoot.decision.verdict_rule import normal_cdf, tabled_normal_cdf
 from mlg_troubleshoot.decision.wear_levels import (
@@ -118,7 +119,17 @@ def test_a_gear_whose_measured_joints_are_worn_is_expected_to_be_worn_elsewhere(
     gear: Gear,
 ) -> None:
     worn, tight = (levels_of(gear, dict.fromkeys((1, 2, 3), c)) for c in (0.0068, 0.0007))
-    assert worn @ MEAN > 2.0 * tight @ MEAN
+    assert worn @ MEAN > 1.5 * tight @ MEAN
+
+
+def test_readings_unlike_each_other_speak_for_joints_that_each_have_their_own_level(
+    gear: Gear,
+) -> None:
+    alike, unlike = (
+        levels_of(gear, dict(enumerate(read, 1)))
+        for read in ((0.0006,) * 6, (0.0002, 0.007, 0.0003, 0.0068, 0.0001, 0.006))
+    )
+    assert alike[-1] < 1.0 - PRIORS.alike < unlike[-1]
 
 
 def test_mean_and_variance_of_wear_are_those_of_its_density() -> None:
@@ -208,7 +219,7 @@ def test_missing_critical_joints_stand_before_all_others(gear: Gear) -> None:
 
 
 def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
-    read = dict.fromkeys((1, 4, 5), 0.001)
+    read = dict.fromkeys((1, 4, 5), 0.0008)
     worth = [w for w in outlook(Cases.of(gear, [inspected(read)])).worth if w.critical]
     assert worth[0].risk_drop > 0.0
     assert worth[0].risk_drop / worth[0].minutes == max(w.risk_drop / w.minutes for w in worth)
@@ -219,7 +230,7 @@ def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
 def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access(
     gear: Gear,
 ) -> None:
-    critical = dict.fromkeys(range(1, 6), 0.0014)
+    critical = dict.fromkeys(range(1, 6), 0.0015)
     worth = {w.joint: w for w in outlook(Cases.of(gear, [inspected(critical)])).worth}
     assert worth[8].risk_drop > worth[6].risk_drop
     assert list(worth).index(6) < list(worth).index(8)

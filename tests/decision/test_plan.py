@@ -158,7 +158,8 @@ def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyo
 
 
 def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judge: Judge) -> None:
-    found = judge(every_joint(0.001, j3=0.0148), outcome=Outcome.FAILED)
+    read = every_joint(0.001, j3=0.0148)
+    found = judge(read, outcome=Outcome.FAILED, measured_again=(3,))
     assert 0.05 < (found.probability_exceed_random_directions or 0.0) < 0.5
     assert [step.action for step in found.plan.steps] == [
         Action.READ_PLUNGER,
@@ -255,7 +256,8 @@ def test_a_reading_in_doubt_of_a_joint_that_hardly_moves_the_plunger_waits_for_t
 def test_a_rigging_that_is_likely_wrong_is_checked_before_a_joint_that_hardly_matters_is_restored(
     judge: Judge,
 ) -> None:
-    found = judge(every_joint(0.001, j8=0.013), readings_in=(0.036,), outcome=Outcome.FAILED)
+    failed = {"outcome": Outcome.FAILED, "measured_again": (8,)}
+    found = judge(every_joint(0.001, j8=0.013), readings_in=(0.036,), **failed)
     # The repair would be followed by a reading of the plunger in vain.
     assert [step.action for step in found.plan.steps] == [
         Action.CHECK_RIGGING,

@@ -166,7 +166,8 @@ def test_a_reading_in_doubt_is_taken_again_before_the_day_ends_for_want_of_a_spa
 
 
 def test_what_has_a_spare_is_restored_today(judge: Judge) -> None:
-    found = judge(every_joint(0.0005, j3=0.0145, j9=0.009), **FAILED, no_spare=(9,))
+    again = {"measured_again": (3, 9)}
+    found = judge(every_joint(0.0005, j3=0.0145, j9=0.009), **FAILED, **again, no_spare=(9,))
     steps = [(step.action, step.joints) for step in found.plan.steps]
     assert steps == [(Action.RESTORE, (3,)), (Action.CONTINUE, ())]
 
@@ -174,7 +175,8 @@ def test_what_has_a_spare_is_restored_today(judge: Judge) -> None:
 def test_no_plunger_is_read_while_a_joint_over_its_limit_waits_for_its_spare(judge: Judge) -> None:
     repaired = {"restored_joints": (5,), "repair_date": datetime(2026, 3, 2, 9)}
     gear = every_joint(0.0005, j3=0.009)
-    found = judge(gear, outcome=Outcome.FAILED, **repaired, no_spare=(3,))
+    failed = {"outcome": Outcome.FAILED, "measured_again": (3,)}
+    found = judge(gear, **failed, **repaired, no_spare=(3,))
     assert found.next_action.text.startswith("Stop for today: #3")
 
 

@@ -169,12 +169,16 @@ def test_the_joints_are_weighed_by_a_reading_once_only(gear: Gear) -> None:
     """By gears drawn here: how many of those that leave the margin stand beyond 0.055 in."""
     rng = np.random.default_rng(7)
     n = 400_000
-    level = LEVELS[rng.integers(len(LEVELS), size=n)]
-    chance = np.geomspace(*PRIORS.worn_out, len(LEVELS))[np.searchsorted(LEVELS, level)]
+    levels = np.geomspace(*PRIORS.levels, 6)
+    chances = np.geomspace(*PRIORS.worn_out, 6)
+    alike = rng.random(n) < PRIORS.alike
+    common = rng.integers(6, size=n)
     moved = PRIORS.linkage_u_in * rng.normal(size=n)
     for amplification in gear.model.plunger_amplification():
+        place = np.where(alike, common, rng.integers(6, size=n))
+        level = levels[place]
         share = -level * np.log1p(-rng.random(n) * -np.expm1(-1.0 / level))
-        share = np.where(rng.random(n) < chance, rng.uniform(1.0, 2.0, n), share)
+        share = np.where(rng.random(n) < chances[place], rng.uniform(1.0, 2.0, n), share)
         moved += amplification * 0.0075 * share * np.cos(rng.uniform(0.0, 2.0 * np.pi, n))
     beyond = [np.mean(np.abs(np.abs(moved) - x) < 0.001) for x in (0.035, 0.055)]
     odds = []
