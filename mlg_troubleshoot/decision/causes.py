@@ -213,17 +213,21 @@ class Causes:
             row, lambda each: self._second_repair(row, members, each, each.waves[row])
         )
 
-    def second_if_worn(self, row: int, restored: Mask, joints: Places) -> Array:
-        """The same once some joints are restored and one of `joints` with them, each in turn being
-        beyond its limit. [1]
+    def second_once_read(self, row: int, restored: Mask, joints: Places) -> Array:
+        """The same once `joints` are read and what was found worn is restored with some others:
+        each in turn being the one beyond its limit; last, none of them. [1]
         """
-        members = restored | np.eye(len(restored), dtype=bool)[joints]
+        n = len(joints)
+        members = np.repeat(restored[None], n + 1, axis=0)
+        members[np.arange(n), joints] = True
 
         def second(each: _Believed) -> Array:
             levels = each.levels[row]
             worn = np.tensordot(levels, each.unread.worn[:, joints], 1)
-            waves = np.repeat(each.waves[row][None], len(joints), axis=0)
-            waves[np.arange(len(joints)), joints] = worn / (levels @ BEYOND.sum(axis=1))
+            beyond = float(levels @ BEYOND.sum(axis=1))
+            waves = np.repeat(each.waves[row][None], n + 1, axis=0)
+            waves[np.arange(n), joints] = worn / beyond
+            waves[n, joints] = (waves[n, joints] - worn) / (1.0 - beyond)
             return self._second_repair(row, members, each, waves)
 
         return self._over_pins(row, second)

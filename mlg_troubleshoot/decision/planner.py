@@ -173,6 +173,8 @@ class _PlanBuilder:
         self.inspection = self.cases.inspections[row]
         self.steps: list[Step] = []
         self.tried: RepairSet | None = None
+        # Chance of a second repair up to which one repair is taken for enough. [1]
+        self.accepted = _FOR_ONE_REPAIR * self.gear.second_repair_chance.value
         self.taken_again = False
         self.opened: frozenset[str] = frozenset(self.inspection.open_areas)
         self.over_limit = self._joints(self.cases.over_limit[row])
@@ -333,14 +335,13 @@ class _PlanBuilder:
         shut = [k for k, area in enumerate(self.gear.areas) if area.name not in self.opened]
         opened = (members[:, None, :] & f.inside[shut]).any(axis=2)
         minutes = members @ f.restore_min + opened @ f.access_min[shut]
-        accepted = _FOR_ONE_REPAIR * self.gear.second_repair_chance.value
         sure = [
             each
             for each in self.sets
-            if (each.second_repair_probability or 0.0) <= accepted
+            if (each.second_repair_probability or 0.0) <= self.accepted
             and set(self.over_limit) <= set(each.joints)
         ]
-        enough = np.flatnonzero(second <= accepted)
+        enough = np.flatnonzero(second <= self.accepted)
         if len(enough):
             best = enough[np.lexsort((second[enough], np.round(minutes[enough], 6)))[0]]
         elif sure or not len(over):
@@ -407,11 +408,15 @@ class _PlanBuilder:
         sound = [n for n in best.joints if n not in self.over_limit]
         if not sound:
             return ()
-        # A reading saves the sound joints where it finds one worn that is enough without them. It
-        # opens no area that the repair opens anyway.
+        # A reading saves the sound joints where it finds one worn that is enough without them, or
+        # none, after which what is over its limit may be enough. It opens no area that the repair
+        # opens anyway.
         places = np.array([self._place(n) for n in chosen])
-        second = f.causes.second_if_worn(i, self.cases.over_limit[i], places)
-        spared = 1.0 - float(np.prod(1.0 - f.causes.worn[i, places] * (1.0 - second)))
+        second = f.causes.second_once_read(i, self.cases.over_limit[i], places)
+        worn = f.causes.worn[i, places]
+        spared = 1.0 - float(np.prod(1.0 - worn * (1.0 - second[:-1])))
+        if second[-1] <= self.accepted:
+            spared += float(np.prod(1.0 - worn))
         anyway = self.opened | {self.gear.joint(n).area for n in (*self.over_limit, *chosen)}
         saved = spared * minutes_to_restore(self.gear, sound, anyway)
         opened = self.opened | {self.gear.joint(n).area for n in best.joints}

@@ -157,6 +157,15 @@ def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyo
     assert compare(cases, predict_batch(cases).upper).explained == [explained]
 
 
+def test_what_may_be_found_within_its_limit_is_read_before_a_sound_joint_is_restored(
+    judge: Judge,
+) -> None:
+    found = judge({3: 0.013, 5: 0.007}, readings_in=(0.041,), outcome=Outcome.FAILED)
+    first = found.plan.steps[0]
+    # Without them #5 would be restored as well, within its limit.
+    assert (first.action, first.joints) == (Action.MEASURE, (2, 4))
+
+
 def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judge: Judge) -> None:
     read = every_joint(0.001, j3=0.0148)
     found = judge(read, outcome=Outcome.FAILED, measured_again=(3,))
