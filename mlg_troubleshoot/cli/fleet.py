@@ -94,7 +94,8 @@ def fleet(
         found = everything.chosen(tail, only or (), order)
         bar("Comparing the last inspections", 0, None)
         read = partial(lives_of, records.kept)
-        noted = suggestions(found.lines, found.forecasts, read, found.model, known)
+        compared = () if shown.quiet else found.lines
+        noted = suggestions(compared, found.forecasts, read, found.model, known)
     for line in noted:
         output.say(f"Note: {line}")
     if shown.as_json:

@@ -45,7 +45,7 @@ def suggestions(
     """
     days = {line.key: line.inspection_date for line in lines}
     apart = {key: forecasts[key].departures for key in days if forecasts[key].departures}
-    exchanged = [] if model is None else _exchanged(apart, days, read, model, gear)
+    exchanged = _exchanged(apart, days, read, model, gear) if model is not None and apart else []
     sentences = [
         f"The last inspections of {' '.join(one)} and {' '.join(other)} fit each other's wear: were"
         " they exchanged?"
