@@ -1,8 +1,10 @@
 """Cold starts and large pieces of work of two trees, in turns: ``python -m
-tests.benchmarks.bench_cold --base FOLDER [--runs 7] [--before PATH] [--batches | -- check FILE]``.
+tests.benchmarks.bench_cold --base FOLDER [--runs 7] [--before PATH] [--lacks=--workers]
+[--batches | -- check FILE]``.
 
 Not collected by pytest. FOLDER is a checkout of the version before; ``--before`` is put into its
-``PYTHONPATH``, for libraries of that time. Each run is a process of its own, the trees take turns,
+``PYTHONPATH``, for libraries of that time; ``--lacks=--workers`` leaves a flag out that it does
+not know. Each run is a process of its own, the trees take turns,
 and what is compared is the processor's time (user and system), so that other work on the machine
 changes both alike. The import of numpy is the measure of the machine. Memory is the largest sum
 over a process and its children, where the system tells (Linux), else that of the largest of them.
@@ -13,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import statistics
 import subprocess
 import sys
@@ -43,6 +46,8 @@ seconds = used.ru_utime + used.ru_stime
 print(json.dumps([process.returncode, seconds, max(used.ru_maxrss, together)]))
 """
 STORE = "store.sqlite"
+VERDICTS = "verdicts.csv"
+REPORTS = "reports"
 ONE_GEAR = ["check", str(ROOT / "inspection_data" / "failure_case.csv")]
 
 
@@ -68,15 +73,21 @@ def batches(folder: Path) -> list[list[str]]:
     few, many = folder / "60.csv", folder / "10000.csv"
     bench_batch.write_csv(few, 60, 0.05)
     bench_batch.write_csv(many, 10_000, 0.05)
-    out = ["--csv", str(folder / "verdicts.csv"), "--force"]
+    out = ["--csv", str(folder / VERDICTS)]
     kept = ["--keep", "--store", str(folder / STORE)]
     return [
         [str(many), "--workers", "1", *out],
         [str(many), "--workers", "2", *out],
         [str(many), "--workers", "2", "--json"],
         [str(many), "--workers", "1", *kept],
-        [str(few), "--report", str(folder / "report"), "--force"],
+        [str(few), "--report", str(folder / REPORTS)],
     ]
+
+
+def without(flags: Sequence[str], command: Sequence[str]) -> list[str]:
+    """A command without some flags and their values."""
+    gone = {at + k for at, word in enumerate(command) if word in flags for k in (0, 1)}
+    return [word for at, word in enumerate(command) if at not in gone]
 
 
 def main() -> None:
@@ -84,6 +95,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--base", type=Path, required=True)
     parser.add_argument("--before", default="")
+    parser.add_argument("--lacks", action="append", default=[], help="a flag with a value")
     parser.add_argument("--runs", type=int, default=7)
     parser.add_argument("--batches", action="store_true", help="tables instead of cold starts")
     parser.add_argument("command", nargs="*", help="a command of mlg instead of the usual ones")
@@ -107,8 +119,11 @@ def main() -> None:
             for turn in range(given.runs + 1 - bool(given.command)):
                 for tree, environment in sides.items():
                     # Each run keeps what no other one has kept.
-                    (Path(compiled) / STORE).unlink(missing_ok=True)
-                    taken = run(tree, command, environment)
+                    for name in (STORE, VERDICTS):
+                        (Path(compiled) / name).unlink(missing_ok=True)
+                    shutil.rmtree(Path(compiled) / REPORTS, ignore_errors=True)
+                    known = without(given.lacks, command) if tree != ROOT else command
+                    taken = run(tree, known, environment)
                     # The first run of a short command compiles.
                     if turn or given.command:
                         found[tree].append(taken)
