@@ -27,6 +27,10 @@ NO_CLOSURE = (
 CHECK_ENTRIES = (
     "Do not use. Correct: the linkage does not close with these clearances; check the entries."
 )
+LIMITS_WRITTEN = (
+    "Every clearance is the limit of its joint: if limits were written in place of readings, the"
+    " verdict says nothing of this gear; enter what was read."
+)
 _SET_THAT_HOLDS = (
     "set of joints that can be restored brings the worst case within the margin with"
     f" {100.0 * CONFORMANCE:.0f} % probability."

@@ -56,8 +56,8 @@ def _strictly(data: bytes, encoding: str) -> str:
 
 def _too_large(what: str, row: int | None = None) -> FileRefusedError:
     limits = (
-        f"at most {MAX_ROWS} rows, {MAX_COLUMNS} columns and {_MAX_LINE_CHARACTERS} characters per"
-        " line"
+        f"at most {_MAX_BYTES // 1_000_000} MB, {MAX_ROWS} rows, {MAX_COLUMNS} columns and"
+        f" {_MAX_LINE_CHARACTERS} characters per line"
     )
     return FileRefusedError("file_too_large", what, limits, row=row)
 

@@ -94,6 +94,9 @@ def _problem(
 # follow the wear.
 _NEIGHBOURS = 3
 _FEWEST = 2
+# So many different clearances are not read again exactly: a reading agrees with the one before to
+# within its gauge's error only. Assumed. [1]
+_DIFFERENT = 5
 # Readings of one joint agree at least within the default uncertainty of their difference, rounded
 # up; those that differ by so many times as much are unusual. Both assumed. [in, 1]
 _FIT_IN = 0.0008
@@ -109,7 +112,7 @@ Clearances = Mapping[int, float]
 
 
 def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, str]:
-    """Suggest slips for rows that do not fit the gear's other inspections."""
+    """Suggest slips for rows that do not fit the gear's other inspections, or fit too well."""
     gears: dict[GearKey, list[int]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection) and row.clearance_in:
@@ -117,11 +120,13 @@ def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, str]:
     usual: dict[GearKey, Clearances] = {}
     found: dict[int, str] = {}
     for gear, places in gears.items():
+        if len(places) == 1:
+            continue
+        seen = [row for row in (rows[p] for p in places) if isinstance(row, Inspection)]
+        found |= {places[at]: said for at, said in _copies(seen).items()}
         if len(places) <= _FEWEST:
             continue
-        clearances = [
-            row.clearance_in for row in (rows[p] for p in places) if isinstance(row, Inspection)
-        ]
+        clearances = [row.clearance_in for row in seen]
         for at, place in enumerate(places):
             near = [
                 *clearances[max(0, at - _NEIGHBOURS) : at],
@@ -139,6 +144,25 @@ def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, str]:
             slip = _slip(clearances[at], expected, usual[other], other[1])
             if slip:
                 found[place] = slip
+    return found
+
+
+def _copies(seen: Sequence[Inspection]) -> dict[int, str]:
+    """Name the rows of one gear, by their place, that repeat every clearance of an earlier row."""
+    first: dict[frozenset[tuple[int, float]], Inspection] = {}
+    found: dict[int, str] = {}
+    for at, row in enumerate(seen):
+        # Rows along the stroke and after a repair are of one reading of the clearances.
+        same = row.actuator_extension_in is not None or row.is_repaired
+        if same or len({v for v in row.clearance_in.values() if v > 0.0}) < _DIFFERENT:
+            continue
+        before = first.setdefault(frozenset(row.clearance_in.items()), row)
+        if before is row or before.record_id == row.record_id:
+            continue
+        said = "copied from that sheet?"
+        if before.inspection_date == row.inspection_date:
+            said = "the same inspection, entered twice?"
+        found[at] = f"all clearances are those of {where(before.source)}: {said}"
     return found
 
 

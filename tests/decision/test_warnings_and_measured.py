@@ -52,6 +52,12 @@ def test_a_joint_above_its_limit_is_rejected_to_the_manual_whatever_the_verdict(
     assert 7 in found.next_action.joints
 
 
+@pytest.mark.parametrize(("c3", "asked"), [(0.0075, True), (0.0074, False)])
+def test_limits_in_place_of_readings_are_asked_about(judge: Judge, c3: float, asked: bool) -> None:
+    found = judge(every_joint(0.0075, j3=c3))
+    assert said(found.warnings, "limits were written in place of readings") is asked
+
+
 def test_the_limit_is_said_to_be_assumed(judge: Judge) -> None:
     assert said(judge(every_joint(0.0, j7=0.008)).warnings, "(assumed)")
 

@@ -32,7 +32,8 @@ def warnings(result):
 
 
 def test_a_steady_history_raises_no_warning(read, table):
-    assert warnings(read(table(HEADER, history(LEFT)))) == {}
+    odd = tuple(round(1.03 * c, 5) for c in LEFT)
+    assert warnings(read(table(HEADER, history(odd)))) == {}
 
 
 @pytest.mark.parametrize(
@@ -83,3 +84,41 @@ def test_two_joints_alone_tell_neither_side_nor_factor(read, table, odd):
     rows = [(*row[:4], *row[4:6]) for row in history((*odd, 0.0, 0.0, 0.0))]
     said = warnings(read(table(HEADER[:6], rows))).get("ODD", ())
     assert not any("side" in text or "all clearances" in text for text in said)
+
+
+COPIED = "all clearances are those of row 2 of "
+
+
+def again(read, table, second, first=LEFT, dates=("2026-03-02", "2026-05-02"), **more):
+    """Return what is said of the second of two inspections of a gear."""
+    header = (*HEADER, "inspection_date", *more)
+    rows = [
+        ("A", "N1", "LH", "RADIAL", *first, dates[0], *more.values()),
+        ("B", "N1", "LH", "RADIAL", *second, dates[1], *more.values()),
+    ]
+    return " ".join(warnings(read(table(header, rows))).get("B", ()))
+
+
+def test_a_sheet_copied_from_an_earlier_one_is_asked_about(read, table):
+    said = again(read, table, LEFT)
+    assert COPIED in said
+    assert said.endswith("copied from that sheet?")
+
+
+def test_an_inspection_under_a_second_record_id_is_asked_about(read, table):
+    said = again(read, table, LEFT, dates=("2026-03-02", "2026-03-02"))
+    assert said.endswith("the same inspection, entered twice?")
+
+
+@pytest.mark.parametrize(
+    ("second", "more"),
+    [
+        ((*LEFT[:4], LEFT[4] + 0.0001), {}),
+        ((*LEFT[:4], ""), {"first": (*LEFT[:4], "")}),
+        (LEFT, {"restored_joints": "6", "repair_date": "2026-03-01"}),
+        (LEFT, {"actuator_extension_in": 1.0, "plunger_position_in": 0.02}),
+    ],
+    ids=["one differs", "four", "after a repair", "along the stroke"],
+)
+def test_rows_that_may_well_be_alike_are_not_asked_about(read, table, second, more):
+    assert "all clearances" not in again(read, table, second, **more)
