@@ -12,6 +12,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, cast
 
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import writable
 from mlg_troubleshoot.records.csvfile import csv_book
@@ -417,6 +418,18 @@ def _no_header(candidate: _Candidate) -> FileRefusedError:
     return FileRefusedError("header_missing", found, sheet=candidate.sheet.name)
 
 
+def _asked_about(rows: Sequence[Inspection | InvalidRow]) -> str:
+    """Name the rows that do not fit, so that nobody must open every report to find them."""
+    one = len(rows) == 1
+    named = ", ".join(str(row.record_id) for row in rows[:8])
+    more = f" and {len(rows) - 8} more" if len(rows) > 8 else ""
+    return (
+        f"{len(rows)} inspection{' does' if one else 's do'} not fit the others of the gear, or"
+        f" repeat{'s' if one else ''} one: {named}{more}. The notes of each say why (--json,"
+        " --report)."
+    )
+
+
 def _finish(results: Sequence[_Found]) -> ReadResult:
     """Join the files, compare the rows with each other, and put the problems in order."""
     rows = [row for _, found in results for row in found.rows]
@@ -440,6 +453,7 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         (
             *(note for _, found in results for note in found.notes),
             *dict.fromkeys(backwards.values()),
+            *([_asked_about([rows[place] for place in sorted(slips)])] if slips else []),
         ),
         layouts,
         tuple(file for file, _ in results),

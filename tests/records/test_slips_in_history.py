@@ -122,3 +122,10 @@ def test_an_inspection_under_a_second_record_id_is_asked_about(read, table):
 )
 def test_rows_that_may_well_be_alike_are_not_asked_about(read, table, second, more):
     assert "all clearances" not in again(read, table, second, **more)
+
+
+def test_a_note_of_the_file_names_the_inspections_that_do_not_fit(read, table):
+    result = read(table(HEADER, history((*LEFT[:3], LEFT[3] * 10, LEFT[4]))))
+    assert [note.partition(".")[0] for note in result.notes if "not fit" in note] == [
+        "1 inspection does not fit the others of the gear, or repeats one: ODD"
+    ]
