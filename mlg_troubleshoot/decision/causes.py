@@ -253,7 +253,8 @@ class Causes:
         if not np.isfinite(x):
             new = np.prod(np.where(members[:, :, None], unread.fresh, 1.0), axis=1)
             return np.asarray(1.0 - inside(left * new, np.full(len(left), margin)))
-        gone = np.prod(np.where(members[:, :, None], waves, 1.0), axis=1) * blur(self.u_in[row])
+        gone = np.prod(np.where(members[:, :, None], waves, 1.0), axis=1)
+        gone = gone * blur(self.u_in[row])
         gone = gone * SMOOTHED
         # The density of the remainder, given that all together read x.
         away = np.exp(-1j * FREQUENCIES * abs(x))

@@ -143,7 +143,8 @@ class Unread:
     def adds(self, joints: Mask) -> tuple[Array, Array]:
         """Mean and variance, at each level, of what some joints add to the worst case. [in, in²]"""
         each = np.where(joints, self.reach_in, 0.0)
-        return each.sum(axis=1)[:, None] * MEAN, (each**2).sum(axis=1)[:, None] * VARIANCE
+        mean = each.sum(axis=1)[:, None] * MEAN
+        return mean, (each**2).sum(axis=1)[:, None] * VARIANCE
 
     def below(self, bound_in: Array, joints: Mask, u_in: Array | float = 0.0) -> Array:
         """Chance that the worst case, some joints added, is below a bound known to `u_in`. [1]"""

@@ -183,7 +183,8 @@ def _copies(table: DiagnosisTable) -> Mask:
     full &= ~np.any(np.nan_to_num(values) != np.nan_to_num(values[before]), axis=1)
     others = both & ~full[:, None]
     usual = (same & others).sum(axis=0) / np.maximum(others.sum(axis=0), 1)
-    expected = float(np.sum(np.prod(np.where(both, usual, 1.0), axis=1)[later & (count > 0)]))
+    by_chance = np.prod(np.where(both, usual, 1.0), axis=1)
+    expected = float(np.sum(by_chance[later & (count > 0)]))
     return np.asarray(full & (pdtrc(full.sum() - 1, expected) < BY_CHANCE))
 
 

@@ -830,7 +830,8 @@ def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections |
     latest = np.array([rows[-1] for rows in visits(table).values()])
     place = int(latest[np.argmax(np.abs(apart[latest]))])
     squared = float(noise.square(apart[:, None], noise.tail_ratios[-1])[0]) / noise.scale_in**2
-    lead = abs(float(np.log(chances[0]) - np.log(max(chances[1], np.finfo(float).tiny))))
+    second = max(chances[1], np.finfo(float).tiny)
+    lead = abs(float(np.log(chances[0]) - np.log(second)))
     times = problem.beliefs.further(float(np.sqrt(squared)), lead)
     count = int(np.ceil(times * len(table))) if times <= _MOST_TIMES else None
     gear = str(table.gears[place])

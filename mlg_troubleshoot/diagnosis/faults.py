@@ -515,7 +515,8 @@ def _bend(table: DiagnosisTable, left: Array) -> Array:
         if near.sum() < LEAST_ALONG:
             break
         # A curve through fewer places than it has coefficients is not determined.
-        places = len(np.unique(np.round(at[near] / max(float(np.ptp(at[near])), 1e-9), 2)))
+        extent = max(float(np.ptp(at[near])), 1e-9)
+        places = len(np.unique(np.round(at[near] / extent, 2)))
         curve = np.polynomial.Polynomial.fit(
             at[near], left[near], min(_BEND, int(near.sum()) // 4, places - 1)
         )

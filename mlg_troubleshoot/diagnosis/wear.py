@@ -389,21 +389,22 @@ def _lines(
     """Level and rate of each gear drawn to the fleet's, (2, n_gears, n_joints), and their
     covariances (aa, ab, bb).
     """
-    p = np.array([spread[2], -spread[1], spread[0]]) / (spread[0] * spread[2] - spread[1] ** 2)
+    of_level, of_both, of_rate = spread
+    p = np.array([of_rate, -of_both, of_level]) / (of_level * of_rate - of_both**2)
     j = weight.shape[1]
     sums = by_gear @ np.hstack([weight, weight * x, weight * x * x, weight * y, weight * x * y])
     w, wx, wxx, wy, wxy = sums.reshape(len(sums), 5, j).swapaxes(0, 1)
     aa = w + p[0]
     ab = wx + p[1]
     bb = wxx + p[2]
-    right = wy + p[0] * fleet[0] + p[1] * fleet[1], wxy + p[1] * fleet[0] + p[2] * fleet[1]
+    level = wy + p[0] * fleet[0] + p[1] * fleet[1]
+    rate = wxy + p[1] * fleet[0] + p[2] * fleet[1]
     # Rounding must not make level and rate of a gear exactly one.
     det = np.maximum(aa * bb - ab * ab, 1e-12 * aa * bb)
     unsure = np.array([bb, -ab, aa]) / det
-    lines = np.array(
-        [unsure[0] * right[0] + unsure[1] * right[1], unsure[1] * right[0] + unsure[2] * right[1]]
-    )
-    return lines, unsure
+    drawn_level = unsure[0] * level + unsure[1] * rate
+    drawn_rate = unsure[1] * level + unsure[2] * rate
+    return np.array([drawn_level, drawn_rate]), unsure
 
 
 def _variance(unsure: Array, gears: Places, x: Array) -> Array:

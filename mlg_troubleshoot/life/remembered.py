@@ -124,7 +124,8 @@ class Remembered:
             due = _Ahead.of(replace(ahead, departures={}) if ahead.due_now else Forecast())
             seen = _Seen(FleetLine.of(life), due)
             if model is not None:
-                seen.model, seen.ahead = self._model_mark, _Ahead.of(ahead)
+                seen.model = self._model_mark
+                seen.ahead = _Ahead.of(ahead)
             self._seen[life.key] = seen
 
     def line(self, key: GearKey) -> FleetLine:

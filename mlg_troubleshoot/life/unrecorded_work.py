@@ -98,7 +98,8 @@ def _exchanged(
 
 def _with_last_of(life: GearLife, other: GearLife) -> GearLife:
     """The life of a gear as if its last inspection had been that of another one."""
-    own, others = life.inspections[-1], other.inspections[-1]
+    own = life.inspections[-1]
+    others = other.inspections[-1]
     events = tuple(others if event is own else event for event in life.events)
     return replace(life, key=(life.name, other.name), events=events)
 

@@ -24,7 +24,8 @@ def folds_of(
         part = np.asarray(numbers % _FOLDS)[group[row]]
         square = columns**2
         least = _LEARNED * np.sum(square, axis=0)
-        if all(np.all(np.sum(square[part != k], axis=0) >= least) for k in range(part.max() + 1)):
+        learnt = [np.sum(square[part != k], axis=0) for k in range(part.max() + 1)]
+        if np.all(learnt >= least):
             return part, "group"
     return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
 

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from mlg_troubleshoot.arrays import Array, log_sum
@@ -101,7 +103,7 @@ class Marginal:
         taken = np.linalg.solve(lower, np.broadcast_to(root.T, (len(lower), *root.T.shape)))
         bent = taken @ held
         bent_data = (taken @ data[..., None])[..., 0]
-        self.log = products.log + 2.0 * np.sum(np.log(np.diagonal(lower, axis1=1, axis2=2)), axis=1)
+        self.log = products.log + _log_determinant(lower)
         self.square = products.square - np.sum(bent**2, axis=1)
         self.along = products.along - np.einsum("rk,rkp->rp", bent_data, bent)
         self.rest = products.rest - np.sum(bent_data**2, axis=1)
@@ -164,7 +166,7 @@ class Marginal:
         left = scaled @ cross[None, :, others].swapaxes(2, 3)
         told = np.einsum("mrij,mrj->mri", root, wide)
         rest = rest - np.sum(told**2, axis=-1)
-        log = log + 2.0 * np.sum(np.log(np.diagonal(lower, axis1=2, axis2=3)), axis=-1)
+        log = log + _log_determinant(lower)
         values = mean + spread * np.einsum("mrji,mrj->mri", root, told)
         error = spread * np.linalg.norm(root, axis=2)
         error *= np.sqrt((np.maximum(rest, 0.0) + self.floor)[..., None] / self.products.n)
@@ -265,3 +267,9 @@ class Marginal:
 def _of_sign(sign: Array, value: Array, error: Array) -> Array:
     """Logarithm of twice the chance that a size has the sign that it can have; 0 where any is."""
     return np.where(sign == 0.0, 0.0, np.log(2.0) + log_ndtr(sign * value / error))
+
+
+def _log_determinant(lower: NDArray[np.floating[Any]]) -> Array:
+    """Logarithm of the determinants of matrices, by their Cholesky factors. [1]"""
+    diagonal = np.diagonal(lower, axis1=-2, axis2=-1)
+    return np.asarray(2.0 * np.sum(np.log(diagonal), axis=-1))

@@ -191,7 +191,8 @@ def smooth_shapes(predicted: Array, sensitivities: Array, group: Wholes | None) 
         ]
         if not varied:
             continue
-        z = (clean[:, varied] - clean[:, varied].mean(axis=0)) / clean[:, varied].std(axis=0)
+        varying = clean[:, varied]
+        z = (varying - varying.mean(axis=0)) / varying.std(axis=0)
         apart = _distances(z, landmarks)
         middle = float(np.median(apart[apart > 0.0]))
         for length in _LENGTHS:

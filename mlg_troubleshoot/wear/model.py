@@ -183,10 +183,12 @@ class WearModel(Result):
         read twice since their restoration, shape (n,). [standard deviations]
         """
         places = self._places(units)
-        usage = np.array([np.asarray(self.paths[u][-1].usage)[-2:] for u in units]).reshape(-1, 2).T
-        before, last = usage / self.scale.usage
-        value = np.array([np.asarray(self.paths[u][-1].value)[-1] for u in units])
-        promised, variance = [], []
+        paths = [self.paths[unit][-1] for unit in units]
+        usage = np.array([np.asarray(path.usage)[-2:] for path in paths])
+        before, last = usage.reshape(-1, 2).T / self.scale.usage
+        value = np.array([np.asarray(path.value)[-1] for path in paths])
+        promised = []
+        variance = []
         for draws, state in self._followed:
             beyond = clock(last, draws.power) - clock(np.maximum(before, 1.0), draws.power)
             doubt = _DOUBT * state.promised_drift[:, places] * np.maximum(beyond, 0.0)
