@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 MAX_FILE_BYTES = 50_000_000
 STDIN_NAME = "-"
+# Rows that the notes of a table name one by one; the others are counted. [1]
+_NAMED = 8
 _PEEKED_ROWS = 120
 _INSTRUCTIONS = "instructions"
 _SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods"))
@@ -421,12 +423,19 @@ def _no_header(candidate: _Candidate) -> FileRefusedError:
 def _asked_about(rows: Sequence[Inspection | InvalidRow]) -> str:
     """Name the rows that do not fit, so that nobody must open every report to find them."""
     one = len(rows) == 1
-    named = ", ".join(str(row.record_id) for row in rows[:8])
-    more = f" and {len(rows) - 8} more" if len(rows) > 8 else ""
+    named = ", ".join(str(row.record_id) for row in rows[:_NAMED])
+    more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
     return (
         f"{len(rows)} inspection{' does' if one else 's do'} not fit the others of the gear, or"
         f" repeat{'s' if one else ''} one: {named}{more}. The notes of each say why (--json,"
         " --report)."
+    )
+
+
+def _falls_elsewhere(count: int) -> str:
+    return (
+        f"Landings fall at {count - _NAMED} more places, as after an overhaul; the notes of their"
+        " rows name them (--json, --report)."
     )
 
 
@@ -441,6 +450,7 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     problems += settle_duplicates(rows, layouts, contents)
     slips = history_warnings(rows)
     backwards = order_warnings(rows, layouts)
+    said_backwards = [*dict.fromkeys(backwards.values())]
     for place in {*slips, *backwards}:
         said = filter(None, (slips.get(place), backwards.get(place)))
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *said))
@@ -452,7 +462,8 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         tuple(problems),
         (
             *(note for _, found in results for note in found.notes),
-            *dict.fromkeys(backwards.values()),
+            *said_backwards[:_NAMED],
+            *([_falls_elsewhere(len(said_backwards))] if len(said_backwards) > _NAMED else []),
             *([_asked_about([rows[place] for place in sorted(slips)])] if slips else []),
         ),
         layouts,
