@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
@@ -178,6 +179,25 @@ def test_answers_are_kept_when_the_prompt_is_left(tmp_path: Path) -> None:
     again = Typed("A 0 1", "q")
     ask_gear(tmp_path / "short.toml", again)
     assert "Points that move" in again.said
+
+
+def test_a_slider_is_asked_for_with_the_direction_of_its_guide(tmp_path: Path) -> None:
+    answers = (
+        "slider crank",
+        *("O 0 0", ""),
+        *("A 0 1", "C 3 0", ""),
+        *("crank O A", "rod A C", ""),
+        *("C 0", ""),
+        "",
+        "crank crank -10 0",
+        "position_of C",
+        *("A 0.005", ""),
+        "0.02",
+        "measured on the bench",
+    )
+    asked = Typed(*answers)
+    assert ask_gear(tmp_path / "short.toml", asked)
+    assert tomllib.loads((tmp_path / "short.toml").read_text("utf-8"))["guides_deg"] == {"C": 0.0}
 
 
 def test_a_line_that_cannot_be_read_is_asked_again(tmp_path: Path) -> None:

@@ -48,6 +48,22 @@ def test_an_unknown_paper_is_refused_before_the_study(tmp_path: Path) -> None:
     assert "Letter" in run.err
 
 
+def test_directions_set_by_a_load_are_read_in_degrees() -> None:
+    def moved(degrees: str) -> list[float]:
+        found = mlg("study", *SMALL, "--fixed", ",".join([degrees] * 10), "--json").json
+        return [joint["first_order"] for joint in found["joints"]]
+
+    assert moved("360") == pytest.approx(moved("0"))
+    assert moved("90") != pytest.approx(moved("0"))
+
+
+@pytest.mark.parametrize("degrees", ["0,ninety", "0,90"])
+def test_directions_that_are_no_degrees_or_too_few_are_refused(degrees: str) -> None:
+    run = mlg("study", *SMALL, "--fixed", degrees)
+    assert run.code == 2
+    assert "per joint" in run.err
+
+
 def test_the_worst_case_is_said_in_the_unit_that_the_user_reads(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
