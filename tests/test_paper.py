@@ -177,7 +177,7 @@ class TestSection3Modelling:
     ) -> None:
         """3.3, Eq. 9: "multiplying amplification indices suitable for the order of mechanisms".
 
-        Not for the fixed pivots #4 and #8, which are no case of Eq. 10: there to 4 % only.
+        Not for the fixed pivots #4 and #8, to which Eq. 10 does not apply: there to 4 % only.
         """
         exact = growth.exact
         movable = [j - 1 for j in NUMBERS if j not in (4, 8)]

@@ -307,8 +307,8 @@ class Assessment(_Planned, Result):
     rigging : Rigging or None
         What re-rigging alone would do; None if it was not asked for or is not needed.
     confidence : Confidence or None
-        Monte Carlo check of the probability; None if it was not asked for or there is no
-        uncertainty.
+        Monte Carlo check of the probability; None if it was not asked for or nothing
+        is uncertain.
     posterior : Posterior or None
         Which joints explain the measured displacement; None if none was measured or it was not
         asked for.

@@ -343,8 +343,8 @@ class Verified:
     """What a walk along the chain showed.
 
     ``count`` records fit, the hash of the last of them is ``last``, and that of number ``expected``
-    is the one that was asked for (None if there is none); ``wrong`` says what else departs from a
-    store as it should be.
+    is the one that was asked for (None without such a record); ``wrong`` says what else departs
+    from a store as it should be.
     """
 
     count: int

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 LIMIT_IN = 0.0075
 GAUGE_U_IN = 0.0005
-#: Joints that no plunger reading can tell apart.
+#: Joints that no plunger reading can distinguish.
 GROUPS = ((1,), (2,), (3, 5), (4,), (6, 7), (8,), (9, 10))
 
 

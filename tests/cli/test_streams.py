@@ -36,7 +36,7 @@ def test_quiet_leaves_stderr_empty(tmp_path: Path) -> None:
     assert mlg("check", FAILURE, "--format", "html", "--report", tmp_path, "--quiet").err == ""
 
 
-def test_without_a_terminal_there_is_no_colour_and_no_progress_bar(failure: Run) -> None:
+def test_without_a_terminal_neither_colour_nor_progress_bar_is_written(failure: Run) -> None:
     assert "\x1b" not in failure.out + failure.err
 
 

@@ -58,7 +58,7 @@ def test_directions_set_by_a_load_are_read_in_degrees() -> None:
 
 
 @pytest.mark.parametrize("degrees", ["0,ninety", "0,90"])
-def test_directions_that_are_no_degrees_or_too_few_are_refused(degrees: str) -> None:
+def test_directions_that_are_not_numbers_or_too_few_are_refused(degrees: str) -> None:
     run = mlg("study", *SMALL, "--fixed", degrees)
     assert run.code == 2
     assert "per joint" in run.err

@@ -1,4 +1,4 @@
-"""The JSON contract of ``mlg check --json``: its keys, and null where there is no number."""
+"""The JSON contract of ``mlg check --json``: its keys, and null without a number."""
 
 from __future__ import annotations
 

@@ -148,11 +148,11 @@ def test_a_restored_joint_has_the_clearance_of_a_new_part(gear: Gear) -> None:
     )
 
 
-def test_where_nothing_need_be_restored_there_is_no_repair_set(gear: Gear) -> None:
+def test_a_gear_that_needs_no_repair_has_no_repair_set(gear: Gear) -> None:
     assert repair_sets(gear, inspected(dict.fromkeys(range(1, 6), 0.0006)), MARGIN_IN) == ()
 
 
-def test_where_no_set_is_sufficient_there_is_no_repair_set(gear: Gear) -> None:
+def test_a_gear_without_a_sufficient_set_has_no_repair_set(gear: Gear) -> None:
     assert repair_sets(gear, inspected(every_joint(0.005)), 0.004) == ()
 
 
@@ -187,7 +187,7 @@ def test_an_allowance_ends_at_the_limit_of_the_joint_where_that_comes_before_the
     assert allowance(gear, inspected(every_joint(0.0017)))[6] == pytest.approx(0.0058)
 
 
-def test_beyond_the_margin_there_is_no_allowance(judge: Judge) -> None:
+def test_a_gear_beyond_its_margin_has_no_allowance(judge: Judge) -> None:
     found = judge(FAILURE)
     assert {finding.allowance_in for finding in found.joints} == {None}
 

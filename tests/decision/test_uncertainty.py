@@ -106,7 +106,7 @@ def test_a_joint_with_an_uncertainty_of_its_own_carries_that_instead(gear: Gear)
     assert u[1] > u[0]
 
 
-def test_a_joint_measured_as_zero_carries_reading_uncertainty_too(judge: Judge) -> None:
+def test_a_joint_measured_as_zero_also_carries_reading_uncertainty(judge: Judge) -> None:
     assert of_readings(budget(judge({3: 0.01, 4: 0.0}))) > of_readings(budget(judge({3: 0.01})))
 
 
@@ -251,7 +251,7 @@ def test_the_geometry_spread_is_that_of_the_prediction_as_loaded_on_every_linkag
     assert loaded.geometry_spread_in == pytest.approx([0.4 * end for end in plain], rel=0.04)
 
 
-def test_a_shift_moves_the_bound_too(judge: Judge) -> None:
+def test_a_shift_also_moves_the_bound(judge: Judge) -> None:
     shifted = judge(WORN, extension=Shifted(), gauge_id="G-1")
     assert shifted.bound_in == shifted.predicted_displacement_in
     assert not shifted.as_loaded

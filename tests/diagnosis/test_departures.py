@@ -463,11 +463,11 @@ def test_a_technician_who_writes_the_other_convention_is_named() -> None:
     assert named("convention") == {("convention_slip", "technician T-2")}
 
 
-def test_a_re_rigged_tail_that_reads_half_is_no_convention_slip() -> None:
+def test_a_re_rigged_tail_that_reads_half_is_not_a_convention_slip() -> None:
     assert named("re-rigged by half") == {("rigging_offset", "tail N103")}
 
 
-def test_digits_that_everybody_cuts_off_are_no_cause() -> None:
+def test_digits_that_everybody_cuts_off_are_not_a_cause() -> None:
     assert found("digits cut off").verdict == "NONE"
 
 

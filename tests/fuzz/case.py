@@ -133,7 +133,7 @@ def _asked(name: str, case: Case, before: Mapping[str, object], *, refused: bool
 
 
 def _rows(store: Path) -> list[tuple[object, ...]]:
-    """Records of a store, read without the program; none where there is no store."""
+    """Records of a store, read without the program; none without a store."""
     import sqlite3
 
     if not store.is_file():

@@ -2,8 +2,8 @@
 coordinates.
 
 Each loop of the mechanism is closed numerically in three dimensions: five unknowns (four lever
-angles and the plunger's travel), five residuals (one per loop), a general root finder. There is no
-law of cosines, no reduction to a plane and no order of the mechanism in it.
+angles and the plunger's travel), five residuals (one per loop), a general root finder. It needs
+neither the law of cosines nor a reduction to a plane, and knows no order of the mechanism.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def test_the_chance_with_random_directions_counts_rate_and_offset(gear: Gear) ->
     assert min(moved[0], grown[0]) > chance_beyond(gear.model, clearance, margin, 512)[0]
 
 
-def test_an_offset_alone_decides_when_there_is_no_clearance(gear: Gear) -> None:
+def test_an_offset_alone_decides_without_clearance(gear: Gear) -> None:
     zero, margin = np.zeros((2, 10)), np.full(2, 0.03)
     assert chance_beyond(
         gear.model, zero, margin, 64, offset_in=np.array([0.029, 0.031])

@@ -21,7 +21,7 @@ from typing import Any
 
 from tests.hidden_effect import study
 
-# The study sets one thread a worker before numpy is loaded.
+# The study sets one thread per worker before numpy is loaded.
 import numpy as np  # isort: skip
 
 from mlg_troubleshoot.cli import main as mlg

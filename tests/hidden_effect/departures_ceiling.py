@@ -320,14 +320,14 @@ def summarise(linkages: Sequence[Record], fleets: Sequence[Record]) -> dict[str,
             for cause, rows in (*sorted(causes.items()), ("all", list(linkages)))
         },
         "directions": {
-            **{name: _told_apart(fleets, (name,)) for name in OTHERS},
-            "one scale, and one joint's direction": _told_apart(fleets, OTHERS[:2]),
-            "all three": _told_apart(fleets, OTHERS),
+            **{name: _distinguished(fleets, (name,)) for name in OTHERS},
+            "one scale, and one joint's direction": _distinguished(fleets, OTHERS[:2]),
+            "all three": _distinguished(fleets, OTHERS),
         },
     }
 
 
-def _told_apart(fleets: Sequence[Record], others: Sequence[str]) -> dict[str, Any]:
+def _distinguished(fleets: Sequence[Record], others: Sequence[str]) -> dict[str, Any]:
     """Directions named where they lead each by more than in all but a few of the fleets that have
     that.
     """

@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-# One thread a worker: the matrices are small, and two workers share two cores.
+# One thread per worker: the matrices are small, and two workers share two cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np

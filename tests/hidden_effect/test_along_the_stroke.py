@@ -1,4 +1,4 @@
-"""An effect is hidden along the stroke: a curve tells apart what one position cannot, and one rig
+"""An effect is hidden along the stroke: a curve distinguishes what one position cannot, and one rig
 is enough.
 
 What was hidden is compared after the diagnosis, which reads the CSV file that the simulator wrote.

@@ -251,7 +251,7 @@ def test_after_a_joint_out_of_turn_the_first_open_one_is_asked(flow: Flow) -> No
     assert play(flow, [".004", "#7", ".002"]).state.joint == 2
 
 
-def test_there_is_no_joint_eleven(flow: Flow) -> None:
+def test_joint_eleven_is_refused(flow: Flow) -> None:
     assert "There is no joint #11" in said(play(flow, ["#11"]))
 
 
@@ -333,7 +333,7 @@ def test_another_value_replaces_the_one_to_confirm(flow: Flow) -> None:
     assert play(flow, [".0205", ".00205"]).state.answers.radial_in == {1: 0.00205}
 
 
-def test_another_large_value_is_asked_again_too(flow: Flow) -> None:
+def test_another_large_value_is_also_asked_again(flow: Flow) -> None:
     assert play(flow, [".0205", ".0305"]).state.ask is Ask.CONFIRM
 
 
@@ -634,7 +634,7 @@ def test_a_joint_opened_from_the_review_can_be_left_as_it_was(flow: Flow, typed:
     assert (turn.state.ask, turn.state.answers.radial_in[3]) == (Ask.REVIEW, 0.004)
 
 
-def test_a_large_value_typed_from_the_review_is_confirmed_too(flow: Flow) -> None:
+def test_a_large_value_typed_from_the_review_is_also_confirmed(flow: Flow) -> None:
     turn = play(flow, [*TEN, *ENTERS, "3", ".0205", "y"])
     assert (turn.state.ask, turn.state.answers.radial_in[3]) == (Ask.REVIEW, 0.0205)
 

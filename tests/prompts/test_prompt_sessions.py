@@ -496,7 +496,7 @@ def test_an_unfinished_entry_is_mentioned_at_the_next_start(
     assert "Unfinished: N123AB LH, begun 2026-03-04 12:00, 1 measured." in terminal.screen
 
 
-def test_without_a_store_there_is_no_latest_session_and_none_is_made(store: SessionStore) -> None:
+def test_without_a_store_no_latest_session_is_found_or_made(store: SessionStore) -> None:
     assert store.latest() is None
     assert not Path(store.place).exists()
 

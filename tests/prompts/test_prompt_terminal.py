@@ -149,7 +149,7 @@ def test_ctrl_c_saves_and_resume_goes_on(start: Start) -> None:
     child.expect_exact("RESULT N123AB LH {1: 0.004, 2: 0.005, 3: 0.006}")
 
 
-def test_ctrl_d_saves_too(start: Start) -> None:
+def test_ctrl_d_also_saves(start: Start) -> None:
     child = start()
     type_lines(child, *_HEADING, ".004")
     child.expect_exact(_PROMPT)
@@ -286,7 +286,7 @@ def test_colours_are_used_in_a_terminal_that_has_them(start: Start) -> None:
 
 
 @pytest.mark.parametrize("variable", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
-def test_without_colour_there_is_no_escape_at_all(start: Start, variable: dict[str, str]) -> None:
+def test_without_colour_no_escape_is_written(start: Start, variable: dict[str, str]) -> None:
     seen = type_lines(start(**variable), *_HEADING, ".008", "q")
     assert "OVER THE LIMIT" in seen
     assert "\x1b" not in seen

@@ -126,7 +126,7 @@ def test_a_joint_over_its_limit_is_marked_in_its_line_of_the_form(template, tmp_
     assert [cell.value for cell in marked] == [FILLED["Clearance #3"]]
 
 
-def test_many_copies_of_the_form_are_many_inspections_and_an_untouched_one_is_none(template):
+def test_many_copies_of_the_form_are_many_inspections_and_an_untouched_one_is_not(template):
     book = openpyxl.load_workbook(template)
     for number in range(3):
         copy = book.copy_worksheet(book["Form"])

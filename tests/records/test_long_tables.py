@@ -98,7 +98,7 @@ def test_a_long_header_without_a_unit_is_reported_once(read, table):
     }
 
 
-def test_axial_floats_are_read_in_a_long_table_too(read, table):
+def test_axial_floats_are_also_read_in_a_long_table(read, table):
     header = (*HEADER, "axial_float_mm")
     rows = [(*ROWS[0], 0.1), (*ROWS[2], None)]
     assert dict(read(table(header, rows)).rows[0].axial_float_in) == {3: pytest.approx(0.1 / 25.4)}

@@ -274,7 +274,7 @@ def test_13_neither_of_two_columns_of_one_header_is_read(read, table, again):
     assert isinstance(result.rows[0], InvalidRow)
 
 
-def test_13_one_joint_in_two_units_is_a_duplicate_too(read, table):
+def test_13_one_joint_in_two_units_is_also_a_duplicate(read, table):
     result = read(table((*HEADER, "clearance_3_mm"), [(*GOOD, 0.33)]))
     assert only(result).code == "header_duplicate"
 
@@ -819,7 +819,7 @@ def test_42_files_written_by_libreoffice_are_read(read, samples, name):
 
 
 @pytest.mark.parametrize("name", ["sample.ods", "sample.xlsx"])
-def test_42_results_of_formulas_are_counted_where_the_file_tells_them_apart(read, samples, name):
+def test_42_results_of_formulas_are_counted_where_the_file_marks_them(read, samples, name):
     (told,) = (
         note for note in read((samples / name).read_bytes(), name).notes if "formulas" in note
     )

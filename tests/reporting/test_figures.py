@@ -138,7 +138,7 @@ def test_the_margin_of_the_gauge_is_drawn_to_the_scale_of_the_worst_case(judge: 
     assert drawn / float(margin["width"]) == pytest.approx(expected, rel=0.01)
 
 
-def test_there_is_no_gauge_where_the_linkage_does_not_close(judge: Judge) -> None:
+def test_a_linkage_that_does_not_close_has_no_gauge(judge: Judge) -> None:
     assert margin_gauge(judge(dict.fromkeys(range(1, 11), 0.0465)), INCHES) is None
 
 

@@ -74,7 +74,7 @@ def test_hostile_text_is_shown_as_it_was_entered(words: str, hostile: Made) -> N
     assert words in readable(hostile.html)
 
 
-def test_hostile_text_is_text_on_paper_too(hostile: Made) -> None:
+def test_hostile_text_is_also_text_on_paper(hostile: Made) -> None:
     assert SCRIPT in text_of(hostile.pdf)
 
 

@@ -16,7 +16,7 @@ def test_nothing_outside_the_file_is_referred_to(failure: Made) -> None:
     assert "@import" not in failure.html
 
 
-def test_there_is_no_script(failure: Made) -> None:
+def test_a_page_has_no_script(failure: Made) -> None:
     assert "script" not in Elements(failure.html).names
 
 

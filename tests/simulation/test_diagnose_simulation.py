@@ -163,7 +163,7 @@ def test_the_same_data_give_the_same_answer() -> None:
     assert first == again
 
 
-def test_two_that_look_nearly_alike_are_both_reported_until_the_data_tell_them_apart() -> None:
+def test_two_that_look_nearly_alike_are_both_reported_until_the_data_distinguish_them() -> None:
     x = np.linspace(0.0, 1.0, 80)
     rng = np.random.default_rng(12)
 
