@@ -39,8 +39,8 @@ from mlg_troubleshoot.decision.waves import (
 from mlg_troubleshoot.decision.wear_levels import (
     BEYOND,
     DENSITIES,
-    LEVELS,
     MEAN,
+    PRIOR_OF_LEVELS,
     SHARES,
     Doubted,
     level_chances,
@@ -82,7 +82,7 @@ def _unread(gear: Gear) -> tuple[_Unread, _Unread]:
         waves = pins.waves(FREQUENCIES * reach[:, None, None] * SHARES[:, None])
         unread = np.einsum("ls,jst->ljt", DENSITIES, waves)
         everything = np.prod(unread, axis=1) * _LINKAGE
-        margin = np.full(len(LEVELS), gear.margin.value)
+        margin = np.full(len(PRIOR_OF_LEVELS), gear.margin.value)
         found.append(
             _Unread(
                 pins,
@@ -309,7 +309,7 @@ def _believed(
     by_joint = [np.flatnonzero(doubted.joints == j) for j in range(read.shape[1])]
     for j, of in enumerate(by_joint):
         known[doubted.rows[of], j] = doubts[of] @ unread.by_share[j]
-    flat = unread.unread.reshape(len(LEVELS), -1)
+    flat = unread.unread.reshape(len(PRIOR_OF_LEVELS), -1)
     waves = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
     worn = np.repeat((levels @ BEYOND.sum(axis=1))[:, None], read.shape[1], axis=1)
     fits = np.ones(len(cases))
@@ -341,7 +341,7 @@ def _believed(
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
     exceeds = 1.0 - inside(sums, cases.margin_in)
-    usually = float(unread.exceeds @ (cases.fleet.levels or LEVELS))
+    usually = float(unread.exceeds @ (cases.fleet.levels or PRIOR_OF_LEVELS))
     return _Believed(unread, fits, likely, worn, waves, sums, exceeds, usually, by_share)
 
 

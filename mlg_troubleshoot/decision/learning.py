@@ -20,7 +20,7 @@ from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.sentences import percent
-from mlg_troubleshoot.decision.wear_levels import LEVELS, MEAN, level_chances
+from mlg_troubleshoot.decision.wear_levels import MEAN, PRIOR_OF_LEVELS, level_chances
 from mlg_troubleshoot.gear.gear import Gear
 
 # Quantiles of the share of gears whose pins are held, and rounds in which shares of levels settle.
@@ -45,12 +45,14 @@ def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:
     """
     known = Cases.of(gear, inspections)
     read = known.measured.any(axis=1)
-    fits = level_chances(known)[read] / LEVELS
-    levels = LEVELS
+    fits = level_chances(known)[read] / PRIOR_OF_LEVELS
+    levels = PRIOR_OF_LEVELS
     for _ in range(_ROUNDS):
         each = fits * levels
         each /= each.sum(axis=1, keepdims=True)
-        levels = (len(LEVELS) * LEVELS + each.sum(axis=0)) / (len(LEVELS) + len(fits))
+        levels = (len(PRIOR_OF_LEVELS) * PRIOR_OF_LEVELS + each.sum(axis=0)) / (
+            len(PRIOR_OF_LEVELS) + len(fits)
+        )
     whole = np.flatnonzero(known.measured.all(axis=1) & np.isfinite(known.mean_in))
     share = betaincinv(PRIORS.loaded, 1.0 - PRIORS.loaded, _QUANTILES)
     likely = np.zeros(len(share))

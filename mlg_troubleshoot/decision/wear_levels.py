@@ -47,8 +47,8 @@ BEYOND = DENSITIES * (SHARES > 1)
 MEAN = DENSITIES @ SHARES
 VARIANCE = DENSITIES @ SHARES**2 - MEAN**2
 # Chances of the levels before any gear of the fleet is known, each common one as likely. [1]
-LEVELS = np.full(len(DENSITIES), PRIORS.alike / (len(DENSITIES) - 1))
-LEVELS[-1] = 1.0 - PRIORS.alike
+PRIOR_OF_LEVELS = np.full(len(DENSITIES), PRIORS.alike / (len(DENSITIES) - 1))
+PRIOR_OF_LEVELS[-1] = 1.0 - PRIORS.alike
 
 
 def level_chances(cases: Cases) -> Array:
@@ -56,7 +56,9 @@ def level_chances(cases: Cases) -> Array:
     share = np.clip(cases.filled(0.0) / cases.gear.limits_in, 0.0, 2.0)
     each = np.array([np.interp(share, SHARES, level) for level in np.log(DENSITIES / SHARE)])
     total = np.sum(np.where(cases.measured, each, 0.0), axis=2).T
-    chances = np.exp(total - total.max(axis=1, keepdims=True)) * (cases.fleet.levels or LEVELS)
+    chances = np.exp(total - total.max(axis=1, keepdims=True)) * (
+        cases.fleet.levels or PRIOR_OF_LEVELS
+    )
     return np.asarray(chances / chances.sum(axis=1, keepdims=True))
 
 

@@ -17,7 +17,7 @@ from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.priors import PRIORS
-from mlg_troubleshoot.decision.wear_levels import DENSITIES, LEVELS, SHARES, level_chances
+from mlg_troubleshoot.decision.wear_levels import DENSITIES, PRIOR_OF_LEVELS, SHARES, level_chances
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import every_joint, inspected
@@ -76,7 +76,7 @@ def test_how_likely_an_unread_joint_is_worn_is_what_drawn_gears_with_its_reading
     case = Cases.of(gear, [inspected(read, readings_in=(0.045,))], fleet=Fleet(loaded=0.0))
     rng = np.random.default_rng(11)
     n = 2_000_000
-    level = rng.choice(len(LEVELS), n, p=level_chances(case)[0])
+    level = rng.choice(len(PRIOR_OF_LEVELS), n, p=level_chances(case)[0])
     clearance = np.full((n, 10), 0.002)
     for place in range(1, 5):
         places = np.sum(rng.random(n)[:, None] > np.cumsum(DENSITIES, axis=1)[level], axis=1)
