@@ -14,7 +14,6 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import STEP, Array, Mask, central_slopes, central_steps
 from mlg_troubleshoot.gear.design import DesignSpace
-from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Guided, Lever, Mechanism, Slider, Slot
@@ -48,7 +47,7 @@ class ReadingKind(StrEnum):
 # and of the logarithm of the order of the indices. [in, in, rad, in, in, 1]
 DEFAULT_U = {
     ReadingKind.DISTANCE: 0.01,
-    ReadingKind.PLUNGER: DEFAULT_PLUNGER_U_IN,
+    ReadingKind.PLUNGER: 0.0015,
     ReadingKind.ANGLE: float(np.radians(1)),
     ReadingKind.EXTENSION: 0.005,
     ReadingKind.TRAVEL: 0.005,

@@ -167,7 +167,7 @@ def test_a_repair_is_to_be_tried_where_fewer_joints_likely_hold(judge: Judge) ->
 def test_a_default_plunger_uncertainty_is_announced(judge: Judge) -> None:
     default = judge(every_joint(0.001), readings_in=(0.01,)).warnings
     stated = judge(every_joint(0.001), readings_in=(0.01,), plunger_gauge_u_in=0.001).warnings
-    words = "plunger reading not stated: 0.0015 in"
+    words = "plunger reading not stated: 0.0020 in"
     assert any(words in w for w in default)
     assert not any(words in w for w in stated)
 

@@ -139,7 +139,7 @@ def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: 
 def test_a_reading_clears_a_gear_from_two_standard_uncertainties_within_its_margin_on(
     gear: Gear, apart: float, clears: bool
 ) -> None:
-    u_in = math.hypot(0.0015, 0.002)
+    u_in = math.hypot(0.002, 0.002)
     cases = Cases.of(gear, [inspected({}, readings_in=(apart * u_in - 0.03,), margin_u_in=0.002)])
     assert compare(cases, predict_batch(cases).upper).clears == [clears]
 
@@ -149,7 +149,7 @@ def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyo
     gear: Gear, judge: Judge, apart: float, explained: bool
 ) -> None:
     found = judge(every_joint(0.0005))
-    u_in = math.hypot(found.standard_uncertainty_in or 0.0, 0.0015)
+    u_in = math.hypot(found.standard_uncertainty_in or 0.0, 0.002)
     read = inspected(
         every_joint(0.0005), readings_in=((found.over_travel_in or 0.0) + apart * u_in,)
     )
