@@ -20,6 +20,10 @@ from weakref import finalize
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
 
+# Told how much is done, and of how much if that is known; or of which stage of the work.
+Progress = Callable[[int, int | None], None]
+StageProgress = Callable[[str, int, int | None], None]
+
 _Item = TypeVar("_Item")
 _Part = TypeVar("_Part")
 _Found = TypeVar("_Found")

@@ -143,7 +143,7 @@ class Run:
                 self._write_json(result)
             else:
                 self._show(result, seen.show, [*found.lines], detail=wanted.detail)
-        if wanted.annotate is not None:
+        if wanted.annotate is not None and result.read is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
         if wanted.report is not None:
             self._write_reports(result, wanted.report, seen)
@@ -252,8 +252,6 @@ class Run:
             self._show(result, seen.show, detail=wanted.detail)
         if wanted.csv is not None:
             task.write_verdicts(result, wanted.csv)
-        if wanted.annotate is not None:
-            self._annotate(None, {}, wanted.annotate)
         if wanted.report is not None:
             self._write_reports(result, wanted.report, seen)
 
@@ -288,9 +286,9 @@ class Run:
                 batch.show_before_and_after(*both, screen)
 
     def _annotate(
-        self, read: ReadResult | None, said: Mapping[RowSource, task.Annotated], out: Path
+        self, read: ReadResult, said: Mapping[RowSource, task.Annotated], out: Path
     ) -> None:
-        if read is not None and not read.layouts:
+        if not read.layouts:
             output.say(f"{out} was not written: no table was found to annotate.")
             return
         for loss in task.annotate(read, said, Path(self._files[0]), out):

@@ -18,7 +18,6 @@ from mlg_troubleshoot.records.values import CellFaultError
 from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
-Progress = Callable[[int, int | None], None]
 _WORDS: Mapping[str, Callable[[str], object]] = {
     "unit": LengthUnit.parse,
     "convention": ClearanceConvention.parse,

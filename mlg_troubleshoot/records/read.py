@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, BinaryIO, cast
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.cells import writable
 from mlg_troubleshoot.records.csvfile import csv_book
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
 from mlg_troubleshoot.records.frames import FRAME, FrameSheet, as_frame, in_frame, is_frame
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
-from mlg_troubleshoot.records.model import FileRead, Progress, ReadOptions, ReadResult
+from mlg_troubleshoot.records.model import FileRead, ReadOptions, ReadResult
 from mlg_troubleshoot.records.row_consistency import (
     history_warnings,
     order_warnings,

@@ -26,7 +26,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_lines, write_text
-from mlg_troubleshoot.parallel import Processes, spread
+from mlg_troubleshoot.parallel import Processes, Progress, spread
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from mlg_troubleshoot.workflows.index_tables import load_index_table
@@ -128,8 +128,8 @@ class BlockOutput:
 def check_files(
     sources: Sequence[Source],
     options: CheckOptions | None = None,
-    on_read: Callable[[int, int | None], None] | None = None,
-    on_judged: Callable[[int, int], None] | None = None,
+    on_read: Progress | None = None,
+    on_judged: Progress | None = None,
     store: Store | None = None,
     outputs: Callable[[CheckResult, int], Sequence[BlockOutput]] | None = None,
 ) -> CheckResult:
@@ -186,7 +186,7 @@ def check_files(
 
 def _start(
     processes: Processes,
-    on_read: Callable[[int, int | None], None] | None,
+    on_read: Progress | None,
     done: int,
     total: int | None,
 ) -> None:
@@ -402,7 +402,7 @@ def _judge(
     found: CheckResult,
     rows: list[Inspection | InvalidRow],
     options: CheckOptions,
-    on_judged: Callable[[int, int], None] | None = None,
+    on_judged: Progress | None = None,
     store: Store | None = None,
     outputs: Callable[[CheckResult, int], Sequence[BlockOutput]] | None = None,
     processes: Processes | None = None,
@@ -475,7 +475,7 @@ def write_reports(
     directory: Path | str,
     formats: Sequence[str] = ("html", "pdf"),
     page: str = "A4",
-    on_written: Callable[[int, int], None] | None = None,
+    on_written: Progress | None = None,
     *,
     unit: LengthUnit | str = LengthUnit.INCH,
     before: Sequence[Sequence[PastInspection]] = (),
@@ -645,13 +645,11 @@ def annotated(judgements: Sequence[Judgement]) -> dict[RowSource, Annotated]:
 
 
 def annotate(
-    read: ReadResult | None, said: Mapping[RowSource, Annotated], source: Path, out: Path
+    read: ReadResult, said: Mapping[RowSource, Annotated], source: Path, out: Path
 ) -> tuple[str, ...]:
     """Write a copy of the user's workbook with bad cells marked and verdict columns added."""
     from mlg_troubleshoot.records.annotate import annotate_workbook
 
-    if read is None:
-        raise UsageError("there is no workbook to annotate", "Give the workbook as FILE.")
     verdicts = {row: each.columns for row, each in said.items()}
     over_limit = {row: each.over_limit for row, each in said.items()}
     return annotate_workbook(source, out, read, verdicts, over_limit)

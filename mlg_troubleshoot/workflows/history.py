@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from functools import partial
@@ -26,6 +26,7 @@ from mlg_troubleshoot.life.folding import (
 )
 from mlg_troubleshoot.life.landings_left import FleetLine, Order
 from mlg_troubleshoot.outputs import write_csv
+from mlg_troubleshoot.parallel import Progress, StageProgress
 from mlg_troubleshoot.records import ReadOptions, admit
 from mlg_troubleshoot.records.gate import judge_text
 from mlg_troubleshoot.results import Result
@@ -114,7 +115,7 @@ def show_fleet(
     *,
     ahead: bool,
     whole: bool = True,
-    progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
+    progress: StageProgress = lambda _name, _done, _total: None,
     problems: tuple[Problem, ...] = (),
 ) -> Lives:
     """Every gear, with its forecast if asked for; `whole`, with all of its records."""
@@ -154,7 +155,7 @@ def _taught(
     gear: Gear,
     keys: Sequence[GearKey],
     remembered: Remembered,
-    progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
+    progress: StageProgress = lambda _name, _done, _total: None,
 ) -> WearModel | None:
     """How joints wear, from as many gears as are needed of a large fleet."""
     from mlg_troubleshoot.life.forecast import (
@@ -186,7 +187,7 @@ def show_lives(
     side: str | None,
     *,
     ahead: bool,
-    progress: Callable[[str, int, int | None], None] = lambda _name, _done, _total: None,
+    progress: StageProgress = lambda _name, _done, _total: None,
 ) -> Lives:
     """The lives of one aircraft's gears, or of one of them."""
     from mlg_troubleshoot.life.forecast import forecast
@@ -357,7 +358,7 @@ class Verified:
 def verify(
     store: Store,
     expect: str | None = None,
-    progress: Callable[[int, int | None], None] = lambda _done, _total: None,
+    progress: Progress = lambda _done, _total: None,
 ) -> Verified:
     """Walk the chain, read every content that is not void, and look whether a hash noted before
     still stands there.

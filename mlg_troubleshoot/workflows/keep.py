@@ -14,7 +14,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, find, life_of, warnings_of, without_dashes
 from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
-from mlg_troubleshoot.parallel import Blocks
+from mlg_troubleshoot.parallel import Blocks, Progress
 from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
     Record,
@@ -64,7 +64,7 @@ def keep(
     options: CheckOptions,
     store: Store,
     same_tail: Callable[[str, str], bool] | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _total: None,
+    progress: Progress = lambda _done, _total: None,
     judged: Blocks[JudgedEntry] | None = None,
 ) -> Kept:
     """Add the judged inspections of a check and their assessments, all or none.

@@ -4,7 +4,6 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import OutputKind, write_text
 from mlg_troubleshoot.paper.targets import load_targets, targets_file
+from mlg_troubleshoot.parallel import StageProgress
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.reconstruct import Reconstruction
@@ -34,7 +34,7 @@ def reconstruct_linkage(
     name: str = "N",
     minutes: float = 15.0,
     out: Path | None = None,
-    progress: Callable[[str, int, int | None], None] | None = None,
+    progress: StageProgress | None = None,
 ) -> tuple[Reconstruction, str]:
     """Search a linkage, or polish the one named `start`; return it with its text for an ensemble
     file.

@@ -7,7 +7,6 @@ What computes is imported where it is needed: a check must not wait for scipy.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -22,6 +21,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import write_index_table
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.paper.targets import targets_file
+from mlg_troubleshoot.parallel import StageProgress
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.indices.given_data import GivenDataResult
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 from mlg_troubleshoot.units import LengthUnit
 
-Progress = Callable[[str, int, int | None], None]
-
 
 def run_study(
     gear: Gear | str | Path = DEFAULT_GEAR,
@@ -41,7 +39,7 @@ def run_study(
     statements: bool = False,
     bound: bool = False,
     designs: bool = False,
-    progress: Progress | None = None,
+    progress: StageProgress | None = None,
 ) -> StudyFindings:
     """Recompute the sensitivity and amplification indices of a gear, and what is asked for with
     them.
@@ -97,7 +95,7 @@ def run_study(
     return findings
 
 
-def _searches(gear: Gear, options: StudyOptions, report: Progress) -> tuple[WorstSearch, ...]:
+def _searches(gear: Gear, options: StudyOptions, report: StageProgress) -> tuple[WorstSearch, ...]:
     from mlg_troubleshoot.paper.worst_search import search_worst
 
     found = []
