@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -34,19 +34,19 @@ class ConventionSlip(Cause):
     all of them or for a time, or the reverse.
     """
 
-    name: ClassVar[str] = "convention_slip"
-    parameter: ClassVar[str] = "share_of_slip"
-    sized: ClassVar[bool] = False
-    trial: ClassVar[float] = 1.0
-    sign: ClassVar[int] = 1
-    exact: ClassVar[float | None] = 1.0
-    extends: ClassVar[bool] = False
-    sentence: ClassVar[str] = (
+    name = "convention_slip"
+    parameter = "share_of_slip"
+    sized = False
+    trial = 1.0
+    sign = 1
+    exact = 1.0
+    extends = False
+    sentence = (
         "The clearances of {target} stand in another convention than they say (radial against"
         " diametral or total play)"
     )
-    inspect: ClassVar[str] = "How those clearances were read and written; the file is left as it is"
-    separates: ClassVar[str] = "one joint measured again by another technician with another gauge"
+    inspect = "How those clearances were read and written; the file is left as it is"
+    separates = "one joint measured again by another technician with another gauge"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield each group whose readings are far off the fleet's share of their prediction; any

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -40,13 +39,13 @@ _LEARNING_DAYS = DAYS_PER_YEAR / 6 * 2 ** np.arange(4)
 class GaugeDrift(Cause):
     """A gauge, or all of them, creep from one calibration to the next."""
 
-    name: ClassVar[str] = "gauge_drift"
-    needs: ClassVar[tuple[str, ...]] = ("gauge_id", "day")
-    parameter: ClassVar[str] = "drift_in_per_year"
-    trial: ClassVar[float] = 0.001
-    sentence: ClassVar[str] = "Readings with {target} creep between calibrations"
-    inspect: ClassVar[str] = "Calibration of that gauge now, and its zero at each inspection"
-    separates: ClassVar[str] = "one gear measured right before and right after a calibration"
+    name = "gauge_drift"
+    needs = ("gauge_id", "day")
+    parameter = "drift_in_per_year"
+    trial = 0.001
+    sentence = "Readings with {target} creep between calibrations"
+    inspect = "Calibration of that gauge now, and its zero at each inspection"
+    separates = "one gear measured right before and right after a calibration"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield each gauge, and all together, with each month of calibration."""
@@ -74,13 +73,13 @@ class GaugeDrift(Cause):
 class TechnicianLearning(Cause):
     """A technician is off at first and becomes better with time."""
 
-    name: ClassVar[str] = "technician_learning"
-    needs: ClassVar[tuple[str, ...]] = ("technician_id", "day")
-    parameter: ClassVar[str] = "offset_at_first_in"
-    trial: ClassVar[float] = 0.001
-    sentence: ClassVar[str] = "Readings by {target} were shifted at first, less and less since"
-    inspect: ClassVar[str] = "The earliest readings of that technician: read those gears again"
-    separates: ClassVar[str] = "an early gear of this technician measured again by another one"
+    name = "technician_learning"
+    needs = ("technician_id", "day")
+    parameter = "offset_at_first_in"
+    trial = 0.001
+    sentence = "Readings by {target} were shifted at first, less and less since"
+    inspect = "The earliest readings of that technician: read those gears again"
+    separates = "an early gear of this technician measured again by another one"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield each technician from his first day on, with each time in which he learns."""
@@ -113,12 +112,12 @@ class Modification(Cause):
     modification, a base, a shop), or those of some aircraft, each from a date of its own.
     """
 
-    name: ClassVar[str] = "modification"
-    parameter: ClassVar[str] = "offset_in"
-    trial: ClassVar[float] = 0.001
-    sentence: ClassVar[str] = "Readings with {target} are shifted"
-    inspect: ClassVar[str] = "What was changed on these gears, or is done otherwise there"
-    separates: ClassVar[str] = (
+    name = "modification"
+    parameter = "offset_in"
+    trial = 0.001
+    sentence = "Readings with {target} are shifted"
+    inspect = "What was changed on these gears, or is done otherwise there"
+    separates = (
         "one gear measured right before and right after the change, by the same technician"
     )
 

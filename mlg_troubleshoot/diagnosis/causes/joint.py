@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar
 
 import numpy as np
 
@@ -17,8 +16,8 @@ _ROOMS = 8
 class _JointShare(Cause):
     """A joint contributes more or less than its measured clearance in the worst direction."""
 
-    parameter: ClassVar[str] = "contribution_change"
-    plausible: ClassVar[float | None] = 1.0 / 3.0
+    parameter = "contribution_change"
+    plausible = 1.0 / 3.0
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate for each joint that was measured with some wear."""
@@ -40,14 +39,14 @@ class _JointShare(Cause):
 class DirectionNotWorstCase(_JointShare):
     """A joint's clearance is not taken up in the worst direction."""
 
-    name: ClassVar[str] = "direction_not_worst_case"
-    trial: ClassVar[float] = -0.1
-    sign: ClassVar[int] = -1
-    sentence: ClassVar[str] = (
+    name = "direction_not_worst_case"
+    trial = -0.1
+    sign = -1
+    sentence = (
         "The clearance of {target} is not taken up in the worst direction: it contributes less"
     )
-    inspect: ClassVar[str] = "Which way the pin of that joint rests under load"
-    separates: ClassVar[str] = (
+    inspect = "Which way the pin of that joint rests under load"
+    separates = (
         "the pin's resting side in that joint under pressure, by feeler or dial"
     )
 
@@ -55,14 +54,14 @@ class DirectionNotWorstCase(_JointShare):
 class OvalWear(_JointShare):
     """A worn bore is larger in the load direction than where it was measured."""
 
-    name: ClassVar[str] = "oval_wear"
-    trial: ClassVar[float] = 0.1
-    sign: ClassVar[int] = 1
-    sentence: ClassVar[str] = (
+    name = "oval_wear"
+    trial = 0.1
+    sign = 1
+    sentence = (
         "The bore of {target} is oval: its clearance in the load direction is larger than measured"
     )
-    inspect: ClassVar[str] = "Bore of that joint in two directions"
-    separates: ClassVar[str] = "the bore of that joint measured across and along the load"
+    inspect = "Bore of that joint in two directions"
+    separates = "the bore of that joint measured across and along the load"
 
 
 class JointContact(Cause):
@@ -72,14 +71,14 @@ class JointContact(Cause):
     two together have room for so much only.
     """
 
-    name: ClassVar[str] = "joint_contact"
-    parameter: ClassVar[str] = "share_not_taken_up"
-    trial: ClassVar[float] = 0.2
-    plausible: ClassVar[float | None] = 0.5
-    sign: ClassVar[int] = 1
-    sentence: ClassVar[str] = "The neighbouring {target} cannot both take up their clearances"
-    inspect: ClassVar[str] = "Contact marks between the two joints"
-    separates: ClassVar[str] = "one plunger reading with each of the two joints shimmed in turn"
+    name = "joint_contact"
+    parameter = "share_not_taken_up"
+    trial = 0.2
+    plausible = 0.5
+    sign = 1
+    sentence = "The neighbouring {target} cannot both take up their clearances"
+    inspect = "Contact marks between the two joints"
+    separates = "one plunger reading with each of the two joints shimmed in turn"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield candidates of both forms for each pair of neighbours that the gear names."""

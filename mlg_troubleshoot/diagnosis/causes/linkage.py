@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar
 
 import numpy as np
 
@@ -32,17 +31,17 @@ class OutOfPlaneTilt(Cause):
     cosine.
     """
 
-    name: ClassVar[str] = "out_of_plane_tilt"
-    needs: ClassVar[tuple[str, ...]] = ("axial_float",)
-    parameter: ClassVar[str] = "inverse_span_squared_per_in2"
-    trial: ClassVar[float] = 1.0 / 1.5**2
-    plausible: ClassVar[float | None] = 1.0 / 1.5**2
-    sign: ClassVar[int] = 1
-    sentence: ClassVar[str] = "End float lets links tilt out of their plane, which shortens them"
-    inspect: ClassVar[str] = (
+    name = "out_of_plane_tilt"
+    needs = ("axial_float",)
+    parameter = "inverse_span_squared_per_in2"
+    trial = 1.0 / 1.5**2
+    plausible = 1.0 / 1.5**2
+    sign = 1
+    sentence = "End float lets links tilt out of their plane, which shortens them"
+    inspect = (
         "End float and thrust washers of the short link, the locking lever and the link assembly"
     )
-    separates: ClassVar[str] = (
+    separates = (
         "end float of joints 3, 4 and 5, and one plunger reading with the float taken up by shims"
     )
 
@@ -73,16 +72,16 @@ class OutOfPlaneTilt(Cause):
 class ElasticCompliance(Cause):
     """A link stretches with hydraulic load, in proportion to the pressure above 3000 psi."""
 
-    name: ClassVar[str] = "elastic_compliance"
-    needs: ClassVar[tuple[str, ...]] = ("hydraulic_pressure_psi",)
-    parameter: ClassVar[str] = "stretch_in_per_psi"
-    trial: ClassVar[float] = 1e-6
-    plausible: ClassVar[float | None] = 2e-6
-    sentence: ClassVar[str] = "Actuator and short link stretch with hydraulic pressure"
-    inspect: ClassVar[str] = (
+    name = "elastic_compliance"
+    needs = ("hydraulic_pressure_psi",)
+    parameter = "stretch_in_per_psi"
+    trial = 1e-6
+    plausible = 2e-6
+    sentence = "Actuator and short link stretch with hydraulic pressure"
+    inspect = (
         "Hydraulic pressure at the reading; actuator rod and short link for cracks and bending"
     )
-    separates: ClassVar[str] = (
+    separates = (
         "two plunger readings of one gear, at full pressure and at hand-pump pressure"
     )
 
@@ -103,18 +102,18 @@ class ElasticCompliance(Cause):
 class ThermalGrowth(Cause):
     """The airframe's pivots spread with temperature more than the links grow."""
 
-    name: ClassVar[str] = "thermal_growth"
-    needs: ClassVar[tuple[str, ...]] = ("temperature_c",)
-    parameter: ClassVar[str] = "expansion_difference_per_c"
-    trial: ClassVar[float] = 1e-5
-    plausible: ClassVar[float | None] = 1.1e-5
-    sentence: ClassVar[str] = (
+    name = "thermal_growth"
+    needs = ("temperature_c",)
+    parameter = "expansion_difference_per_c"
+    trial = 1e-5
+    plausible = 1.1e-5
+    sentence = (
         "Aluminium airframe pivots and steel links grow differently with temperature"
     )
-    inspect: ClassVar[str] = (
+    inspect = (
         "Temperature of the structure at the reading; rig and measure at about 20 °C"
     )
-    separates: ClassVar[str] = "two plunger readings of one gear, cold and warm"
+    separates = "two plunger readings of one gear, cold and warm"
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Spread every fixed point and the plunger's axis from the origin."""
@@ -135,16 +134,16 @@ class UnlistedWear(Cause):
     the lever.
     """
 
-    name: ClassVar[str] = "unlisted_wear"
-    needs: ClassVar[tuple[str, ...]] = ("gear_landings",)
-    parameter: ClassVar[str] = "lever_shift_per_1000_landings"
-    trial: ClassVar[float] = 1e-3
-    plausible: ClassVar[float | None] = 1e-3
-    sentence: ClassVar[str] = (
+    name = "unlisted_wear"
+    needs = ("gear_landings",)
+    parameter = "lever_shift_per_1000_landings"
+    trial = 1e-3
+    plausible = 1e-3
+    sentence = (
         "A part outside the listed joints wears with landings and shifts the lever"
     )
-    inspect: ClassVar[str] = "Lock roller and cam of the locking lever"
-    separates: ClassVar[str] = "one plunger reading after a new lock roller, clearances unchanged"
+    inspect = "Lock roller and cam of the locking lever"
+    separates = "one plunger reading after a new lock roller, clearances unchanged"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield a few exponents of wear where the gear says which number it shifts."""
@@ -179,19 +178,19 @@ class UnlistedWear(Cause):
 class CalibrationRate(Cause):
     """The calibration rate is wrong: all predictions are scaled."""
 
-    name: ClassVar[str] = "calibration_rate"
-    parameter: ClassVar[str] = "rate_change"
-    trial: ClassVar[float] = 0.01
-    plausible: ClassVar[float | None] = 0.02
-    sentence: ClassVar[str] = (
+    name = "calibration_rate"
+    parameter = "rate_change"
+    trial = 0.01
+    plausible = 0.02
+    sentence = (
         "The calibration rate of the model is off, or the gauge of all rows reads too much or too"
         " little by the same share: every prediction is scaled"
     )
-    inspect: ClassVar[str] = (
+    inspect = (
         "Calibration of the gauge; plunger travel from Down Lock to mid-position (technical order:"
         " 0.45 in)"
     )
-    separates: ClassVar[str] = (
+    separates = (
         "the plunger's travel over the release, measured on two gears without wear by a gauge that"
         " was checked against a gauge block"
     )

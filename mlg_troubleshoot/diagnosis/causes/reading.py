@@ -75,8 +75,8 @@ def _change_days(days: Array, least: int, most: int) -> list[float]:
 class _Level(Cause):
     """An offset of all rows that share one value of a factor."""
 
-    parameter: ClassVar[str] = "offset_in"
-    trial: ClassVar[float] = 0.001
+    parameter = "offset_in"
+    trial = 0.001
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate for each value that occurs often enough, but not everywhere."""
@@ -92,11 +92,11 @@ class _Level(Cause):
 class GaugeBias(_Level):
     """One gauge reads off."""
 
-    name: ClassVar[str] = "gauge_bias"
-    needs: ClassVar[tuple[str, ...]] = ("gauge_id",)
-    sentence: ClassVar[str] = "Readings with {target} are shifted"
-    inspect: ClassVar[str] = "Calibration of that gauge"
-    separates: ClassVar[str] = (
+    name = "gauge_bias"
+    needs = ("gauge_id",)
+    sentence = "Readings with {target} are shifted"
+    inspect = "Calibration of that gauge"
+    separates = (
         "one gear measured with this gauge and with another by the same technician on one day"
     )
 
@@ -104,11 +104,11 @@ class GaugeBias(_Level):
 class TechnicianBias(_Level):
     """One technician reads off."""
 
-    name: ClassVar[str] = "technician_bias"
-    needs: ClassVar[tuple[str, ...]] = ("technician_id",)
-    sentence: ClassVar[str] = "Readings by {target} are shifted"
-    inspect: ClassVar[str] = "How that technician seats and zeroes the gauge"
-    separates: ClassVar[str] = (
+    name = "technician_bias"
+    needs = ("technician_id",)
+    sentence = "Readings by {target} are shifted"
+    inspect = "How that technician seats and zeroes the gauge"
+    separates = (
         "one gear measured by this technician and by another with the same gauge on one day"
     )
 
@@ -116,7 +116,7 @@ class TechnicianBias(_Level):
 class _Contrast(Cause):
     """Rows of two kinds shifted against each other, or those of one kind alone."""
 
-    trial: ClassVar[float] = 0.001
+    trial = 0.001
     shares: ClassVar[tuple[dict[str, float], ...]]
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
@@ -135,17 +135,17 @@ class _Contrast(Cause):
 class SideDifference(_Contrast):
     """Left and right gear differ."""
 
-    name: ClassVar[str] = "side_difference"
-    needs: ClassVar[tuple[str, ...]] = ("side",)
-    parameter: ClassVar[str] = "rh_minus_lh_in"
-    shares: ClassVar[tuple[dict[str, float], ...]] = (
+    name = "side_difference"
+    needs = ("side",)
+    parameter = "rh_minus_lh_in"
+    shares = (
         {"RH": 1.0},
         {"LH": -1.0},
         {"RH": 0.5, "LH": -0.5},
     )
-    sentence: ClassVar[str] = "Right-hand and left-hand gears differ"
-    inspect: ClassVar[str] = "Rigging of one right-hand gear against its left-hand neighbour"
-    separates: ClassVar[str] = "both gears of one aircraft, same technician, same gauge, same day"
+    sentence = "Right-hand and left-hand gears differ"
+    inspect = "Rigging of one right-hand gear against its left-hand neighbour"
+    separates = "both gears of one aircraft, same technician, same gauge, same day"
 
 
 class ApproachHysteresis(_Contrast):
@@ -153,19 +153,19 @@ class ApproachHysteresis(_Contrast):
     technician.
     """
 
-    name: ClassVar[str] = "approach_hysteresis"
-    needs: ClassVar[tuple[str, ...]] = ("approach",)
-    parameter: ClassVar[str] = "extending_minus_retracting_in"
-    shares: ClassVar[tuple[dict[str, float], ...]] = (
+    name = "approach_hysteresis"
+    needs = ("approach",)
+    parameter = "extending_minus_retracting_in"
+    shares = (
         {"EXTENDING": 0.5, "RETRACTING": -0.5},
         {"EXTENDING": 1.0},
         {"RETRACTING": -1.0},
     )
-    sentence: ClassVar[str] = "Lost motion: the reading depends on the direction of approach"
-    inspect: ClassVar[str] = (
+    sentence = "Lost motion: the reading depends on the direction of approach"
+    inspect = (
         "Approach mid-position always in the same direction; look for friction in the link assembly"
     )
-    separates: ClassVar[str] = "one gear read twice, approached extending and retracting"
+    separates = "one gear read twice, approached extending and retracting"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield the contrasts of all rows, and of the rows of each technician."""
@@ -195,13 +195,13 @@ class ApproachHysteresis(_Contrast):
 class DateStep(Cause):
     """A fleet-wide change of practice from a date on."""
 
-    name: ClassVar[str] = "date_step"
-    needs: ClassVar[tuple[str, ...]] = ("day",)
-    parameter: ClassVar[str] = "offset_in"
-    trial: ClassVar[float] = 0.001
-    sentence: ClassVar[str] = "All readings are shifted from a date on"
-    inspect: ClassVar[str] = "What changed that day: procedure, tooling, rigging instruction"
-    separates: ClassVar[str] = "one gear measured by the old and by the new practice on one day"
+    name = "date_step"
+    needs = ("day",)
+    parameter = "offset_in"
+    trial = 0.001
+    sentence = "All readings are shifted from a date on"
+    inspect = "What changed that day: procedure, tooling, rigging instruction"
+    separates = "one gear measured by the old and by the new practice on one day"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate for each day on which the change may have come."""
@@ -217,13 +217,13 @@ class DateStep(Cause):
 class RiggingOffset(Cause):
     """The plunger rod of one aircraft, or of one of its gears, was re-rigged."""
 
-    name: ClassVar[str] = "rigging_offset"
-    needs: ClassVar[tuple[str, ...]] = ("tail_no",)
-    parameter: ClassVar[str] = "offset_in"
-    trial: ClassVar[float] = 0.001
-    sentence: ClassVar[str] = "The plunger rod of {target} was re-rigged"
-    inspect: ClassVar[str] = "Plunger rod length and rigging record of that gear"
-    separates: ClassVar[str] = (
+    name = "rigging_offset"
+    needs = ("tail_no",)
+    parameter = "offset_in"
+    trial = 0.001
+    sentence = "The plunger rod of {target} was re-rigged"
+    inspect = "Plunger rod length and rigging record of that gear"
+    separates = (
         "rigging check of that gear: plunger at Down Lock and at mid-position"
     )
 

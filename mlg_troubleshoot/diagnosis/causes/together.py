@@ -124,9 +124,9 @@ class JointFactors(Cause):
     gives.
     """
 
-    parameter: ClassVar[str] = "share_of_change"
-    sized: ClassVar[bool] = False
-    trial: ClassVar[float] = 1.0
+    parameter = "share_of_change"
+    sized = False
+    trial = 1.0
     bounds: ClassVar[tuple[float, float]]
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
@@ -170,16 +170,16 @@ class LoadDirections(JointFactors):
     all gears.
     """
 
-    name: ClassVar[str] = "load_directions"
-    bounds: ClassVar[tuple[float, float]] = (-1.0, 1.0)
-    sentence: ClassVar[str] = (
+    name = "load_directions"
+    bounds = (-1.0, 1.0)
+    sentence = (
         "Load holds the pins away from their worst directions: readings are smaller than the bound,"
         " joint by joint"
     )
-    inspect: ClassVar[str] = (
+    inspect = (
         "Which way the pins rest under load; the prediction is now the displacement as loaded"
     )
-    separates: ClassVar[str] = (
+    separates = (
         "one gear's plunger over the whole stroke, or read again with one pin pushed by hand"
     )
 
@@ -208,15 +208,15 @@ class OtherGeometry(JointFactors):
     less.
     """
 
-    name: ClassVar[str] = "geometry"
-    bounds: ClassVar[tuple[float, float]] = (0.0, 3.0)
-    sentence: ClassVar[str] = (
+    name = "geometry"
+    bounds = (0.0, 3.0)
+    sentence = (
         "The linkage has other dimensions than the drawn one: its joints count more or less"
     )
-    inspect: ClassVar[str] = (
+    inspect = (
         "Distances between the pivots of one gear (mlg gear survey says which one first)"
     )
-    separates: ClassVar[str] = "the next distance that the survey of one gear asks for"
+    separates = "the next distance that the survey of one gear asks for"
 
     def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
         """Second moments of what the linkages of the ensemble make of each joint, about the drawn
