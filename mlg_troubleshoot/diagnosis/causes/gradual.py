@@ -4,24 +4,27 @@ technician who learns, a modification that only some gears have.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask, log_sum
+from mlg_troubleshoot.arrays import Array, log_sum
 from mlg_troubleshoot.diagnosis.causes.base import (
     MOST_UNREAD,
     Candidate,
-    Cause,
     Scene,
     levels,
-    offset,
     share_never_read,
 )
-from mlg_troubleshoot.diagnosis.causes.reading import change_date, days_since
+from mlg_troubleshoot.diagnosis.causes.reading import (
+    RowShift,
+    change_date,
+    dated,
+    days_since,
+)
 from mlg_troubleshoot.diagnosis.noise import FREEDOM, growth
-from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.units import DAYS_PER_YEAR
 
@@ -36,13 +39,12 @@ _TAILS = "tails "
 _LEARNING_DAYS = DAYS_PER_YEAR / 6 * 2 ** np.arange(4)
 
 
-class GaugeDrift(Cause):
+class GaugeDrift(RowShift):
     """A gauge, or all of them, creep from one calibration to the next."""
 
     name = "gauge_drift"
     needs = ("gauge_id", "day")
     parameter = "drift_in_per_year"
-    trial = 0.001
     sentence = "Readings with {target} creep between calibrations"
     inspect = "Calibration of that gauge now, and its zero at each inspection"
     separates = "one gear measured right before and right after a calibration"
@@ -57,26 +59,28 @@ class GaugeDrift(Cause):
         for gauge in (None, *levels(scene.table.factors["gauge_id"])):
             for month in range(_MONTHS):
                 day = round(first - month * DAYS_PER_YEAR / _MONTHS)
-                setting = {"value": gauge, "day": day, "since": change_date(scene, day)}
+                setting = {"value": gauge, **dated(scene, day)}
                 yield Candidate(self, None if gauge is None else f"gauge {gauge}", setting)
 
-    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Shift the rows of that gauge by the time since it was calibrated."""
-        since = np.nan_to_num(days_since(scene, candidate.setting)) % DAYS_PER_YEAR / DAYS_PER_YEAR
-        return offset(scene, since * _of_value(scene, self.needs[0], candidate), value)
+    def rows(self, candidate: Candidate) -> Mapping[str, str]:
+        """Those of that gauge, or all."""
+        return super().rows(candidate) if candidate.target else {}
+
+    def share(self, scene: Scene, setting: Mapping[str, Any]) -> Any:
+        """Time since the calibration. [a]"""
+        return days_since(scene, setting) % DAYS_PER_YEAR / DAYS_PER_YEAR
 
     def words(self, target: str | None) -> str:
         """Say which gauge, or that it is all of them."""
         return self.sentence.format(target=target or "every gauge")
 
 
-class TechnicianLearning(Cause):
+class TechnicianLearning(RowShift):
     """A technician is off at first and becomes better with time."""
 
     name = "technician_learning"
     needs = ("technician_id", "day")
     parameter = "offset_at_first_in"
-    trial = 0.001
     sentence = "Readings by {target} were shifted at first, less and less since"
     inspect = "The earliest readings of that technician: read those gears again"
     separates = "an early gear of this technician measured again by another one"
@@ -92,34 +96,23 @@ class TechnicianLearning(Cause):
             first = float(own.min())
             for time in _LEARNING_DAYS:
                 if 2.0 * time < np.ptp(own):
-                    setting = {
-                        "value": person,
-                        "day": first,
-                        "since": change_date(scene, first),
-                        "learning_days": time,
-                    }
+                    setting = {"value": person, **dated(scene, first), "learning_days": time}
                     yield Candidate(self, f"technician {person}", setting)
 
-    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Shift the rows of that technician, the later the less."""
-        since = np.maximum(days_since(scene, candidate.setting), 0.0)
-        left = np.nan_to_num(np.exp(-since / candidate.setting["learning_days"]))
-        return offset(scene, left * _of_value(scene, self.needs[0], candidate), value)
+    def share(self, scene: Scene, setting: Mapping[str, Any]) -> Any:
+        """The later, the less."""
+        return np.exp(-np.maximum(days_since(scene, setting), 0.0) / setting["learning_days"])
 
 
-class Modification(Cause):
+class Modification(RowShift):
     """Rows of some gears are shifted: those that a column of the table's own sets apart (a
     modification, a base, a shop), or those of some aircraft, each from a date of its own.
     """
 
     name = "modification"
-    parameter = "offset_in"
-    trial = 0.001
     sentence = "Readings with {target} are shifted"
     inspect = "What was changed on these gears, or is done otherwise there"
-    separates = (
-        "one gear measured right before and right after the change, by the same technician"
-    )
+    separates = "one gear measured right before and right after the change, by the same technician"
 
     def is_distinct(self) -> bool:
         """A column of the table's own does not follow the clearances; aircraft are not offered
@@ -135,37 +128,38 @@ class Modification(Cause):
         for column in table.own_factors:
             for value in _apart(scene, column):
                 yield Candidate(self, f"{column} {value}", {"column": column, "value": value})
-        dated = "tail_no" in table.factors and "day" in table.quantities and not table.doubt
-        if dated and share_never_read(scene) <= MOST_UNREAD:
-            yield from self._of_aircraft(scene)
+        datable = "tail_no" in table.factors and "day" in table.quantities and not table.doubt
+        if not datable or share_never_read(scene) > MOST_UNREAD:
+            return
+        misfit = table.measured_in - scene.over_in
+        for direction in (1.0, -1.0):
+            steps = _likeliest_steps(scene, direction * misfit)
+            if steps is not None and len(steps.shown) >= _LEAST_AIRCRAFT:
+                since = {tail: change_date(scene, day) or day for tail, day in steps.days.items()}
+                target = _TAILS + ",".join(steps.sure)
+                yield Candidate(self, target, {"steps": since}, rarity=steps.rarity)
 
-    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Shift the rows with that value, or those of the aircraft from its date on."""
+    def rows(self, candidate: Candidate) -> Mapping[str, str]:
+        """Those with that value, or all."""
         setting = candidate.setting
-        table = scene.table
+        return {setting["column"]: setting["value"]} if "column" in setting else {}
+
+    def share(self, scene: Scene, setting: Mapping[str, Any]) -> Any:
+        """Shift the aircraft that have a step, each from its date on."""
         if "column" in setting:
-            return offset(scene, _of_value(scene, setting["column"], candidate), value)
-        after = np.zeros(len(table), bool)
+            return 1.0
+        after = np.zeros(len(scene.table), bool)
         for tail, step in setting["steps"].items():
-            dated = isinstance(step, str)
-            from_day = {"day": np.nan if dated else step, "since": step if dated else None}
-            after |= (table.tails == tail) & (days_since(scene, from_day) >= 0)
-        return offset(scene, after, value)
+            known = isinstance(step, str)
+            from_day = {"day": np.nan if known else step, "since": step if known else None}
+            after |= (scene.table.tails == tail) & (days_since(scene, from_day) >= 0.0)
+        return after
 
     def words(self, target: str | None) -> str:
         """Say whose readings they are."""
         of_aircraft = target is not None and target.startswith(_TAILS)
         each = ", each from its own date on" if of_aircraft else ""
         return f"Readings {'of' if of_aircraft else 'with'} {target} are shifted{each}"
-
-    def _of_aircraft(self, scene: Scene) -> Iterator[Candidate]:
-        misfit = scene.table.measured_in - scene.over_in
-        for direction in (1.0, -1.0):
-            steps = _likeliest_steps(scene, direction * misfit)
-            if steps is not None and len(steps.shown) >= _LEAST_AIRCRAFT:
-                dated = {tail: change_date(scene, day) or day for tail, day in steps.days.items()}
-                target = _TAILS + ",".join(steps.sure)
-                yield Candidate(self, target, {"steps": dated}, rarity=steps.rarity)
 
 
 @dataclass(frozen=True)
@@ -279,11 +273,3 @@ def _two_levels(values: Array, relative: Array, weight: Array) -> tuple[Array, A
     square = (off / (scatter * relative)) ** 2
     density = -0.5 * (FREEDOM + 1.0) * np.log1p(square / FREEDOM) - np.log(scatter)
     return density, (FREEDOM + 1.0) / (FREEDOM + square)
-
-
-def _of_value(scene: Scene, factor: str, candidate: Candidate) -> Mask:
-    """Rows that have the value of a candidate, all rows if it has no target, shape (n,)."""
-    if candidate.target is None:
-        return np.ones(len(scene.table), bool)
-    texts = scene.table.factors.get(factor, np.full(len(scene.table), ""))
-    return np.asarray(texts == candidate.setting["value"])

@@ -46,9 +46,7 @@ class DirectionNotWorstCase(_JointShare):
         "The clearance of {target} is not taken up in the worst direction: it contributes less"
     )
     inspect = "Which way the pin of that joint rests under load"
-    separates = (
-        "the pin's resting side in that joint under pressure, by feeler or dial"
-    )
+    separates = "the pin's resting side in that joint under pressure, by feeler or dial"
 
 
 class OvalWear(_JointShare):

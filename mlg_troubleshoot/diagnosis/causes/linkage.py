@@ -81,9 +81,7 @@ class ElasticCompliance(Cause):
     inspect = (
         "Hydraulic pressure at the reading; actuator rod and short link for cracks and bending"
     )
-    separates = (
-        "two plunger readings of one gear, at full pressure and at hand-pump pressure"
-    )
+    separates = "two plunger readings of one gear, at full pressure and at hand-pump pressure"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate for each length that stretches; the sign of a stretch is not
@@ -107,12 +105,8 @@ class ThermalGrowth(Cause):
     parameter = "expansion_difference_per_c"
     trial = 1e-5
     plausible = 1.1e-5
-    sentence = (
-        "Aluminium airframe pivots and steel links grow differently with temperature"
-    )
-    inspect = (
-        "Temperature of the structure at the reading; rig and measure at about 20 °C"
-    )
+    sentence = "Aluminium airframe pivots and steel links grow differently with temperature"
+    inspect = "Temperature of the structure at the reading; rig and measure at about 20 °C"
     separates = "two plunger readings of one gear, cold and warm"
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
@@ -139,9 +133,7 @@ class UnlistedWear(Cause):
     parameter = "lever_shift_per_1000_landings"
     trial = 1e-3
     plausible = 1e-3
-    sentence = (
-        "A part outside the listed joints wears with landings and shifts the lever"
-    )
+    sentence = "A part outside the listed joints wears with landings and shifts the lever"
     inspect = "Lock roller and cam of the locking lever"
     separates = "one plunger reading after a new lock roller, clearances unchanged"
 

@@ -176,9 +176,7 @@ class LoadDirections(JointFactors):
         "Load holds the pins away from their worst directions: readings are smaller than the bound,"
         " joint by joint"
     )
-    inspect = (
-        "Which way the pins rest under load; the prediction is now the displacement as loaded"
-    )
+    inspect = "Which way the pins rest under load; the prediction is now the displacement as loaded"
     separates = (
         "one gear's plunger over the whole stroke, or read again with one pin pushed by hand"
     )
@@ -210,12 +208,8 @@ class OtherGeometry(JointFactors):
 
     name = "geometry"
     bounds = (0.0, 3.0)
-    sentence = (
-        "The linkage has other dimensions than the drawn one: its joints count more or less"
-    )
-    inspect = (
-        "Distances between the pivots of one gear (mlg gear survey says which one first)"
-    )
+    sentence = "The linkage has other dimensions than the drawn one: its joints count more or less"
+    inspect = "Distances between the pivots of one gear (mlg gear survey says which one first)"
     separates = "the next distance that the survey of one gear asks for"
 
     def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
