@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlg_troubleshoot.arrays import Mask
-from mlg_troubleshoot.decision.columns import LANDINGS, TECHNICIAN_ID
+from mlg_troubleshoot.decision.columns import LANDINGS
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
 # Share of rows that show a habit, and of values on a step, that may be exceptions. [1]
@@ -36,7 +36,7 @@ class Blanks:
 
 def blanks_by_wear(table: DiagnosisTable) -> list[Blanks]:
     """The habit of all rows, else those of single technicians."""
-    people = table.factors.get(TECHNICIAN_ID.variable, np.full(len(table), ""))
+    people = table.people
     people = np.where(table.along, "", people)
     own = {str(person): people == person for person in np.unique(people[people != ""])}
     whole = list(_habit(table, "", ~table.along))
@@ -66,7 +66,7 @@ def _habit(table: DiagnosisTable, whose: str, rows: Mask) -> Iterator[Blanks]:
 
 def _fewer_as_worn(table: DiagnosisTable, rows: Mask) -> bool:
     """Rows with fewer landings have more blanks."""
-    landings = table.quantities.get(LANDINGS.variable, np.full(len(table), np.nan))
+    landings = table.numbers(LANDINGS.variable)
     known = rows & np.isfinite(landings)
     blanks = np.isnan(table.clearance_in[known]).sum(axis=1)
     if len(blanks) < LEAST_ROWS or not np.ptp(blanks) or not np.ptp(landings[known]):

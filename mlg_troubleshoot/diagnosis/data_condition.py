@@ -13,7 +13,6 @@ import numpy as np
 from scipy.special import pdtrc
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
-from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
 from mlg_troubleshoot.diagnosis.blanks import BY_CHANCE, LEAST_ROWS, blanks_by_wear
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import gears_of, visits
@@ -138,7 +137,7 @@ def _listed(table: DiagnosisTable, rows: Mask) -> str:
     """Name rows: by who wrote them if one did, and by their numbers."""
     numbers = [str(int(n)) for n in table.row[rows][:8]]
     more = f" and {int(rows.sum()) - 8} more" if rows.sum() > 8 else ""
-    people = set(table.factors.get(TECHNICIAN_ID.variable, np.array([""]))[rows]) - {""}
+    people = set(table.people[rows]) - {""}
     whose = f" of technician {people.pop()}" if len(people) == 1 and rows.sum() > 1 else ""
     return f"row{'s' if rows.sum() > 1 else ''} {', '.join(numbers)}{more}{whose}"
 
@@ -222,7 +221,7 @@ def _too_coarse(values: Array, step: float) -> bool:
 def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     """Values on a step of twice their standard uncertainty or more: half a step is as large."""
     use = rows & _at_mid(table)
-    people = table.factors.get(TECHNICIAN_ID.variable, np.full(len(table), ""))
+    people = table.people
     least = 2.0 * float(np.median(table.gauge_u_in))
     each = steps_of(table.take(rows))
     steps = {str(p): float(s) for p, s in zip(people[rows], each, strict=True) if s >= least}
@@ -336,8 +335,8 @@ def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
 
 def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
     """Landings of a gear that fall over time: at overhauls, where its wear begins anew, or not."""
-    landings = table.quantities.get("gear_landings")
-    if landings is None or "day" not in table.quantities:
+    landings = table.numbers("gear_landings")
+    if "day" not in table.quantities:
         return
     order = visits(table)
     numbers = gears_of(table)

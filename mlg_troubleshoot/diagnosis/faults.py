@@ -240,8 +240,8 @@ class _Screen:
         others[place] = False
         groups = [others]
         for name in ("tail_no", "gauge_id", "technician_id"):
-            texts = self.table.factors.get(name)
-            if texts is not None and texts[place]:
+            texts = self.table.texts(name)
+            if texts[place]:
                 groups.append(others & (texts == texts[place]))
         for rows in groups:
             weight += rows / max(int(rows.sum()), 1)

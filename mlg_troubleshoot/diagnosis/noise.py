@@ -152,9 +152,7 @@ def small_trends(table: DiagnosisTable) -> tuple[Array, tuple[Array, ...], Array
 
 def _levels(table: DiagnosisTable, name: str) -> Array:
     """Rows of each level of a factor, one column each. [1]"""
-    texts = table.factors.get(name)
-    if texts is None:
-        return np.empty((len(table), 0))
+    texts = table.texts(name)
     levels = np.unique(texts)
     return np.asarray(texts[:, None] == levels[levels != ""], float)
 

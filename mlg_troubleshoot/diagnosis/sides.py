@@ -25,12 +25,10 @@ def swapped_sides(table: DiagnosisTable, odds: float) -> list[tuple[int, str, st
     """Find rows whose landings lie on the line of the aircraft's other gear, one of an aircraft at
     most; `odds` is the logarithm of what speaks against it beforehand.
     """
-    side = table.factors.get("side")
-    tail = table.factors.get("tail_no")
-    landings = table.quantities.get("gear_landings")
-    day = table.quantities.get("day")
-    if side is None or tail is None or landings is None or day is None:
-        return []
+    side = table.texts("side")
+    tail = table.texts("tail_no")
+    landings = table.numbers("gear_landings")
+    day = table.numbers("day")
     known = np.isin(side, _SIDES) & np.isfinite(landings + day)
     rate, anew = _usual(table)
     own, other = np.full((2, len(table)), np.nan)
@@ -105,8 +103,8 @@ def _usual(table: DiagnosisTable) -> tuple[float, float]:
     """Landings a day between inspections of one gear, median over the fleet, 0 if none was
     inspected twice; and how often they begin anew.
     """
-    day = table.quantities["day"]
-    landings = table.quantities["gear_landings"]
+    day = table.numbers("day")
+    landings = table.numbers("gear_landings")
     gears = table.gears
     known = np.flatnonzero(np.isfinite(day) & np.isfinite(landings))
     order = known[np.lexsort((day[known], gears[known]))]

@@ -19,6 +19,7 @@ from mlg_troubleshoot.decision.columns import (
     DATE,
     SIDE,
     TAIL_NO,
+    TECHNICIAN_ID,
     Holds,
 )
 from mlg_troubleshoot.decision.inspection import Inspection
@@ -102,7 +103,7 @@ class DiagnosisTable(Result):
         """Actuator extension from Down Lock of each row along the stroke, shape (n,); NaN at
         mid-position. [in]
         """
-        return np.asarray(self.quantities.get(ALONG, np.full(len(self), np.nan)))
+        return self.numbers(ALONG)
 
     @property
     def along(self) -> Mask:
@@ -136,6 +137,19 @@ class DiagnosisTable(Result):
         """The aircraft of each row, shape (n,); each row its own where no tail is given."""
         tail = self.factors.get(TAIL_NO.variable)
         return np.array([str(i) for i in range(len(self))]) if tail is None else tail
+
+    def numbers(self, name: str) -> Array:
+        """A quantity of each row, NaN where there is none, shape (n,)."""
+        return self.quantities.get(name, np.full(len(self), np.nan))
+
+    def texts(self, name: str) -> Texts:
+        """A factor of each row, empty where there is none, shape (n,)."""
+        return self.factors.get(name, np.full(len(self), ""))
+
+    @property
+    def people(self) -> Texts:
+        """Who wrote each row, shape (n,)."""
+        return self.texts(TECHNICIAN_ID.variable)
 
     def take(self, rows: Any) -> DiagnosisTable:
         """Return some of the rows, by place or as a mask."""

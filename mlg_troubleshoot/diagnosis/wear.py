@@ -176,8 +176,8 @@ def gears_of(table: DiagnosisTable) -> Places:
     of_gear = np.unique(table.gears, return_inverse=True)[1]
     begun = np.zeros(len(table), np.intp)
     falls = 0
-    landings = table.quantities.get("gear_landings")
-    if landings is not None and "day" in table.quantities:
+    landings = table.numbers("gear_landings")
+    if "day" in table.quantities:
         order = visits(table).values()
         for rows in order:
             known = rows[np.isfinite(landings[rows])]
@@ -192,7 +192,7 @@ def gears_of(table: DiagnosisTable) -> Places:
 
 def visits(table: DiagnosisTable) -> dict[str, Places]:
     """Rows of each gear in the order of their dates, else as they stand."""
-    day = np.nan_to_num(table.quantities.get("day", np.zeros(len(table))), nan=-np.inf)
+    day = np.nan_to_num(table.numbers("day"), nan=-np.inf)
     gears = table.gears
     order = np.lexsort((np.arange(len(table)), day, gears))
     starts = np.flatnonzero(np.r_[True, gears[order][1:] != gears[order][:-1]])
@@ -209,9 +209,9 @@ def _overhauls(landings: Array) -> Places:
     return np.concatenate([np.zeros(1, np.intp), np.cumsum(low > after, dtype=np.intp)])
 
 
-def landings_of(landings: Array | None, gears: Places) -> tuple[Array, Mask]:
+def landings_of(landings: Array, gears: Places) -> tuple[Array, Mask]:
     """Fill gaps in the landings by the mean of the gear's other inspections, else of the fleet."""
-    if landings is None or not np.isfinite(landings).any():
+    if not np.isfinite(landings).any():
         return np.zeros(len(gears)), np.ones(len(gears), bool)
     known = np.isfinite(landings)
     count = np.bincount(gears[known], minlength=gears.max() + 1)
@@ -222,7 +222,7 @@ def landings_of(landings: Array | None, gears: Places) -> tuple[Array, Mask]:
 
 def landed_share(table: DiagnosisTable) -> Array:
     """Landings of each row over their mean, 1 where none are known. [1]"""
-    landings = landings_of(table.quantities.get("gear_landings"), gears_of(table))[0]
+    landings = landings_of(table.numbers("gear_landings"), gears_of(table))[0]
     return landings / np.mean(landings) if landings.any() else np.ones(len(table))
 
 
@@ -270,7 +270,7 @@ def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
     blank = np.isnan(table.clearance_in) & np.isfinite(says.high)
     readings = np.where(blank, 0.5 * says.high, table.clearance_in)
     gears = gears_of(table)
-    kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
+    kilo, landed = landings_of(table.numbers("gear_landings"), gears)
     worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
     dated = np.where(landed[:, None], readings, np.nan)[:, worn]
     dated = np.where(np.isfinite(dated).any(axis=0), dated, readings[:, worn])

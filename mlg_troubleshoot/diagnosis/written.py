@@ -14,7 +14,6 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from mlg_troubleshoot.arrays import Array, Places
-from mlg_troubleshoot.decision.columns import TECHNICIAN_ID
 from mlg_troubleshoot.diagnosis.blanks import EXCEPTIONS, blanks_by_wear
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
@@ -140,7 +139,7 @@ def written(table: DiagnosisTable) -> Written:
 
 def steps_of(table: DiagnosisTable) -> Array:
     """Step on which the clearances of each row's technician lie, 0 if on none, shape (n,). [in]"""
-    people = table.factors.get(TECHNICIAN_ID.variable, np.full(len(table), ""))
+    people = table.people
     values = _read(table)
     found = np.zeros(len(table))
     every = step_of(values[~table.along])
@@ -161,7 +160,7 @@ def cut_off(table: DiagnosisTable) -> Array:
     """
     half = 0.5 * steps_of(table)
     lacks_in = np.where(half >= DEFAULT_GAUGE_U_IN, half, 0.0)
-    people = table.factors.get(TECHNICIAN_ID.variable, np.full(len(table), ""))
+    people = table.people
     who = np.unique(people[lacks_in > 0.0])
     return np.where(people[:, None] == who, np.sqrt(_CUT_OFF) * lacks_in[:, None], 0.0)
 

@@ -60,8 +60,7 @@ class ConventionSlip(Cause):
         groups = [
             (column, label, value)
             for column, label in _LABELS.items()
-            if column in scene.table.factors
-            for value in levels(scene.table.factors[column][at_mid], _LEAST_ROWS)
+            for value in levels(scene.table.texts(column)[at_mid], _LEAST_ROWS)
         ]
         found: list[Candidate] = []
         for column, label, value in groups:
@@ -99,7 +98,7 @@ def _stretches(
     Of all stretches the one with the largest sum of how far each row is beyond doubt, in the
     logarithm: it ends where rows are as usual.
     """
-    day = scene.table.quantities.get("day", np.full(len(group), np.nan))
+    day = scene.table.numbers("day")
     rows = np.flatnonzero(group & np.isfinite(day) & (over_usual > 0.0))
     rows = rows[np.argsort(day[rows], kind="stable")]
     for factor, way in ((2.0, -1.0), (0.5, 1.0)):
@@ -151,7 +150,7 @@ def _log_wear(table: DiagnosisTable) -> Array:
     usual = read.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     worn = read.sum(axis=1) / np.maximum(known @ usual, np.finfo(float).tiny)
     some = worn > 0.0
-    kilo = landings_of(table.quantities.get(LANDINGS.variable), gears_of(table))[0]
+    kilo = landings_of(table.numbers(LANDINGS.variable), gears_of(table))[0]
     line = np.polyfit(kilo[some], worn[some], 1 if np.ptp(kilo[some]) > 0.0 else 0)
     expected = np.maximum(np.polyval(line, kilo), worn[some].min())
     return np.asarray(np.log(np.where(some, worn, np.nan) / expected))

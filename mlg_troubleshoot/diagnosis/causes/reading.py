@@ -39,7 +39,7 @@ def days_since(scene: Scene, setting: Mapping[str, Any]) -> Array:
     """Days of each row since the setting's day, which is found by its date in any table; NaN where
     a row has no date, shape (n,). [d]
     """
-    days = scene.table.quantities.get("day", np.full(len(scene.table), np.nan))
+    days = scene.table.numbers("day")
     start = setting["day"]
     if setting.get("since") is not None and scene.table.first_day is not None:
         start = (
@@ -81,7 +81,7 @@ class RowShift(Cause):
         """Shift each row by its share."""
         where = np.nan_to_num(np.ones(len(scene.table)) * self.share(scene, candidate.setting))
         for column, text in self.rows(candidate).items():
-            where = where * (scene.table.factors.get(column, "") == text)
+            where = where * (scene.table.texts(column) == text)
         return offset(scene, where, value)
 
 
@@ -182,7 +182,7 @@ class ApproachHysteresis(_Contrast):
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield the contrasts of all rows, and of the rows of each technician."""
         yield from super().candidates(scene)
-        people = scene.table.factors.get(TECHNICIAN_ID.variable, np.empty(0, str))
+        people = scene.table.people
         for person in levels(people):
             yield from self.of_rows(scene, people == person, f"technician {person}", value=person)
 
@@ -225,7 +225,7 @@ class RiggingOffset(RowShift):
         on.
         """
         table = scene.table
-        days = table.quantities.get("day", np.full(len(table), np.nan))
+        days = table.numbers("day")
         tails = table.factors["tail_no"]
         groups = [(f"tail {v}", {"tail": v}, tails == v) for v in levels(tails)]
         for v in levels(table.gears) if "side" in table.factors else ():
