@@ -4,6 +4,8 @@ numbers.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -30,6 +32,16 @@ def log_sum(terms: Array) -> Array:
     largest: Array = np.max(terms, axis=0)
     total: Array = np.sum(np.exp(terms - largest), axis=0)
     return largest + np.log(total)
+
+
+def rms(values: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def numbered(labels: NDArray[Any]) -> Wholes:
+    """Number of each label among all of them, in their order."""
+    return np.unique(labels, return_inverse=True)[1].astype(np.int64)
 
 
 def count_failed(values: Array) -> int:

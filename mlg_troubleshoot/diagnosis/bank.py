@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, rms
 from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
 from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.units import DAYS_PER_YEAR
@@ -132,7 +132,7 @@ def _distinct(
         for shape, names in shapes:
             spread = float(np.std(shape))
             if spread > 1e-9 * float(np.max(np.abs(shape))):
-                size = float(np.sqrt(np.mean(shape[shape != 0.0] ** 2)))
+                size = rms(shape[shape != 0.0])
                 variables.append(names)
                 spreads.append(spread / size)
                 yield shape / size

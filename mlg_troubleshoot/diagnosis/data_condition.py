@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import pdtrc
 
-from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.arrays import Array, Mask, Places, numbered
 from mlg_troubleshoot.diagnosis.blanks import BY_CHANCE, LEAST_ROWS, blanks_by_wear
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import gears_of, visits
@@ -149,7 +149,7 @@ def _at_mid(table: DiagnosisTable) -> Mask:
 
 def _duplicates(table: DiagnosisTable) -> Mask:
     """Rows that say what an earlier one says, but for their identity, shape (n,)."""
-    texts = [np.unique(t, return_inverse=True)[1] for t in table.factors.values()]
+    texts = [numbered(t) for t in table.factors.values()]
     parts = [table.clearance_in, table.readings_in, *table.quantities.values(), *texts]
     whole = np.column_stack([np.nan_to_num(part, nan=-1.0) for part in parts])
     _rows, first = np.unique(whole, axis=0, return_index=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,12 +11,12 @@ from scipy.linalg import block_diag
 from scipy.special import chdtri
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array, Mask, rms
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.blanks import BY_CHANCE
 from mlg_troubleshoot.diagnosis.causes import with_own
-from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
+from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, offered
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
 from mlg_troubleshoot.diagnosis.data_condition import DataCondition
@@ -99,7 +99,7 @@ class NamedCause(Term):
     @property
     def effect_rms_in(self) -> float:
         """Root mean square of its effect over the rows. [in]"""
-        return float(np.sqrt(np.mean(self.effect_in**2)))
+        return rms(self.effect_in)
 
     @property
     def rows_acting(self) -> int:
@@ -342,38 +342,33 @@ def diagnose(
         table = _answerable(table)
         screened = screen_faults(model, table)
         faults = screened[1]
-        scene, rows = _scene_of(model, screened, where)
+        plain = _scene_of(model, screened, where)
         catalogue = with_own(own_causes)
         # What never varies cannot be distinguished from a linkage of other dimensions.
-        same = {
-            name
-            for name, values in scene.table.quantities.items()
-            if len(np.unique(values[np.isfinite(values)])) < 2
-        }
-        columns = set(scene.table.columns) - same
-        testable = [cause for cause in catalogue if set(cause.needs) <= columns]
-        blind = [cause for cause in catalogue if cause not in testable]
-        not_testable = tuple((c.name, next(n for n in c.needs if n not in columns)) for c in blind)
-        told_by = (testable, blind)
-        beliefs = beliefs or Beliefs()
-        case = _explained(scene, rows, told_by, ensemble, beliefs)
+        columns = plain[0].table.varying
+        lacking = ((cause.name, cause.lacks(columns)) for cause in catalogue)
+        not_testable = tuple((name, column) for name, column in lacking if column)
+        believed = beliefs or Beliefs()
+
+        def explained(plain: tuple[Scene, Rows]) -> _Case:
+            return _explained(*plain, catalogue, columns, ensemble, believed)
+
+        case = explained(plain)
         report_progress(0.6)
         if case.acts:
             # A large effect hides slips of single cells: look again with what is likely taken out.
-            screened = screen_faults(model, scene.table, case.explained)
+            screened = screen_faults(model, case.scene.table, case.explained)
             if screened[1]:
                 faults = (*faults, *screened[1])
-                again = _scene_of(model, screened, where)
-                case = _explained(*again, told_by, ensemble, beliefs)
+                case = explained(_scene_of(model, screened, where))
         if not table.doubt:
             # Rows that are taken for a cause hide others: look again.
             for _ in range(2):
-                repaired, more = restored_joints(case.scene, case.accounts, beliefs)
+                repaired, more = restored_joints(case.scene, case.accounts, believed)
                 if not more:
                     break
                 faults = (*faults, *more)
-                again = build_scene(model, repaired, where)
-                case = _explained(*again, told_by, ensemble, beliefs)
+                case = explained(build_scene(model, repaired, where))
         report_progress(1.0)
         return _report(model, case.scene.table, read, faults, not_testable, case)
 
@@ -454,14 +449,14 @@ def _scene_of(
 def _explained(
     scene: Scene,
     rows: Rows,
-    causes: tuple[Sequence[Cause], Sequence[Cause]],
+    causes: Sequence[Cause],
+    columns: Collection[str],
     ensemble: Sequence[LinkageModel],
     beliefs: Beliefs,
 ) -> _Case:
     """Say what may explain the rows, and fit the likeliest explanation of what is said."""
-    table, (testable, blind) = scene.table, causes
-    candidates = [candidate for cause in testable for candidate in cause.candidates(scene)]
-    candidates += [candidate for cause in blind for candidate in cause.stand_ins(scene)]
+    table = scene.table
+    candidates = list(offered(causes, scene, columns))
     if table.doubt:
         candidates = [replace(c, stands_in=not c.cause.is_distinct()) for c in candidates]
     moving: list[Candidate] = []
@@ -472,12 +467,12 @@ def _explained(
                 moving.append(candidate)
                 yield column
 
-    columns = EffectColumns.made(len(table), moved())
+    effects = EffectColumns.made(len(table), moved())
     blocks = [
-        b
-        for cause in testable
+        block
+        for cause in causes
         if isinstance(cause, JointFactors)
-        for b in cause.blocks(scene, ensemble)
+        for block in cause.blocks(scene, ensemble)
     ]
     _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
 
@@ -485,26 +480,26 @@ def _explained(
         table.measured_in - scene.over_in,
         rows,
         moving,
-        columns,
-        build_bank(scene, columns),
+        effects,
+        build_bank(scene, effects),
         blocks,
-        (*testable, *blind),
+        causes,
         beliefs,
         bool(table.doubt),
     )
     finding = explain(problem)
     best = finding.best
-    effects = finding.posterior.effects
+    every = finding.posterior.effects
     chosen = tuple(k for k in best.members if k < len(moving))
     others = [k for k in best.members if k >= len(moving)]
     block = blocks[best.context - 1] if best.context else None
-    known = effects.kept.take(others)
-    spread = np.diag(effects.size[others] ** 2)
+    known = every.kept.take(others)
+    spread = np.diag(every.size[others] ** 2)
     if block is not None:
         known = np.hstack([block.columns, known])
         spread = block_diag(block.covariance, spread)
     values, covariance = shrunk(
-        finding.noise, columns.take(chosen), known, spread, problem.expected
+        finding.noise, effects.take(chosen), known, spread, problem.expected
     )
     count = len(chosen) + (0 if block is None else block.columns.shape[1])
     return _Case(finding, scene, chosen, block, values[:count], covariance[:count, :count])
@@ -713,7 +708,7 @@ def _report(
         unread_in=float(np.mean(case.scene.contribution_in[:, ~seen].sum(axis=1))),
         unread_u_in=float(np.sqrt(np.mean(np.sum(case.problem.rows.unread_in**2, axis=1)))),
         mean_in=float(np.mean(raw_misfit)),
-        rms_in=float(np.sqrt(np.mean(raw_misfit**2))),
+        rms_in=rms(raw_misfit),
         repeatability_in=repeatability if np.isfinite(repeatability) else None,
         repeatability_source=source,
         smallest_rms_in=finding.smallest_rms_in,
@@ -783,11 +778,12 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
     """
     follows = case.finding.follows
     fitted: dict[Key, tuple[Candidate, float, tuple[float, float], Array]] = {}
-    for place, k in enumerate(case.chosen):
+    reach = 1.96 * np.sqrt(np.diag(case.covariance))
+    sizes = zip(case.values, case.values - reach, case.values + reach, strict=True)
+    for place, (k, size) in enumerate(zip(case.chosen, sizes, strict=False)):
+        value, low, high = map(float, size)
         candidate = case.problem.candidates[k]
-        value = float(case.values[place])
-        error = float(np.sqrt(case.covariance[place, place]))
-        fitted[candidate.key] = candidate, value, _interval(value, error), case.effect(place)
+        fitted[candidate.key] = candidate, value, (low, high), case.effect(place)
     if case.block is not None:
         k = len(case.chosen)
         change = case.values[k:]
@@ -837,10 +833,6 @@ def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections |
     gear = str(table.gears[place])
     apart_in = float(abs(apart[place]))
     return FurtherInspections(tuple(rivals), gear, apart_in, count)
-
-
-def _interval(value: float, error: float) -> tuple[float, float]:
-    return value - 1.96 * error, value + 1.96 * error
 
 
 def _expected_scatter(

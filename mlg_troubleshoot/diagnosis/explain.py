@@ -15,7 +15,7 @@ from math import erfc, sqrt
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, log_sum
+from mlg_troubleshoot.arrays import Array, log_sum, rms
 from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
@@ -330,5 +330,5 @@ def _unlisted(found: MisfitPosterior) -> tuple[tuple[str, ...], float]:
         for k, value in zip(explanation.members, explanation.values, strict=True):
             if found.effects.names[k] == name:
                 column = found.effects.kept.take([k])
-                return variables, float(abs(value) * np.sqrt(np.mean(column**2)))
+                return variables, float(abs(value) * rms(column))
     return variables, 0.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.arrays import Array, Wholes, rms
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -74,8 +74,8 @@ def measure_gain(
     said_before = np.abs(predicted) <= table.margin_in
     said_after = np.abs(predicted + correction) <= table.margin_in
     return Gain(
-        rms_before_in=float(np.sqrt(np.mean(before**2))),
-        rms_after_in=float(np.sqrt(np.mean(after**2))),
+        rms_before_in=rms(before),
+        rms_after_in=rms(after),
         share_interval=_interval(before, after, drawn),
         false_within_before=int(np.sum(said_before & outside)),
         false_within_after=int(np.sum(said_after & outside)),

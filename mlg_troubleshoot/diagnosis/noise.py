@@ -8,14 +8,13 @@ is part of the covariance; what stands out against it is an effect.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.arrays import Array, numbered, rms
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
@@ -124,11 +123,6 @@ def student(off: Array, spread: Array | float) -> Array:
     return np.where(np.isnan(off), 0.0, -tails - np.log(spread))
 
 
-def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> Wholes:
-    """Number the tails in order of their names."""
-    return np.unique(np.asarray(tails), return_inverse=True)[1].astype(np.int64)
-
-
 def small_trends(table: DiagnosisTable) -> tuple[Array, tuple[Array, ...], Array]:
     """Trends and habits that are always there in some small measure: people, gauges, seasons,
     wear; rows of each reader, and of each value of the table's own columns.
@@ -164,7 +158,7 @@ def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> No
     rest = misfit if explained is None else misfit - explained
     wide = rows.along_in
     noise = _scatter(rest, rest, rows)
-    gears = tail_numbers(rows.gears)
+    gears = numbered(rows.gears)
     unread = rows.unread_in if rows.unread_in.any() else np.empty((len(rest), 0))
     for _ in range(_ROUNDS if wide.size + unread.size else 0):
         known = noise.with_effects(wide)
@@ -181,17 +175,17 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     gears. [in]
     """
     predicted = rows.predicted_in
-    numbers = tail_numbers(rows.tails)
+    numbers = numbered(rows.tails)
     centred = alone.copy()
     for tail in range(numbers.max() + 1):
         own = numbers == tail
         if own.sum() > 2:
             centred[own] -= np.median(alone[own])
-    least = max(LEAST_SCATTER * float(np.sqrt(np.mean(predicted**2))), 1e-9)
+    least = max(LEAST_SCATTER * rms(predicted), 1e-9)
     scale = max(robust_scale(centred), least)
     relative = growth(centred, predicted)
     scale = max(robust_scale(centred / relative), least)
-    gears = tail_numbers(rows.gears)
+    gears = numbered(rows.gears)
     relative = np.hypot(relative, rows.u_filled_in / scale)
     # Rows far out in the tails of the distribution count less, but never as nothing.
     relative = relative * np.maximum(1.0, np.abs(centred) / (scale * relative) / FAR)

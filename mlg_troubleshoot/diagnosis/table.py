@@ -117,6 +117,14 @@ class DiagnosisTable(Result):
         return (*self.quantities, *self.factors, *floats)
 
     @property
+    def varying(self) -> set[str]:
+        """Names of the covariates but the quantities that are the same in all rows."""
+        same = {
+            name for name, q in self.quantities.items() if len(np.unique(q[np.isfinite(q)])) < 2
+        }
+        return set(self.columns) - same
+
+    @property
     def own_factors(self) -> tuple[str, ...]:
         """Names of the texts that only this table has: a modification, a base, a shop."""
         return tuple(name for name in self.factors if name not in FACTORS)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.sparse import csr_array
 
-from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.arrays import Array, Mask, Places, numbered
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.written import Written, written
 from mlg_troubleshoot.misfit.covariance import FAR
@@ -173,7 +173,7 @@ def gears_of(table: DiagnosisTable) -> Places:
     """Number of the single gear of each row; from an overhaul on, where its landings begin anew, a
     gear is another.
     """
-    of_gear = np.unique(table.gears, return_inverse=True)[1]
+    of_gear = numbered(table.gears)
     begun = np.zeros(len(table), np.intp)
     falls = 0
     landings = table.numbers("gear_landings")
@@ -186,8 +186,7 @@ def gears_of(table: DiagnosisTable) -> Places:
         if falls > _MOST_FALLS * max(len(table) - len(order), 1):
             begun[:] = 0
     numbers = of_gear + (of_gear.max(initial=0) + 1) * begun
-    found: Places = np.unique(numbers, return_inverse=True)[1]
-    return found
+    return numbered(numbers)
 
 
 def visits(table: DiagnosisTable) -> dict[str, Places]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask, Wholes
+from mlg_troubleshoot.arrays import Array, Mask, Wholes, rms
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.conclusion import Conclusion
 from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
@@ -138,7 +138,7 @@ class Study:
         self.readings = Readings(runner.row, self.outputs, group, own, least, series, base)
         scale = np.ones(len(base)) if own is None else own.copy()
         for index in self.outputs if own is None else ():
-            scale[index] = max(float(np.sqrt(np.mean(columns[index] ** 2))), 1e-300)
+            scale[index] = max(rms(columns[index]), 1e-300)
         seen = columns / scale[:, None]
         self.design = design_of(seen[:, :count], seen[:, count:])
         rest = self._rest(base)

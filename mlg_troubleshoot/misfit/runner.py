@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.arrays import Array, Wholes, rms
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.misfit.simulation_result import Suspect
 
@@ -161,7 +161,7 @@ class Runner:
         """Root mean square by which a second call at the nominal values differs from the first."""
         first = self.at(self.nominal)
         del self._asked[self.nominal.tobytes()]
-        return float(np.sqrt(np.mean((self.at(self.nominal) - first) ** 2)))
+        return rms(self.at(self.nominal) - first)
 
     def sensitivities(self, values: Array, base: Array, which: Sequence[int]) -> Array:
         """Change of the readings for a change of some parameters by their trials, shape (N,

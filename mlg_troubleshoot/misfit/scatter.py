@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.arrays import Array, Wholes, numbered
 from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 from mlg_troubleshoot.misfit.design import basis_of
 from mlg_troubleshoot.misfit.runner import least_squares
@@ -74,7 +74,7 @@ class Readings:
         basis = basis_of(free / scale[:, None])
         noise = NoiseModel(
             relative=relative,
-            tails=np.unique(tails, return_inverse=True)[1],
+            tails=numbered(tails),
             gears=np.zeros(len(scale), np.int64),
             loadings=_WIDE * relative[:, None] * basis,
             floor_in=1e-9,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.special import chdtrc, stdtrit
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.arrays import Array, Wholes, rms
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import FAR
@@ -304,7 +304,7 @@ class _Report:
                 float(max(value - reach, run.low[k])),
                 float(min(value + reach, run.high[k])),
             ),
-            effect_rms=float(np.sqrt(np.mean(seen**2))),
+            effect_rms=rms(seen),
             probability=min(at.follows.listed.get(key_of(names[k]), 0.0), 1.0),
             aliases=tuple(names[j] for j in self.study.design.class_of(k) if j != k),
         )
@@ -323,8 +323,7 @@ class _Report:
         if refitted:
             before = self._refitted(start, (), part)
             after = self._refitted(self.final, self.causes, part)
-        rms = [float(np.sqrt(np.mean((left * at.weight) ** 2))) for left in (before, after)]
-        return HeldOutGain(rms[0], rms[1], by, refitted)
+        return HeldOutGain(rms(before * at.weight), rms(after * at.weight), by, refitted)
 
     def _refitted(self, point: FittedPoint, fitted: Sequence[int], part: Wholes) -> Array:
         """Misfit of each reading over its scatter, the simulation fitted to the other folds."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.arrays import Array, Wholes, numbered
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.misfit.simulation_result import Suspect
 
@@ -105,7 +105,7 @@ def _labels(labels: ArrayLike, n: int, name: str) -> Wholes:
         raise UsageError(
             f"{name} has shape {given.shape}, there are {n} rows", "give one label for each row"
         )
-    return np.unique(given.astype(str), return_inverse=True)[1].astype(np.int64)
+    return numbered(given.astype(str))
 
 
 def _numbers(values: ArrayLike, name: str) -> Array:

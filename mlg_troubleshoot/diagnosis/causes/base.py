@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -158,6 +158,10 @@ class Cause(ABC):
     separates: ClassVar[str]
     """The one reading that would separate it from its rivals."""
 
+    def lacks(self, columns: Collection[str]) -> str | None:
+        """Return the first column that it needs and that is not among some; None if it has all."""
+        return next((name for name in self.needs if name not in columns), None)
+
     def is_distinct(self) -> bool:
         """Whether it can be distinguished from clearances that are missing or cut off."""
         return bool(_APART_FROM_WEAR.intersection(self.needs))
@@ -193,6 +197,12 @@ class Cause(ABC):
         last word.
         """
         return {self.parameter: value}
+
+
+def offered(causes: Iterable[Cause], scene: Scene, columns: Collection[str]) -> Iterator[Candidate]:
+    """Candidates of all causes; of those that the columns cannot test what stands in for them."""
+    for cause in causes:
+        yield from cause.stand_ins(scene) if cause.lacks(columns) else cause.candidates(scene)
 
 
 def filled(values: Array, neutral: float) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array, Mask, numbered
 from mlg_troubleshoot.decision.columns import LANDINGS
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, levels
 from mlg_troubleshoot.diagnosis.causes.reading import change_date
@@ -130,7 +130,7 @@ def _odds_of_wear(table: DiagnosisTable, setting: Any) -> float:
     if not rows.any():
         return 0.0
     apart = apart[known]
-    gears = np.unique(gears_of(table)[known], return_inverse=True)[1]
+    gears = numbered(gears_of(table)[known])
     mean = np.bincount(gears, apart) / np.bincount(gears)
     within = np.sum((apart - mean[gears]) ** 2) / max(len(apart) - len(mean), 1)
     share = np.bincount(gears[rows]) / rows.sum()
