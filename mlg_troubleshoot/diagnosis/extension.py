@@ -179,20 +179,20 @@ def adjustment_of(
     loaded: Array | None = None
     for term in terms:
         cause = term.candidate.cause
-        if not set(cause.needs) <= set(table.columns):
+        if cause.lacks(table.columns):
             continue
         scene = scene_at(model, table, where, clearance)
         with in_own_cause([cause], table.columns):
             own = cause.adjust(scene, term.candidate, term.value)
         clearance = own.clearance_in
         for name, values in own.changed.items():
-            changed[name] = changed.get(name, np.zeros(len(clearance))) + values
+            changed[name] = changed.get(name, 0.0) + values
         for name, values in own.scaled.items():
-            scaled[name] = scaled.get(name, np.ones(len(clearance))) * values
+            scaled[name] = scaled.get(name, 1.0) * values
         rate = rate if own.rate_factor is None else rate * own.rate_factor
         shift = shift if own.offset_in is None else shift + own.offset_in
         if own.direction_factors is not None:
-            loaded = own.direction_factors if loaded is None else loaded * own.direction_factors
+            loaded = own.direction_factors * (1.0 if loaded is None else loaded)
     return Adjustment(clearance, changed, scaled, rate, shift, loaded)
 
 
@@ -213,20 +213,17 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
     """
     terms = []
     for term in extension.terms:
-        cause = term.candidate.cause
         candidate = term.candidate
-        setting = {k: v for k, v in candidate.setting.items() if v is not None}
-        terms.append(
-            {
-                "words": term.words(),
-                "cause": cause.name,
-                "parameter": cause.parameter,
-                "value": term.value,
-                "interval_95": term.interval,
-                **({} if candidate.target is None else {"target": candidate.target}),
-                **({"setting": setting} if setting else {}),
-            }
-        )
+        table = {
+            "words": term.words(),
+            "cause": candidate.cause.name,
+            "parameter": candidate.cause.parameter,
+            "value": term.value,
+            "interval_95": term.interval,
+            "target": candidate.target,
+            "setting": {k: v for k, v in candidate.setting.items() if v is not None} or None,
+        }
+        terms.append({key: value for key, value in table.items() if value is not None})
     whole = {
         "schema": 1,
         "gear": extension.gear.id,

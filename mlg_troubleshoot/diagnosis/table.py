@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from datetime import date
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -132,13 +131,9 @@ class DiagnosisTable(Result):
     @property
     def gears(self) -> Texts:
         """The single gear of each row, tail and side, shape (n,)."""
-        tail = self.factors.get(TAIL_NO.variable)
-        if tail is None:
-            return np.array([str(i) for i in range(len(self))])
-        side = self.factors.get(SIDE.variable)
-        if side is None:
-            return tail
-        return np.array([f"{t} {s}" for t, s in zip(tail, side, strict=True)])
+        if not {TAIL_NO.variable, SIDE.variable} <= set(self.factors):
+            return self.tails
+        return np.array([f"{t} {s}" for t, s in zip(self.tails, self.texts("side"), strict=True)])
 
     @property
     def tails(self) -> Texts:
@@ -162,22 +157,14 @@ class DiagnosisTable(Result):
     def take(self, rows: Any) -> DiagnosisTable:
         """Return some of the rows, by place or as a mask."""
         places = np.arange(len(self))[rows]
-        return replace(
-            self,
-            clearance_in=self.clearance_in[places],
-            readings_in=self.readings_in[places],
-            record_id=tuple(self.record_id[int(i)] for i in places),
-            row=self.row[places],
-            margin_in=self.margin_in[places],
-            gauge_u_in=self.gauge_u_in[places],
-            quantities={name: values[places] for name, values in self.quantities.items()},
-            factors={name: values[places] for name, values in self.factors.items()},
-            axial_float_in=None if self.axial_float_in is None else self.axial_float_in[places],
-            plunger_gauge_u_in=(
-                None if self.plunger_gauge_u_in is None else self.plunger_gauge_u_in[places]
-            ),
-            below=None if self.below is None else self.below[places],
-        )
+        taken: dict[str, Any] = {"record_id": tuple(self.record_id[int(i)] for i in places)}
+        for field_of in fields(self):
+            values = getattr(self, field_of.name)
+            if isinstance(values, np.ndarray):
+                taken[field_of.name] = values[places]
+            elif isinstance(values, Mapping):
+                taken[field_of.name] = {name: each[places] for name, each in values.items()}
+        return replace(self, **taken)
 
 
 def _read_along(inspection: Inspection) -> bool:
@@ -221,39 +208,33 @@ def table_from_inspections(
         [*[np.nan] * len(at_mid), *(i.actuator_extension_in for i in positions)], float
     )
     inspections = [*at_mid, *positions]
-    n = len(inspections)
-    numbers = gear.joint_numbers
-    clearance = np.full((n, len(numbers)), np.nan)
-    floats = np.full((n, len(numbers)), np.nan)
-    below = np.zeros((n, len(numbers)), bool)
-    width = max((len(i.readings_in) for i in inspections), default=0)
-    readings = np.full((n, max(width, 1)), np.nan)
-    for row, inspection in enumerate(inspections):
-        for j, number in enumerate(numbers):
-            clearance[row, j] = inspection.clearance_in.get(number, np.nan)
-            floats[row, j] = inspection.axial_float_in.get(number, np.nan)
-            entered = inspection.entered.get(number)
-            below[row, j] = entered is not None and entered.bound == "<"
-        if row < len(at_mid):
-            readings[row, : len(inspection.readings_in)] = inspection.readings_in
+    shape = len(inspections), len(gear.joint_numbers)
+
+    def of_joints(cell: Callable[[Inspection, int], Any], kind: type = float) -> NDArray[Any]:
+        cells = [cell(i, number) for i in inspections for number in gear.joint_numbers]
+        return np.array(cells, kind).reshape(shape)
+
+    clearance = of_joints(lambda i, number: i.clearance_in.get(number))
+    floats = of_joints(lambda i, number: i.axial_float_in.get(number))
+    below = of_joints(lambda i, n: n in i.entered and i.entered[n].bound == "<", bool)
     clearance[below] *= 0.5
+    width = max((len(i.readings_in) for i in at_mid), default=0)
+    readings = np.full((len(inspections), max(width, 1)), np.nan)
+    for row, inspection in enumerate(at_mid):
+        readings[row, : len(inspection.readings_in)] = inspection.readings_in
     readings[len(at_mid) :, 0] = [i.plunger_position_in for i in positions]
     readings[len(at_mid) :, 0] -= np.nan_to_num(gear.model.plunger(stroke[len(at_mid) :]))
-    days = [
-        None if i.inspection_date is None else i.inspection_date.toordinal() for i in inspections
-    ]
-    known = [day for day in days if day is not None]
-    first = min(known) if known else None
-    given: dict[str, Sequence[float | None]] = {
+    dates = [i.inspection_date for i in inspections]
+    first = min((day for day in dates if day is not None), default=None)
+    given: dict[str, Sequence[Any]] = {
         c.variable: [i.value(c.filled) for i in inspections] for c in COVARIATES if c not in _TEXTS
     }
-    given[DATE.variable] = [None if day is None or first is None else day - first for day in days]
-    given[ALONG] = [None if np.isnan(at) else at for at in stroke.tolist()]
+    given[DATE.variable] = [day and first and (day - first).days for day in dates]
+    quantities = {name: np.array(values, float) for name, values in given.items()}
+    quantities[ALONG] = stroke
     factors = {c.variable: [str(i.value(c.filled) or "") for i in inspections] for c in _TEXTS}
     factors |= _own_texts(inspections)
-    declared = [
-        np.nan if i.plunger_gauge_u_in is None else i.plunger_gauge_u_in for i in inspections
-    ]
+    declared = np.array([i.plunger_gauge_u_in for i in inspections], float)
     return DiagnosisTable(
         clearance_in=clearance,
         readings_in=readings,
@@ -265,14 +246,10 @@ def table_from_inspections(
             np.inf,
         ),
         gauge_u_in=np.array([i.gauge_u_in for i in inspections]),
-        quantities={
-            name: np.array([np.nan if v is None else v for v in values], float)
-            for name, values in given.items()
-            if any(v is not None for v in values)
-        },
+        quantities={name: own for name, own in quantities.items() if np.isfinite(own).any()},
         factors={name: np.array(values) for name, values in factors.items() if any(values)},
         axial_float_in=floats if np.isfinite(floats).any() else None,
-        first_day=None if first is None else date.fromordinal(first).isoformat(),
-        plunger_gauge_u_in=np.array(declared) if np.isfinite(declared).any() else None,
+        first_day=None if first is None else first.isoformat(),
+        plunger_gauge_u_in=declared if np.isfinite(declared).any() else None,
         below=below if below.any() else None,
     )
