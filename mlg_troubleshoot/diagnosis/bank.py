@@ -11,6 +11,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, rms
 from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
+from mlg_troubleshoot.diagnosis.noise import standardised
 from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.units import DAYS_PER_YEAR
 
@@ -104,17 +105,11 @@ def _quantities(scene: Scene) -> dict[str, Array]:
         raw[f"clearance_{joint}"] = scene.clearance_in[:, j]
     if table.axial_float_in is not None:
         for j, joint in enumerate(scene.joints):
-            if np.isfinite(table.axial_float_in[:, j]).any():
-                raw[f"axial_float_{joint}"] = table.axial_float_in[:, j]
+            raw[f"axial_float_{joint}"] = table.axial_float_in[:, j]
     smooth = {}
     for name, values in raw.items():
-        known = np.isfinite(values)
-        if known.sum() < 3 or np.std(values[known]) <= 1e-12 * max(
-            1.0, float(np.max(np.abs(values[known])))
-        ):
-            continue
-        z = (values - np.mean(values[known])) / np.std(values[known])
-        smooth[name] = np.clip(np.where(known, z, 0.0), -4.0, 4.0)
+        if (z := standardised(values)) is not None:
+            smooth[name] = np.clip(np.nan_to_num(z), -4.0, 4.0)
     return smooth
 
 

@@ -13,10 +13,16 @@ import numpy as np
 from scipy.special import pdtrc
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, numbered
-from mlg_troubleshoot.diagnosis.blanks import BY_CHANCE, LEAST_ROWS, blanks_by_wear
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import gears_of, visits
-from mlg_troubleshoot.diagnosis.written import piles, step_of, steps_of
+from mlg_troubleshoot.diagnosis.written import (
+    BY_CHANCE,
+    LEAST_ROWS,
+    blanks_by_wear,
+    piles,
+    step_of,
+    steps_of,
+)
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
@@ -135,16 +141,16 @@ def _of_rows(kind: str, table: DiagnosisTable, rows: Mask) -> Iterator[DataCondi
 
 def _listed(table: DiagnosisTable, rows: Mask) -> str:
     """Name rows: by who wrote them if one did, and by their numbers."""
-    numbers = [str(int(n)) for n in table.row[rows][:8]]
-    more = f" and {int(rows.sum()) - 8} more" if rows.sum() > 8 else ""
+    several = rows.sum() > 1
     people = set(table.people[rows]) - {""}
-    whose = f" of technician {people.pop()}" if len(people) == 1 and rows.sum() > 1 else ""
-    return f"row{'s' if rows.sum() > 1 else ''} {', '.join(numbers)}{more}{whose}"
+    whose = f" of technician {people.pop()}" if len(people) == 1 and several else ""
+    return f"row{'s' if several else ''} {_first([str(n) for n in table.row[rows]])}{whose}"
 
 
-def _at_mid(table: DiagnosisTable) -> Mask:
-    """Rows at mid-position: rows along the stroke repeat the clearances of one inspection."""
-    return ~table.along
+def _first(names: list[str]) -> str:
+    """Eight of some names, and how many more there are."""
+    more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+    return ", ".join(names[:8]) + more
 
 
 def _duplicates(table: DiagnosisTable) -> Mask:
@@ -178,7 +184,7 @@ def _copies(table: DiagnosisTable) -> Mask:
     both = (values > least) & (values[before] > 0.0) & later[:, None]
     same = both & (values == values[before])
     count = both.sum(axis=1)
-    full = (same.sum(axis=1) == count) & (count >= _LEAST_JOINTS) & _at_mid(table)
+    full = (same.sum(axis=1) == count) & (count >= _LEAST_JOINTS) & ~table.along
     full &= ~np.any(np.nan_to_num(values) != np.nan_to_num(values[before]), axis=1)
     others = both & ~full[:, None]
     usual = (same & others).sum(axis=0) / np.maximum(others.sum(axis=0), 1)
@@ -198,7 +204,7 @@ def _identical(table: DiagnosisTable) -> Mask:
     low = np.where(known, values, np.inf).min(axis=1)
     count = known.sum(axis=1)
     same = (np.where(known, values, -np.inf).max(axis=1) == low) & (low > 0.0)
-    same &= (count >= _LEAST_JOINTS) & _at_mid(table)
+    same &= (count >= _LEAST_JOINTS) & ~table.along
     _found, often = np.unique(values[known & ~same[:, None]], return_counts=True)
     alike = float(np.sum((often / max(often.sum(), 1)) ** 2))
     return np.asarray(same & (len(values) * alike ** np.maximum(count - 1.0, 0.0) < BY_CHANCE))
@@ -220,7 +226,7 @@ def _too_coarse(values: Array, step: float) -> bool:
 
 def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     """Values on a step of twice their standard uncertainty or more: half a step is as large."""
-    use = rows & _at_mid(table)
+    use = rows & ~table.along
     people = table.people
     least = 2.0 * float(np.median(table.gauge_u_in))
     each = steps_of(table.take(rows))
@@ -312,7 +318,7 @@ def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
 
 def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
     """Whether the plunger was read depends on the displacement that is predicted."""
-    use = np.isfinite(table.clearance_in).any(axis=1) & _at_mid(table)
+    use = np.isfinite(table.clearance_in).any(axis=1) & ~table.along
     read = np.isfinite(table.readings_in[use]).any(axis=1)
     if min(read.sum(), (~read).sum()) < 2 * LEAST_ROWS:
         return
@@ -352,9 +358,8 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
         gears += int(falls.any())
     if not gears:
         return
-    more = f" and {len(fell) - 8} more" if len(fell) > 8 else ""
     times = f"{pooled} time{'s' if pooled > 1 else ''}"
-    named = f"gears {', '.join(fell[:8])}{more}: {times}" if fell else ""
+    named = f"gears {_first(fell)}: {times}" if fell else ""
     at = f"at {overhauls} overhaul{'s' if overhauls > 1 else ''}" if overhauls else ""
     slip = (
         "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"

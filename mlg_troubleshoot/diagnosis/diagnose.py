@@ -14,7 +14,6 @@ from threadpoolctl import threadpool_limits
 from mlg_troubleshoot.arrays import Array, Mask, rms
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.bank import build_bank
-from mlg_troubleshoot.diagnosis.blanks import BY_CHANCE
 from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, offered
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
@@ -44,6 +43,7 @@ from mlg_troubleshoot.diagnosis.noise import (
 from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import visits
+from mlg_troubleshoot.diagnosis.written import BY_CHANCE
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
@@ -374,10 +374,11 @@ def diagnose(
 
 
 @dataclass(frozen=True)
-class _Case:
-    """Candidates with their effects, the misfit and what the inference makes of it."""
+class _Case(Finding):
+    """What the posterior says, and what is reported fitted: effects of which candidates and block,
+    of which size.
+    """
 
-    finding: Finding
     scene: Scene
     chosen: tuple[int, ...]
     block: Block | None
@@ -385,14 +386,9 @@ class _Case:
     covariance: Array
 
     @property
-    def problem(self) -> MisfitProblem:
-        """The data, and all that may explain them."""
-        return self.finding.problem
-
-    @property
     def acts(self) -> bool:
         """True if some listed cause is likely to act."""
-        return self.finding.follows.verdict in {Verdict.NAMED, Verdict.AMBIGUOUS}
+        return self.follows.verdict in {Verdict.NAMED, Verdict.AMBIGUOUS}
 
     @property
     def columns(self) -> Array:
@@ -413,9 +409,9 @@ class _Case:
         whole = (self.problem.misfit, 0.0)
         if not self.acts:
             return [whole]
-        found = self.finding.posterior
+        found = self.posterior
         prior = found.effects.log_prior[list(self.chosen)].sum()
-        prior += found.contexts[self.finding.best.context].log_prior
+        prior += found.contexts[self.best.context].log_prior
         fitted = self.columns.shape[1] * np.log(len(self.problem.misfit))
         return [whole, (self.problem.misfit - self.explained, float(prior - 0.5 * fitted))]
 
@@ -502,7 +498,8 @@ def _explained(
         finding.noise, effects.take(chosen), known, spread, problem.expected
     )
     count = len(chosen) + (0 if block is None else block.columns.shape[1])
-    return _Case(finding, scene, chosen, block, values[:count], covariance[:count, :count])
+    told = finding.problem, finding.follows, finding.noise
+    return _Case(*told, scene, chosen, block, values[:count], covariance[:count, :count])
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
@@ -666,40 +663,39 @@ def _report(
     case: _Case,
 ) -> Diagnosis:
     misfit = case.problem.misfit
-    finding = case.finding
     causes, open_ = _told(case)
-    variables, unlisted_rms_in = finding.unlisted
+    variables, unlisted_rms_in = case.unlisted
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
     as_read = np.where(read, table.clearance_in, case.scene.clearance_in)
     raw = predicted(model, table, as_read)[0]
     raw_misfit = table.measured_in - raw
-    gain = _gain(case) if finding.follows.verdict is Verdict.NAMED else None
+    gain = _gain(case) if case.follows.verdict is Verdict.NAMED else None
     left = misfit - np.sum([cause.effect_in for cause in causes], axis=0)
     repeatability, source = estimate_repeatability(table)
     residual = float(np.std(left))
     expected = _expected_scatter(model, table, repeatability)
-    chances = finding.posterior
+    chances = case.posterior
     return Diagnosis(
-        verdict=finding.follows.verdict,
+        verdict=case.follows.verdict,
         causes=causes,
         also_possible=() if causes else open_,
         beside=open_ if causes else (),
         further=_further(case, open_),
         unlisted_variables=variables,
         unlisted_rms_in=unlisted_rms_in,
-        probabilities=finding.follows.listed,
-        weighed=finding.weighed,
+        probabilities=case.follows.listed,
+        weighed=case.weighed,
         p_nothing=chances.nothing,
         p_unlisted=chances.unlisted,
-        p_left=finding.left,
+        p_left=case.left,
         remainder_p=p_value_of(
-            case.problem, left - case.problem.misfit + case.problem.expected, finding.noise
+            case.problem, left - case.problem.misfit + case.problem.expected, case.noise
         ),
-        ten_times=finding.follows.ten_times,
+        ten_times=case.follows.ten_times,
         not_testable=not_testable,
         unsaid=_unsaid(table),
-        ruled_out=finding.ruled_out,
+        ruled_out=case.ruled_out,
         faults=faults,
         corrected=_corrected(model, table, causes),
         rows_read=rows_read,
@@ -711,7 +707,7 @@ def _report(
         rms_in=rms(raw_misfit),
         repeatability_in=repeatability if np.isfinite(repeatability) else None,
         repeatability_source=source,
-        smallest_rms_in=finding.smallest_rms_in,
+        smallest_rms_in=case.smallest_rms_in,
         gain=gain,
         # What predicts aircraft that it was not fitted to no better is not written.
         terms=(
@@ -722,7 +718,7 @@ def _report(
         residual_u_in=residual,
         expected_scatter_in=expected,
         # What the gauges alone leave is noise, however it lies.
-        remainder_is_noise=finding.left < 0.5 or (expected is not None and residual <= expected),
+        remainder_is_noise=case.left < 0.5 or (expected is not None and residual <= expected),
         used=table,
         predicted_in=case.scene.over_in,
         misfit_in=misfit,
@@ -735,9 +731,9 @@ def _gain(case: _Case) -> Gain:
 
     What else acts, being one of a set, is noise of the size that it was found with.
     """
-    noise = case.finding.noise
+    noise = case.noise
     block = case.block
-    said = case.finding.follows.said
+    said = case.follows.said
     keys = [case.problem.candidates[k].key for k in case.chosen]
     firm = [place for place, key in enumerate(keys) if key in said]
     others = [case.effect(place)[:, None] for place in range(len(keys)) if place not in firm]
@@ -776,7 +772,7 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
     """The causes that are named, by effect, and those of which something acts, the likeliest
     first.
     """
-    follows = case.finding.follows
+    follows = case.follows
     fitted: dict[Key, tuple[Candidate, float, tuple[float, float], Array]] = {}
     reach = 1.96 * np.sqrt(np.diag(case.covariance))
     sizes = zip(case.values, case.values - reach, case.values + reach, strict=True)
@@ -790,14 +786,17 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
         candidate = case.block.candidate(change, case.covariance[k:, k:])
         fitted[candidate.key] = candidate, 1.0, (1.0, 1.0), case.block.columns @ change
     none = np.zeros(len(case.problem.misfit))
+    for cause in {block.cause for block in case.problem.blocks}:
+        fitted.setdefault((cause.name, None), (Candidate(cause), 0.0, (0.0, 0.0), none))
 
     def found(key: Key) -> NamedCause:
-        rival = case.problem.candidate(key, case.finding.posterior)
-        own = fitted.get(key, (rival, 0.0, (0.0, 0.0), none))
-        return NamedCause(*own, follows.probability(key), follows.class_probability(key))
+        if key not in fitted:
+            rival = case.problem.likeliest(key, case.posterior)
+            fitted[key] = case.problem.candidates[rival], 0.0, (0.0, 0.0), none
+        return NamedCause(*fitted[key], follows.probability(key), follows.class_probability(key))
 
     named = sorted((found(key) for key in follows.said), key=lambda cause: -cause.effect_rms_in)
-    return tuple(named), tuple(found(key) for key in case.finding.open)
+    return tuple(named), tuple(found(key) for key in case.open)
 
 
 def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections | None:
@@ -805,22 +804,20 @@ def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections |
     and how many further inspections like these distinguish them.
     """
     problem = case.problem
-    finding = case.finding
     table = case.scene.table
     single = {c.key for c in problem.candidates}
     rivals = [cause.candidate for cause in open_ if cause.candidate.key in single][:2]
     if not rivals:
         return None
-    chances = [finding.follows.probability(rival.key) for rival in rivals]
-    if finding.posterior.nothing > min(chances[1:], default=0.0):
+    chances = [case.follows.probability(rival.key) for rival in rivals]
+    if case.posterior.nothing > min(chances[1:], default=0.0):
         rivals = rivals[:1]
-        chances = [chances[0], finding.posterior.nothing]
-    noise = finding.noise
+        chances = [chances[0], case.posterior.nothing]
+    noise = case.noise
     apart = np.zeros(len(table))
     none = np.empty((len(table), 0))
     for rival, sign in zip(rivals, (1.0, -1.0), strict=False):
-        own = [k for k, c in enumerate(problem.candidates) if c.key == rival.key]
-        column = problem.columns.take([max(own, key=finding.posterior.of_effect.item)])
+        column = problem.columns.take([problem.likeliest(rival.key, case.posterior)])
         value = shrunk(noise, column, none, np.empty((0, 0)), problem.expected)[0]
         apart += sign * (column @ value)
     latest = np.array([rows[-1] for rows in visits(table).values()])

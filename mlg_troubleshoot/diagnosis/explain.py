@@ -68,13 +68,10 @@ class MisfitProblem:
         constant = EffectColumns.of(np.ones((len(self.misfit), 1)))
         return EffectColumns.joined([self.bank.columns, constant])
 
-    def candidate(self, key: Key, found: MisfitPosterior | None = None) -> Candidate:
-        """The likeliest candidate of a name, or all-joint effects."""
+    def likeliest(self, key: Key, found: MisfitPosterior) -> int:
+        """Place of the likeliest candidate of a name."""
         own = [k for k, c in enumerate(self.candidates) if c.key == key]
-        if not own:
-            return Candidate(next(b.cause for b in self.blocks if b.cause.name == key[0]))
-        best = own[0] if found is None else max(own, key=lambda k: found.of_effect[k])
-        return self.candidates[best]
+        return max(own, key=found.of_effect.item)
 
     def effects(self, noise: NoiseModel) -> Effects:
         """All that may act alone, with how often and how large it is expected."""
@@ -90,10 +87,11 @@ class MisfitProblem:
         ]
         rarity = np.array([c.rarity for c in self.candidates])
         acting = self.columns.acting
-        exact = np.array([c.cause.exact or 0.0 for c in self.candidates])
+        causes = [c.cause for c in self.candidates]
+        exact = np.array([cause.exact or 0.0 for cause in causes])
         usual = beliefs.shape_size * scale / acting
-        stated = [beliefs.plausible.get(c.cause.name, c.cause.plausible) for c in self.candidates]
-        plausible = np.where(stated == np.array(None), usual, np.array(stated, float))
+        stated = np.array([beliefs.plausible.get(c.name, c.plausible) for c in causes], float)
+        plausible = np.where(np.isnan(stated), usual, stated)
         listed = Effects(
             self.columns,
             [c.key for c in self.candidates],
@@ -102,9 +100,7 @@ class MisfitProblem:
             np.where(exact != 0.0, beliefs.exact * np.abs(exact), plausible),
             exact == 0.0,
             np.where(exact == 0.0, usual * min(beliefs.sizes), 0.0),
-            np.array(
-                [0.0 if e else c.cause.sign for c, e in zip(self.candidates, exact, strict=True)]
-            ),
+            np.where(exact == 0.0, [cause.sign for cause in causes], 0.0),
             exact,
             rarity,
         )

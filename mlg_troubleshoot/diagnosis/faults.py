@@ -378,13 +378,11 @@ def screen_faults(
         {**table.quantities, ALONG: extension} if ALONG in table.quantities else table.quantities
     )
     repaired = replace(table, clearance_in=clearance, readings_in=readings, quantities=quantities)
-    swapped = swapped_sides(repaired, Beliefs().odds + np.log(_KINDS / _WRONG))
-    faults += [
-        DataFault.at(table, row, "side", "swapped_side", own, other) for row, own, other in swapped
-    ]
-    if swapped:
-        side = repaired.factors["side"].copy()
-        side[[row for row, _own, _other in swapped]] = [other for _row, _own, other in swapped]
+    side = repaired.texts("side").copy()
+    for row, own, other in swapped_sides(repaired, Beliefs().odds + np.log(_KINDS / _WRONG)):
+        faults.append(DataFault.at(table, row, "side", "swapped_side", own, other))
+        side[row] = other
+    if "side" in repaired.factors:
         repaired = replace(repaired, factors={**repaired.factors, "side": side})
     return repaired, tuple(faults), usable
 

@@ -11,7 +11,7 @@ from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.held_out import folds_of, held_out_part, likelier
+from mlg_troubleshoot.misfit.fitting import folds_of, held_out_part, likelier
 
 # With fewer tails none can be held out.
 LEAST_TAILS = 4

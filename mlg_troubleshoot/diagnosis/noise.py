@@ -123,17 +123,24 @@ def student(off: Array, spread: Array | float) -> Array:
     return np.where(np.isnan(off), 0.0, -tails - np.log(spread))
 
 
+def standardised(values: Array) -> Array | None:
+    """Values less their mean, over their standard deviation; None if they do not vary. [1]"""
+    known = values[np.isfinite(values)]
+    least = 1e-12 * max(1.0, float(np.max(np.abs(known), initial=0.0)))
+    if len(known) < 3 or np.std(known) <= least:
+        return None
+    z: Array = (values - np.mean(known)) / np.std(known)
+    return z
+
+
 def small_trends(table: DiagnosisTable) -> tuple[Array, tuple[Array, ...], Array]:
     """Trends and habits that are always there in some small measure: people, gauges, seasons,
     wear; rows of each reader, and of each value of the table's own columns.
     """
     trends = []
     for values in table.quantities.values():
-        known = np.isfinite(values)
-        if known.sum() > 2 and np.std(values[known]) > 0.0:
-            z = (values - np.mean(values[known])) / np.std(values[known])
-            trends.append(np.where(known, z, 0.0))
-            trends.append(np.where(known, z * z - 1.0, 0.0) / np.sqrt(2.0))
+        if (z := standardised(values)) is not None:
+            trends += [np.nan_to_num(z), np.nan_to_num(z * z - 1.0) / np.sqrt(2.0)]
     habits = [_levels(table, name) for name in ("side", "approach")]
     readers = tuple(
         levels

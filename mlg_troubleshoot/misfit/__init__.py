@@ -13,7 +13,6 @@ __all__ = [
     "dynamic",
     "explanation",
     "fitting",
-    "held_out",
     "posterior",
     "simulation",
     "simulation_result",

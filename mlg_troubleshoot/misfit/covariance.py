@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -79,16 +79,9 @@ class NoiseModel:
 
     def take(self, rows: Mask) -> NoiseModel:
         """Return the noise of some of the rows."""
-        return replace(
-            self,
-            relative=self.relative[rows],
-            tails=self.tails[rows],
-            gears=self.gears[rows],
-            loadings=self.loadings[rows],
-            of_gear=None if self.of_gear is None else self.of_gear[rows],
-            chain=None if self.chain is None else self.chain[rows],
-            time=None if self.time is None else self.time[rows],
-        )
+        every = {f.name: getattr(self, f.name) for f in fields(self)}
+        own: dict[str, Any] = {k: v[rows] for k, v in every.items() if isinstance(v, np.ndarray)}
+        return replace(self, **own)
 
     @property
     def worth(self) -> float:

@@ -1,4 +1,6 @@
-"""Columns fitted to data under a noise model: freely, and with what is known of them beforehand."""
+"""Columns fitted to data under a noise model, freely and with what is known of them beforehand; and
+what a fit explains of held-out rows.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 
 
@@ -61,3 +63,80 @@ def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
     if best is None:
         raise ValueError("no tail ratio to try")
     return best
+
+
+_FOLDS = 10
+# Share of what a cause does that must remain in the rows it is learned from. [1]
+_LEARNED = 0.1
+
+
+def folds_of(
+    row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes
+) -> tuple[Wholes, str]:
+    """Number the fold in which each reading is held out: whole groups, or rows where a cause acts
+    in one group only.
+    """
+    if group is not None and group.max() > 0:
+        numbers = np.argsort(np.argsort(shuffled[: group.max() + 1]))
+        part = np.asarray(numbers % _FOLDS)[group[row]]
+        square = columns**2
+        least = _LEARNED * np.sum(square, axis=0)
+        learnt = [np.sum(square[part != k], axis=0) for k in range(part.max() + 1)]
+        if np.all(learnt >= least):
+            return part, "group"
+    return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
+
+
+def blocks_of(chain: Wholes, time: Array) -> Wholes:
+    """Number the fold in which each row is held out with those that it follows: whole series where
+    there are as many as folds, else as many stretches of all series together.
+    """
+    many = int(chain.max()) + 1
+    if many >= _FOLDS:
+        return np.asarray(chain % _FOLDS)
+    place = np.empty(len(chain), np.int64)
+    place[np.lexsort((time, chain))] = np.arange(len(chain))
+    return np.asarray(place * _FOLDS // len(chain))
+
+
+def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bool:
+    """Tell whether the residual of held-out rows is likelier after than before, what a fold has in
+    common being noise.
+
+    Far readings decide no more than others: where noise is estimated they scatter more.
+    """
+    left = np.column_stack([before, after])
+    ratio = noise.tail_ratios[-1]
+    square = np.sum(
+        [noise.take(fold == k).square(left[fold == k], ratio) for k in np.unique(fold)], axis=0
+    )
+    return bool(square[1] < square[0])
+
+
+def held_out_part(
+    noise: NoiseModel,
+    columns: Array,
+    data: Array,
+    fold: Wholes,
+    known: tuple[Array, Array] | None = None,
+) -> Array:
+    """What a model explains of each row that was fitted to the rows of the other folds alone. [in]
+
+    known: further effects, shape (n, k), and the covariance of their sizes that is known
+    beforehand.
+    """
+    explained = np.zeros(len(data))
+    for k in np.unique(fold):
+        train = fold != k
+        test = fold == k
+        used = np.any(columns[train] != 0.0, axis=0)
+        held = columns[:, used]
+        part = noise.take(train)
+        if not train.any():
+            continue
+        if known is not None:
+            values, _covariance = shrunk(part, held[train], known[0][train], known[1], data[train])
+            explained[test] = np.hstack([held, known[0]])[test] @ values
+        elif used.any():
+            explained[test] = held[test] @ fit(part, held[train], data[train]).values
+    return explained

@@ -200,7 +200,7 @@ class _Search:
                 self.extend(context, members - {k})
         return len(self.extended) > before
 
-    def _masked(self) -> Iterator[tuple[int, frozenset[int], _Extended]]:
+    def _masked(self) -> Iterator[_Extended]:
         """Each extended set with what no other one has as well: no set is counted twice."""
         counted: dict[int, list[frozenset[int]]] = {}
         for (context, members), at in sorted(self.extended.items(), key=lambda e: len(e[0][1])):
@@ -212,18 +212,15 @@ class _Search:
                 if len(other) == len(members) and len(other - members) == 1:
                     at.further[list(other - members)] = -np.inf
             counted.setdefault(context, []).append(members)
-            yield context, members, at
+            yield at
 
     def summed(self) -> MisfitPosterior:
         """Probabilities of everything, from all sets that were looked at."""
         alone = self.extended[0, frozenset[int]()]
         over_nothing = alone.further - alone.own.log_posterior
         parts = list(self._masked())
-        whole = float(
-            log_sum(
-                np.concatenate([np.append(at.further, at.own.log_posterior) for *_k, at in parts])
-            )
-        )
+        every = [np.append(at.further, at.own.log_posterior) for at in parts]
+        whole = float(log_sum(np.concatenate(every)))
         names: dict[Key, float] = {}
         together: dict[frozenset[Key], float] = {}
         of_effect = np.zeros(len(self.number))
@@ -232,7 +229,7 @@ class _Search:
         listed = {
             name for name, own in zip(self.effects.names, self.effects.listed, strict=True) if own
         }
-        for context, _members, at in parts:
+        for at in parts:
             chance = np.exp(at.further - whole)
             own = float(np.exp(at.own.log_posterior - whole))
             total = own + float(chance.sum())
@@ -241,14 +238,14 @@ class _Search:
             of_effect[places] += total
             size += chance * at.values
             size[places] += total * at.own.values
-            about = self.contexts[context]
+            about = self.contexts[at.own.context]
             own_names = [*(self.effects.names[k] for k in places), about.name]
             held = frozenset(name for name in own_names if name is not None)
             by_name = np.bincount(self.number, chance, len(self.once))
             sets = {held: own + float(by_name[0])}
-            for place in np.flatnonzero(by_name[1:] > _TRACE) + 1:
-                name = self.once[place]
-                sets[held | ({name} if name else set())] = float(by_name[place])
+            for name, likely in zip(self.once, by_name.tolist(), strict=True):
+                if name and likely > _TRACE:
+                    sets[held | {name}] = likely
             for key, likely in sets.items():
                 together[key] = together.get(key, 0.0) + likely
                 for name in key:
@@ -263,7 +260,7 @@ class _Search:
         listed |= {context.name for context in self.contexts if context.listed}
         nothing = together.get(frozenset(), 0.0)
         unlisted = sum(p for own, p in together.items() if own - listed)
-        order = sorted((at.own for *_k, at in parts), key=lambda e: -e.log_posterior)
+        order = sorted((at.own for at in parts), key=lambda e: -e.log_posterior)
         return MisfitPosterior(
             self.effects,
             self.contexts,

@@ -16,7 +16,7 @@ from mlg_troubleshoot.arrays import Array, Wholes, rms
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import FAR
-from mlg_troubleshoot.misfit.held_out import blocks_of, folds_of
+from mlg_troubleshoot.misfit.fitting import blocks_of, folds_of
 from mlg_troubleshoot.misfit.linearised import FittedPoint, JudgedPoint, Study, key_of
 from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
 from mlg_troubleshoot.misfit.simulation_inputs import checked, followed

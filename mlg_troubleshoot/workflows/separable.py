@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -28,6 +27,7 @@ from mlg_troubleshoot.decision.columns import (
     TEMPERATURE,
 )
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate
+from mlg_troubleshoot.diagnosis.causes.base import offered
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.diagnosis.extension import MOST_IN
 from mlg_troubleshoot.diagnosis.noise import TAIL_RATIOS
@@ -60,7 +60,6 @@ FURTHER = {
 # Of what is tried for all-joint effects, the middle one: directions spread by 45°, linkages half as
 # far apart.
 _MIDDLE = 1
-_JOINT = re.compile(r"clearance_(\d+)_in")
 _NAMES = {column: name for name, column in FURTHER.items()} | {PLUNGER_POSITION: ALONG}
 Key = tuple[str, str | None]
 
@@ -97,27 +96,24 @@ def separable(
     recorded, joints = _planned(columns, model)
     here = _Plan(model, recorded, joints)
 
+    access = sorted((j.access.value, j.number) for j in model.joints if j.number not in joints)
+    unread = {CLEARANCE.header(number, LengthUnit.INCH): number for _min, number in access}
+
     @cache
     def with_column(column: str) -> _Plan:
-        number = _JOINT.fullmatch(column)
-        return (
-            _Plan(model, recorded, joints | {int(number[1])})
-            if number
-            else _Plan(model, recorded | {column}, joints)
-        )
+        if column in unread:
+            return _Plan(model, recorded, joints | {unread[column]})
+        return _Plan(model, recorded | {column}, joints)
 
-    access = sorted((j.access.value, j.number) for j in model.joints if j.number not in joints)
     further = [name for name in FURTHER if name not in {*recorded, ALONG}]
-    further += [CLEARANCE.header(number, LengthUnit.INCH) for _min, number in access] + [ALONG] * (
-        ALONG not in recorded
-    )
+    further += [*unread, *({ALONG} - recorded)]
     with threadpool_limits(1, "blas"):
         keys = [*(key for key in here.keys if key not in here.stand_ins), *here.blocks]
         judged = tuple(_judged(here, with_column, further, key) for key in keys)
     return judged + tuple(
-        CausePlanned(c.name, None, None, FURTHER[lacks].name, None, None, None, c.separates)
+        CausePlanned(c.name, None, None, FURTHER[column].name, None, None, None, c.separates)
         for c in CATALOGUE
-        if (lacks := next((n for n in c.needs if n not in recorded), None)) is not None
+        if (column := c.lacks(recorded))
     )
 
 
@@ -148,18 +144,7 @@ class _Plan:
     def __init__(self, gear: Gear, recorded: set[str], joints: set[int]) -> None:
         table = _fleet(gear, recorded, joints)
         scene, rows = build_scene(gear.model, table, gear.discrepancies)
-        found = [
-            c
-            for cause in CATALOGUE
-            if set(cause.needs) <= recorded
-            for c in cause.candidates(scene)
-        ]
-        found += [
-            c
-            for cause in CATALOGUE
-            if not set(cause.needs) <= recorded
-            for c in cause.stand_ins(scene)
-        ]
+        found = list(offered(CATALOGUE, scene, recorded))
         effects = effect_columns(scene, found)
         effects[:, [not _speaks_for_all(c, table) for c in found]] = 0.0
         tails = TAIL_RATIOS[1] * (table.tails[:, None] == np.unique(table.tails))

@@ -10,7 +10,7 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import Diagnosis, diagnose
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.misfit import held_out
+from mlg_troubleshoot.misfit import fitting
 from mlg_troubleshoot.reporting.json_form import diagnosis_as_json
 
 from .conftest import Array, DiagnosisTable, fleet
@@ -45,8 +45,8 @@ def fitted_tails(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
         seen.append(len(data))
         return real(noise, columns, data)
 
-    real = held_out.fit
-    monkeypatch.setattr(held_out, "fit", watched)
+    real = fitting.fit
+    monkeypatch.setattr(fitting, "fit", watched)
     yield seen
 
 

@@ -14,8 +14,7 @@ from scipy.stats import multivariate_normal
 from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
 from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
-from mlg_troubleshoot.diagnosis.causes.joint import JointContact
-from mlg_troubleshoot.diagnosis.causes.linkage import CalibrationRate
+from mlg_troubleshoot.diagnosis.causes.linkage import CalibrationRate, JointContact
 from mlg_troubleshoot.diagnosis.causes.reading import GaugeBias
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.diagnosis.explain import MisfitProblem

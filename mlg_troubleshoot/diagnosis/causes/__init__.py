@@ -15,11 +15,13 @@ from mlg_troubleshoot.diagnosis.causes.gradual import (
     Modification,
     TechnicianLearning,
 )
-from mlg_troubleshoot.diagnosis.causes.joint import DirectionNotWorstCase, JointContact, OvalWear
 from mlg_troubleshoot.diagnosis.causes.linkage import (
     CalibrationRate,
+    DirectionNotWorstCase,
     ElasticCompliance,
+    JointContact,
     OutOfPlaneTilt,
+    OvalWear,
     ThermalGrowth,
     UnlistedWear,
 )
