@@ -233,20 +233,25 @@ class Finding:
     def weighed(self) -> tuple[WeighedCause, ...]:
         """What Bayes' rule makes of every name, the one with the highest odds alone first."""
         found = self.posterior
-        alone: dict[Key, list[tuple[float, float]]] = {}
-        names = found.effects.names
-        priors = (found.effects.log_prior - found.effects.rarity).tolist()
-        for name, prior, odds in zip(names, priors, found.over_nothing.tolist(), strict=True):
-            if name is not None:
-                alone.setdefault(name, []).append((prior, odds))
         bare = {e.context: e.log_posterior for e in found.likeliest if not e.members}
-        for number, context in enumerate(found.contexts):
-            if context.name is not None:
-                odds = bare[number] - bare[0]
-                alone.setdefault(context.name, []).append((context.log_prior, odds))
+        over_nothing = [bare[k] - bare[0] for k in range(len(found.contexts))]
+        terms = np.array(
+            [
+                np.append(
+                    found.effects.log_prior - found.effects.rarity,
+                    [context.log_prior for context in found.contexts],
+                ),
+                np.append(found.over_nothing, over_nothing),
+            ]
+        )
+        places: dict[Key, list[int]] = {}
+        every = (*found.effects.names, *(context.name for context in found.contexts))
+        for place, name in enumerate(every):
+            if name is not None:
+                places.setdefault(name, []).append(place)
         each: list[tuple[float, WeighedCause]] = []
-        for name, terms in alone.items():
-            prior, odds = (float(log_sum(np.array(part))) for part in zip(*terms, strict=True))
+        for name, own in places.items():
+            prior, odds = log_sum(terms[:, own].T).tolist()
             probability = found.names.get(name, 0.0)
             weighed = WeighedCause(*name, float(np.exp(prior)), odds - prior, probability)
             each.append((odds, weighed))

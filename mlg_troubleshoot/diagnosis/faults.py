@@ -206,20 +206,18 @@ class _Screen:
     def readings_of(self, cells: Array, along: Mask) -> Array:
         """Readings that the cells of rows make, along the stroke less the position at rest. [in]"""
         readings = cells[..., self.table.clearance_in.shape[1] : -1]
-        if not along.any():
-            return readings
-        at_rest = np.where(along, np.nan_to_num(self.model.plunger(cells[..., -1])), 0.0)
-        return np.asarray(readings - at_rest[..., None])
+        return np.asarray(readings - self._at_rest(cells[..., -1], along))
+
+    def _at_rest(self, extension: Array, along: Mask) -> Array:
+        """Position at rest of rows along the stroke, 0 of the others, as columns. [in]"""
+        moved = self.model.plunger(extension) if along.any() else extension
+        return np.where(along, np.nan_to_num(moved), 0.0)[..., None]
 
     def written(self, places: Places) -> Array:
         """Cells of rows as they are written, shape (n_places, n_cells)."""
         table = self.table
-        along = table.along[places]
         extension = table.extension_in[places]
-        readings = table.readings_in[places]
-        if along.any():
-            at_rest = np.nan_to_num(self.model.plunger(extension))
-            readings = readings + np.where(along, at_rest, 0.0)[:, None]
+        readings = table.readings_in[places] + self._at_rest(extension, table.along[places])
         return np.column_stack([table.clearance_in[places], readings, extension])
 
     def misfit_of(self, place: int, cells: Array) -> Array:
@@ -235,15 +233,12 @@ class _Screen:
 
     def near(self, place: int, misfit: Array) -> Array:
         """Log-density of misfits by the other rows of the tail, gauge, technician and fleet. [1]"""
-        weight = np.zeros(len(self.table))
         others = np.isfinite(self.rest)
         others[place] = False
-        groups = [others]
+        weight = others / max(int(others.sum()), 1)
         for name in ("tail_no", "gauge_id", "technician_id"):
             texts = self.table.texts(name)
-            if texts[place]:
-                groups.append(others & (texts == texts[place]))
-        for rows in groups:
+            rows = others & (texts == texts[place]) & (texts != "")
             weight += rows / max(int(rows.sum()), 1)
         kept = weight > 0.0
         if not kept.any():

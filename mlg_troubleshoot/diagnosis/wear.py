@@ -130,15 +130,14 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     # What wear is to be expected of an inspection without its landings is not known: its readings
     # stand.
     both = history.scatter_in2 + noise
-    trust = np.where(
-        landed[:, None] & (both > 0.0), history.scatter_in2 / np.where(both > 0.0, both, 1.0), 1.0
-    )
+    known_wear = landed[:, None] & (both > 0.0)
+    trust = np.divide(history.scatter_in2, both, out=np.ones_like(both), where=known_wear)
     told = np.isfinite(history.shown_in)
     read = np.where(told, history.shown_in, history.expected_in)
     drawn = history.expected_in + trust * (read - history.expected_in)
     # A reading is never overruled by more than its own uncertainty makes likely.
     reach = FAR * np.sqrt(noise)
-    likely = np.where(told, np.clip(drawn, read - reach, read + reach), drawn)
+    likely = np.clip(drawn, read - reach, read + reach)
     variance = np.where(told, trust * noise + trust**2 * history.written_in2, history.scatter_in2)
     spread = np.where(known, 0.0, np.sqrt(variance))
     shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))

@@ -223,17 +223,18 @@ class Study:
             scale = self.readings.first_scale(point.columns, free, point.rest)
             noise, unit = self.readings.noise(scale, free)
             point = self._fit(point.values, (), noise.with_tails(0.0), unit)
-            columns = point.columns / unit[:, None]
-            _left, seen = project_out(columns[:, : self.count], columns[:, self.count :])
-            self.design = self.design.within(seen)
+            self.design = self.design.within(self._seen(point, unit))
         return point
+
+    def _seen(self, point: FittedPoint, unit: Array) -> Mask:
+        """Suspects of whose effect there the nuisance parameters leave something."""
+        columns = point.columns / unit[:, None]
+        return project_out(columns[:, : self.count], columns[:, self.count :])[1]
 
     def _look_again(self, point: FittedPoint, unit: Array) -> None:
         """Ask for suspects that did nothing at the nominal values and do something here."""
-        columns = point.columns / unit[:, None]
-        _left, seen = project_out(columns[:, : self.count], columns[:, self.count :])
         idle = ~np.any(self.nominal.columns[:, : self.count] != 0.0, axis=0)
-        new = set(np.flatnonzero(seen & idle).tolist()) - self.design.testable
+        new = set(np.flatnonzero(self._seen(point, unit) & idle).tolist()) - self.design.testable
         self.design = Design((*self.design.classes, *((k,) for k in sorted(new))))
 
     @property

@@ -115,13 +115,8 @@ class Marginal:
         # Sizes in units of the noise's scale: of each level's factor, and fixed where it has none.
         factor = np.where(effects.scales, np.array(beliefs.sizes)[:, None], 1.0)
         self.spread = np.maximum(factor * effects.size, effects.least) / noise.scale_in
+        self.every_spread = np.repeat(self.spread, len(self.log), axis=0)
         self.signed = np.flatnonzero(effects.sign)
-
-    @cached_property
-    def _every_spread(self) -> tuple[Array, Array]:
-        """Standard deviation of each effect's size in each level, and its square."""
-        spread = np.repeat(self.spread, len(self.log), axis=0)
-        return spread, spread**2
 
     def _cross(self, members: Members, kept: list[int] | slice) -> Array:
         """Products of some effects with the members, shape (levels, kept, k)."""
@@ -208,7 +203,8 @@ class Marginal:
         given = self._given(members)
         effects = self.effects
         n = self.products.n
-        spread, wide = self._every_spread
+        spread = self.every_spread
+        wide = spread**2
         square = given.square
         along = given.along
         rest = given.rest[:, None]

@@ -95,27 +95,21 @@ class _Search:
     beliefs: Beliefs
     most: int
     extended: dict[tuple[int, frozenset[int]], _Extended] = field(default_factory=dict)
-    _marginals: dict[int, Marginal] = field(default_factory=dict)
     _alone: dict[tuple[int, frozenset[int]], Explanation] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.products = Products(self.noise, self.effects.columns, self.data)
+        products = Products(self.noise, self.effects.columns, self.data)
+        self.marginals = [
+            Marginal(products, self.effects, context, self.beliefs) for context in self.contexts
+        ]
         self.once, self.number = self.effects.numbered
-
-    def marginal(self, context: int) -> Marginal:
-        """The likelihoods in a context."""
-        if context not in self._marginals:
-            self._marginals[context] = Marginal(
-                self.products, self.effects, self.contexts[context], self.beliefs
-            )
-        return self._marginals[context]
 
     def alone(self, context: int, members: frozenset[int]) -> Explanation:
         """One set on its own, exactly."""
         key = context, members
         if key not in self._alone:
             places = tuple(sorted(members))
-            self._alone[key] = self.marginal(context).explanation(context, places)
+            self._alone[key] = self.marginals[context].explanation(context, places)
         return self._alone[key]
 
     def extend(self, context: int, members: frozenset[int]) -> None:
@@ -124,7 +118,7 @@ class _Search:
         if key in self.extended:
             return
         places = tuple(sorted(members))
-        own, further, values = self.marginal(context).extended(context, places)
+        own, further, values = self.marginals[context].extended(context, places)
         own = self._alone.setdefault(key, own)
         taken = {int(self.number[k]) for k in members} - {0}
         further[np.isin(self.number, list(taken))] = -np.inf

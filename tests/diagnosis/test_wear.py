@@ -119,7 +119,7 @@ def test_nothing_is_learned_from_a_row_without_landings_where_others_have_them()
 
 
 def test_without_any_landings_every_row_tells_its_gear_s_level() -> None:
-    _kilo, known = landings_of(None, np.array([0, 0]))
+    _kilo, known = landings_of(np.full(2, np.nan), np.array([0, 0]))
     assert known.all()
 
 

@@ -5,6 +5,7 @@ pivots, levers.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -272,17 +273,12 @@ class JointContact(Cause):
                 scene.is_read(first) and scene.is_read(second) and np.any(np.minimum(a, b) > 0.0)
             ):
                 continue
-            label = f"joints {first},{second}"
-            yield Candidate(self, label, {"pair": (first, second), "room_in": None})
-            yield Candidate(
-                self, label, {"pair": (first, second), "room_in": None, "smaller": "clearance"}
-            )
-            for share in (np.arange(_ROOMS) + 0.5) / _ROOMS:
-                yield Candidate(
-                    self,
-                    label,
-                    {"pair": (first, second), "room_in": float(np.quantile(a + b, share))},
-                )
+            rooms = np.quantile(a + b, (np.arange(_ROOMS) + 0.5) / _ROOMS).tolist()
+            forms: list[dict[str, Any]] = [{"room_in": room} for room in (None, *rooms)]
+            forms.insert(1, {"room_in": None, "smaller": "clearance"})
+            for form in forms:
+                setting = {"pair": (first, second), **form}
+                yield Candidate(self, f"joints {first},{second}", setting)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Take clearance from the two: from the one that contributes less, or what is beyond the
