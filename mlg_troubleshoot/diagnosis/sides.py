@@ -15,10 +15,12 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.diagnosis.noise import robust_scale, student
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.misfit.covariance import FAR
 
 _SIDES = ("LH", "RH")
 # Computing only: rows that are compared together.
 _AT_ONCE = 64
+_TINY = np.finfo(float).tiny
 
 
 def swapped_sides(table: DiagnosisTable, odds: float) -> list[tuple[int, str, str]]:
@@ -50,7 +52,11 @@ def swapped_sides(table: DiagnosisTable, odds: float) -> list[tuple[int, str, st
     scatter = max(robust_scale(own[judged]), 1.0)
     as_written = student(own, scatter) + np.log1p(-anew)
     as_written = np.logaddexp(as_written, np.log(anew / (1.0 + np.nanmax(landings))))
-    evidence = student(other, scatter) - as_written + _by_visits(table)
+    # Both gears of an aircraft may have been overhauled together.
+    alike = np.mean(np.abs(other[judged]) < FAR * scatter)
+    swapped_to = student(other, scatter)
+    as_written = np.logaddexp(as_written, swapped_to + np.log(np.maximum(anew * alike, _TINY)))
+    evidence = swapped_to - as_written + _by_visits(table)
     swapped = []
     for name in np.unique(tail[judged]):
         rows = np.flatnonzero(judged & (tail == name))
