@@ -16,7 +16,6 @@ from scipy.special import log_ndtr
 
 from mlg_troubleshoot.arrays import Array, log_sum
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation
 
@@ -28,14 +27,22 @@ class Products:
 
     A level is one ratio of the scatter between tails. square, along, shape (levels, p): of each
     effect with itself and with the data. rest, shape (levels,): of the data. log, shape (levels,):
-    logarithm of the covariance's determinant, less twice that of the level's chance.
+    logarithm of the covariance's determinant, less twice that of the level's chance. spread, shape
+    (sizes, p): standard deviation of each effect's size in units of the noise's scale; every_spread
+    the same in each level.
     """
 
-    def __init__(self, noise: NoiseModel, columns: Array | EffectColumns, data: Array) -> None:
+    def __init__(self, noise: NoiseModel, effects: Effects, data: Array, beliefs: Beliefs) -> None:
         self.noise = noise
-        self.columns = EffectColumns.of(columns)
+        self.effects = effects
+        self.columns = effects.kept
         self.data = data
         self.n = len(data) - noise.absorbed
+        # Of each level's factor, and fixed where it has none.
+        factor = np.where(effects.scales, np.array(beliefs.sizes)[:, None], 1.0)
+        self.spread = np.maximum(factor * effects.size, effects.least) / noise.scale_in
+        self.every_spread = np.repeat(self.spread, len(noise.tail_levels), axis=0)
+        self.signed = np.flatnonzero(effects.sign)
         weighted, log = self._weighted(data[:, None])
         self._weighted_data = weighted[:, :, 0]
         self.rest = self._weighted_data @ data
@@ -43,7 +50,7 @@ class Products:
         self.square = noise.squares(self.columns)
         self.along = self.columns.onto(self._weighted_data)
         self._cross: dict[int, Array] = {}
-        self._onto: dict[bytes, Array] = {}
+        self._onto: dict[int, Array] = {}
 
     def _weighted(self, columns: Array) -> tuple[Array, list[float]]:
         """Columns times the inverse covariance of each level, (levels, n, k)."""
@@ -53,21 +60,26 @@ class Products:
     def cross(self, member: int) -> Array:
         """Products of all effects with one of them, shape (levels, p)."""
         if member not in self._cross:
-            self._cross[member] = self.onto(self.columns.take([member]))[0][:, 0]
+            self._cross[member] = self._held(self._weighted(self.columns.take([member]))[0])[:, 0]
         return self._cross[member]
+
+    def _held(self, weighted: Array) -> Array:
+        """Products of all effects with weighted columns, (levels, n, k): (levels, k, p)."""
+        flat = weighted.swapaxes(1, 2).reshape(-1, len(self.data))
+        return self.columns.onto(flat).reshape(len(weighted), -1, self.columns.p)
 
     def onto(self, columns: Array) -> tuple[Array, Array, Array]:
         """Products of other columns with the effects, (levels, k, p), with the data, (levels, k),
         and with each other; those that contexts share are multiplied once.
         """
-        weighted = self._weighted(columns)[0].swapaxes(1, 2)
-        keys = [column.tobytes() for column in columns.T]
+        weighted = self._weighted(columns)[0]
+        keys = [hash(column.tobytes()) for column in columns.T]
         new = [k for k, key in enumerate(keys) if key not in self._onto]
-        shape = (len(weighted), len(new), self.columns.p)
-        products = self.columns.onto(weighted[:, new].reshape(-1, len(self.data))).reshape(shape)
+        products = self._held(weighted[:, :, new])
         self._onto.update((keys[k], products[:, place]) for place, k in enumerate(new))
         held = np.stack([self._onto[key] for key in keys], axis=1) if keys else products
-        return held, weighted @ self.data, weighted @ columns
+        across = weighted.swapaxes(1, 2)
+        return held, across @ self.data, across @ columns
 
 
 @dataclass(frozen=True)
@@ -89,11 +101,9 @@ class _Given:
 class Marginal:
     """Marginal likelihoods of effects in one context."""
 
-    def __init__(
-        self, products: Products, effects: Effects, context: Context, beliefs: Beliefs
-    ) -> None:
+    def __init__(self, products: Products, context: Context) -> None:
         self.products = products
-        self.effects = effects
+        self.effects = products.effects
         self.context = context
         noise = products.noise
         self.floor = products.n * noise.floor_in**2
@@ -112,11 +122,6 @@ class Marginal:
         self._held = held
         self._taken = taken.swapaxes(1, 2) @ taken
         self._corrected = held, data, inner
-        # Sizes in units of the noise's scale: of each level's factor, and fixed where it has none.
-        factor = np.where(effects.scales, np.array(beliefs.sizes)[:, None], 1.0)
-        self.spread = np.maximum(factor * effects.size, effects.least) / noise.scale_in
-        self.every_spread = np.repeat(self.spread, len(self.log), axis=0)
-        self.signed = np.flatnonzero(effects.sign)
 
     def _cross(self, members: Members, kept: list[int] | slice) -> Array:
         """Products of some effects with the members, shape (levels, kept, k)."""
@@ -134,7 +139,8 @@ class Marginal:
         places = list(members)
         square = self.square
         along = self.along
-        m = len(self.spread)
+        spread = self.products.spread
+        m = len(spread)
         rest = self.rest
         log = self.log
         if alone:
@@ -150,7 +156,7 @@ class Marginal:
         cross = self._cross(members, kept)
         inner = cross[:, at]
         mean = effects.mean[places]
-        spread = self.spread[:, places][:, None, :]
+        spread = spread[:, places][:, None, :]
         onto = self.along[:, kept] - cross @ mean
         rest = rest - 2.0 * self.along[:, places] @ mean + (inner @ mean) @ mean
         wide = spread * onto[None, :, at]
@@ -203,13 +209,13 @@ class Marginal:
         given = self._given(members)
         effects = self.effects
         n = self.products.n
-        spread = self.every_spread
+        spread = self.products.every_spread
         wide = spread**2
         square = given.square
         along = given.along
         rest = given.rest[:, None]
         mean = effects.mean
-        one = self.signed
+        one = self.products.signed
         if mean.any():
             rest = rest - mean * (2.0 * along - mean * square)
             along = along - mean * square

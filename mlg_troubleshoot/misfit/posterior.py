@@ -98,10 +98,8 @@ class _Search:
     _alone: dict[tuple[int, frozenset[int]], Explanation] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        products = Products(self.noise, self.effects.columns, self.data)
-        self.marginals = [
-            Marginal(products, self.effects, context, self.beliefs) for context in self.contexts
-        ]
+        products = Products(self.noise, self.effects, self.data, self.beliefs)
+        self.marginals = [Marginal(products, context) for context in self.contexts]
         self.once, self.number = self.effects.numbered
 
     def alone(self, context: int, members: frozenset[int]) -> Explanation:

@@ -98,8 +98,7 @@ def brute(members: tuple[int, ...], context: Context, given: Effects) -> float:
 
 
 def alone(members: tuple[int, ...], context: int, given: Effects) -> float:
-    products = Products(NOISE, given.columns, DATA)
-    found = Marginal(products, given, CONTEXTS[context], BELIEFS)
+    found = Marginal(Products(NOISE, given, DATA, BELIEFS), CONTEXTS[context])
     return found.explanation(context, members).log_posterior
 
 
@@ -125,7 +124,7 @@ def test_an_effect_of_only_one_size_counts_with_that() -> None:
 
 @pytest.mark.parametrize("members", SETS)
 def test_a_further_effect_makes_a_set_as_likely_as_both_together(members: tuple[int, ...]) -> None:
-    marginal = Marginal(Products(NOISE, COLUMNS, DATA), FREE, CONTEXTS[1], BELIEFS)
+    marginal = Marginal(Products(NOISE, FREE, DATA, BELIEFS), CONTEXTS[1])
     _own, further, _values = marginal.extended(1, members)
     for k in set(range(P)) - set(members):
         both = tuple(sorted({*members, k}))
@@ -137,7 +136,7 @@ def test_a_further_effect_of_only_one_size_is_expected_as_large_as_both_together
     members: tuple[int, ...],
 ) -> None:
     given = replace(effects(mean=0.7), sign=np.zeros(P))
-    marginal = Marginal(Products(NOISE, COLUMNS, DATA), given, CONTEXTS[1], BELIEFS)
+    marginal = Marginal(Products(NOISE, given, DATA, BELIEFS), CONTEXTS[1])
     _own, further, values = marginal.extended(1, members)
     for k in {0, 3} - set(members):
         both = tuple(sorted({*members, k}))
