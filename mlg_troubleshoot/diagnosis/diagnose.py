@@ -774,12 +774,12 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
     """
     follows = case.follows
     fitted: dict[Key, tuple[Candidate, float, tuple[float, float], Array]] = {}
-    reach = 1.96 * np.sqrt(np.diag(case.covariance))
-    sizes = zip(case.values, case.values - reach, case.values + reach, strict=True)
-    for place, (k, size) in enumerate(zip(case.chosen, sizes, strict=False)):
-        value, low, high = map(float, size)
+    errors = np.sqrt(np.diag(case.covariance))
+    for place, k in enumerate(case.chosen):
         candidate = case.problem.candidates[k]
-        fitted[candidate.key] = candidate, value, (low, high), case.effect(place)
+        value = float(case.values[place])
+        interval = _interval(value, float(errors[place]))
+        fitted[candidate.key] = candidate, value, interval, case.effect(place)
     if case.block is not None:
         k = len(case.chosen)
         change = case.values[k:]
@@ -830,6 +830,10 @@ def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections |
     gear = str(table.gears[place])
     apart_in = float(abs(apart[place]))
     return FurtherInspections(tuple(rivals), gear, apart_in, count)
+
+
+def _interval(value: float, error: float) -> tuple[float, float]:
+    return value - 1.96 * error, value + 1.96 * error
 
 
 def _expected_scatter(

@@ -53,7 +53,8 @@ def swapped_sides(table: DiagnosisTable, odds: float) -> list[tuple[int, str, st
     as_written = student(own, scatter) + np.log1p(-anew)
     as_written = np.logaddexp(as_written, np.log(anew / (1.0 + np.nanmax(landings))))
     # Both gears of an aircraft may have been overhauled together.
-    alike = np.mean(np.abs(other[judged]) < FAR * scatter)
+    on_own = np.abs(own) < FAR * scatter
+    alike = np.mean(np.abs(other[on_own]) < FAR * scatter) if on_own.any() else 0.0
     swapped_to = student(other, scatter)
     as_written = np.logaddexp(as_written, swapped_to + np.log(np.maximum(anew * alike, _TINY)))
     evidence = swapped_to - as_written + _by_visits(table)

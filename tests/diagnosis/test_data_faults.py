@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis import DiagnosisTable, diagnose
 from mlg_troubleshoot.diagnosis.faults import screen_faults
+from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
@@ -288,6 +289,18 @@ def test_landings_that_begin_anew_are_not_those_of_the_other_side(gear: Gear) ->
     landings[37] = 695.0
     anew = replace(table, quantities={**table.quantities, "gear_landings": landings})
     assert faults(gear, anew) == []
+
+
+def test_gears_of_one_aircraft_that_are_overhauled_together_are_not_on_the_wrong_side(
+    gear: Gear,
+) -> None:
+    table = paired(gear, [10.0, 150.0, 300.0, 450.0, 460.0])
+    day = table.quantities["day"]
+    alike = 200.0 + 1.1 * day - np.where(day > 400.0, 600.0, 0.0)
+    both = replace(table, quantities={**table.quantities, "gear_landings": alike})
+    # Of one aircraft each gear lacks one of the two visits after the overhaul.
+    rows = np.delete(np.arange(len(both)), [35, 40])
+    assert swapped_sides(both.take(rows), 7.0) == []
 
 
 def test_a_row_in_millimetres_is_found_in_its_clearances(gear: Gear, sound: DiagnosisTable) -> None:
