@@ -109,7 +109,7 @@ def _scatter(result: DiagnoseResult, *, unit: str = "in") -> list[Markup]:
 
 
 def _tails(result: DiagnoseResult, *, unit: str = "in") -> list[Markup]:
-    return [diagnosis_figures.tail_strips(_rows(result, unit))]
+    return diagnosis_figures.tail_strips(_rows(result, unit))
 
 
 def _rows(result: DiagnoseResult, unit: str) -> Residuals:

@@ -9,16 +9,9 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.columns import LANDINGS, TECHNICIAN_ID
-from mlg_troubleshoot.reporting.diagnosis_figures import Residuals, against_column
-from mlg_troubleshoot.reporting.figures import INK, PALE, SOFT, TEXT_SIZE, Axis, Canvas, Plot
-from mlg_troubleshoot.reporting.formats import short
+from mlg_troubleshoot.reporting.diagnosis_figures import Residuals, against_column, lanes
+from mlg_troubleshoot.reporting.figures import SOFT, Axis
 
-# Width of one of two figures side by side, and height of a line of it. [canvas units]
-_WIDTH = 335.0
-_LINE = 20.0
-_LEFT = 62.0
-_TOP = 22.0
-_BOTTOM = 38.0
 # Lines of technicians that are drawn, those who wrote most; cells of a row of blanks. [1]
 _MOST = 8
 _CELLS = 24
@@ -67,34 +60,18 @@ def _people(residuals: Residuals) -> list[tuple[str, NDArray[np.bool_]]]:
     return [(name, texts == name) for name in most] or every
 
 
-def _frame(title: str, across: Axis, names: list[str]) -> Plot:
-    """Axes with a line for each name."""
-    height = _TOP + _LINE * len(names) + _BOTTOM
-    canvas = Canvas(_WIDTH, height, title, f"one line for each of {', '.join(names)}")
-    margins = {"left": _LEFT, "top": _TOP, "bottom": _BOTTOM}
-    plot = Plot(canvas, across, Axis("", 0.0, float(len(names))), **margins)
-    plot.draw_vertical_grid()
-    canvas.text(_LEFT, _TOP - 9, title, size=TEXT_SIZE, bold=True)
-    for place, name in enumerate(names):
-        base = _TOP + _LINE * (place + 1)
-        canvas.text(_LEFT - 6, base - 5, short(name, 9), size=9.5, anchor="end")
-        canvas.line(_LEFT, base, plot.area[2], base, colour=PALE)
-    return plot
-
-
 def _values(residuals: Residuals) -> Markup:
     table = residuals.diagnosis.used
     written = residuals.drawn(table.clearance_in)
     people = _people(residuals)
     across = Axis(f"clearance, {residuals.unit}", 0.0, float(np.nanmax(written)) or 1.0)
-    plot = _frame("Clearances as they were written", across, [name for name, _rows in people])
+    plot = lanes("Clearances as they were written", across, [name for name, _rows in people])
     for place, (_name, rows) in enumerate(people):
         values = written[rows & ~table.along]
         found, counts = np.unique(np.round(values[np.isfinite(values)], 6), return_counts=True)
-        base = _TOP + _LINE * (place + 1)
-        for value, count in zip(found.tolist(), counts.tolist(), strict=True):
-            x = plot.at(value, 0.0)[0]
-            plot.canvas.line(x, base, x, base - 0.9 * _LINE * count / counts.max(), colour=INK)
+        tops = place + 1 - 0.9 * counts / counts.max(initial=1)
+        for value, top in zip(found.tolist(), tops.tolist(), strict=True):
+            plot.canvas.line(*plot.at(value, place + 1), *plot.at(value, top))
     return plot.canvas.svg()
 
 
@@ -102,12 +79,11 @@ def _dates(residuals: Residuals) -> Markup:
     days = against_column(residuals, "day")
     people = _people(residuals)
     across = Axis.around(days.label, days.values.tolist(), 0.02)
-    plot = _frame("When each technician read", across, [name for name, _rows in people])
+    plot = lanes("When each technician read", across, [name for name, _rows in people])
     for place, (_name, rows) in enumerate(people):
-        base = _TOP + _LINE * (place + 1)
         for day in days.values[rows & np.isfinite(days.values)].tolist():
-            x = plot.at(day, 0.0)[0]
-            plot.canvas.line(x, base - 0.7 * _LINE, x, base - 2.0, colour=SOFT, width=0.8)
+            ends = plot.at(day, place + 0.3), plot.at(day, place + 0.9)
+            plot.canvas.line(*ends[0], *ends[1], colour=SOFT, width=0.8)
     return plot.canvas.svg()
 
 
@@ -120,18 +96,14 @@ def _blanks(residuals: Residuals) -> Markup:
     parts = np.array_split(order, min(_CELLS, len(order)))
     label = "rows, few landings to many" if known else "rows as they stand"
     names = [f"#{joint}" for joint in residuals.joints]
-    plot = _frame("Blank clearances", Axis(f"{label}, %", 0.0, 100.0), names)
-    across = (plot.area[2] - _LEFT) / len(parts)
+    plot = lanes("Blank clearances", Axis(f"{label}, %", 0.0, 100.0), names)
     for joint in range(len(names)):
         for place, rows in enumerate(parts):
             share = float(np.mean(np.isnan(table.clearance_in[rows, joint])))
             if share > 0.0:
                 grey = round(255 - 215 * share)
-                plot.canvas.rectangle(
-                    _LEFT + place * across,
-                    _TOP + _LINE * joint + 2,
-                    across,
-                    _LINE - 3,
-                    fill=f"#{grey:02x}{grey:02x}{grey:02x}",
-                )
+                x, y = plot.at(100.0 * place / len(parts), joint + 0.1)
+                right, low = plot.at(100.0 * (place + 1) / len(parts), joint + 0.95)
+                fill = f"#{grey:02x}{grey:02x}{grey:02x}"
+                plot.canvas.rectangle(x, y, right - x, low - y, fill=fill)
     return plot.canvas.svg()

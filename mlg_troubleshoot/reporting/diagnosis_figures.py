@@ -4,6 +4,7 @@ predicted, tails.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, CLEARANCE, COVARIATES
 from mlg_troubleshoot.diagnosis import Candidate, Diagnosis
 from mlg_troubleshoot.diagnosis.table import ALONG
 from mlg_troubleshoot.reporting.diagnosis_lines import column_words
-from mlg_troubleshoot.reporting.figures import ACCENT, INK, PAPER, SOFT, Axis, Canvas, Plot
+from mlg_troubleshoot.reporting.figures import ACCENT, INK, PALE, PAPER, SOFT, Axis, Canvas, Plot
 from mlg_troubleshoot.reporting.formats import short
 from mlg_troubleshoot.units import LengthUnit
 
@@ -23,8 +24,6 @@ Texts = NDArray[np.str_]
 
 # Width and height of one plot of two side by side. [canvas units]
 _PLOT = (335, 236)
-_BAR = 150
-_BAR_HIGH = 10
 _BINS = 8
 _FEWEST_IN_A_BIN = 5
 # Length of a legend's text. [characters]
@@ -125,7 +124,8 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
         return _over_time(residuals, candidate, effect_in)
     for need in candidate.cause.needs:
         if need == AXIAL_FLOAT.variable and table.axial_float_in is not None:
-            return _most_correlated_float(residuals, table.axial_float_in, effect_in)
+            widest = np.argmax(np.nansum(table.axial_float_in**2, axis=0))
+            return against_column(residuals, AXIAL_FLOAT.header(residuals.joints[widest]))
         if need in table.quantities or need in table.factors:
             return against_column(residuals, need)
     return against_column(residuals, ALONG if table.along.any() else "predicted")
@@ -167,46 +167,6 @@ def against_column(residuals: Residuals, name: str) -> ResidualAxis:
     return ResidualAxis(
         f"predicted displacement, {unit}", residuals.drawn(residuals.diagnosis.predicted_in)
     )
-
-
-def split_by(residuals: Residuals, name: str, other: ResidualAxis) -> tuple[Mask, str, str] | None:
-    """Split the rows by a column, so that what moves with two columns together can be seen."""
-    column = against_column(residuals, name)
-    x = other.values
-    if not column.names:
-        known = np.isfinite(column.values)
-        half = float(np.median(column.values[known])) if known.any() else np.nan
-        words = column_words(name)
-        shown = f"{half:.0f}" if abs(half) >= 100.0 else f"{half:.3g}"
-        return column.values >= half, f"{words} {shown} and more", f"{words} below {shown}"
-    slopes = {}
-    for place, level in enumerate(column.names):
-        rows = (column.values == place) & np.isfinite(x)
-        if rows.sum() > 3 and np.std(x[rows]) > 0.0:
-            slope = float(np.polyfit(x[rows], residuals.before_in[rows], 1)[0])
-            slopes[level] = abs(slope) * np.sqrt(rows.sum())
-    if not slopes:
-        return None
-    level = max(slopes, key=lambda each: slopes[each])
-    return column.values == column.names.index(level), level, f"not {level}"
-
-
-def _most_correlated_float(
-    residuals: Residuals, floats_in: Array, effect_in: Array
-) -> ResidualAxis:
-    """The end float with which the fitted effect goes most."""
-
-    def alike(place: int) -> float:
-        known = np.isfinite(floats_in[:, place])
-        both = floats_in[known, place], effect_in[known]
-        if known.sum() <= 2 or min(map(np.std, both)) == 0.0:
-            return -1.0
-        correlation = np.corrcoef(both[0] ** 2, both[1])
-        return abs(float(correlation[0, 1]))
-
-    place = max(range(floats_in.shape[1]), key=alike)
-    label = f"end float of #{residuals.joints[place]}, {residuals.unit}"
-    return ResidualAxis(label, residuals.drawn(floats_in[:, place]))
 
 
 def _day_label(residuals: Residuals) -> str:
@@ -290,47 +250,50 @@ def _mean_mark(plot: Plot, x: float, values: Array) -> None:
     plot.canvas.rectangle(px - 3, py - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
 
 
-def tail_strips(residuals: Residuals) -> Markup:
-    """Draw the residuals of each tail on a line of its own, before and after side by side."""
+def lanes(title: str, across: Axis, names: Sequence[str], high: float = 20.0) -> Plot:
+    """Axes of one of two figures side by side with a lane for each name: that of the first reaches
+    from 0 to 1.
+    """
+    margins = {"left": 62.0, "top": 22.0, "bottom": 38.0}
+    height = margins["top"] + high * len(names) + margins["bottom"]
+    canvas = Canvas(_PLOT[0], height, title, f"one line for each of {', '.join(names)}")
+    plot = Plot(canvas, across, Axis("", float(len(names)), 0.0), **margins)
+    plot.draw_vertical_grid()
+    left, top, right, _ = plot.area
+    canvas.text(left, top - 9, title, bold=True)
+    for place, name in enumerate(names, 1):
+        base = top + high * place
+        canvas.text(left - 6, base - high / 2 + 3.5, short(name, 9), size=9.5, anchor="end")
+        canvas.line(left, base, right, base, colour=PALE)
+    return plot
+
+
+def tail_strips(residuals: Residuals) -> list[Markup]:
+    """Draw the residuals of each tail in a lane of its own, before and, where the model was
+    extended, after; the square is their mean.
+    """
     tails = residuals.diagnosis.used.tails
-    panels = [("before", residuals.drawn(residuals.before_in), False)]
-    if residuals.diagnosis.causes:
-        panels.append(("with the extension", residuals.drawn(residuals.after_in), True))
-    before = panels[0][1]
+    before = residuals.drawn(residuals.before_in)
 
     def size(name: str) -> float:
         return abs(float(np.mean(before[tails == name])))
 
     names = sorted(np.unique(tails).tolist(), key=size, reverse=True)
     shown = sorted(names[:MOST_TAILS])
-    width = 690.0
-    row = 13.0
-    top = 22.0
-    left = 74.0
-    gap = 16.0
-    height = top + row * len(shown) + 34
-    description = (
-        "One line for each aircraft; every point is one inspection, the square is their mean"
-    )
-    canvas = Canvas(width, height, "Measured less predicted, by tail", description)
-    room = (width - left - 8 - gap * (len(panels) - 1)) / len(panels)
-    for k, (name, values, is_after) in enumerate(panels):
-        start = left + k * (room + gap)
-        margins = {"left": start, "right": width - start - room, "top": top, "bottom": 34.0}
-        rows = Axis("", 0.0, float(len(shown)))
-        plot = Plot(canvas, residuals.axis, rows, **margins)
-        plot.draw_vertical_grid()
-        canvas.text(start, top - 9, name, size=11, bold=True)
-        for i, tail in enumerate(shown):
-            y = top + row * (i + 0.5)
-            if k == 0:
-                canvas.text(left - 8, y + 3.5, short(tail, 10), size=9.5, anchor="end")
-            own = values[tails == tail]
+    panels = [("before", before, False)]
+    if residuals.diagnosis.causes:
+        panels.append(("with the extension", residuals.drawn(residuals.after_in), True))
+    figures = []
+    for title, values, after in panels:
+        plot = lanes(title, residuals.axis, shown, 13.0)
+        for place, tail in enumerate(shown):
+            own = values[tails == tail].tolist()
             for value in own:
-                _point(canvas, plot.at(float(value), 0.0)[0], y, after=is_after)
-            x = plot.at(float(np.mean(own)), 0.0)[0]
-            canvas.rectangle(x - 3, y - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
-    return canvas.svg()
+                _point(plot.canvas, *plot.at(value, place + 0.5), after=after)
+            x, y = plot.at(float(np.mean(own)), place + 0.5)
+            plot.canvas.rectangle(x - 3, y - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
+        figures.append(plot.canvas.svg())
+    return figures
 
 
 def measured_against_predicted(residuals: Residuals) -> Markup:
@@ -366,13 +329,4 @@ def measured_against_predicted(residuals: Residuals) -> Markup:
             x = plot.area[0] + 6 + 62 * k
             _point(canvas, x, 10, after=is_after)
             canvas.text(x + 7, 13.5, label, size=10)
-    return canvas.svg()
-
-
-def probability_bar(chance: float) -> Markup:
-    """Draw a probability as a bar that fills its frame at certainty."""
-    canvas = Canvas(_BAR + 2, _BAR_HIGH + 2, f"probability {chance:.1%}")
-    canvas.rectangle(1, 1, _BAR, _BAR_HIGH, fill=PAPER, colour=SOFT, width=1)
-    length = _BAR * min(max(chance, 0.0), 1.0)
-    canvas.rectangle(1, 1, length, _BAR_HIGH, fill=INK)
     return canvas.svg()
