@@ -95,8 +95,6 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
         _show(shown, settings.show)
         if given is not None:
             _show_given(gear, given)
-    if flags.csv is not None:
-        task.write_study_csv(findings, flags.csv)
     if flags.report is not None:
         written = task.write_study_report(
             findings,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -14,12 +15,12 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
 from mlg_troubleshoot.reporting import figures
 from mlg_troubleshoot.reporting.figures import INK, PALE, SOFT, Bar, Canvas
-from mlg_troubleshoot.reporting.formats import Lengths, number
+from mlg_troubleshoot.reporting.formats import Lengths
 
 
 def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
     """Draw the worst cases of both senses against the margin, with the uncertainty and what was
-    measured.
+    measured: a lane for each.
     """
     a = assessment
     if a.predicted_displacement_in is None or a.over_travel_in is None or a.under_travel_in is None:
@@ -31,117 +32,86 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
     sense = 1.0 if over >= -under else -1.0
     u2 = 2.0 * (a.standard_uncertainty_in or 0.0)
     measured = a.inspection.measured_displacement_in
-    spread = a.geometry_spread_in
-    upper = a.predicted_upper_in
-    if upper is not None and abs(upper - worst) <= 5e-5:
-        upper = None
-    extent = max(
-        margin, worst + u2, abs(measured or 0.0), upper or 0.0, spread[1] if spread else 0.0
-    )
-    lanes = 1 + (upper is not None) + (spread is not None) + (measured is not None)
+    low, high = (sense * value for value in a.geometry_spread_in or (0.0, 0.0))
+    upper = sense * (a.predicted_upper_in or 0.0)
     what = "As loaded" if a.as_loaded else "Worst case"
-    description = (
-        f"{what} {lengths.full(over, True)} over-travel and {lengths.full(under, True)}"
-        f" under-travel against a margin of plus or minus {lengths.full(margin)}"
-    )
+    what = f"{what} ({'expected' if a.as_loaded else 'bound'})"
+    shown = partial(lengths.bare, signed=True)
+    lanes = {what: f"{shown(under)} / {shown(over)}"}
     if measured is not None:
-        description += f"; measured {lengths.full(measured, True)}"
-    gauge = _Gauge(extent, margin, lanes, description, lengths)
-    canvas = gauge.canvas
+        lanes = {"Measured on the gear": shown(measured), **lanes}
+    if abs(upper) > worst + 5e-5:
+        lanes["unmeasured at limit"] = shown(upper)
+    if a.geometry_spread_in:
+        lanes["other geometries"] = " … ".join(dict.fromkeys((shown(low), shown(high))))
+    farthest = max(margin, worst + u2, *map(abs, (measured or 0.0, upper, high)))
+    plot = _gauge(lanes, margin, 1.06 * farthest, lengths)
+    canvas = plot.canvas
+    rows = {name: place + 0.5 for place, name in enumerate(lanes)}
+
+    def at(value_in: float, lane: str) -> figures.Place:
+        return plot.at(lengths.unit.from_inches(value_in), rows[lane])
 
     if measured is not None:
-        y = gauge.lane("Measured on the gear", lengths.bare(measured, True), bold=True)
-        canvas.line(gauge.px(0.0), y, gauge.px(measured), y, width=2.0)
-        canvas.marker("triangle", gauge.px(measured), y, 6.5)
-    y = gauge.lane(
-        f"{what} ({'expected' if a.as_loaded else 'bound'})",
-        f"{lengths.bare(under, True)} / {lengths.bare(over, True)}",
-        bold=True,
-    )
-    canvas.line(gauge.px(under), y, gauge.px(over), y, width=4)
-    left = gauge.px(sense * worst - u2)
-    width = gauge.px(2 * u2) - gauge.px(0.0)
-    canvas.rectangle(left, y - 6, width, 12, colour=INK)
-    for value in (under, over):
-        canvas.marker("diamond", gauge.px(value), y, 5.5)
-    if upper is not None:
-        y = gauge.lane("unmeasured at limit", lengths.bare(sense * upper, True))
-        end = gauge.px(sense * upper)
-        canvas.line(gauge.px(0.0), y, end, y, width=1.5, dash="5 3")
-        canvas.marker("ring", end, y, 4.5)
-    if spread is not None:
-        ends = [gauge.px(sense * value) for value in spread]
-        y = gauge.lane(
-            "other geometries",
-            " … ".join(dict.fromkeys(lengths.bare(sense * v, True) for v in spread)),
-        )
-        canvas.line(ends[0], y, ends[1], y, width=1.5)
-        for end in ends:
-            canvas.line(end, y - 5, end, y + 5, width=1.5)
+        ends = at(0.0, "Measured on the gear"), at(measured, "Measured on the gear")
+        canvas.line(*ends[0], *ends[1], width=2.0)
+        canvas.marker("triangle", *ends[1], 6.5)
+    canvas.line(*at(under, what), *at(over, what), width=4)
+    x, y = at(sense * worst - u2, what)
+    canvas.rectangle(x, y - 6, at(sense * worst + u2, what)[0] - x, 12, colour=INK)
+    for end in (under, over):
+        canvas.marker("diamond", *at(end, what), 5.5)
+    if "unmeasured at limit" in lanes:
+        ends = at(0.0, "unmeasured at limit"), at(upper, "unmeasured at limit")
+        canvas.line(*ends[0], *ends[1], width=1.5, dash="5 3")
+        canvas.marker("ring", *ends[1], 4.5)
+    if "other geometries" in lanes:
+        canvas.line(*at(low, "other geometries"), *at(high, "other geometries"), width=1.5)
+        for end in (low, high):
+            x, y = at(end, "other geometries")
+            canvas.line(x, y - 5, x, y + 5, width=1.5)
     return canvas.svg()
 
 
-class _Gauge:
-    """The gauge without its lanes: axis, margin and allowed range; lanes are added from the top."""
-
-    def __init__(
-        self, extent: float, margin: float, lanes: int, description: str, lengths: Lengths
-    ) -> None:
-        self.left = 150.0
-        self.right = 556.0
-        self.top = 36.0
-        self.row = 21.0
-        self.width = 690.0
-        self.bottom = self.top + self.row * lanes + 4
-        self.centre = (self.left + self.right) / 2
-        self.scale = (self.right - self.left) / 2 / (extent * 1.06)
-        self.filled = 0
-        self.canvas = canvas = Canvas(
-            self.width,
-            self.bottom + 24,
-            "Margin gauge: plunger displacement from mid-position",
-            description,
-        )
-        top = self.top
-        bottom = self.bottom
-        header = self.top - 26
-        canvas.rectangle(
-            self.px(-margin),
-            top - 4,
-            self.px(margin) - self.px(-margin),
-            bottom - top + 4,
-            fill=PALE,
-        )
-        canvas.text(self.centre, header, "allowed", size=10, anchor="middle", colour=SOFT)
-        for end in (-margin, margin):
-            x = self.px(end)
-            canvas.line(x, top - 8, x, bottom + 4, width=2.6)
-            said = lengths.bare(end, True)
-            canvas.text(x, top - 11, said, size=10.5, bold=True, anchor="middle", halo=True)
-        canvas.line(self.centre, top - 4, self.centre, bottom, colour=SOFT, dash="3 3")
-        canvas.text(self.left, header, "◀ short of mid-position", size=10, colour=SOFT)
-        canvas.text(self.right, header, "beyond mid-position ▶", size=10, colour=SOFT, anchor="end")
-        canvas.text(self.width, header, lengths.unit, size=10, colour=SOFT, anchor="end")
-        canvas.line(self.left, bottom, self.right, bottom, colour=SOFT)
-        shown = lengths.unit.from_inches(extent * 1.05)
-        ticks = figures.nice_ticks(-shown, shown, 7)
-        for tick in ticks:
-            x = self.px(lengths.unit.to_inches(tick))
-            canvas.line(x, bottom, x, bottom + 4, colour=SOFT)
-            said = number(tick, figures.decimals_of(ticks), True)
-            canvas.text(x, bottom + 15, said, size=9.5, anchor="middle", colour=SOFT)
-        canvas.text(0, bottom + 15, f"{lengths.unit}, over-travel +", size=9.5, colour=SOFT)
-
-    def px(self, value: float) -> float:
-        return self.centre + value * self.scale
-
-    def lane(self, name: str, said: str, bold: bool = False) -> float:
-        """Write the name and the value of the next lane; return its height on the canvas."""
-        y = self.top + self.row * (self.filled + 0.5)
-        self.filled += 1
-        self.canvas.text(0, y + 4, name, size=10.5, bold=bold)
-        self.canvas.text(self.width, y + 4, said, size=10.5, bold=bold, anchor="end")
-        return y
+def _gauge(
+    lanes: Mapping[str, str], margin_in: float, extent_in: float, lengths: Lengths
+) -> figures.Plot:
+    """The gauge with its margin, and each lane with its name and what it says."""
+    said = ", ".join(f"{name}: {value}" for name, value in lanes.items())
+    canvas = Canvas(
+        690,
+        68 + 21 * len(lanes),
+        "Margin gauge: plunger displacement from mid-position",
+        f"Margin ±{lengths.full(margin_in)}. {said} {lengths.unit}",
+    )
+    extent = lengths.unit.from_inches(extent_in)
+    plot = figures.Plot(
+        canvas,
+        figures.Axis(f"{lengths.unit}, over-travel +", -extent, extent),
+        figures.Axis("", float(len(lanes)), 0.0),
+        left=150,
+        right=134,
+        top=36,
+        bottom=32,
+    )
+    left, top, right, bottom = plot.area
+    ends = [plot.at(lengths.unit.from_inches(end), 0.0)[0] for end in (-margin_in, margin_in)]
+    canvas.rectangle(ends[0], top, ends[1] - ends[0], bottom - top, fill=PALE)
+    plot.draw_vertical_grid()
+    canvas.text(left, 10, "◀ short of mid-position", size=10, colour=SOFT)
+    canvas.text((left + right) / 2, 10, "allowed", size=10, anchor="middle", colour=SOFT)
+    canvas.text(right, 10, "beyond mid-position ▶", size=10, colour=SOFT, anchor="end")
+    canvas.text(canvas.width, 10, lengths.unit, size=10, colour=SOFT, anchor="end")
+    for x, end in zip(ends, (-margin_in, margin_in), strict=True):
+        canvas.line(x, top - 8, x, bottom + 4, width=2.6)
+        words = lengths.bare(end, True)
+        canvas.text(x, top - 11, words, size=10.5, bold=True, anchor="middle", halo=True)
+    for place, (name, value) in enumerate(lanes.items()):
+        y = plot.at(0.0, place + 0.5)[1] + 4
+        bold = name[0].isupper()
+        canvas.text(0, y, name, size=10.5, bold=bold)
+        canvas.text(canvas.width, y, value, size=10.5, bold=bold, anchor="end")
+    return plot
 
 
 def contribution_bar(

@@ -163,8 +163,8 @@ def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]
             "f": f,
             "location": gear.joint(f.joint).location,
             "entered": a.inspection.entered.get(f.joint),
-            "state": joint_state(f),
-            "mark": joint_mark(str(f.joint), joint_state(f)),
+            "state": joint_state(gear.joint(f.joint), f.clearance_in),
+            "mark": joint_mark(str(f.joint), joint_state(gear.joint(f.joint), f.clearance_in)),
             "bar": drawn.contribution_bar(f, longest, gauge_u(f.joint), lengths),
             "allowance_in": _allowance(f),
         }

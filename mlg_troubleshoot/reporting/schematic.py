@@ -15,8 +15,8 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.decision.assessment import Assessment, JointFinding
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.decision.assessment import Assessment
+from mlg_troubleshoot.gear.gear import Gear, JointSpec
 from mlg_troubleshoot.geometry.mechanism import (
     Crank,
     Dyad,
@@ -95,34 +95,18 @@ def schematic(
     """
     over = (assessment.over_travel_in or 0.0) >= -(assessment.under_travel_in or 0.0)
     directions = assessment.over_directions_rad if over else assessment.under_directions_rad
-    return _drawn(gear, assessment.joints, directions, lengths or Lengths(), width)
+    clearance_in = assessment.inspection.clearance_in
+    return _drawn(gear, clearance_in, directions, lengths or Lengths(), width)
 
 
 def blank_schematic(gear: Gear) -> Schematic:
     """Draw the linkage with its joints numbered and named, none of them measured yet."""
-    nothing = tuple(
-        JointFinding(
-            joint=j.number,
-            name=j.name,
-            clearance_in=None,
-            limit_in=j.limit.value,
-            over_limit=False,
-            contribution_in=None,
-            first_order=0.0,
-            total_order=0.0,
-            plunger_amplification=0.0,
-            rank=j.number,
-            rank_range=(1, 1),
-            alike=(),
-        )
-        for j in gear.joints
-    )
-    return _drawn(gear, nothing, (), Lengths(), _WIDTH)
+    return _drawn(gear, {}, (), Lengths(), _WIDTH)
 
 
 def _drawn(
     gear: Gear,
-    findings: Sequence[JointFinding],
+    clearance_in: Mapping[int, float],
     directions: Sequence[float],
     lengths: Lengths,
     width: float,
@@ -133,13 +117,14 @@ def _drawn(
     side = 74.0
     free = width - gap * (len(drawings) - 1) - 2 * side * len(drawings)
     scale = free / sum(drawing.size.real for drawing in drawings)
-    largest = max([0.0, *(f.clearance_in or 0.0 for f in findings)])
+    largest = max(clearance_in.values(), default=0.0)
     exaggeration = None
     if largest > 0.0 and directions:
         exaggeration = min(_LARGEST_EXAGGERATION, _one_digit(_LONGEST_ARROW / (largest * scale)))
     height = max(drawing.size.imag for drawing in drawings) * scale + _ABOVE + _BELOW
     shown = _Shown(
-        {finding.joint: finding for finding in findings},
+        gear,
+        clearance_in,
         dict(zip(gear.joint_numbers, directions, strict=True)) if exaggeration else {},
         (exaggeration or 0) * scale,
         lengths,
@@ -151,27 +136,31 @@ def _drawn(
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """What is shown at the joints: findings, directions of their clearances, and how long an inch
-    of clearance is drawn.
+    """What is shown at the joints: clearances, their directions, and how long an inch of clearance
+    is drawn.
     """
 
-    findings: dict[int, JointFinding]
+    gear: Gear
+    clearance_in: Mapping[int, float]
     angles: dict[int, float]
     per_inch: float
     lengths: Lengths
 
-    def state(self, joint: int) -> str:
-        finding = self.findings[joint]
-        if finding.clearance_in is None:
-            return "not measured"
-        over = " over its limit" if finding.over_limit else ""
-        return f"{self.lengths.full(finding.clearance_in)}{over}"
+    def state(self, joint: int) -> JointState:
+        return joint_state(self.gear.joint(joint), self.clearance_in.get(joint))
+
+    def said(self, joint: int) -> str:
+        state = self.state(joint)
+        if state == "missing":
+            return JOINT_STATES[state]
+        over = f" {JOINT_STATES[state]}" if state == "over" else ""
+        return self.lengths.full(self.clearance_in[joint]) + over
 
     def arrow(self, joint: int, place: complex) -> Segment | None:
         """The joint's clearance as an arrow from the edge of its marker; None if it would be too
         short to see.
         """
-        length = (self.findings[joint].clearance_in or 0.0) * self.per_inch
+        length = self.clearance_in.get(joint, 0.0) * self.per_inch
         if joint not in self.angles or length <= _SHORTEST_ARROW:
             return None
         along = cmath.rect(1.0, -self.angles[joint])
@@ -179,12 +168,12 @@ class _Shown:
         return start, start + length * along
 
     def label(self, joint: int, name: str, *, strong: bool) -> list[_Line]:
-        finding = self.findings[joint]
         lines = [_Line(part, 8.5, False) for part in ([name] if strong else _two_lines(name))]
-        if finding.clearance_in is not None:
-            mark = " OVER LIMIT" if strong else " OVER" if finding.over_limit else ""
+        state = self.state(joint)
+        if state != "missing":
+            mark = " OVER LIMIT" if strong else " OVER" if state == "over" else ""
             size = 10.5 if strong else 9.5
-            lines.append(_Line(self.lengths.bare(finding.clearance_in) + mark, size, True))
+            lines.append(_Line(self.lengths.bare(self.clearance_in[joint]) + mark, size, True))
         return lines
 
 
@@ -244,7 +233,7 @@ class _PlaneDrawing:
         width = self.size.real * scale + 2 * side
         name = self.plane.replace("_", " ") + " plane"
         joints = [j for j in self.gear.joints if j.point in self.points]
-        said = ", ".join(f"joint {j.number} {shown.state(j.number)}" for j in joints)
+        said = ", ".join(f"joint {j.number} {shown.said(j.number)}" for j in joints)
         canvas = Canvas(width, height, f"Linkage schematic, {name}", said)
         # Upward in the plane is to lower numbers on the canvas.
         corner = complex(side, (height + _ABOVE - _BELOW + self.size.imag * scale) / 2)
@@ -266,7 +255,7 @@ class _PlaneDrawing:
         here = [j for j in joints if self.mechanism.point(j.point).plane == self.plane]
         for joint in joints:
             if joint not in here:
-                state = joint_state(shown.findings[joint.number])
+                state = shown.state(joint.number)
                 _mark(canvas, markers[joint.number], str(joint.number), state, faded=True)
         for joint in here:
             place = at[joint.point]
@@ -280,11 +269,10 @@ class _PlaneDrawing:
                 _line(canvas, place, marker, colour=SOFT, width=1.2)
                 canvas.marker("circle", place.real, place.imag, 2.5)
                 boxes.append(_box(marker, around=11 + 11j))
-            state = joint_state(shown.findings[joint.number])
-            _mark(canvas, marker, str(joint.number), state)
-        framed = sum(shown.findings[j.number].over_limit for j in here) <= _MOST_FRAMES
-        for joint in sorted(here, key=lambda j: not shown.findings[j.number].over_limit):
-            strong = framed and shown.findings[joint.number].over_limit
+            _mark(canvas, marker, str(joint.number), shown.state(joint.number))
+        over = [joint for joint in here if shown.state(joint.number) == "over"]
+        for joint in sorted(here, key=lambda joint: joint not in over):
+            strong = joint in over and len(over) <= _MOST_FRAMES
             lines = shown.label(joint.number, joint.name, strong=strong)
             _callout(canvas, markers[joint.number], lines, boxes, segments, strong)
         return name, canvas.svg("figure panel"), width
@@ -474,10 +462,10 @@ def _ground(canvas: Canvas, place: complex) -> None:
         _line(canvas, above, below)
 
 
-def joint_state(finding: JointFinding) -> JointState:
-    if finding.clearance_in is None:
+def joint_state(joint: JointSpec, clearance_in: float | None) -> JointState:
+    if clearance_in is None:
         return "missing"
-    return "over" if finding.over_limit else "fine"
+    return "over" if joint.is_over_limit(clearance_in) else "fine"
 
 
 def _mark(canvas: Canvas, at: complex, text: str, state: str, faded: bool = False) -> None:
