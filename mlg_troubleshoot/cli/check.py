@@ -62,10 +62,7 @@ _OF_ONE_GEAR: options.ColumnFlags = {
 class Flags:
     """What the flags say of one gear, as it was typed: clearances by joint, the rest by column."""
 
-    panels: ClassVar[Mapping[str, str]] = {
-        "values": "One gear by hand",
-        "typed": "One gear by hand",
-    }
+    panel: ClassVar = "One gear by hand"
 
     values: Annotated[
         list[str] | None,
@@ -81,20 +78,10 @@ class Flags:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted(options.OutputOptions):
-    """What ``mlg check`` predicts with, shows, writes and keeps."""
+class CheckOutputs(options.OutputOptions):
+    """What ``mlg check`` shows and writes."""
 
-    panels: ClassVar[Mapping[str, str]] = {
-        **options.OutputOptions.panels,
-        **dict.fromkeys(("formats", "annotate", "csv", "detail", "every"), "Output"),
-        **dict.fromkeys(
-            (
-                *("extension", "causes", "resume", "keep", "store", "tails", "remember", "seed"),
-                *("workers", "scheduler"),
-            ),
-            "This run",
-        ),
-    }
+    panel: ClassVar = "Output"
 
     formats: Annotated[
         list[ReportFormat] | None,
@@ -105,14 +92,6 @@ class Wanted(options.OutputOptions):
             help="Report format, may repeat; default html and pdf. HTML is the accessible form.",
         ),
     ] = None
-    extension: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="TOML",
-            help="Predict with an extension of the model; may repeat.",
-        ),
-    ] = None
-    causes: options.Causes = None
     annotate: Annotated[
         Path | None,
         typer.Option(
@@ -124,6 +103,31 @@ class Wanted(options.OutputOptions):
         Path | None,
         typer.Option(metavar="OUT.csv", help="Verdicts as a CSV, one line per gear."),
     ] = None
+    detail: Annotated[
+        bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")
+    ] = False
+    every: Annotated[
+        bool,
+        typer.Option(
+            "--all", help="In a batch, every inspection instead of the latest of each gear."
+        ),
+    ] = False
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted(CheckOutputs):
+    """What ``mlg check`` predicts with, shows, writes and keeps."""
+
+    panel: ClassVar = "This run"
+
+    extension: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="TOML",
+            help="Predict with an extension of the model; may repeat.",
+        ),
+    ] = None
+    causes: options.Causes = None
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the last unfinished entry.")
     ] = False
@@ -139,15 +143,6 @@ class Wanted(options.OutputOptions):
             help="Whether tails that differ only in case, blanks or dashes are one aircraft.",
         ),
     ] = None
-    detail: Annotated[
-        bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")
-    ] = False
-    every: Annotated[
-        bool,
-        typer.Option(
-            "--all", help="In a batch, every inspection instead of the latest of each gear."
-        ),
-    ] = False
     remember: options.Remember = False
     seed: Annotated[
         int,

@@ -350,13 +350,8 @@ class Run:
 
     def _same_tail(self) -> Callable[[str, str], bool] | None:
         """Who says whether two spellings of a tail number are one aircraft."""
-        tails = self._wanted.tails
-        if tails not in (None, "same", "apart"):
-            raise UsageError(
-                f"--tails {tails!r} is not same or apart",
-                "Give same (one aircraft) or apart (two).",
-            )
-        if tails is not None:
-            return lambda _new, _kept: tails == "same"
+        if self._wanted.tails is not None:
+            same = options.one_of(options.Tails, self._wanted.tails, "--tails")
+            return lambda _new, _kept: same is options.Tails.SAME
         # A command with a FILE never waits for a key.
         return history.ask_tail if self._asks else None

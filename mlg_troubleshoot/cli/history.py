@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.cli.remembered import Settings
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.life.folding import GearLife
-    from mlg_troubleshoot.life.forecast import Forecast
+    from mlg_troubleshoot.life.forecast import Forecast, Quantiles
     from mlg_troubleshoot.life.landings_left import FleetLine
     from mlg_troubleshoot.life.looking_back import Advice
     from mlg_troubleshoot.store import Record, Store
@@ -86,8 +86,10 @@ def show(
             everything = history.show_fleet(place, known, ahead=False, whole=False, progress=bar)
         if shown.as_json:
             output.write_json(life_json.fleet_as_json(everything.lines, {}))
+        elif everything.lines:
+            show_gears(everything, ahead=False)
         else:
-            _show_gears(everything.lines, place.place)
+            output.console().print(no_records(place.place))
         return
     with stages(quiet=shown.quiet) as bar:
         ahead = not no_forecast
@@ -131,38 +133,58 @@ def no_records(place: str) -> str:
     return f"No records in {place}. Keep inspections with: mlg check FILE --keep"
 
 
-def _show_gears(found: Sequence[FleetLine], place: str) -> None:
+def show_gears(found: Lives, *, ahead: bool) -> None:
+    """Show one line per gear, worst first; `ahead`: with the landings that are left."""
+    from mlg_troubleshoot.cli.views.tables import STYLES, Cell, print_lines
+    from mlg_troubleshoot.life.landings_left import fleet_lines, landings_shown, work_sentence
     from mlg_troubleshoot.life.looking_back import Advice
 
     console = output.console()
-    if not found:
-        console.print(no_records(place))
-        return
+    gear = found.gear
+    lines = fleet_lines(found.lines, found.forecasts, found.order)
     headings = (
-        "tail",
-        "side",
-        "last seen",
-        "landings",
-        "verdict",
-        "joint",
-        "seen",
-        "repairs",
+        *("tail", "side", "last seen", "landings", "verdict", "inspect"),
+        *("to limit", "to margin", "next due", "next action"),
     )
-    table = output.plain_table(console, *headings, right=("landings", "seen", "repairs"))
-    for line in found:
-        state = ["-", "-", "-", "-"]
-        if line.inspections:
-            state = [
+    styles = {each.value: style for each, style in STYLES.items()}
+
+    def left(ends: Quantiles | None) -> str:
+        if ends is None or not ahead:
+            return "-"
+        return f"{landings_shown(ends['p50'], gear)} ({landings_shown(ends['p05'], gear)})"
+
+    rows: list[list[Cell]] = []
+    for line in lines:
+        first = "" if line.limit_joint is None else f" #{line.limit_joint}"
+        due = line.landings_to_limit if ahead else None
+        verdict = line.verdict or "-"
+        rows.append(
+            [
+                output.word(line.tail_no),
+                line.side,
                 line.inspection_date or "no date",
                 _count(line.gear_landings),
-                str(line.verdict).removesuffix("_MARGIN"),
+                output.text(verdict.removesuffix("_MARGIN"), styles.get(verdict, "")),
                 output.joint(line.worst_joint),
+                left(due) + first * (due is not None),
+                left(line.landings_to_margin),
+                "-" if due is None else landings_shown(line.next_inspection_landings, gear),
+                line.next_action or "-",
             ]
-        seen = str(line.inspections), str(line.repairs)
-        table.add_row(output.word(line.tail_no), line.side, *state, *seen)
-    show_warnings(console, found)
-    console.print(table)
-    _show_advice(console, Advice.total(line.advice for line in found))
+        )
+    said = f"{len(lines)} gears; 'inspect' is the joint to inspect first today"
+    if ahead:
+        said += (
+            "; landings left are those from the last inspection, median (5 %): to the limit of any"
+            " joint, with the one that most likely reaches its limit first; to the margin by the"
+            " worst-case bound"
+        )
+    console.print(f"{said}.")
+    show_warnings(console, found.lines)
+    spare = ("landings", "inspect", "last seen", "to limit", "to margin")
+    print_lines(console, headings, rows, "landings", spare, "--json lists all of them")
+    console.print(work_sentence(lines))
+    _show_advice(console, Advice.total(line.advice for line in found.lines))
 
 
 def _count(landings: float | None) -> str:
@@ -181,7 +203,7 @@ def _show_advice(console: output.DataConsole, advice: Advice) -> None:
 
 
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
-    from mlg_troubleshoot.cli.views.tables import lines_of
+    from mlg_troubleshoot.cli.views.tables import print_lines
     from mlg_troubleshoot.life.landings_left import outlook_sentence
     from mlg_troubleshoot.life.looking_back import Advice
     from mlg_troubleshoot.reporting.life_json import life_as_json
@@ -200,8 +222,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
         for event in values["events"]
     ]
     headings = ("date", "landings", "record", "hash", "what")
-    for each in lines_of(console, headings, events, "landings", ("hash", "record")):
-        console.print(each)
+    print_lines(console, headings, events, "landings", ("hash", "record"))
     show_warnings(console, [life])
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
@@ -216,7 +237,7 @@ def _show_joints(
     ahead: Forecast,
     gear: Gear,
 ) -> None:
-    from mlg_troubleshoot.cli.views.tables import lines_of
+    from mlg_troubleshoot.cli.views.tables import print_lines
     from mlg_troubleshoot.cli.views.wear import wear_lines
     from mlg_troubleshoot.decision.sentences import joint_list
     from mlg_troubleshoot.life.landings_left import span
@@ -242,10 +263,9 @@ def _show_joints(
                 ("… " if len(joint["readings"]) > len(newest) else "") + (read or "none"),
             )
         )
-    for each in (
-        *(lines_of(console, headings, rows, "", ()) if rows else ()),
-        *wear_lines(life, ahead, gear, console.width),
-    ):
+    if rows:
+        print_lines(console, headings, rows)
+    for each in wear_lines(life, ahead, gear, console.width):
         console.print(each)
     ever = {n for kept in life.inspections for n in kept.inspection.clearance_in}
     since = stretches(life, gear.joint_numbers)

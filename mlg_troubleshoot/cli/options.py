@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import wraps
 from importlib import import_module
-from inspect import Parameter, Signature, signature
+from inspect import Parameter, Signature, get_annotations, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_type_hints
 
 import typer
 
@@ -24,27 +24,33 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.store import Store
 
 
+_Word = TypeVar("_Word", bound=StrEnum)
+
+
 class ReportFormat(StrEnum):
     HTML = "html"
     PDF = "pdf"
 
 
 def report_format(text: str) -> ReportFormat:
-    try:
-        return ReportFormat(text)
-    except ValueError:
-        remedy = "Give html or pdf; the HTML report is the accessible form."
-        raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
+    return one_of(ReportFormat, text, "--format")
 
 
-def one_of(kind: type[StrEnum], text: str, flag: str) -> str:
+def one_of(kind: type[_Word], text: str, flag: str) -> _Word:
     """Judge a word that must be one of a few."""
     try:
-        return kind(text).value
+        return kind(text)
     except ValueError:
         raise UsageError(
             f"{flag} {text!r} is not known", f"Give one of {', '.join(kind)}."
         ) from None
+
+
+class Tails(StrEnum):
+    """Whether two spellings of a tail number are one aircraft."""
+
+    SAME = "same"
+    APART = "apart"
 
 
 class PaperSize(StrEnum):
@@ -175,9 +181,7 @@ NoForecast = Annotated[
 class OutputOptions:
     """What a command writes in addition to its screen, and how it shows lengths."""
 
-    panels: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("report", "page", "force", "show", "as_json", "quiet"), "Output"
-    )
+    panel: ClassVar = "Output"
 
     report: Report = None
     page: Paper = None
@@ -235,13 +239,7 @@ class Records:
 class Tables:
     """The gear, and what is declared about the tables that are read."""
 
-    panels: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        (
-            *("gear", "unit", "convention", "sheet", "column_map", "decimal_comma"),
-            *("small_readings_true", "dates"),
-        ),
-        "Input",
-    )
+    panel: ClassVar = "Input"
 
     gear: Gear = DEFAULT_GEAR
     unit: Unit = None
@@ -280,6 +278,13 @@ class Tables:
         return mapped
 
 
+def _panel(group: type, name: str) -> str | None:
+    """The panel of the help in which a group shows one of its own options."""
+    owners = (each for each in group.__mro__ if name in get_annotations(each))
+    panel: str | None = next(owners).__dict__.get("panel")
+    return panel
+
+
 def _in_panel(hint: Any, panel: str | None) -> Any:
     """An option in a panel of the help."""
     if panel is None:
@@ -307,18 +312,16 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
             show(name, parameter.default, hints[name])
             continue
         own = get_type_hints(groups[name], include_extras=True)
-        panels = getattr(groups[name], "panels", None) or {}
         # What all commands share stands last.
         for each in sorted(fields(groups[name]), key=lambda each: each in fields(OutputOptions)):
             (flags, *_) = getattr(own[each.name], "__metadata__", ((),))
+            panel = _panel(groups[name], each.name)
             if not isinstance(flags, Mapping):
-                show(each.name, each.default, _in_panel(own[each.name], panels.get(each.name)))
+                show(each.name, each.default, _in_panel(own[each.name], panel))
                 continue
             columns[each.name] = flags
             for column, (flag, takes, said) in flags.items():
-                option = typer.Option(
-                    flag, metavar=takes, help=said, rich_help_panel=panels.get(each.name)
-                )
+                option = typer.Option(flag, metavar=takes, help=said, rich_help_panel=panel)
                 show(column, None, Annotated[str | None, option])
 
     @wraps(command)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, replace
-from typing import TypeVar
 
 import numpy as np
 import typer
@@ -32,7 +31,6 @@ from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 from mlg_troubleshoot.workflows import study as task
 
 _BAR = 16
-_Choice = TypeVar("_Choice", StudyDesign, Directions)
 
 
 @contextmanager
@@ -54,9 +52,9 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
         if hasattr(flags, each.name)
     }
     read = {
-        "design": _choice(StudyDesign, flags.design, "design"),
+        "design": options.one_of(StudyDesign, flags.design.lower(), "--design"),
         "directions": (
-            _choice(Directions, flags.directions, "directions")
+            options.one_of(Directions, flags.directions.lower(), "--directions")
             if fixed is None
             else Directions.FIXED
         ),
@@ -109,15 +107,6 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
     if not findings.result.finished:
         output.say("Interrupted: these are partial results.")
         raise typer.Exit(ExitCode.INTERRUPTED)
-
-
-def _choice(kind: type[_Choice], text: str, what: str) -> _Choice:
-    try:
-        return kind(text.lower())
-    except ValueError:
-        raise UsageError(
-            f"{what} {text!r} is not known", f"Give one of {', '.join(kind)}."
-        ) from None
 
 
 def _show(findings: StudyFindings, unit: LengthUnit) -> None:

@@ -8,13 +8,11 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, plain_table, word
-from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, Cell, lines_of
+from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, Cell, print_lines
 from mlg_troubleshoot.decision.assessment import Assessment, Verdict
 from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear, worst_first
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear
-
-_LINES = 60
 
 
 def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: bool) -> None:
@@ -39,13 +37,11 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
     if wide:
         headings.insert(-2, f"margin {screen.unit}")
     rows = []
-    for line in ordered[:_LINES]:
+    for line in ordered:
         cells = _cells(line, screen)
         rows.append([cells[heading.split(" ")[0]] for heading in headings])
-    for shown in lines_of(screen, headings, rows, "chance", ("chance", "date", "record")):
-        screen.print(shown, no_wrap=True, overflow="ellipsis")
-    if len(ordered) > _LINES:
-        screen.print(f"… and {len(ordered) - _LINES} more; --csv or --json lists all of them.")
+    spare = ("chance", "date", "record")
+    print_lines(screen, headings, rows, "chance", spare, "--csv or --json lists all of them")
     worn = Counter(joint for line in ordered for joint in line.over_limit)
     if worn:
         joints = ", ".join(f"#{joint} ({count})" for joint, count in sorted(worn.items()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from rich.text import Text
 
@@ -29,6 +29,8 @@ MARKS = {
 Cell = str | Text
 # Room that the last column of a table gets before other columns are left out for it.
 _LEAST = 30
+# Lines of a table that a screen shows where all of them are listed elsewhere.
+_LINES = 60
 
 
 def next_words(judgement: Judgement) -> str:
@@ -65,31 +67,42 @@ def measured_outside(judgement: Judgement) -> bool:
     return isinstance(judgement, Assessment) and judgement.basis is Basis.MEASURED
 
 
-def lines_of(
+def print_lines(
     screen: DataConsole,
     headings: Sequence[str],
     rows: Sequence[Sequence[Cell]],
-    right: str,
-    spare: Sequence[str],
-) -> Iterator[Text]:
-    """Set rows in columns, `right` names right-aligned ones. On a narrow screen the columns of
-    `spare` are left out, the first first, and then the last column is folded: nothing is cut.
+    right: str = "",
+    spare: Sequence[str] = (),
+    others: str = "",
+) -> None:
+    """Set rows in columns; `right` names right-aligned ones. A column that says nothing is left
+    out, and on a narrow screen those of `spare`, the first first. Then the last column is folded:
+    nothing is cut. Of many rows the first are printed, and where the `others` are listed.
     """
+    shown = rows[:_LINES] if others else rows
     cells = [
-        [word(each) if isinstance(each, str) else each for each in row] for row in (headings, *rows)
+        [word(each) if isinstance(each, str) else each for each in row]
+        for row in (headings, *shown)
     ]
-    taken = {h: max(row[k].cell_len for row in cells) + 1 for k, h in enumerate(headings)}
-    last = taken.pop(headings[-1])
+    taken = {
+        h: max(row[k].cell_len for row in cells) + 1
+        for k, h in enumerate(headings)
+        if any(row[k].plain != "-" for row in cells[1:])
+    }
+    last = taken.pop(headings[-1], 0)
     for heading in spare:
         if sum(taken.values()) + min(last, _LEAST) > screen.width:
             taken.pop(heading, None)
     room = max(screen.width - sum(taken.values()), 12)
     for number, row in enumerate(cells):
-        line = Text(style="bold" if number == 0 else "", no_wrap=True, overflow="ellipsis")
+        line = Text(style="bold" if number == 0 else "")
         for heading, cell in zip(headings, row, strict=True):
             if heading in taken:
                 gap = " " * (taken[heading] - 1 - cell.cell_len)
                 line.append(gap if heading in right.split() else "").append_text(cell)
                 line.append(" " if heading in right.split() else gap + " ")
         indent = "\n" + " " * sum(taken.values())
-        yield line.append_text(Text(indent).join(row[-1].wrap(screen, room)))
+        line.append_text(Text(indent).join(row[-1].wrap(screen, room)))
+        screen.print(line, no_wrap=True, overflow="ellipsis")
+    if len(rows) > len(shown):
+        screen.print(f"… and {len(rows) - len(shown)} more; {others}.")
