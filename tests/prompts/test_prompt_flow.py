@@ -41,9 +41,8 @@ def test_the_tenth_joint_costs_as_many_judgements_as_the_first(
     flow: Flow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = []
-    for room in ("flow", "pages"):
-        name = f"mlg_troubleshoot.cli.prompts.{room}.judge"
-        monkeypatch.setattr(name, lambda *given: calls.append(given) or judge(*given))
+    name = "mlg_troubleshoot.cli.prompts.flow.judge"
+    monkeypatch.setattr(name, lambda *given: calls.append(given) or judge(*given))
     turn, counts = flow.begin(RADIAL_INCHES), []
     for _ in range(10):
         calls.clear()
@@ -398,7 +397,7 @@ def test_a_changed_unit_asks_what_the_typed_numbers_were(flow: Flow) -> None:
         play(
             flow, ["4", "b", "b", "b", "i"], replace(RADIAL_INCHES, unit=LengthUnit.THOU)
         ).state.ask
-        is Ask.REREAD
+        is Ask.CONFIRM
     )
 
 
@@ -541,14 +540,14 @@ def test_a_plunger_farther_off_than_worn_joints_could_push_it_is_asked_again(
     flow: Flow, typed: str, taken: str | None
 ) -> None:
     asked = play(flow, [*TEN, "p -.3"])
-    assert asked.state.ask is Ask.CONFIRM_MORE
+    assert asked.state.ask is Ask.CONFIRM
     assert "farther than all joints at their limits" in shown(flow, asked.state)
     after = answer(flow, asked.state, typed).state
     assert (after.ask, after.answers.more.get("plunger_displacement")) == (Ask.MORE, taken)
 
 
 def test_enter_does_not_confirm_the_plunger(flow: Flow) -> None:
-    assert play(flow, [*TEN, "p .3", ""]).state.ask is Ask.CONFIRM_MORE
+    assert play(flow, [*TEN, "p .3", ""]).state.ask is Ask.CONFIRM
 
 
 @pytest.mark.parametrize(
@@ -692,7 +691,7 @@ def _offering(gear: Gear, **changes: object) -> Flow:
 def test_an_unfinished_inspection_is_offered_when_tail_and_side_are_known(gear: Gear) -> None:
     flow = _offering(gear)
     state = play(flow, ["N123AB", "l"], Answers()).state
-    assert state.ask is Ask.OFFER
+    assert state.ask is Ask.CONFIRM
     assert "begun 2026-03-04 12:00, 2 of 10 joints" in shown(flow, state)
 
 
@@ -715,7 +714,7 @@ def test_no_begins_anew_and_puts_the_old_one_away(gear: Gear) -> None:
 
 
 def test_enter_does_not_choose(gear: Gear) -> None:
-    assert play(_offering(gear), ["N123AB", "l", ""], Answers()).state.ask is Ask.OFFER
+    assert play(_offering(gear), ["N123AB", "l", ""], Answers()).state.ask is Ask.CONFIRM
 
 
 def test_an_unfinished_inspection_in_another_convention_is_not_offered_but_named(
@@ -874,7 +873,7 @@ def test_readings_that_look_like_another_unit_are_asked_about_before_they_are_co
     flow: Flow,
 ) -> None:
     turn = in_millimetres(flow)
-    assert turn.state.ask is Ask.CONFIRM_UNIT
+    assert turn.state.ask is Ask.CONFIRM
     assert "inches, not in millimetres" in shown(flow, turn.state)
 
 
@@ -885,7 +884,7 @@ def test_a_yes_takes_the_readings_in_their_unit(flow: Flow, gear: Gear) -> None:
 
 
 def test_b_after_a_yes_does_not_ask_about_the_unit_again(flow: Flow) -> None:
-    assert answer(flow, in_millimetres(flow, "y").state, "b").state.ask is not Ask.CONFIRM_UNIT
+    assert answer(flow, in_millimetres(flow, "y").state, "b").state.ask is not Ask.CONFIRM
 
 
 def test_a_no_goes_back_to_the_table(flow: Flow) -> None:
@@ -893,7 +892,7 @@ def test_a_no_goes_back_to_the_table(flow: Flow) -> None:
 
 
 def test_enter_alone_does_not_confirm_the_unit(flow: Flow) -> None:
-    assert in_millimetres(flow, "").state.ask is Ask.CONFIRM_UNIT
+    assert in_millimetres(flow, "").state.ask is Ask.CONFIRM
 
 
 def test_another_unit_takes_the_confirmation_back(flow: Flow) -> None:

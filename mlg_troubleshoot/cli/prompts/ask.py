@@ -76,8 +76,7 @@ class _Saver:
 
     def resume(self, session: Session) -> None:
         """Resume another session instead of the one just begun."""
-        if self.saved:
-            self._store.discard(self.session.id)
+        self.forget()
         self.session = session
         self.saved = True
 
@@ -161,7 +160,7 @@ def ask_inspection(
 def _converse(flow: Flow, turn: Turn[State], terminal: RichTerminal, saver: _Saver) -> Entry:
     conversation = Conversation(flow, terminal)
     while True:
-        if turn.state.ask in (Ask.OFFER, Ask.NEXT):
+        if turn.state.offers:
             saver.forget()
         else:
             saver.save(turn.state.answers)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import date
 from enum import StrEnum
+from functools import partial
 from types import MappingProxyType
 from typing import TypeVar
 
@@ -21,7 +22,6 @@ from mlg_troubleshoot.cli.prompts.answers import (
     SIGN_OFF,
     Answers,
     JointAnswer,
-    Reading,
     judge,
     judge_more,
     plunger_in,
@@ -36,7 +36,7 @@ from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, WrittenLength
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _T = TypeVar("_T")
 # Radial clearances by joint [in] and the joints still to be asked, to a sentence and the joint that
@@ -51,21 +51,15 @@ class Ask(StrEnum):
     SIDE = "side"
     UNIT = "unit"
     CONVENTION = "reading"
-    OFFER = "offer"
+    CONFIRM = "confirm"
     NEXT = "next"
     STEP = "step"
-    REREAD = "reread"
     JOINT = "joint"
-    CONFIRM = "confirm"
     MORE = "more"
-    CONFIRM_MORE = "confirm more"
-    CONFIRM_UNIT = "confirm unit"
     DETAIL = "detail"
     REVIEW = "review"
 
 
-# What a confirmation goes back to.
-_CONFIRMS = {Ask.CONFIRM: Ask.JOINT, Ask.CONFIRM_MORE: Ask.MORE, Ask.CONFIRM_UNIT: Ask.REVIEW}
 _HEADING = (Ask.TAIL, Ask.SIDE, Ask.UNIT, Ask.CONVENTION)
 Place = tuple[Ask, int | str | None]
 
@@ -74,19 +68,17 @@ Place = tuple[Ask, int | str | None]
 class State:
     """Where the conversation stands.
 
-    `at` is the joint or the column that is asked for, `pending` what waits for a confirmation,
-    `saved` an unfinished inspection that is offered, `visit` the last one that is kept, `suggested`
-    the joint that Enter takes, and `trail` where one came from.
+    `at` is the joint or the column that is asked for, `doubt` what is to be confirmed, `saved` an
+    unfinished inspection that is offered, `visit` the last one that is kept, `suggested` the joint
+    that Enter takes, and `trail` where one came from.
     """
 
     ask: Ask
     answers: Answers
     at: int | str | None = None
-    pending: WrittenLength | Answers | None = None
+    doubt: Doubt | None = None
     saved: Session | None = None
     visit: Visit | None = None
-    old_unit: LengthUnit | None = None
-    from_review: bool = False
     suggested: int | None = None
     trail: tuple[Place, ...] = ()
 
@@ -95,6 +87,37 @@ class State:
         if not isinstance(self.at, int):
             raise TypeError("this question is not for a joint")
         return self.at
+
+    @property
+    def place(self) -> Place:
+        """The question where this stands; a confirmation belongs to the one that it is of."""
+        return (self.ask, self.at) if self.doubt is None else self.doubt.of.place
+
+    @property
+    def from_review(self) -> bool:
+        return (Ask.REVIEW, None) in self.trail
+
+    @property
+    def offers(self) -> bool:
+        """Whether it shows what the store holds already, to be gone on with or not."""
+        return self.ask is Ask.NEXT or (self.doubt is not None and self.saved is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """What is confirmed by a yes: the page that asks, the state of the question that it is about,
+    what a yes leads to, and what a no does where it does not go back.
+
+    `retyped` is what was typed, where another answer may be typed in its place and the same again
+    is a yes.
+    """
+
+    page: Page
+    of: State
+    yes: Callable[[], Turn[State]]
+    no: Callable[[], Turn[State]] | None = None
+    retyped: object = None
+    help: tuple[Line, ...] = ()
 
 
 # What only shows or ends after a result.
@@ -149,17 +172,31 @@ class Flow:
         return _QUESTIONS[state.ask].page(self, state, width)
 
     def help(self, state: State) -> tuple[Line, ...]:
-        if state.ask in (Ask.JOINT, Ask.CONFIRM):
+        if state.doubt is not None:
+            return state.doubt.help or self.help(state.doubt.of)
+        if state.ask is Ask.JOINT:
             return pages.joint_help(self.gear, state.answers, state.joint)
         return _QUESTIONS[state.ask].help
 
     def take(self, state: State, typed: str) -> Turn[State]:
         turn = _QUESTIONS[state.ask].take(self, state, typed)
-        here, there = (_question(each) for each in (state, turn.state))
-        moved = there != here and state.ask not in (Ask.OFFER, Ask.NEXT, Ask.REREAD)
-        return replace(
-            turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail)
-        )
+        moved = turn.state.place != state.place and state.ask is not Ask.NEXT
+        trail = (*state.trail, state.place) if moved else state.trail
+        return replace(turn, state=replace(turn.state, trail=trail))
+
+    def _confirm(self, state: State, typed: str) -> Turn[State]:
+        doubt = _known(state.doubt)
+        match _YES_NO.get(typed.lower()):
+            case True:
+                return doubt.yes()
+            case False:
+                return Turn(doubt.of) if doubt.no is None else doubt.no()
+        if not typed or doubt.retyped is None:
+            choices = doubt.page.prompt.strip(" >")
+            return again(state, _not_taken(typed, f"Choose one: {choices}."))
+        turn = _QUESTIONS[doubt.of.ask].take(self, doubt.of, typed)
+        anew = turn.state.doubt
+        return doubt.yes() if anew is not None and anew.retyped == doubt.retyped else turn
 
     def _tail(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
@@ -186,25 +223,26 @@ class Flow:
         bare = any(
             a.written is not None and a.written.unit is None for a in answers.joints.values()
         )
-        if answers.unit not in (None, unit) and bare:
-            return Turn(
-                State(Ask.REREAD, changed, old_unit=answers.unit, from_review=state.from_review)
-            )
-        return self._read_anew(changed, state.from_review)
-
-    def _reread(self, state: State, typed: str) -> Turn[State]:
-        old = _known(state.old_unit)
+        old = answers.unit
+        if old in (None, unit) or not bare:
+            return self._read_anew(changed, state.from_review)
 
         def in_old(answer: JointAnswer) -> JointAnswer:
             if answer.written is None:
                 return answer
             return replace(answer, written=replace(answer.written, unit=answer.written.unit or old))
 
-        yes = _YES_NO.get(typed.lower())
-        if yes is None:
-            return again(state, _not_taken(typed, "Type y or n."))
-        change = _unconfirmed if yes else in_old
-        return self._read_anew(state.answers.with_each(change), state.from_review)
+        def reread(change: Callable[[JointAnswer], JointAnswer]) -> Turn[State]:
+            return self._read_anew(changed.with_each(change), state.from_review)
+
+        doubt = Doubt(
+            pages.reread_page(changed, old),
+            state,
+            partial(reread, _unconfirmed),
+            partial(reread, in_old),
+            help=pages.REREAD_HELP,
+        )
+        return Turn(State(Ask.CONFIRM, changed, doubt=doubt))
 
     def _convention(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
@@ -220,22 +258,14 @@ class Flow:
         changed = replace(answers, convention=convention).with_each(_unconfirmed)
         return self._read_anew(changed, state.from_review, remarks)
 
-    def _offer(self, state: State, typed: str) -> Turn[State]:
-        saved = _known(state.saved)
-        yes = _YES_NO.get(typed.lower())
-        if yes is None:
-            return again(state, _not_taken(typed, "Type y to resume it or n to begin a new one."))
-        if yes:
-            return self._on_with(saved, state.answers)
-        turn = self._offer_visit(state.answers)
-        state = replace(turn.state, saved=saved)
-        return replace(turn, state=state, effect=Effect.PUT_AWAY)
-
     def _on_with(self, saved: Session, given: Answers) -> Turn[State]:
         answers = saved.answers.completed_from(given)
         turn = self._read_anew(answers, remarks=self._resumed(saved.answers))
-        state = replace(turn.state, saved=saved)
-        return replace(turn, state=state, effect=Effect.RESUME)
+        return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.RESUME)
+
+    def _anew_without(self, saved: Session, given: Answers) -> Turn[State]:
+        turn = self._offer_visit(given)
+        return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.PUT_AWAY)
 
     def _next(self, state: State, typed: str) -> Turn[State]:
         """What follows a result, now or at the next visit."""
@@ -307,9 +337,9 @@ class Flow:
         if column == PLUNGER_DISPLACEMENT.name and (visit := self._visit(answers)) is not None:
             answers = visit.with_both_readings(answers)
         if self._is_far(answers, state.answers):
-            return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), remarks)
-        answers = self._reread_restored(state.answers, answers).without(column)
-        turn = self._go_on(answers)
+            accepted = partial(self._go_on, answers.without(column))
+            return self._doubt_far(state, answers, accepted, remarks)
+        turn = self._go_on(self._reread_restored(state.answers, answers).without(column))
         return replace(turn, lines=(*remarks, *turn.lines))
 
     def _advised(self, answers: Answers) -> str:
@@ -342,32 +372,24 @@ class Flow:
                 return again(state, _not_taken(typed, remedy))
         return self._value(state, number, typed)
 
-    def _confirm(self, state: State, typed: str) -> Turn[State]:
-        if not typed:
-            return again(state, "Enter alone does not confirm it. Type y, or the value again.")
-        match _YES_NO.get(typed.lower()):
-            case True:
-                confirmed = JointAnswer(self._pending(state).written, confirmed=True)
-                return self._answered(state, state.joint, confirmed)
-            case False:
-                return self.back(state)
-        return self._joint(state, typed)
-
     def _value(self, state: State, number: int, typed: str) -> Turn[State]:
         answers = state.answers
         judged = judge(typed, number, _known(answers.unit), _known(answers.convention), self.gear)
         if judged.refused:
-            back = replace(state, ask=Ask.JOINT, pending=None)
-            return Turn(back, pages.refusal_lines(typed, number, judged.said))
+            return Turn(state, pages.refusal_lines(typed, number, judged.said))
         if judged.written is None:
             return self._answered(state, number, NOT_MEASURED)
-        unusual = bool(judged.said)
-        written = judged.written
-        radial_in = _known(answers.read(written)).radial_in
-        same = state.pending is not None and self._pending(state).radial_in == radial_in
-        if unusual and not same:
-            return Turn(replace(state, ask=Ask.CONFIRM, pending=written))
-        return self._answered(state, number, JointAnswer(written, confirmed=unusual))
+        answer = JointAnswer(judged.written, confirmed=bool(judged.said))
+        if not judged.said:
+            return self._answered(state, number, answer)
+        reading = _known(answers.read(judged.written))
+        doubt = Doubt(
+            pages.confirm_page(self.gear, reading, number, answers.unit, judged.said),
+            state,
+            partial(self._answered, state, number, answer),
+            retyped=reading.radial_in,
+        )
+        return Turn(replace(state, ask=Ask.CONFIRM, doubt=doubt))
 
     def _answered(self, state: State, number: int, answer: JointAnswer) -> Turn[State]:
         answers = state.answers.with_joint(number, answer)
@@ -396,33 +418,30 @@ class Flow:
             return again(
                 state, f"There is no joint #{number}. The joints are {self._joint_names()}."
             )
-        return Turn(State(Ask.JOINT, state.answers, number, from_review=state.from_review))
+        return Turn(State(Ask.JOINT, state.answers, number))
 
     def _more(self, state: State, typed: str) -> Turn[State]:
         if typed.lower() in ("", "s"):
-            return self._go_on(state.answers.without(OPTIONAL))
+            return self._go_on(state.answers.without(OPTIONAL), state.from_review)
         try:
             answers, remarks = read_more(state.answers, typed, self.gear)
         except UsageError as error:
             return again(state, f"{error.message}. {error.remedy}")
+        taken = State(Ask.MORE, answers)
         if self._is_far(answers, state.answers):
-            return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), remarks)
-        return Turn(replace(state, ask=Ask.MORE, answers=answers, pending=None), remarks)
+            return self._doubt_far(state, answers, lambda: Turn(taken), remarks)
+        return Turn(taken, remarks)
 
-    def _confirm_more(self, state: State, typed: str) -> Turn[State]:
-        yes = _YES_NO.get(typed.lower())
-        if yes and isinstance(state.pending, Answers) and state.at is not None:
-            return self._go_on(state.pending.without(state.at))
-        if yes and isinstance(state.pending, Answers):
-            return Turn(State(Ask.MORE, state.pending))
-        if yes is False:
-            return self.back(state)
-        if not typed:
-            return again(
-                state,
-                "Enter alone does not confirm it. Type y, n, or p with the displacement again.",
-            )
-        return (self._more if state.at is None else self._step)(state, typed)
+    def _doubt_far(
+        self,
+        state: State,
+        answers: Answers,
+        yes: Callable[[], Turn[State]],
+        remarks: tuple[Line, ...],
+    ) -> Turn[State]:
+        page = pages.confirm_more_page(self._most_in, state.answers.unit)
+        doubt = Doubt(page, state, yes, retyped=plunger_in(answers, self.gear))
+        return Turn(replace(state, ask=Ask.CONFIRM, doubt=doubt), remarks)
 
     def _is_far(self, answers: Answers, before: Answers) -> bool:
         stands, stood = (plunger_in(each, self.gear) for each in (answers, before))
@@ -442,7 +461,7 @@ class Flow:
         if column == DATE.name and self.today is not None:
             untold = column not in answers.more and not typed
             typed = self.today.isoformat() if untold or typed.lower() == "today" else typed
-        if typed.lower() == "done" and not state.from_review:
+        if typed.lower() == "done":
             return self._go_on(replace(answers, todo=()))
         if typed.lower() == "x":
             answers = answers.with_more(**{column: None})
@@ -452,23 +471,21 @@ class Flow:
             except UsageError as error:
                 return again(state, f"{error.message}. {error.remedy}")
             answers = answers.with_more(**{column: typed})
-        if state.from_review:
-            return Turn(State(Ask.REVIEW, answers))
-        return self._go_on(answers.without(column))
+        return self._go_on(answers.without(column), state.from_review)
 
     def _review(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
         if not typed:
             return self._compute(state)
         if typed.lower() in _HEADING:
-            return Turn(State(Ask(typed.lower()), answers, from_review=True))
+            return Turn(State(Ask(typed.lower()), answers))
         if typed.lower() in pages.DETAILS:
-            return Turn(State(Ask.DETAIL, answers, pages.DETAILS[typed.lower()], from_review=True))
+            return Turn(State(Ask.DETAIL, answers, pages.DETAILS[typed.lower()]))
         if typed.lower() == "more":
             return Turn(State(Ask.MORE, answers))
         number = re.fullmatch(r"#?\s*(\d{1,4})", typed)
         if number is not None:
-            return self._jump(replace(state, from_review=True), int(number[1]))
+            return self._jump(state, int(number[1]))
         return again(
             state,
             _not_taken(typed, f"Type a joint number ({self._joint_names()}), or Enter alone."),
@@ -482,18 +499,17 @@ class Flow:
                 "No joint has a clearance, the plunger was not read, and no outcome is stated, so"
                 " there is nothing to compute. Type a joint number, or more to enter the others.",
             )
-        if state.answers.unit_question(self.gear):
-            return Turn(replace(state, ask=Ask.CONFIRM_UNIT))
-        return Turn(state, effect=Effect.COMPUTE)
-
-    def _confirm_unit(self, state: State, typed: str) -> Turn[State]:
-        match _YES_NO.get(typed.lower()):
-            case True:
-                answers = state.answers.with_more(small_readings_true="yes")
-                return Turn(State(Ask.REVIEW, answers), effect=Effect.COMPUTE)
-            case False:
-                return self.back(state)
-        return again(state, _not_taken(typed, "Type y if the unit is right, or n to correct it."))
+        question = state.answers.unit_question(self.gear)
+        if not question:
+            return Turn(state, effect=Effect.COMPUTE)
+        right = State(Ask.REVIEW, state.answers.with_more(small_readings_true="yes"))
+        doubt = Doubt(
+            pages.confirm_unit_page(state.answers, question),
+            state,
+            lambda: Turn(right, effect=Effect.COMPUTE),
+            help=pages.CONFIRM_UNIT_HELP,
+        )
+        return Turn(replace(state, ask=Ask.CONFIRM, doubt=doubt))
 
     def begin(self, answers: Answers, from_review: bool = False) -> Turn[State]:
         """Begin with what flags already gave; `b` still reaches it.
@@ -509,7 +525,14 @@ class Flow:
         if saved is None:
             return self._offer_visit(answers)
         if not contradictions(saved.answers, answers):
-            return Turn(State(Ask.OFFER, answers, saved=saved))
+            doubt = Doubt(
+                pages.offer_page(saved, self.gear),
+                State(Ask.SIDE, answers),
+                partial(self._on_with, saved, answers),
+                partial(self._anew_without, saved, answers),
+                help=pages.OFFER_HELP,
+            )
+            return Turn(State(Ask.CONFIRM, answers, saved=saved, doubt=doubt))
         remarks = ("An unfinished inspection is not offered: ", Tone.WARN)
         return self._go_on(answers, remarks=(line(remarks, self._heading(saved.answers)),))
 
@@ -546,7 +569,7 @@ class Flow:
         if step is not None and not from_review:
             return State(Ask.STEP, answers, step)
         for number in self.open_joints(answers):
-            return State(Ask.JOINT, answers, number, from_review=from_review)
+            return State(Ask.JOINT, answers, number)
         rest = None if from_review else next((each for each in answers.todo if each in REST), None)
         if rest is None:
             return State(Ask.REVIEW, answers)
@@ -587,19 +610,13 @@ class Flow:
         return replace(answers, joints=MappingProxyType(kept)), tuple(remarks)
 
     def back(self, state: State) -> Turn[State]:
-        if state.ask in _CONFIRMS:
-            is_step = state.ask is Ask.CONFIRM_MORE and state.at is not None
-            ask = Ask.STEP if is_step else _CONFIRMS[state.ask]
-            return Turn(replace(state, ask=ask, pending=None))
-        if state.ask is Ask.REREAD:
-            answers = replace(state.answers, unit=state.old_unit)
-            return Turn(State(Ask.UNIT, answers, from_review=state.from_review, trail=state.trail))
-        if state.ask in (Ask.OFFER, Ask.NEXT):
+        if state.doubt is not None:
+            return Turn(state.doubt.of)
+        if state.ask is Ask.NEXT:
             return Turn(State(Ask.SIDE, state.answers))
         if state.trail:
             ask, at = state.trail[-1]
-            inside = state.from_review and ask is not Ask.REVIEW
-            return Turn(State(ask, state.answers, at, from_review=inside, trail=state.trail[:-1]))
+            return Turn(State(ask, state.answers, at, trail=state.trail[:-1]))
         visit = self._visit(state.answers) if state.answers.continues else None
         if visit is not None:
             return Turn(State(Ask.NEXT, visit.answers, visit=visit))
@@ -617,11 +634,6 @@ class Flow:
         ask, at = course[place - 1]
         return Turn(State(ask, state.answers, at))
 
-    def _pending(self, state: State) -> Reading:
-        if not isinstance(state.pending, WrittenLength):
-            raise TypeError("no clearance waits for a confirmation")
-        return _known(state.answers.read(state.pending))
-
     def _heading(self, answers: Answers) -> str:
         skipped = len(answers.joints) - len(answers.radial_in)
         parts = [f"{len(answers.radial_in)} of {len(self.order)} joints measured"]
@@ -635,11 +647,6 @@ class Flow:
 
     def _joint_names(self) -> str:
         return ", ".join(map(str, self.gear.joint_numbers))
-
-
-def _question(state: State) -> Place:
-    """The question where a state stands; a confirmation belongs to the one that it is of."""
-    return _CONFIRMS.get(state.ask, state.ask), state.at
 
 
 def _known(value: _T | None) -> _T:
@@ -701,9 +708,7 @@ _QUESTIONS: dict[Ask, _Question] = {
     Ask.CONVENTION: _Question(
         Flow._convention, lambda _, s, __: pages.convention_page(s.answers), pages.CONVENTION_HELP
     ),
-    Ask.OFFER: _Question(
-        Flow._offer, lambda f, s, _: pages.offer_page(_known(s.saved), f.gear), pages.OFFER_HELP
-    ),
+    Ask.CONFIRM: _Question(Flow._confirm, lambda _, s, __: _known(s.doubt).page),
     Ask.NEXT: _Question(
         Flow._next, lambda _, s, __: pages.next_page(_known(s.visit)), pages.NEXT_HELP
     ),
@@ -712,31 +717,12 @@ _QUESTIONS: dict[Ask, _Question] = {
         lambda f, s, _: pages.step_page(s.answers, str(s.at), f._advised(s.answers)),
         pages.MORE_HELP,
     ),
-    Ask.REREAD: _Question(
-        Flow._reread,
-        lambda _, s, __: pages.reread_page(s.answers, _known(s.old_unit)),
-        pages.REREAD_HELP,
-    ),
     Ask.JOINT: _Question(
         Flow._joint,
         lambda f, s, w: pages.joint_page(f.gear, s.answers, f.order, s.joint, w, s.suggested),
     ),
-    Ask.CONFIRM: _Question(
-        Flow._confirm,
-        lambda f, s, _: pages.confirm_page(f.gear, f._pending(s), s.joint, s.answers.unit),
-    ),
     Ask.MORE: _Question(
         Flow._more, lambda f, s, w: pages.more_page(s.answers, f.gear, w), pages.MORE_HELP
-    ),
-    Ask.CONFIRM_MORE: _Question(
-        Flow._confirm_more,
-        lambda f, s, _: pages.confirm_more_page(f._most_in, s.answers.unit),
-        pages.MORE_HELP,
-    ),
-    Ask.CONFIRM_UNIT: _Question(
-        Flow._confirm_unit,
-        lambda f, s, _: pages.confirm_unit_page(s.answers, s.answers.unit_question(f.gear)),
-        pages.CONFIRM_UNIT_HELP,
     ),
     Ask.DETAIL: _Question(
         Flow._detail,

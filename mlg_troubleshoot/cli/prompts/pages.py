@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import date
 
 from mlg_troubleshoot.cli.output import at_prompt
-from mlg_troubleshoot.cli.prompts.answers import DAY, SIGN_OFF, Answers, Reading, judge
+from mlg_troubleshoot.cli.prompts.answers import DAY, SIGN_OFF, Answers, Reading
 from mlg_troubleshoot.cli.prompts.conversation import Page
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line, note, warning
 from mlg_troubleshoot.cli.prompts.sketch import sketch
@@ -277,15 +277,16 @@ def joint_page(
     return Page(shown, f" #{number}{kind}, {unit}{enter} > ")
 
 
-def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | None) -> Page:
+def confirm_page(
+    gear: Gear, reading: Reading, number: int, unit: LengthUnit | None, judged: str
+) -> Page:
     joint = gear.joint(number)
     what = "is counted: the upper end of what was found"
     if joint.is_over_limit(reading.radial_in):
         what = f"is far beyond the limit of {length(joint.limit.value, unit)}"
     elif reading.radial_in < joint.new_part.value:
         what = f"is less than new parts have ({length(joint.new_part.value, unit)})"
-    judged = judge(reading.written.text, number, reading.unit, reading.convention, gear)
-    said = said_in(judged.said, reading.unit)
+    said = said_in(judged, reading.unit)
     shown = (
         warning(f"#{number}  {length(reading.radial_in, unit)} radial {what}."),
         note(f"{said[:1].upper()}{said[1:]}"),
