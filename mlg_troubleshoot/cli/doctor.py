@@ -24,11 +24,6 @@ def doctor(
 
         output.write_json(written(DoctorOutput, abilities=findings))
     else:
-        console = output.console()
-        for finding in findings:
-            mark = "ok      " if finding.works else ("MISSING " if finding.needed else "optional")
-            console.print(f"{mark} {finding.ability}: {finding.detail}")
-            if not finding.works and finding.remedy:
-                console.print(f"         What to do: {finding.remedy}")
+        output.show_page("doctor", output.console(), findings=findings)
     lacking = any(f.needed and not f.works for f in findings)
     raise typer.Exit(ExitCode.ATTENTION if lacking else ExitCode.FINE)

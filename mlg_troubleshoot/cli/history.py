@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.life.landings_left import FleetLine
     from mlg_troubleshoot.life.looking_back import Advice
     from mlg_troubleshoot.store import Record, Store
-    from mlg_troubleshoot.workflows.history import Lives, Verified
+    from mlg_troubleshoot.workflows.history import Lives
 
 EPILOG = (
     "Example: [b]mlg history N123 LH[/b] · [b]mlg history repair N123 LH --joint 3 --date"
@@ -452,41 +452,9 @@ def verify(
         )
     with stages(quiet=False) as bar:
         found = history.verify(records.kept, noted, partial(bar, "Verifying"))
-    if found.broken is None:
-        output.write(f"{found.count} records fit the chain.")
-    else:
-        broken = found.broken
-        output.write(
-            f"Record {broken.seq} ({broken.kind} {broken.record_id!r}) does not fit the chain:"
-            f" {broken.why}. {found.count} records before it fit."
-        )
-    if found.last:
-        output.write(f"The last hash is {found.last}")
-    if noted is not None:
-        output.write(_expected(found))
-    for each in found.wrong:
-        output.write(f"Not as expected: {each}.")
-    if found.wrong:
-        output.write(
-            "What to do: void a record that cannot be read (mlg history void HASH --why TEXT)."
-            " Otherwise export the chain, and import it into a new store."
-        )
+    output.write("\n".join(output.page("chain", found=found, noted=noted)))
     if found.broken is not None or found.wrong or (noted is not None and found.expected is None):
         raise typer.Exit(ExitCode.ATTENTION)
-
-
-def _expected(found: Verified) -> str:
-    if found.expected is None:
-        return (
-            "The expected hash is not in the chain: records were taken away or changed, or this is"
-            " another store or an older copy."
-        )
-    since = found.count - found.expected
-    return (
-        f"The expected hash is that of record {found.expected}; {since} were added since."
-        if since
-        else "The expected hash is the last one."
-    )
 
 
 @options.flat

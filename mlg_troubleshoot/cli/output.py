@@ -11,6 +11,7 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -29,6 +30,8 @@ _WIDTH_ELSEWHERE = 80
 WIDE = 100
 WIDEST = 120
 _PLAIN = "mlg.plain"
+# Between the cells of a table in a template.
+_CELL = "│"
 # A sign and what stands for it, one for one, so that drawings and tables keep their columns.
 _SIGNS = (
     "═=─-━-│|┃|╭+╮+╰+╯+┌+┐+└+┘+├+┤+▲^△A▶>"
@@ -179,6 +182,40 @@ def plain_table(
         # What does not fit goes on below: nothing is cut.
         table.add_column(heading, justify="right" if heading in right else "left", overflow="fold")
     return table
+
+
+def show_page(name: str, screen: DataConsole, **values: object) -> None:
+    """Print the screen that a template makes: each line folded, one after ``#`` bold; lines of
+    cells are a table under their heading, in which ``>`` aligns a column to the right and a number after it is its greatest width.
+    """
+    for is_table, lines in groupby(page(name, screen.unit, **values), lambda line: _CELL in line):
+        if not is_table:
+            for line in lines:
+                bold = line.startswith("# ")
+                screen.print(line.removeprefix("# "), style="bold" if bold else "")
+            continue
+        headings, *rows = ([cell.strip() for cell in line.split(_CELL)] for line in lines)
+        table = plain_table(None)
+        for heading in headings:
+            name, right, widest = heading.partition(">")
+            table.add_column(
+                name,
+                justify="right" if right else "left",
+                max_width=int(widest) if widest else None,
+                overflow="fold",
+            )
+        for row in rows:
+            table.add_row(*map(text, row))
+        screen.print(table)
+
+
+def page(name: str, unit: LengthUnit = LengthUnit.INCH, **values: object) -> list[str]:
+    """The lines that a template says, lengths in the unit of the reader."""
+    from mlg_troubleshoot.reporting.formats import Lengths
+    from mlg_troubleshoot.reporting.html import environment
+
+    said = environment().get_template(f"{name}.txt.j2").render(lengths=Lengths(unit), **values)
+    return said.replace("\u200b", "").replace("\u00a0", " ").splitlines()
 
 
 def text(data: str, style: str = "") -> Text:

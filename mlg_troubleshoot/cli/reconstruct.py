@@ -5,16 +5,13 @@ before it runs.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-
-if TYPE_CHECKING:
-    from mlg_troubleshoot.paper.reconstruct import Reconstruction
 
 EPILOG = (
     "Example: [b]mlg gear reconstruct --seed 7 --out new-member.toml[/b] · with your own numbers: "
@@ -77,36 +74,9 @@ def reconstruct(
 
         output.write_json(reconstruction_as_json(found, text))
     else:
-        _show(found, text, show_member=out is None)
+        output.show_page("reconstruct", output.console(elsewhere=output.WIDEST), found=found)
+        if out is None:
+            output.write("\n" + text)
     if out is not None:
         output.say(f"Linkage written: {out}")
     raise typer.Exit(ExitCode.FINE if found.meets_all else ExitCode.ATTENTION)
-
-
-def _show(found: Reconstruction, text: str, *, show_member: bool) -> None:
-    console = output.console(elsewhere=output.WIDEST)
-    table = output.plain_table(
-        None, "target", "printed", "linkage", "accepted", "", "", right=("linkage",)
-    )
-    for each in found.met:
-        table.add_row(
-            each.target.quantity,
-            each.target.printed,
-            f"{each.computed:.5g} {each.target.unit}".strip(),
-            each.target.accepted,
-            "met" if each.holds else "NOT MET",
-            "binds" if each.binds else "slack",
-        )
-    console.print(table)
-    free = found.numbers - found.determined
-    loosest = ", ".join(name for name, _ in found.loosest)
-    console.print(
-        f"{found.numbers} numbers describe the linkage; the binding targets determine"
-        f" {found.determined} directions among them, {free} stay free. Least determined: {loosest}."
-        f" {found.evaluations} linkages tried, seed {found.seed}."
-    )
-    console.print(
-        "This linkage is chosen to meet numbers; it is not measured and not drawing data."
-    )
-    if show_member:
-        output.write("\n" + text)

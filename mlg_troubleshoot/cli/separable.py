@@ -41,30 +41,4 @@ def separable(
 
         output.write_json(written(SeparableOutput, columns=names, causes=causes))
         return
-    console = output.console()
-    console.print(
-        "Smallest effects, rms in thou over 200 rows of 20 aircraft, that are detected, and"
-        " distinguished from the nearest alternative, with 80 % power; the last column is the"
-        " cheapest one that would distinguish them:"
-    )
-    headings = ("cause", "detected", "looks most like", "distinguished", "column to add")
-    table = output.plain_table(None, *headings, right=("detected", "distinguished"))
-    for cause in (c for c in causes if c.missing_column is None):
-        table.add_row(
-            " ".join(part for part in (cause.cause, cause.target) if part),
-            _thou(cause.found_from_in),
-            cause.nearest or "-",
-            _thou(cause.told_apart_from_in),
-            cause.further_column or "-",
-        )
-    console.print(table)
-    for cause in causes:
-        if cause.missing_column is not None:
-            console.print(f"NOT TESTABLE without {cause.missing_column}: {cause.cause}")
-    for cause in causes:
-        if cause.nearest is not None and cause.told_apart_from_in is None:
-            console.print(f"{cause.cause} {cause.target or ''}: only by {cause.separating_reading}")
-
-
-def _thou(value_in: float | None) -> str:
-    return "never" if value_in is None else f"{value_in * 1000.0:.1f}"
+    output.show_page("separable", output.console(), causes=causes)

@@ -11,10 +11,8 @@ import typer
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.units import Sentence
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.surveying.result import SurveyResult
     from mlg_troubleshoot.units import LengthUnit
 
 EPILOG = (
@@ -106,7 +104,13 @@ def survey(
 
         output.write_json(survey_as_json(result))
     else:
-        _show(result, output.console(unit=shown.show))
+        for problem in result.problems:
+            output.say(
+                f"{problem.place()}: {problem.value}: expected {problem.expected}. {problem.remedy}"
+            )
+        each = result.gear.joints, result.amplification, result.interval, result.before
+        rows = [*zip(*each, strict=True)]
+        output.show_page("survey", output.console(unit=shown.show), result=result, rows=rows)
     written = None
     if wanted.report is not None:
         written = task.write_survey_report(
@@ -145,56 +149,3 @@ def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
         raise KeyboardInterrupt from None
     output.say(again)
     raise typer.Exit
-
-
-def _show(result: SurveyResult, console: output.DataConsole) -> None:
-    for problem in result.problems:
-        output.say(
-            f"{problem.place()}: {problem.value}: expected {problem.expected}. {problem.remedy}"
-        )
-    found = result.survey
-    if found is None:
-        console.print("This table contains no usable reading.")
-    else:
-        console.print(f"{result.gear.name}: {found.words}", style="bold")
-        numbers = ("index", "90 % interval", "before")
-        table = output.plain_table(None, "joint", *numbers, right=numbers)
-        rows = zip(
-            result.gear.joints, result.amplification, result.interval, result.before, strict=True
-        )
-        for joint, a, after, before in rows:
-            ends = (f"{low:.3f} to {high:.3f}" for low, high in (after, before))
-            table.add_row(output.word(joint.label), f"{a:.3f}", *ends)
-        console.print(table)
-        mode = found.modes[0]
-        console.print(
-            "Index: movement of the plunger per clearance of the joint. The readings determine"
-            f" {mode.parameters:.1f} of {len(mode.vector)} numbers of the linkage; the rest is as"
-            " it was before."
-        )
-        for misfit in found.misfits:
-            console.sentence(
-                Sentence.of(
-                    "Row {}, {}: {}.", misfit.reading.row, misfit.reading.words, misfit.words
-                ),
-                "bold",
-            )
-    for each in result.inspections:
-        console.sentence(Sentence.of("{}: {}.", each.record_id, each.words))
-    for warning in result.warnings:
-        console.sentence(Sentence.of("Note: {}.", warning))
-    if result.suggestion is None:
-        console.print("No further reading would narrow the intervals by 1 %: you can stop.")
-    else:
-        share = 100 * result.suggestion.narrowing
-        console.sentence(
-            Sentence.of(
-                "Next reading: {}; narrows the 90 % intervals by about {} %.",
-                result.suggestion.reading.words,
-                f"{share:.0f}",
-            )
-        )
-    if result.gear_file is not None:
-        console.print(
-            f"Written: {result.gear_file}. Use it: mlg check FILE --gear {result.gear_file}"
-        )

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path, PurePath
 from typing import Any
@@ -102,6 +102,7 @@ def environment() -> Environment:
         minutes=formats.minutes,
         landings_count=formats.landings_count,
         grouped=grouped,
+        zip=partial(zip, strict=True),
         file_name=lambda name: PurePath(name).name,
         moment=formats.moment,
     )
