@@ -135,7 +135,7 @@ def no_records(place: str) -> str:
 
 def show_gears(found: Lives, *, ahead: bool) -> None:
     """Show one line per gear, worst first; `ahead`: with the landings that are left."""
-    from mlg_troubleshoot.cli.views.tables import STYLES, Cell, print_lines
+    from mlg_troubleshoot.cli.views.tables import STYLES, Cell
     from mlg_troubleshoot.life.landings_left import fleet_lines, landings_shown, work_sentence
     from mlg_troubleshoot.life.looking_back import Advice
 
@@ -143,7 +143,7 @@ def show_gears(found: Lives, *, ahead: bool) -> None:
     gear = found.gear
     lines = fleet_lines(found.lines, found.forecasts, found.order)
     headings = (
-        *("tail", "side", "last seen", "landings", "verdict", "inspect"),
+        *("tail", "side", "last seen", "landings>", "verdict", "inspect"),
         *("to limit", "to margin", "next due", "next action"),
     )
     styles = {each.value: style for each, style in STYLES.items()}
@@ -182,7 +182,7 @@ def show_gears(found: Lives, *, ahead: bool) -> None:
     console.print(f"{said}.")
     show_warnings(console, found.lines)
     spare = ("landings", "inspect", "last seen", "to limit", "to margin")
-    print_lines(console, headings, rows, "landings", spare, "--json lists all of them")
+    output.print_table(console, headings, rows, spare, "--json lists all of them")
     console.print(work_sentence(lines))
     _show_advice(console, Advice.total(line.advice for line in found.lines))
 
@@ -203,7 +203,6 @@ def _show_advice(console: output.DataConsole, advice: Advice) -> None:
 
 
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
-    from mlg_troubleshoot.cli.views.tables import print_lines
     from mlg_troubleshoot.life.landings_left import outlook_sentence
     from mlg_troubleshoot.life.looking_back import Advice
     from mlg_troubleshoot.reporting.life_json import life_as_json
@@ -221,8 +220,8 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
         )
         for event in values["events"]
     ]
-    headings = ("date", "landings", "record", "hash", "what")
-    print_lines(console, headings, events, "landings", ("hash", "record"))
+    headings = ("date", "landings>", "record", "hash", "what")
+    output.print_table(console, headings, events, ("hash", "record"))
     show_warnings(console, [life])
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
@@ -237,7 +236,6 @@ def _show_joints(
     ahead: Forecast,
     gear: Gear,
 ) -> None:
-    from mlg_troubleshoot.cli.views.tables import print_lines
     from mlg_troubleshoot.cli.views.wear import wear_lines
     from mlg_troubleshoot.decision.sentences import joint_list
     from mlg_troubleshoot.life.landings_left import span
@@ -264,7 +262,7 @@ def _show_joints(
             )
         )
     if rows:
-        print_lines(console, headings, rows)
+        output.print_table(console, headings, rows, ())
     for each in wear_lines(life, ahead, gear, console.width):
         console.print(each)
     ever = {n for kept in life.inspections for n in kept.inspection.clearance_in}

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.table import Table
@@ -32,6 +33,11 @@ WIDEST = 120
 _PLAIN = "mlg.plain"
 # Between the cells of a table in a template.
 _CELL = "│"
+_MARK = re.compile(r"[<>]\d*$")
+# Room that the last column of a table gets before other columns are left out for it, and rows that
+# are printed where all of them are listed elsewhere.
+_LEAST = 27
+_LINES = 60
 # A sign and what stands for it, one for one, so that drawings and tables keep their columns.
 _SIGNS = (
     "═=─-━-│|┃|╭+╮+╰+╯+┌+┐+└+┘+├+┤+▲^△A▶>"
@@ -160,33 +166,9 @@ def console(
     return found
 
 
-def plain_table(
-    console: Console | None,
-    *headings: str,
-    right: Sequence[str] = (),
-    title: str | Text | None = None,
-) -> Table:
-    """Return a table without rules, set closer where a console has little room; numbers stand to
-    the right.
-    """
-    gap = 2 if console is None or console.width >= WIDE else 1
-    table = Table(
-        box=None,
-        pad_edge=False,
-        padding=(0, gap, 0, 0),
-        header_style="bold",
-        title=title,
-        title_justify="left",
-    )
-    for heading in headings:
-        # What does not fit goes on below: nothing is cut.
-        table.add_column(heading, justify="right" if heading in right else "left", overflow="fold")
-    return table
-
-
 def show_page(name: str, screen: DataConsole, **values: object) -> None:
     """Print the screen that a template makes: each line folded, one after ``#`` bold; lines of
-    cells are a table under their heading, in which ``>`` aligns a column to the right and a number after it is its greatest width.
+    cells are a table under their heading.
     """
     for is_table, lines in groupby(page(name, screen.unit, **values), lambda line: _CELL in line):
         if not is_table:
@@ -195,18 +177,56 @@ def show_page(name: str, screen: DataConsole, **values: object) -> None:
                 screen.print(line.removeprefix("# "), style="bold" if bold else "")
             continue
         headings, *rows = ([cell.strip() for cell in line.split(_CELL)] for line in lines)
-        table = plain_table(None)
-        for heading in headings:
-            name, right, widest = heading.partition(">")
-            table.add_column(
-                name,
-                justify="right" if right else "left",
-                max_width=int(widest) if widest else None,
-                overflow="fold",
-            )
-        for row in rows:
-            table.add_row(*map(text, row))
-        screen.print(table)
+        print_table(screen, headings, rows)
+
+
+def print_table(
+    screen: DataConsole,
+    headings: Sequence[str],
+    rows: Sequence[Sequence[str | Text]],
+    spare: Sequence[str] | None = None,
+    others: str = "",
+    folded: str = "",
+) -> None:
+    """Print a table without rules; a heading may end with ``>``, which aligns its column to the
+    right, or ``<``, and its greatest width.
+
+    With `spare` a column that says nothing is left out, and on a narrow screen those of `spare`,
+    the first first; then only the last column, or the one that is named, is folded. Of many rows
+    the first are printed, and where the `others` are listed.
+    """
+    shown = rows[:_LINES] if others else rows
+    cells = [[word(each) if isinstance(each, str) else each for each in row] for row in shown]
+    kept = {_MARK.sub("", heading): place for place, heading in enumerate(headings)}
+    last = folded or [*kept][-1]
+    wide = {
+        name: max(*map(cell_len, name.split("\n")), 1, *(row[place].cell_len for row in cells))
+        for name, place in kept.items()
+    }
+    if spare is not None:
+        for name, place in [*kept.items()]:
+            if all(row[place].plain == "-" for row in cells):
+                del kept[name]
+        foldable = max(wide[last] - _LEAST, 0)
+        for name in spare:
+            if sum(wide[each] + 1 for each in kept) - 1 - foldable > screen.width:
+                kept.pop(name, None)
+    gap = 2 if sum(wide[name] + 2 for name in kept) - 2 <= screen.width else 1
+    table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
+    for name, place in kept.items():
+        mark = headings[place].removeprefix(name)
+        table.add_column(
+            name,
+            justify="right" if mark.startswith(">") else "left",
+            max_width=int(mark[1:]) if mark[1:] else None,
+            overflow="fold",
+            no_wrap=spare is not None and name != last,
+        )
+    for row in cells:
+        table.add_row(*(row[place] for place in kept.values()))
+    screen.print(table)
+    if len(rows) > len(shown):
+        screen.print(f"… and {len(rows) - len(shown)} more; {others}.")
 
 
 def page(name: str, unit: LengthUnit = LengthUnit.INCH, **values: object) -> list[str]:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 
 from rich.text import Text
 
-from mlg_troubleshoot.cli.output import WIDE, DataConsole, plain_table, word
-from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, Cell, print_lines
+from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, word
+from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, Cell
 from mlg_troubleshoot.decision.assessment import Assessment, Verdict
 from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear, worst_first
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.visible import visible
 
 
 def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: bool) -> None:
@@ -30,7 +32,7 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
         screen.print(f"{gears}, the latest inspection of each; --all shows every inspection.")
     places = worst_first(lines, (*latest, *earlier)) if every else latest
     ordered = [lines[place] for place in places]
-    headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance", "next"]
+    headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance>", "next"]
     wide = screen.width >= WIDE
     if wide or every or any(line.day is None for line in ordered):
         headings.insert(5, "record")
@@ -39,9 +41,9 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
     rows = []
     for line in ordered:
         cells = _cells(line, screen)
-        rows.append([cells[heading.split(" ")[0]] for heading in headings])
+        rows.append([cells[re.split("[ >]", heading)[0]] for heading in headings])
     spare = ("chance", "date", "record")
-    print_lines(screen, headings, rows, "chance", spare, "--csv or --json lists all of them")
+    print_table(screen, headings, rows, spare, "--csv or --json lists all of them")
     worn = Counter(joint for line in ordered for joint in line.over_limit)
     if worn:
         joints = ", ".join(f"#{joint} ({count})" for joint, count in sorted(worn.items()))
@@ -89,29 +91,23 @@ def show_before_and_after(before: Assessment, after: Assessment, screen: DataCon
             "" if one is None or two is None else screen.length(two - one, sign=True),
         )
 
-    title = Text("Before and after")
-    table = plain_table(None, title=title)
-    table.add_column("", overflow="fold")
-    for a in (before, after):
-        table.add_column(word(a.inspection.record_id), justify="right", overflow="fold")
-    table.add_column("change", justify="right")
-    table.add_row(
-        "verdict", *(Text(a.verdict.value, style=STYLES[a.verdict]) for a in (before, after)), ""
-    )
-    for label, one, two in (
-        ("worst case", before.predicted_displacement_in, after.predicted_displacement_in),
-        ("margin", before.margin_in, after.margin_in),
-        (
-            "measured",
-            before.inspection.measured_displacement_in,
-            after.inspection.measured_displacement_in,
-        ),
-    ):
-        table.add_row(f"{label} {screen.unit}", *change(one, two))
-    chances = (before.probability_within_margin, after.probability_within_margin)
-    table.add_row("probability within", *("-" if p is None else percent(p) for p in chances), "")
-    for first, second in zip(before.joints, after.joints, strict=True):
-        if first.clearance_in is not None or second.clearance_in is not None:
-            label = f"#{first.joint} {first.name} {screen.unit}"
-            table.add_row(label, *change(first.clearance_in, second.clearance_in))
-    screen.print(table)
+    both = before, after
+    lengths: dict[str, list[float | None]] = {
+        "worst case": [a.predicted_displacement_in for a in both],
+        "margin": [a.margin_in for a in both],
+        "measured": [a.inspection.measured_displacement_in for a in both],
+    }
+    for found in zip(before.joints, after.joints, strict=True):
+        read = [f.clearance_in for f in found]
+        if read != [None, None]:
+            lengths[f"#{found[0].joint} {found[0].name}"] = read
+    chances = [a.probability_within_margin for a in both]
+    verdicts = [Text(a.verdict.value, style=STYLES[a.verdict]) for a in both]
+    within = ["-" if p is None else percent(p) for p in chances]
+    rows: list[list[Cell]] = [["verdict", *verdicts, ""]]
+    for label, values in lengths.items():
+        rows.append([f"{label} {screen.unit}", *change(*values)])
+    rows.insert(4, ["probability within", *within, ""])
+    screen.print("Before and after", style="bold")
+    names = [f"{visible(a.inspection.record_id, one_line=True)}>" for a in both]
+    print_table(screen, ("", *names, "change>"), rows)

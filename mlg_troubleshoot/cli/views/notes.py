@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
-from rich.console import Console
 from rich.padding import Padding
 
 from mlg_troubleshoot.cli import output
@@ -13,7 +12,6 @@ from mlg_troubleshoot.errors import Problem, ProblemGroup, grouped
 
 _LINES_OF_PROBLEMS = 40
 _LINES_OF_NOTES = (8, 4)
-_PROBLEM_COLUMN = 22
 
 
 def show_notes(notes: Sequence[str]) -> None:
@@ -51,7 +49,7 @@ def show_problems(problems: Sequence[Problem]) -> None:
         _message(console, more, indent=2)
 
 
-def _show_problem(console: Console, group: ProblemGroup) -> None:
+def _show_problem(console: output.DataConsole, group: ProblemGroup) -> None:
     problem = group.first
     about_all = problem.row is None and problem.column is None
     found = (
@@ -70,7 +68,7 @@ def _show_problem(console: Console, group: ProblemGroup) -> None:
     _message(console, f"What to do: {problem.remedy}", indent=4)
 
 
-def _show_problem_tables(console: Console, groups: Sequence[ProblemGroup]) -> None:
+def _show_problem_tables(console: output.DataConsole, groups: Sequence[ProblemGroup]) -> None:
     """One table for each sheet; what is wrong with a file as a whole stands before its tables."""
     for (file, sheet), found in groupby(groups, key=lambda g: (g.first.file, g.first.sheet)):
         of_sheet = list(found)
@@ -85,25 +83,23 @@ def _show_problem_tables(console: Console, groups: Sequence[ProblemGroup]) -> No
             for part in (file, None if sheet is None else f"sheet {sheet!r}")
             if part is not None
         )
-        table = output.plain_table(console)
-        table.title = output.text(place)
-        table.title_justify = "left"
-        table.title_style = ""
-        for heading in ("cell", "column", "found"):
-            table.add_column(heading, overflow="fold", max_width=_PROBLEM_COLUMN)
-        table.add_column("expected, and what to do", ratio=1)
-        for group in placed:
-            problem = group.first
-            table.add_row(
-                output.word(group.where.removeprefix("cell ")),
-                output.word(problem.column or "-"),
-                output.text("nothing" if group.found is None else group.found),
-                output.text(f"{problem.expected}.\n{problem.remedy}"),
-            )
-        console.print(table)
+        console.print(output.text(place))
+        output.print_table(
+            console,
+            ("cell<22", "column<22", "found<22", "expected, and what to do"),
+            [
+                (
+                    group.where.removeprefix("cell "),
+                    group.first.column or "-",
+                    "nothing" if group.found is None else group.found,
+                    output.text(f"{group.first.expected}.\n{group.first.remedy}"),
+                )
+                for group in placed
+            ],
+        )
 
 
-def _message(console: Console, text: str, indent: int = 0) -> None:
+def _message(console: output.DataConsole, text: str, indent: int = 0) -> None:
     """Print a message: folded under its own indent on a terminal, one line of a file elsewhere."""
     if console.is_terminal:
         console.print(Padding(output.text(text), (0, 0, 0, indent)))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from rich.panel import Panel
-from rich.table import Table
 from rich.text import Text
 
-from mlg_troubleshoot.cli.output import WIDE, DataConsole, plain_table, text, word
+from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, text, word
 from mlg_troubleshoot.cli.views.tables import (
     MARKS,
     STYLES,
@@ -51,7 +50,7 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
     if isinstance(judgement, Assessment) and detail:
         _show_detail(judgement, gear, screen)
     elif isinstance(judgement, Assessment):
-        screen.print(_short_table(judgement, screen))
+        _show_joints(judgement, screen, detail=False)
     notes = judgement.warnings if detail else judgement.warnings[:_NOTES]
     for note in notes:
         screen.sentence(Sentence.of("* {}", note))
@@ -112,46 +111,48 @@ def _numbers(a: Assessment) -> Iterator[str]:
         )
 
 
-def _short_table(a: Assessment, screen: DataConsole) -> Table:
-    table = plain_table(screen)
+def _show_joints(a: Assessment, screen: DataConsole, *, detail: bool) -> None:
+    """Show the joints in the order to read them: the first few, or all that is known of each."""
     row = a.inspection
-    typed = row.convention is not ClearanceConvention.RADIAL
-    kind = row.convention.lower().replace("_", " ")
     first = a.next_action
     to_read = first.joints if first.action in (Action.MEASURE, Action.MEASURE_AGAIN) else ()
-    joint = "inspect in this order" if to_read else "joints, by contribution"
-    headings = (
-        "",
-        joint,
-        *([f"typed,\n{kind}"] if typed else []),
-        f"radial\n{screen.unit}",
-        f"limit\n{screen.unit}",
-        "contri-\nbutes",
-    )
-    for heading in headings:
-        is_joint = heading == joint
-        table.add_column(
-            heading,
-            justify="left" if is_joint else "right",
-            no_wrap=not is_joint,
-            min_width=20 if is_joint else None,
-        )
-    order = {number: place for place, number in enumerate(to_read)}
+    order = {number: place for place, number in enumerate(() if detail else to_read)}
     listed = sorted(a.ranked, key=lambda f: order.get(f.joint, len(order)))
-    for place, f in enumerate(listed[:_JOINTS], start=1):
-        cells = [str(place), *_joint_cells(f, screen)[1:5]]
-        if typed:
-            entered = row.entered.get(f.joint)
-            cells.insert(2, "-" if entered is None else str(entered))
-        table.add_row(*cells, style="bold" if f.over_limit else "")
-    return table
+    joint = "inspect in this order" if order else "joints, by contribution"
+    columns: dict[str, Callable[[JointFinding], str]] = {
+        "rank>" if detail else ">": lambda f: str(f.rank if detail else listed.index(f) + 1),
+        joint: lambda f: f"#{f.joint} {f.name}" + " OVER LIMIT" * f.over_limit,
+    }
+    if row.convention is not ClearanceConvention.RADIAL and not detail:
+        kind = row.convention.lower().replace("_", " ")
+        columns[f"typed,\n{kind}>"] = lambda f: str(row.entered.get(f.joint, "-"))
+    columns[f"radial\n{screen.unit}>"] = lambda f: (
+        "unmeasured" if f.clearance_in is None else screen.length(f.clearance_in)
+    )
+    # A narrow terminal leaves the limit to the short view, for the sake of the names.
+    if not detail or screen.width >= WIDE:
+        columns[f"limit\n{screen.unit}>"] = lambda f: screen.length(f.limit_in)
+    columns[f"contri-\nbutes {screen.unit if detail else ''}".strip() + ">"] = lambda f: (
+        "-" if f.contribution_in is None else screen.length(f.contribution_in)
+    )
+    if detail:
+        columns["S\nfirst>"] = lambda f: f"{f.first_order:.3f}"
+        columns["S\ntotal>"] = lambda f: f"{f.total_order:.3f}"
+        columns["ampli-\nfication>"] = lambda f: f"{f.plunger_amplification:.2f}"
+        columns["rank\nrange>"] = lambda f: "-".join(map(str, dict.fromkeys(f.rank_range)))
+    rows = [
+        [text(cell(f), "bold" if f.over_limit else "") for cell in columns.values()]
+        for f in listed[: None if detail else _JOINTS]
+    ]
+    spare = ("rank\nrange", "S\nfirst", "S\ntotal")
+    print_table(screen, [*columns], rows, spare, folded=joint)
 
 
 def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
     """Everything that is known: all joints with their indices, repairs, re-rigging, the uncertainty
     budget.
     """
-    screen.print(_joint_table(a, screen))
+    _show_joints(a, screen, detail=True)
     alike = sorted({tuple(sorted((f.joint, *f.alike))) for f in a.joints if f.alike})
     if alike:
         pairs = ", ".join("#" + " = #".join(str(n) for n in group) for group in alike)
@@ -159,7 +160,7 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
             f"Both ends of one link act alike ({pairs}): the plunger cannot tell which end is worn."
         )
     if a.repair_sets:
-        screen.print(_repair_table(a, screen))
+        _show_repairs(a, screen)
         parts = sorted({gear.joint(n).new_part.value for s in a.repair_sets for n in s.joints})
         listed = " to ".join(screen.length(each) for each in dict.fromkeys((parts[0], parts[-1])))
         screen.print(
@@ -189,62 +190,13 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
     screen.print(f"Model: {gear.name}, geometry {gear.provenance}. {what}", style="dim")
 
 
-def _joint_table(a: Assessment, screen: DataConsole) -> Table:
-    table = plain_table(screen)
-    # Two-line headings: with them every column, and first of all the joint, has its place in 80
-    # columns.
-    limit = f"limit\n{screen.unit}"
-    headings = (
-        *(
-            "rank",
-            "joint",
-            f"clearance\n{screen.unit}",
-            limit,
-            f"contri-\nbutes {screen.unit}",
-            "S\nfirst",
-            "S\ntotal",
-        ),
-        *("ampli-\nfication", "rank\nrange"),
-    )
-    # A narrow terminal leaves the limit to the short view, for the sake of the names.
-    shown = [heading for heading in headings if heading != limit or screen.width >= WIDE]
-    for heading in shown:
-        name = heading == "joint"
-        table.add_column(
-            heading,
-            justify="left" if name else "right",
-            no_wrap=not name,
-            min_width=19 if name else None,
-        )
-    for f in a.ranked:
-        cells = dict(zip(headings, _joint_cells(f, screen), strict=True))
-        table.add_row(*(cells[heading] for heading in shown), style="bold" if f.over_limit else "")
-    return table
-
-
-def _joint_cells(f: JointFinding, screen: DataConsole) -> tuple[str, ...]:
-    low, high = f.rank_range
-    return (
-        str(f.rank),
-        f"#{f.joint} {f.name}" + (" OVER LIMIT" if f.over_limit else ""),
-        "unmeasured" if f.clearance_in is None else screen.length(f.clearance_in),
-        screen.length(f.limit_in),
-        "-" if f.contribution_in is None else screen.length(f.contribution_in),
-        f"{f.first_order:.3f}",
-        f"{f.total_order:.3f}",
-        f"{f.plunger_amplification:.2f}",
-        str(low) if low == high else f"{low}-{high}",
-    )
-
-
-def _repair_table(a: Assessment, screen: DataConsole) -> Table:
-    title = Text(
+def _show_repairs(a: Assessment, screen: DataConsole) -> None:
+    screen.print(
         "Repairs: sure = within the margin in the worst case; try = restore, then read the plunger"
     )
-    numbers = ("minutes", f"worst case {screen.unit}", "within", "second repair")
-    table = plain_table(None, "restore", "kind", *numbers, right=numbers, title=title)
-    for s in a.repair_sets or ():
-        table.add_row(
+    headings = ("restore", "kind", "minutes>", f"worst case {screen.unit}>", "within>")
+    rows = [
+        (
             joint_list(s.joints),
             str(s.kind),
             f"{s.minutes:.0f}",
@@ -252,4 +204,6 @@ def _repair_table(a: Assessment, screen: DataConsole) -> Table:
             percent(s.probability_within_margin),
             "-" if s.second_repair_probability is None else percent(s.second_repair_probability),
         )
-    return table
+        for s in a.repair_sets or ()
+    ]
+    print_table(screen, (*headings, "second repair>"), rows)
