@@ -5,14 +5,11 @@ not known.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from enum import Enum
-from functools import cache
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, cast
 
+import msgspec
 import numpy as np
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
@@ -44,54 +41,31 @@ _OF_GEOMETRY = ("name", "first_order", "total_order", "plunger_amplification", "
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON can hold it: records as objects, arrays as lists, names as text,
-    nothing but numbers.
+    """Return a value as JSON can hold it: records as objects, arrays as lists, names as text, and
+    null for what is not a finite number.
     """
-    return json.loads(as_text(value))
+    return msgspec.json.decode(msgspec.json.encode(value, enc_hook=_parts))
 
 
 def as_text(value: Any) -> str:
-    """Write a value as JSON: what `plain` makes of it, several times as fast."""
+    """Write a value as JSON: what `plain` makes of it, twice as fast."""
+    parts = msgspec.to_builtins(value, enc_hook=_parts)
     try:
-        return _ENCODED(value)
-    except (TypeError, ValueError):
-        # NaN or an infinity, or a key that is not a text.
-        return _ENCODED(_cleaned(value))
+        return _ENCODED(parts)
+    except ValueError:
+        return _ENCODED(plain(parts))
 
 
 def _parts(value: Any) -> Any:
     """What a value consists of that the encoder does not know."""
-    names = _field_names(value.__class__)
-    if names:
-        return {name: getattr(value, name) for name in names}
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, Mapping):
-        return dict(value)
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else list(value)
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, str):
+        return str(value)
+    return dict(value) if isinstance(value, Mapping) else list(value)
 
 
-def _cleaned(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, str | int):
-        return value
-    parts = value if isinstance(value, Mapping) else _parts(value)
-    if isinstance(parts, Mapping):
-        return {str(key): _cleaned(each) for key, each in parts.items()}
-    if isinstance(parts, list | tuple):
-        return [_cleaned(each) for each in parts]
-    return _cleaned(parts)
-
-
-_ENCODED = json.JSONEncoder(
-    allow_nan=False, ensure_ascii=False, check_circular=False, default=_parts
-).encode
-
-
-@cache
-def _field_names(kind: type) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
+_ENCODED = json.JSONEncoder(allow_nan=False, ensure_ascii=False, check_circular=False).encode
 
 
 def written(kind: Any, record: Any = None, /, **given: Any) -> dict[str, Any]:
