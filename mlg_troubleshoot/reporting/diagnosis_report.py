@@ -19,7 +19,6 @@ from mlg_troubleshoot.reporting.data_figures import data_figures
 from mlg_troubleshoot.reporting.diagnosis_figures import Residuals
 from mlg_troubleshoot.reporting.diagnosis_lines import (
     cause_words,
-    chance_words,
     column_words,
     fitted_numbers,
     headline,
@@ -44,7 +43,6 @@ _WORDS = {
 _MOST_PANELS = 2
 _MOST_RULED_OUT = 14
 _MOST_CHANGES = 40
-_MOST_LIKELY = 8
 _LEAST_LIKELY = 0.005
 
 PlotPair = tuple[Markup, Markup, str]
@@ -78,7 +76,6 @@ def _context(
     source = ", ".join(Path(name).name for name in provenance.input_sha256) or "inspections"
     residuals = Residuals(d, gear.joint_numbers, lengths.unit)
     words, tone = _WORDS[d.verdict]
-    found = d.causes or d.also_possible
     return {
         **head(
             f"Measured against predicted – {source}",
@@ -95,8 +92,11 @@ def _context(
         "tone": tone,
         "headline": headline(d, lengths.unit),
         "action": seven_lines(d, lengths.unit)[-1].text,
-        "sure": chance_words(d.beliefs.sure),
-        "likely": _likely(d),
+        "likely": [
+            (name_words(cause), target, chance)
+            for (cause, target), chance in d.probabilities.items()
+            if chance >= _LEAST_LIKELY
+        ],
         "of_data": data_figures(residuals),
         "plots": _plots(residuals),
         "scatter": drawn.measured_against_predicted(residuals),
@@ -108,32 +108,9 @@ def _context(
         "catalogue": {cause.name: cause for cause in CATALOGUE},
         "most_ruled_out": _MOST_RULED_OUT,
         "kind_words": kind_words,
-        "as_loaded": "load_directions" in [c.candidate.cause.name for c in d.causes],
         "changes": _changes(residuals),
-        "more_changes": len(d.gain.verdicts_changed) - _MOST_CHANGES if d.gain else 0,
-        "do": [
-            (cause_words(c), c.candidate.cause.inspect, c.candidate.separates)
-            for c in (*found, *d.beside)
-        ],
         "extension": extension,
-        "approval": [("Proposed by", ""), ("Checked by", ""), ("Approved for use by", "")],
     }
-
-
-def _likely(d: Diagnosis) -> list[tuple[str, str, float]]:
-    """What may be wrong, with its target and its probability, the likeliest first; then what no
-    list has, and nothing.
-    """
-    listed = [
-        (name_words(cause), target or "–", chance)
-        for (cause, target), chance in d.probabilities.items()
-        if chance >= _LEAST_LIKELY
-    ]
-    return [
-        *listed[:_MOST_LIKELY],
-        ("not on the list", "–", d.p_unlisted),
-        ("nothing wrong", "–", d.p_nothing),
-    ]
 
 
 def _days(d: Diagnosis) -> int | None:

@@ -14,7 +14,6 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.paper.statements import ClaimOutcome
 from mlg_troubleshoot.paper.study import Directions, StudyFindings
 from mlg_troubleshoot.reporting import study_figures as drawn
 from mlg_troubleshoot.reporting.figures import Style
@@ -61,17 +60,13 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
         ),
         "f": f,
         "table": table,
-        "limits": sorted({entry.limit_in for entry in table.joints}),
         "directions": _DIRECTIONS[f.options.directions],
-        "greatest": sorted(e.joint for e in order[:4]),
-        "top": _span(e.joint for e in order[:5]),
-        "top_share": sum(e.first_order for e in order[:5]),
+        "order": order,
+        "span": _span,
         "half": float(np.ptp([e.first_order_interval for e in table.joints], axis=1).max()) / 2.0,
-        "counts": [sum(s.outcome is outcome for s in f.statements) for outcome in ClaimOutcome],
         "rows": list(
             zip(f.gear.joints, table.joints, f.result.growth.local_stage.tolist(), strict=True)
         ),
-        "pairs": [g for g in f.result.groups if len(g.joints) > 1],
         "tiny": _tiny,
         "curve": drawn.release_curve(f.gear, lengths),
         "orders": _orders(f),

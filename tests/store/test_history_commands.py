@@ -17,7 +17,7 @@ import scipy.stats
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear import gear_file
-from mlg_troubleshoot.reporting.fleet_report import interval_bar
+from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.cli.conftest import Run, mlg, row
@@ -486,6 +486,7 @@ def test_the_page_of_a_life_shows_before_and_after_with_what_was_restored(
 
 
 def test_landings_left_are_drawn_with_an_arrow_beyond_the_horizon() -> None:
+    interval_bar = environment().get_template("bars.html.j2").module.interval_bar
     near = interval_bar({"p05": 100.0, "p50": 400.0, "p95": 900.0}, 20_000)
     far = interval_bar({"p05": 100.0, "p50": 400.0, "p95": None}, 20_000)
     assert "<polygon" not in near
