@@ -22,7 +22,6 @@ from mlg_troubleshoot.cli import (
     new_gear,
     options,
     reconstruct,
-    separable,
     study,
     survey,
     template,
@@ -110,7 +109,7 @@ gear_app.command(epilog="Example: [b]mlg gear verify[/b]")(gear.verify)
 gear_app.command(epilog=new_gear.EPILOG)(new_gear.new)
 gear_app.command(epilog="Example: [b]mlg gear draw gear.svg[/b]")(new_gear.draw)
 gear_app.command(epilog=reconstruct.EPILOG)(reconstruct.reconstruct)
-gear_app.command(epilog=separable.EPILOG)(separable.separable)
+gear_app.command(epilog=gear.SEPARABLE)(gear.separable)
 gear_app.command(epilog=survey.EPILOG)(survey.survey)
 app.command(epilog="Example: [b]mlg doctor[/b]")(doctor.doctor)
 app.command(epilog=study.EPILOG)(study.study)
