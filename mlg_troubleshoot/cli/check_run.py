@@ -340,7 +340,14 @@ class Run:
         else:
             with stages(quiet=self._wanted.quiet) as bar:
                 progress = partial(bar, "Keeping")
-                added = keep(result, self._asked, self._place, self._same_tail(), progress, judged)
+                added = keep(
+                    result,
+                    self._asked,
+                    self._place,
+                    self._same_tail(),
+                    progress,
+                    judged,
+                )
         if not self._wanted.quiet:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""

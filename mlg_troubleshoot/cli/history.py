@@ -93,7 +93,14 @@ def show(
         return
     with stages(quiet=shown.quiet) as bar:
         ahead = not no_forecast
-        found = history.show_lives(place, known, tail, side, ahead=ahead, progress=bar)
+        found = history.show_lives(
+            place,
+            known,
+            tail,
+            side,
+            ahead=ahead,
+            progress=bar,
+        )
     if shown.as_json and len(found.lives) != 1:
         tail = found.lives[0].key[0]
         raise UsageError(
@@ -357,7 +364,14 @@ def rerig(
 
     place = records.kept
     gear_key = (tail, side)
-    record = history.work(place, RecordKind.RERIG, gear_key, day, work_order, landings)
+    record = history.work(
+        place,
+        RecordKind.RERIG,
+        gear_key,
+        day,
+        work_order,
+        landings,
+    )
     _say_added(place, f"re-rigging of {record.tail_no} {record.side}", record)
 
 

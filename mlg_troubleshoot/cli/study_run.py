@@ -85,7 +85,14 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
     else:
         screen = output.console(unit=settings.show, elsewhere=output.WIDEST)
         rows = [*zip(gear.joints, findings.result.table.joints, strict=True)]
-        output.show_page("study", screen, f=shown, rows=rows, given=given, infinity=math.inf)
+        output.show_page(
+            "study",
+            screen,
+            f=shown,
+            rows=rows,
+            given=given,
+            infinity=math.inf,
+        )
     if flags.report is not None:
         written = task.write_study_report(
             findings,

@@ -235,7 +235,15 @@ def _point(canvas: Canvas, x: float, y: float, *, after: bool, marked: bool = Fa
     elif after:
         canvas.marker("circle", x, y, 1.9, colour=ACCENT)
     else:
-        canvas.add("circle", cx=x, cy=y, r=2.3, fill="none", stroke=SOFT, stroke_width=0.8)
+        canvas.add(
+            "circle",
+            cx=x,
+            cy=y,
+            r=2.3,
+            fill="none",
+            stroke=SOFT,
+            stroke_width=0.8,
+        )
 
 
 def _mean_mark(plot: Plot, x: float, values: Array) -> None:
@@ -247,7 +255,15 @@ def _mean_mark(plot: Plot, x: float, values: Array) -> None:
     plot.canvas.line(px, low, px, high, width=1.6)
     for end in (low, high):
         plot.canvas.line(px - 3, end, px + 3, end, width=1.6)
-    plot.canvas.rectangle(px - 3, py - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
+    plot.canvas.rectangle(
+        px - 3,
+        py - 3,
+        6,
+        6,
+        fill=PAPER,
+        colour=INK,
+        width=1.4,
+    )
 
 
 def lanes(title: str, across: Axis, names: Sequence[str], high: float = 20.0) -> Plot:
@@ -291,7 +307,15 @@ def tail_strips(residuals: Residuals) -> list[Markup]:
             for value in own:
                 _point(plot.canvas, *plot.at(value, place + 0.5), after=after)
             x, y = plot.at(float(np.mean(own)), place + 0.5)
-            plot.canvas.rectangle(x - 3, y - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
+            plot.canvas.rectangle(
+                x - 3,
+                y - 3,
+                6,
+                6,
+                fill=PAPER,
+                colour=INK,
+                width=1.4,
+            )
         figures.append(plot.canvas.svg())
     return figures
 

@@ -104,7 +104,15 @@ class Canvas:
         outline = _stroke(edge) if edge else {}
         width = max(across, 0.0)
         height = max(down, 0.0)
-        self.add("rect", x=x, y=y, width=width, height=height, fill=fill, **outline)
+        self.add(
+            "rect",
+            x=x,
+            y=y,
+            width=width,
+            height=height,
+            fill=fill,
+            **outline,
+        )
 
     def polyline(
         self,
@@ -166,7 +174,15 @@ class Canvas:
             case "circle":
                 self.add("circle", cx=x, cy=y, r=size, fill=colour)
             case "ring":
-                self.add("circle", cx=x, cy=y, r=size, fill=PAPER, stroke=colour, stroke_width=1.6)
+                self.add(
+                    "circle",
+                    cx=x,
+                    cy=y,
+                    r=size,
+                    fill=PAPER,
+                    stroke=colour,
+                    stroke_width=1.6,
+                )
             case "square":
                 self.rectangle(left, top, 2 * size, 2 * size, fill=colour)
             case "diamond":
@@ -293,7 +309,14 @@ class Plot:
         for value, text in marks or [(value, number(value, decimals_of(ticks))) for value in ticks]:
             x, _ = self.at(value, self.y.low)
             self.canvas.line(x, y1, x, y1 + 4, colour=SOFT)
-            self.canvas.text(x, y1 + 14, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
+            self.canvas.text(
+                x,
+                y1 + 14,
+                text,
+                size=_TICK_SIZE,
+                anchor="middle",
+                colour=SOFT,
+            )
         self.canvas.line(x0, y1, x1, y1, colour=SOFT)
         self.canvas.line(x0, y0, x0, y1, colour=SOFT)
         middle = (x0 + x1) / 2
@@ -322,7 +345,14 @@ class Plot:
                 width=1.0 if value == 0.0 else 0.5,
             )
             text = number(value, decimals_of(ticks))
-            self.canvas.text(x, y1 + 13, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
+            self.canvas.text(
+                x,
+                y1 + 13,
+                text,
+                size=_TICK_SIZE,
+                anchor="middle",
+                colour=SOFT,
+            )
         self.canvas.line(x0, y1, x1, y1, colour=SOFT)
         middle = (x0 + x1) / 2
         self.canvas.text(middle, y1 + 27, self.x.label, size=10, anchor="middle")
@@ -345,7 +375,15 @@ class Plot:
     ) -> None:
         """Draw the legend on one line, from its left end. [canvas units]"""
         for one in series:
-            self.canvas.line(x, y, x + 24, y, colour=one.colour, width=one.width, dash=one.dash)
+            self.canvas.line(
+                x,
+                y,
+                x + 24,
+                y,
+                colour=one.colour,
+                width=one.width,
+                dash=one.dash,
+            )
             self.canvas.text(x + 28, y + 3.5, one.label, size=_TICK_SIZE)
             x += 40 + text_width(one.label, _TICK_SIZE)
         for shape, label in markers:

@@ -99,13 +99,35 @@ def _gauge(
     canvas.rectangle(ends[0], top, ends[1] - ends[0], bottom - top, fill=PALE)
     plot.draw_vertical_grid()
     canvas.text(left, 10, "◀ short of mid-position", size=10, colour=SOFT)
-    canvas.text((left + right) / 2, 10, "allowed", size=10, anchor="middle", colour=SOFT)
-    canvas.text(right, 10, "beyond mid-position ▶", size=10, colour=SOFT, anchor="end")
+    canvas.text(
+        (left + right) / 2,
+        10,
+        "allowed",
+        size=10,
+        anchor="middle",
+        colour=SOFT,
+    )
+    canvas.text(
+        right,
+        10,
+        "beyond mid-position ▶",
+        size=10,
+        colour=SOFT,
+        anchor="end",
+    )
     canvas.text(canvas.width, 10, lengths.unit, size=10, colour=SOFT, anchor="end")
     for x, end in zip(ends, (-margin_in, margin_in), strict=True):
         canvas.line(x, top - 8, x, bottom + 4, width=2.6)
         words = lengths.bare(end, True)
-        canvas.text(x, top - 11, words, size=10.5, bold=True, anchor="middle", halo=True)
+        canvas.text(
+            x,
+            top - 11,
+            words,
+            size=10.5,
+            bold=True,
+            anchor="middle",
+            halo=True,
+        )
     for place, (name, value) in enumerate(lanes.items()):
         y = plot.at(0.0, place + 0.5)[1] + 4
         bold = name[0].isupper()
@@ -128,7 +150,14 @@ def contribution_bar(
         u2 = 2.0 * gauge_u_in * finding.plunger_amplification
         style: figures.Style = "solid" if finding.over_limit else "mid"
         bar = Bar(value, max(value - u2, 0.0), value + u2, style)
-    figures.draw_bar(canvas, bar, 1, 2, 10, 196 / longest_in if longest_in > 0 else 0.0)
+    figures.draw_bar(
+        canvas,
+        bar,
+        1,
+        2,
+        10,
+        196 / longest_in if longest_in > 0 else 0.0,
+    )
     canvas.line(1, 0, 1, 14, colour=SOFT)
     return canvas.svg("bar")
 
@@ -208,7 +237,15 @@ def plunger_curve(
         plot.draw(one)
     px, high = plot.at(end * per_inch, margin)
     _, low = plot.at(end * per_inch, -margin)
-    canvas.rectangle(px, high, 7, low - high, fill=PALE, colour=INK, width=1.2)
+    canvas.rectangle(
+        px,
+        high,
+        7,
+        low - high,
+        fill=PALE,
+        colour=INK,
+        width=1.2,
+    )
     marks = [(0.0, f"margin ±{shown.bare(a.margin_in)}", False)]
     marks += [
         (v, shown.bare(v, True), True)

@@ -342,7 +342,14 @@ class _PlaneDrawing:
                 pivot = at[step.pivot]
                 pin = at[step.pin]
                 along = _unit(pin - pivot)
-                _tube(canvas, pin - 13 * along, pin + 9 * along, 25, PAPER, cap="round")
+                _tube(
+                    canvas,
+                    pin - 13 * along,
+                    pin + 9 * along,
+                    25,
+                    PAPER,
+                    cap="round",
+                )
         return segments
 
     def _rigid(self, joint: str, pivot: str) -> bool:
@@ -451,11 +458,26 @@ def _guides(canvas: Canvas, step: Guided, at: Mapping[str, complex]) -> list[Seg
 
 
 def _named(canvas: Canvas, place: complex, name: str, anchor: Anchor) -> None:
-    canvas.text(place.real, place.imag, name, size=9, bold=True, colour=SOFT, anchor=anchor)
+    canvas.text(
+        place.real,
+        place.imag,
+        name,
+        size=9,
+        bold=True,
+        colour=SOFT,
+        anchor=anchor,
+    )
 
 
 def _ground(canvas: Canvas, place: complex) -> None:
-    _polygon(canvas, place, place + (12 + 19j), place + (-12 + 19j), fill=PAPER, width=1.4)
+    _polygon(
+        canvas,
+        place,
+        place + (12 + 19j),
+        place + (-12 + 19j),
+        fill=PAPER,
+        width=1.4,
+    )
     for k in range(-2, 3):
         above = place + complex(5 * k + 1, 19)
         below = place + complex(5 * k - 3, 24)
@@ -476,7 +498,14 @@ def _mark(canvas: Canvas, at: complex, text: str, state: str, faded: bool = Fals
     pale = state == "missing" or faded
     colour = SOFT if pale else INK
     if state == "over":
-        canvas.rectangle(x - size, y - size, 2 * size, 2 * size, fill=colour, colour=PAPER)
+        canvas.rectangle(
+            x - size,
+            y - size,
+            2 * size,
+            2 * size,
+            fill=colour,
+            colour=PAPER,
+        )
         colour = PAPER
     else:
         outline: dict[str, Any] = {
@@ -500,7 +529,14 @@ def _arrow(canvas: Canvas, start: complex, end: complex) -> None:
     base = end - min(8.0, abs(end - start)) * along
     _line(canvas, start, end, colour=PAPER, width=5.5)
     _line(canvas, start, base, width=2.4)
-    _polygon(canvas, end, base + 4.2j * along, base - 4.2j * along, fill=INK, width=0.5)
+    _polygon(
+        canvas,
+        end,
+        base + 4.2j * along,
+        base - 4.2j * along,
+        fill=INK,
+        width=0.5,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -555,7 +591,15 @@ def _callout(
         start = joint + (_MARKER + 1) * _unit(edge - joint)
         _line(canvas, start, edge, colour=SOFT, width=0.8)
     if framed:
-        canvas.rectangle(box[0], box[1], width, height, fill=PAPER, colour=INK, width=1.4)
+        canvas.rectangle(
+            box[0],
+            box[1],
+            width,
+            height,
+            fill=PAPER,
+            colour=INK,
+            width=1.4,
+        )
     base = box[1] + 0.5
     middle = (box[0] + box[2]) / 2
     for line in lines:

@@ -69,7 +69,14 @@ def grouped_bars(
     per_value = (_WIDTH - _LABEL_WIDTH - 46) / longest if longest > 0.0 else 0.0
     for i, label in enumerate(labels):
         top = _TOP + row * i
-        canvas.text(_LABEL_WIDTH - 5, top + row / 2 + 1, label, size=10, anchor="end", bold=True)
+        canvas.text(
+            _LABEL_WIDTH - 5,
+            top + row / 2 + 1,
+            label,
+            size=10,
+            anchor="end",
+            bold=True,
+        )
         for k, one in enumerate(series):
             value = float(one.values[i])
             if not math.isfinite(value):
@@ -77,7 +84,14 @@ def grouped_bars(
             low, high = (None, None) if one.spread is None else one.spread[i].tolist()
             y = top + _BAR_HEIGHT * k
             bar = Bar(max(value, 0.0), low, high, one.style)
-            end = draw_bar(canvas, bar, _LABEL_WIDTH, y + 0.5, _BAR_HEIGHT - 1.5, per_value)
+            end = draw_bar(
+                canvas,
+                bar,
+                _LABEL_WIDTH,
+                y + 0.5,
+                _BAR_HEIGHT - 1.5,
+                per_value,
+            )
             canvas.text(end + 4, y + 7.2, number(value, 4), size=8)
     canvas.line(_LABEL_WIDTH, _TOP - 2, _LABEL_WIDTH, canvas.height, colour=SOFT)
     return canvas.svg()
@@ -118,7 +132,15 @@ def release_curve(gear: Gear, lengths: Lengths) -> Markup:
         plot.draw(one)
     px, high = plot.at(1.0, mid + margin)
     _, low = plot.at(1.0, mid - margin)
-    canvas.rectangle(px, high, 7, low - high, fill=PALE, colour=INK, width=1.2)
+    canvas.rectangle(
+        px,
+        high,
+        7,
+        low - high,
+        fill=PALE,
+        colour=INK,
+        width=1.2,
+    )
     for i, text in enumerate(("margin", f"±{lengths.bare(gear.margin.value)}")):
         canvas.text(px + 11, (high + low) / 2 + 1 + 10 * i, text, size=9)
     plot.draw_legend([reference, others[0]] if others else [reference], plot.area[0], 8)
