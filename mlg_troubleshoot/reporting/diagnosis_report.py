@@ -38,11 +38,10 @@ _WORDS = {
     "UNLISTED": ("REAL, BUT NOT ON THE LIST", "inconclusive"),
     "NONE": ("NOTHING FOUND", "within-margin"),
 }
-# What a page has room for: panels of rivals, causes ruled out, changed verdicts, and explanations;
-# one that is less likely than this is not drawn. [1]
+# What a page has room for: panels of rivals and causes ruled out; what is less likely than this is
+# not listed. [1]
 _MOST_PANELS = 2
 _MOST_RULED_OUT = 14
-_MOST_CHANGES = 40
 _LEAST_LIKELY = 0.005
 
 PlotPair = tuple[Markup, Markup, str]
@@ -108,7 +107,8 @@ def _context(
         "catalogue": {cause.name: cause for cause in CATALOGUE},
         "most_ruled_out": _MOST_RULED_OUT,
         "kind_words": kind_words,
-        "changes": _changes(residuals),
+        "places": {record: place for place, record in enumerate(d.used.record_id)},
+        "effect_in": residuals.effect_in,
         "extension": extension,
     }
 
@@ -179,39 +179,3 @@ def _against_each(residuals: Residuals) -> list[tuple[Markup, Markup | None]]:
         )
         for axis in filter(varies, axes)
     ]
-
-
-def _changes(residuals: Residuals) -> list[dict[str, Any]]:
-    """Inspections whose predicted side of the margin changes, and whether it is then the measured
-    one.
-    """
-    d = residuals.diagnosis
-    if d.gain is None:
-        return []
-    places = {record: k for k, record in enumerate(d.used.record_id)}
-    rows = []
-    for record in d.gain.verdicts_changed[:_MOST_CHANGES]:
-        k = places[record]
-        margin = float(d.used.margin_in[k])
-        values = [
-            float(d.predicted_in[k]),
-            float(d.predicted_in[k] + residuals.effect_in[k]),
-            d.used.measured_in[k],
-        ]
-        before, after, truth = ("within" if abs(value) <= margin else "OUTSIDE" for value in values)
-        rows.append(
-            {
-                "record": record,
-                "gear": str(d.used.gears[k]),
-                "margin_in": margin,
-                "shown": list(zip(values, (before, after, truth), strict=True)),
-                "right": (
-                    "on the edge"
-                    if before == after
-                    else "now right"
-                    if after == truth
-                    else "now wrong"
-                ),
-            }
-        )
-    return rows
