@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.views.notes import show_notes
 from tests.cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 
@@ -249,3 +250,46 @@ def test_of_many_notes_the_first_and_the_last_are_shown(capsys: pytest.CaptureFi
     said = capsys.readouterr().err
     assert re.findall(r"note (\d+) of", said) == [*map(str, range(8)), *map(str, range(26, 30))]
     assert "18 more notes; --json" in said
+
+
+def test_a_study_stands_whole_on_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = at_width(monkeypatch, 80, "study").out
+    assert "…" not in shown
+    assert max(map(len, shown.splitlines())) <= 80
+
+
+def table(width: int, *headings: str, spare: tuple[str, ...] = ()) -> list[str]:
+    """Two rows of a table, as they stand on a screen of some width."""
+    screen = output.console()
+    screen.width = width
+    rows = [[f"{heading} one" for heading in headings], ["-"] * len(headings)]
+    with screen.capture() as shown:
+        output.print_table(screen, headings, rows, spare)
+    return shown.get().splitlines()
+
+
+def test_a_narrow_screen_leaves_out_the_first_spare_columns() -> None:
+    headings = table(30, "tail", "date", "verdict", "next", spare=("verdict", "date"))[0].split()
+    assert headings == ["tail", "date", "next"]
+
+
+def test_a_wide_screen_shows_spare_columns() -> None:
+    headings = table(60, "tail", "date", "verdict", "next", spare=("verdict", "date"))[0].split()
+    assert headings == ["tail", "date", "verdict", "next"]
+
+
+def test_a_column_that_says_nothing_is_left_out() -> None:
+    screen = output.console()
+    with screen.capture() as shown:
+        output.print_table(screen, ("tail", "due>", "next"), [("N1", "-", "go on")], ())
+    assert shown.get().splitlines()[0].split() == ["tail", "next"]
+
+
+def test_numbers_stand_to_the_right_of_their_column() -> None:
+    screen = output.console()
+    with screen.capture() as shown:
+        output.print_table(screen, ("tail", "landings>"), [("N1", "7"), ("N2", "1200")])
+    assert [line.rstrip() for line in shown.get().splitlines()[1:]] == [
+        "N1           7",
+        "N2        1200",
+    ]
