@@ -43,7 +43,6 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.looking_back import PastInspection
 
-SIGNATORIES = ("Measured by", "Independently measured by", "Rectified by", "Inspected by")
 _SIDES = {Side.LH: "left-hand main landing gear", Side.RH: "right-hand main landing gear"}
 _WARNINGS_ON_FRONT = 3
 _MANUAL = ("manual_ref", "manual_rev")
@@ -120,11 +119,9 @@ def _inspection(
         "carried": in_front,
         "carried_in_full": carried if carried != in_front else [],
         "front_warnings": front,
-        "unmeasured": [f.joint for f in a.joints if f.clearance_in is None],
         "gauge": drawn.margin_gauge(a, lengths),
         "drawing": schematic(gear, a, lengths),
         "legend": [(joint_mark("", state), words) for state, words in JOINT_STATES.items()],
-        "extended": bool(provenance.extension),
         "wrong": chance_wrong_sentence(a),
         "no_repair": no_repair_set(a),
         "rigging": None if a.rigging is None else lengths.said(rigging_sentence(a.rigging)),
@@ -132,11 +129,6 @@ def _inspection(
         "rows": _joints(gear, a, lengths),
         "curve": drawn.plunger_curve(gear, a, lengths),
         "cases": _sequence(gear, a, lengths),
-        "signatories": [
-            (role, inspection.technician_id or "" if i == 0 else "")
-            for i, role in enumerate(SIGNATORIES)
-        ],
-        "intervals": {i.joint: i for i in a.posterior.intervals} if a.posterior else {},
     }
 
 
@@ -147,7 +139,7 @@ def _place(
 
 
 def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]:
-    """The ranked joints, each with its mark, its bar and what was entered."""
+    """The ranked joints, each with its mark and its bar."""
     gauge_u = a.inspection.gauge_u_of
 
     def bar_end(finding: JointFinding) -> float:
@@ -161,12 +153,9 @@ def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]
     return [
         {
             "f": f,
-            "location": gear.joint(f.joint).location,
-            "entered": a.inspection.entered.get(f.joint),
             "state": joint_state(gear.joint(f.joint), f.clearance_in),
             "mark": joint_mark(str(f.joint), joint_state(gear.joint(f.joint), f.clearance_in)),
             "bar": drawn.contribution_bar(f, longest, gauge_u(f.joint), lengths),
-            "allowance_in": _allowance(f),
         }
         for f in a.ranked
     ]
@@ -176,15 +165,6 @@ def _areas(gear: Gear, step: Step) -> str:
     """The areas to open for a step, in the order of the gear file."""
     names = {gear.joint(number).area for number in step.joints}
     return ", ".join(area.name for area in gear.areas if area.name in names)
-
-
-def _allowance(finding: JointFinding) -> float | None:
-    """How much further a joint may wear: to the margin, and no further than to its own limit.
-    [in]
-    """
-    if finding.allowance_in is None or finding.clearance_in is None:
-        return None
-    return max(0.0, min(finding.allowance_in, finding.limit_in - finding.clearance_in))
 
 
 def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
