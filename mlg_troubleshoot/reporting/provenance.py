@@ -80,9 +80,7 @@ def head(
     """Return what the base template shows; the caller adds its own and may replace any of it."""
     return {
         "title": title,
-        "heading_of_gear": gear.name,
         "footer_left": footer,
-        "footer_middle": _program_and_hashes(provenance),
         "disclaimer": DISCLAIMER,
         "source_counts": [
             (sum(n.kind is kind for n in gear.numbers), kind.value) for kind in SourceKind
@@ -92,16 +90,7 @@ def head(
             " = ".join(map("#{}".format, pair)) for pair in gear.link_groups if len(pair) > 1
         ],
         "made": provenance,
-        "made_on": provenance.created.date().isoformat(),
         "lengths": lengths,
         "unit": lengths.unit.value,
         "gear": gear,
     }
-
-
-def _program_and_hashes(p: ReportProvenance) -> str:
-    hashes = list(p.input_sha256.values())
-    parts = [f"mlg {p.program_version}", f"geometry {p.geometry_sha256[:8]}"]
-    if hashes:
-        parts.append(f"input {hashes[0][:8]}" if len(hashes) == 1 else f"{len(hashes)} inputs")
-    return " · ".join(parts)
