@@ -169,6 +169,28 @@ def against_column(residuals: Residuals, name: str) -> ResidualAxis:
     )
 
 
+def split_by(residuals: Residuals, name: str, other: ResidualAxis) -> tuple[Mask, str, str] | None:
+    """Split the rows by a column, so that what moves with two columns together can be seen."""
+    column = against_column(residuals, name)
+    x = other.values
+    if not column.names:
+        known = np.isfinite(column.values)
+        half = float(np.median(column.values[known])) if known.any() else np.nan
+        words = column_words(name)
+        shown = f"{half:.0f}" if abs(half) >= 100.0 else f"{half:.3g}"
+        return column.values >= half, f"{words} {shown} and more", f"{words} below {shown}"
+    slopes = {}
+    for place, level in enumerate(column.names):
+        rows = (column.values == place) & np.isfinite(x)
+        if rows.sum() > 3 and np.std(x[rows]) > 0.0:
+            slope = float(np.polyfit(x[rows], residuals.before_in[rows], 1)[0])
+            slopes[level] = abs(slope) * np.sqrt(rows.sum())
+    if not slopes:
+        return None
+    level = max(slopes, key=lambda each: slopes[each])
+    return column.values == column.names.index(level), level, f"not {level}"
+
+
 def _day_label(residuals: Residuals) -> str:
     first = residuals.diagnosis.used.first_day
     return f"days since {first}" if first else "day"
@@ -296,9 +318,9 @@ def tail_strips(residuals: Residuals) -> list[Markup]:
 
     names = sorted(np.unique(tails).tolist(), key=size, reverse=True)
     shown = sorted(names[:MOST_TAILS])
-    panels = [("before", before, False)]
+    panels = [("by tail, before", before, False)]
     if residuals.diagnosis.causes:
-        panels.append(("with the extension", residuals.drawn(residuals.after_in), True))
+        panels.append(("by tail, with the extension", residuals.drawn(residuals.after_in), True))
     figures = []
     for title, values, after in panels:
         plot = lanes(title, residuals.axis, shown, 13.0)

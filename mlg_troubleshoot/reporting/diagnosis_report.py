@@ -151,12 +151,7 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
             )
         ]
     if d.unlisted_variables:
-        first, *others = (
-            drawn.residual_plot(residuals, drawn.against_column(residuals, name), "")
-            for name in d.unlisted_variables
-        )
-        words = " and ".join(map(column_words, d.unlisted_variables))
-        return [(first, (others or [scatter])[0], f"Moves with {words}")]
+        return [_unlisted_plots(residuals, d.unlisted_variables, scatter)]
     left = drawn.residual_plot(residuals, drawn.against_column(residuals, "predicted"), "")
     return [(left, scatter, "Against the prediction")]
 
@@ -179,3 +174,24 @@ def _against_each(residuals: Residuals) -> list[tuple[Markup, Markup | None]]:
         )
         for axis in filter(varies, axes)
     ]
+
+
+def _unlisted_plots(residuals: Residuals, variables: tuple[str, ...], scatter: Markup) -> PlotPair:
+    """Plots against the variables of an unlisted effect; of two, the rows split by the second
+    one.
+    """
+    columns = [drawn.against_column(residuals, name) for name in variables]
+    caption = f"Moves with {' and '.join(column_words(name) for name in variables)}"
+    # A number makes the better axis, a name the better way to split.
+    first = int(len(columns) > 1 and bool(columns[0].names) and not columns[1].names)
+    split = None
+    if len(columns) > 1:
+        split = drawn.split_by(residuals, variables[1 - first], columns[first])
+    if split is None:
+        return drawn.residual_plot(residuals, columns[0], ""), scatter, caption
+    rows, these, others = split
+    return (
+        drawn.residual_plot(residuals, columns[first], these, only=rows),
+        drawn.residual_plot(residuals, columns[first], others, only=~rows),
+        caption,
+    )

@@ -255,7 +255,7 @@ def test_an_effect_of_two_columns_is_drawn_in_two_parts(unlisted: Made) -> None:
 
 
 def test_each_tail_has_its_line(named: Made) -> None:
-    strips = named.html[named.html.index("Measured less predicted, by tail") :]
+    strips = named.html[named.html.index("<title>by tail, before") :]
     assert all(f">N{100 + k}<" in strips for k in range(10))
 
 
