@@ -33,7 +33,11 @@ class ReportFormat(StrEnum):
 
 
 def report_format(text: str) -> ReportFormat:
-    return one_of(ReportFormat, text, "--format")
+    try:
+        return ReportFormat(text)
+    except ValueError:
+        remedy = "Give html or pdf; the HTML report is the accessible form."
+        raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
 
 
 def one_of(kind: type[_Word], text: str, flag: str) -> _Word:
@@ -279,7 +283,7 @@ class Tables:
 
 
 def _panel(group: type, name: str) -> str | None:
-    """The panel of the help in which a group shows one of its own options."""
+    """The panel of the help for an option that a group defines."""
     owners = (each for each in group.__mro__ if name in get_annotations(each))
     panel: str | None = next(owners).__dict__.get("panel")
     return panel

@@ -237,15 +237,7 @@ def plunger_curve(
         plot.draw(one)
     px, high = plot.at(end * per_inch, margin)
     _, low = plot.at(end * per_inch, -margin)
-    canvas.rectangle(
-        px,
-        high,
-        7,
-        low - high,
-        fill=PALE,
-        colour=INK,
-        width=1.2,
-    )
+    canvas.rectangle(px, high, 7, low - high, fill=PALE, colour=INK, width=1.2)
     marks = [(0.0, f"margin ±{shown.bare(a.margin_in)}", False)]
     marks += [
         (v, shown.bare(v, True), True)

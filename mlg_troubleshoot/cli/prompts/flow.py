@@ -99,7 +99,7 @@ class State:
 
     @property
     def offers(self) -> bool:
-        """Whether it shows what the store holds already, to be gone on with or not."""
+        """Whether it shows what the store holds already, to be continued or not."""
         return self.ask is Ask.NEXT or (self.doubt is not None and self.saved is not None)
 
 
