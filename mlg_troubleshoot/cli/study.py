@@ -105,6 +105,7 @@ class StudyFlags(options.OutputOptions):
         str | None,
         typer.Option(metavar="ADDRESS", help="Dask cluster for the total order of lhs."),
     ] = None
+    csv: Annotated[Path | None, typer.Option(metavar="OUT.csv", help="One line per joint.")] = None
     write_table: Annotated[
         bool,
         typer.Option(
@@ -128,8 +129,12 @@ def study(flags: StudyFlags, _version: options.Version = False) -> None:
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.indices.index_table import INDEX_TABLE
     from mlg_troubleshoot.outputs import CONTINUED, OutputFile
+    from mlg_troubleshoot.workflows.study import STUDY_CSV
 
-    outputs = [OutputFile("--state", flags.state, CONTINUED)]
+    outputs = [
+        OutputFile("--csv", flags.csv, STUDY_CSV),
+        OutputFile("--state", flags.state, CONTINUED),
+    ]
     if flags.write_table:
         outputs.append(OutputFile(WRITE_TABLE, load_gear(flags.gear).indices_file, INDEX_TABLE))
     shown = flags.begin(flags.gear, [flags.given], outputs)

@@ -25,6 +25,9 @@ from mlg_troubleshoot.paper.study import (
 from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.workflows import study as task
 
+# Bar of the largest first-order index. [characters]
+_LONGEST_BAR = 50
+
 
 @contextmanager
 def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
@@ -85,14 +88,19 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
     else:
         screen = output.console(unit=settings.show, elsewhere=output.WIDEST)
         rows = [*zip(gear.joints, findings.result.table.joints, strict=True)]
+        first = np.nan_to_num([entry.first_order for _, entry in rows]).clip(0.0)
+        lengths = _LONGEST_BAR * first / max(first.max(), 1e-9)
         output.show_page(
             "study",
             screen,
             f=shown,
             rows=rows,
+            bars=["█" * round(length) for length in lengths],
             given=given,
             infinity=math.inf,
         )
+    if flags.csv is not None:
+        task.write_study_csv(findings, flags.csv)
     if flags.report is not None:
         written = task.write_study_report(
             findings,

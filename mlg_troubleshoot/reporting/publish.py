@@ -17,6 +17,7 @@ from typing import BinaryIO
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.outputs import OutputKind, write_bytes
 from mlg_troubleshoot.parallel import spread
+from mlg_troubleshoot.reporting.glyphs import missing_characters, spell_out
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
 
@@ -106,13 +107,8 @@ def publish(
                 running.start()
         if "pdf" in wanted:
             try:
-                html = render(document, page, for_pdf=True)
-                pdf, boxes = running.convert(html, page, document.created)
-                if boxes:
-                    notes.append(
-                        "No font on this computer can draw some characters: they are boxes in the"
-                        " PDF; the HTML report has them as entered."
-                    )
+                pdf, found = _pdf(document, page, running)
+                notes += found
                 made["pdf"] = _written(directory / f"{document.stem}.pdf", _marked(pdf))
             except PdfError as error:
                 instead = f"Open {web.name} in a web browser and print it"
@@ -134,6 +130,26 @@ def _written(file: Path, data: bytes) -> Path:
 def _marked(pdf: bytes) -> bytes:
     before, end, after = pdf.rpartition(b"startxref")
     return before + _IN_PDF + end + after
+
+
+def _pdf(document: Document, page: str, engine: PdfEngine) -> tuple[bytes, list[str]]:
+    """Make the PDF; characters that no font of this machine can draw are spelled out."""
+    html = render(document, page, for_pdf=True)
+    made, boxes = engine.convert(html, page, document.created)
+    missing = missing_characters(html)
+    if not missing or not boxes:
+        return made, []
+    note = (
+        "No font on this computer can draw"
+        f" {' '.join(missing[:12])}{' …' if len(missing) > 12 else ''}: they stand in the PDF by"
+        " their sound or code in ‹ ›; the HTML report has them as entered."
+    )
+    on_paper = (
+        "Text in ‹ › stands for characters that this PDF's fonts lack; the HTML report has them as"
+        " entered."
+    )
+    html = render(document, page, for_pdf=True, glyph_note=on_paper)
+    return engine.convert(spell_out(html, missing), page, document.created)[0], [note]
 
 
 def publish_all(

@@ -6,6 +6,7 @@ What computes is imported where it is needed: a check must not wait for scipy.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -18,6 +19,7 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import write_index_table
+from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.parallel import StageProgress
 
@@ -161,3 +163,48 @@ def write_study_report(
     hashes = {targets.name: sha256(targets.read_bytes()).hexdigest()} if findings.statements else {}
     made = provenance_of(findings.gear, hashes, seed=findings.options.seed, remembered=remembered)
     return publish(study_document(findings, made, unit), directory, page=page)
+
+
+_HEADS = (
+    "joint",
+    "name",
+    "first_order",
+    "first_order_low",
+    "first_order_high",
+    "total_order",
+    "total_order_low",
+    "total_order_high",
+    "plunger_amplification",
+    "max_amplification_index",
+    "rank",
+    "rank_least",
+    "rank_greatest",
+    "first_order_least",
+    "first_order_greatest",
+)
+STUDY_CSV = OutputKind.marked("is not a table of a study", csv_text(_HEADS, ()))
+
+
+def write_study_csv(findings: StudyFindings, path: Path) -> None:
+    rows = []
+    for joint, e in zip(findings.gear.joints, findings.result.table.joints, strict=True):
+        numbers = (
+            e.first_order,
+            *e.first_order_interval,
+            e.total_order,
+            *e.total_order_interval,
+            e.plunger_amplification,
+            e.max_amplification_index,
+        )
+        known = [v if math.isfinite(v) else None for v in (*numbers, *e.first_order_spread)]
+        rows.append(
+            (
+                e.joint,
+                joint.name,
+                *known[: len(numbers)],
+                e.rank,
+                *e.rank_range,
+                *known[len(numbers) :],
+            )
+        )
+    write_csv(path, _HEADS, rows)

@@ -85,7 +85,7 @@ def test_a_file_that_a_check_reads_beside_the_table_is_not_replaced(
     ("command", "name"),
     [
         (("check", FAILURE, "--csv"), "mine.toml"),
-        (("study", "--state"), "hawker-800xp-ensemble.toml"),
+        (("study", "--csv"), "hawker-800xp-ensemble.toml"),
         (("study", "--state"), "hawker-800xp-indices.json"),
         (("diagnose", FAILURE, "--write-extension"), "mine-targets.toml"),
     ],
@@ -108,7 +108,7 @@ def test_a_reconstruction_does_not_replace_its_targets(own_gear: Path) -> None:
 
 def test_a_study_does_not_replace_the_measured_table(measured: Path) -> None:
     before = measured.read_bytes()
-    kept(mlg("study", "--given", measured, "--state", measured), measured, before, "--state")
+    kept(mlg("study", "--given", measured, "--csv", measured), measured, before, "--csv")
 
 
 def test_a_study_may_write_its_table_again_but_not_over_the_gear(own_gear: Path) -> None:
@@ -298,6 +298,7 @@ def test_an_export_may_be_written_again_and_not_over_that_of_another_store(
         ("check", FAILURE, "--csv"),
         ("check", DATA / "failure_case.xlsx", "--annotate"),
         ("diagnose", DATA / "measured_pressure.csv", "--write-extension"),
+        ("study", "--csv"),
         ("gear", "reconstruct", "--minutes", "0.01", "--out"),
         ("history", "export"),
         ("template",),

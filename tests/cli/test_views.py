@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from pathlib import Path
 
 import pytest
 
@@ -256,6 +257,24 @@ def test_a_study_stands_whole_on_80_columns(monkeypatch: pytest.MonkeyPatch) -> 
     shown = at_width(monkeypatch, 80, "study").out
     assert "…" not in shown
     assert max(map(len, shown.splitlines())) <= 80
+
+
+def test_bars_of_a_study_are_as_long_as_its_first_order_indices(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shown = at_width(monkeypatch, 80, "study").out
+    bars = re.findall(r"^#\d+ +(0\.\d{4}) +(█+)", shown, re.MULTILINE)
+    per_share = 50 / max(float(first) for first, _ in bars)
+    assert [len(bar) for _, bar in bars] == [round(float(first) * per_share) for first, _ in bars]
+    assert len(bars) == 10
+
+
+def test_a_study_writes_a_line_for_each_joint(tmp_path: Path) -> None:
+    assert mlg("study", "--csv", tmp_path / "study.csv").code == 0
+    with (tmp_path / "study.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["joint"] for row in rows] == [str(n) for n in range(1, 11)]
+    assert float(rows[2]["max_amplification_index"]) > 5.0
 
 
 def table(width: int, *headings: str, spare: tuple[str, ...] = ()) -> list[str]:

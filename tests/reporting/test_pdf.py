@@ -24,7 +24,8 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import pdf
 from mlg_troubleshoot.reporting.engine import check_fonts
-from mlg_troubleshoot.reporting.html import font_faces, render
+from mlg_troubleshoot.reporting.glyphs import font_faces
+from mlg_troubleshoot.reporting.html import render
 from mlg_troubleshoot.reporting.inspection_report import inspection_document
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError, sections_of
 from mlg_troubleshoot.reporting.provenance import ReportProvenance, provenance_of
