@@ -78,11 +78,11 @@ def _unread(gear: Gear) -> tuple[_Unread, _Unread]:
     diagonal = np.diag(response.curvature)
     bend = 0.25 * (diagonal[0::2] + diagonal[1::2])
     reach = amplification * gear.limits_in
+    margin = np.full(len(PRIOR_OF_LEVELS), gear.margin.value)
     for pins in (RANDOM, HELD):
         waves = pins.waves(FREQUENCIES * reach[:, None, None] * SHARES[:, None])
         unread = np.einsum("ls,jst->ljt", DENSITIES, waves)
         everything = np.prod(unread, axis=1) * _LINKAGE
-        margin = np.full(len(PRIOR_OF_LEVELS), gear.margin.value)
         found.append(
             _Unread(
                 pins,

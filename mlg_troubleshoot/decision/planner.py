@@ -132,15 +132,14 @@ class _BatchContext:
         self.inside = np.array(
             [[joint.area == area.name for joint in gear.joints] for area in gear.areas]
         )
-        self.questions = judged.questions
         self.complained = cases.complained
         self.over = cases.over_limit & cases.restorable
         self.removable = removable(cases)
         self.open: Mask = np.asarray(~cases.measured & cases.reachable)
         critical = self.open & gear.critical
         missing = np.asarray(critical.any(axis=1))
-        self.candidates = np.where(missing[:, None], critical, self.open)
-        self.group = ahead.group(self.candidates, _SETTLED)
+        candidates = np.where(missing[:, None], critical, self.open)
+        self.group = ahead.group(candidates, _SETTLED)
         self.rest = self.open & ~self.group
         self.too_close = ~missing & (ahead.too_close() >= TOO_CLOSE)
         self.rest_needed = ahead.settled(self.group, self.rest) < 0.5
@@ -176,7 +175,8 @@ class _PlanBuilder:
         # Chance of a second repair up to which one repair is taken for enough. [1]
         self.accepted = _FOR_ONE_REPAIR * self.gear.second_repair_chance.value
         self.taken_again = False
-        self.opened: frozenset[str] = frozenset(self.inspection.open_areas)
+        self.at_first = frozenset(self.inspection.open_areas)
+        self.opened = self.at_first
         self.over_limit = self._joints(self.cases.over_limit[row])
         self.over = self._joints(facts.over[row])
         self.read_plunger = bool(np.isfinite(self.cases.mean_in[row]))
@@ -184,21 +184,18 @@ class _PlanBuilder:
 
     def plan(self) -> Plan:
         """The steps in their order, within what the day allows."""
-        f = self.facts
         i = self.row
         if not np.isfinite(self.judged.batch.lower.displacement_in[i]):
             return NOT_CLOSING
-        if f.questions[i] and not self.judged.plunger.beyond[i]:
+        if self.judged.questions[i] and not self.judged.plunger.beyond[i]:
             return CONFIRM
-        failed = bool(self.cases.failed[i])
-        complained = bool(f.complained[i])
-        found = self._course(failed=failed, complained=complained)
+        found = self._course()
         return self._within_the_day(replace(found, open_question=self._open_question(found)))
 
-    def _course(self, *, failed: bool, complained: bool) -> Plan:
-        if failed:
+    def _course(self) -> Plan:
+        if self.cases.failed[self.row]:
             return self._failed()
-        if complained:
+        if self.facts.complained[self.row]:
             return self._repaired()
         if self.inspection.is_repaired and not self.over:
             return self._restore_over_limit()._done()
@@ -301,7 +298,7 @@ class _PlanBuilder:
         # nobody read any joint, two are restored on average.
         more = 1 if self.cases.measured[self.row].any() else 2
         joints = (*self.over, *likely[:more])
-        without = [n for n in joints if not self.cases.restorable[self.row, self._place(n)]]
+        without = [n for n in joints if not self.cases.restorable[self.row, numbers.index(n)]]
         if without:
             return self._restore_over_limit()._stop_for_today(without)
         return self._try(joints, expected=True)
@@ -353,24 +350,21 @@ class _PlanBuilder:
             best = 0
         if second[best] > 0.5 and not len(over):
             return None
-        tried = self._try_set(members[best], float(second[best]))
-        quicker = [s for s in sure if s.minutes < tried.minutes]
-        today = self.over == self.over_limit
-        if today and all(set(each.joints) != set(tried.joints) for each in self.sets):
-            self.tried = tried
-        return quicker[0] if quicker else tried
-
-    def _try_set(self, members: Mask, second: float) -> RepairSet:
-        joints = tuple(np.array(self.numbers)[members].tolist())
-        return RepairSet(
+        joints = tuple(np.array(self.numbers)[members[best]].tolist())
+        tried = RepairSet(
             joints,
             np.nan,
             np.nan,
             minutes_to_measure(self.gear, joints),
             minutes_to_restore(self.gear, joints),
             RepairKind.TRY,
-            second,
+            float(second[best]),
         )
+        quicker = [s for s in sure if s.minutes < tried.minutes]
+        today = self.over == self.over_limit
+        if today and all(set(each.joints) != set(tried.joints) for each in self.sets):
+            self.tried = tried
+        return quicker[0] if quicker else tried
 
     def _worth_reading(self, best: RepairSet | None) -> tuple[int, ...]:
         """The joints to read next; none where a repair is quicker than what reading may save."""
@@ -411,7 +405,7 @@ class _PlanBuilder:
         # A reading saves the sound joints where it finds one worn that is enough without them, or
         # none, after which what is over its limit may be enough. It opens no area that the repair
         # opens anyway.
-        places = np.array([self._place(n) for n in chosen])
+        places = np.array([self.numbers.index(n) for n in chosen])
         second = f.causes.second_once_read(i, self.cases.over_limit[i], places)
         worn = f.causes.worn[i, places]
         spared = 1.0 - float(np.prod(1.0 - worn * (1.0 - second[:-1])))
@@ -439,7 +433,7 @@ class _PlanBuilder:
         elif found is Verdict.INCOMPLETE:
             return self._settled(End.CANNOT_CLEAR)
         elif found is Verdict.INCONCLUSIVE and f.again[i].any() and not self.over:
-            self._measure_again(self._joints(f.again[i]), float(f.again_u_in[i]))
+            self._measure(self._joints(f.again[i]), float(f.again_u_in[i]))
             inside = self.judged.batch.lower.displacement_in[i] <= self.cases.margin_in[i]
             found = Verdict.WITHIN_MARGIN if inside else Verdict.OUTSIDE_MARGIN
         ends = {
@@ -533,16 +527,10 @@ class _PlanBuilder:
             failed=bool(self.cases.failed[self.row]),
             beyond=bool(self.judged.plunger.beyond[self.row]),
             looked=self.looked,
-            look_again=self._look_again(where),
+            look_again=sentences.look_again(self.inspection) if where is End.TOO_CLOSE else "",
         )
         self._step(Action.CONTINUE, 0.0, text)
         return Plan(tuple(self.steps), where)
-
-    def _look_again(self, where: End) -> str:
-        """By when a gear that is too close is looked at again."""
-        if where is not End.TOO_CLOSE:
-            return ""
-        return sentences.look_again(self.inspection)
 
     def _step(
         self,
@@ -554,18 +542,17 @@ class _PlanBuilder:
     ) -> None:
         self.steps.append(Step(action, joints, minutes, gauge_u_needed_in, text))
 
-    def _measure(self, joints: tuple[int, ...]) -> None:
-        minutes = self._open(minutes_to_measure(self.gear, joints, self.opened), joints)
-        self._step(Action.MEASURE, minutes, sentences.measure(self.gear, joints), joints)
+    def _measure(self, joints: tuple[int, ...], needed: float | None = None) -> None:
+        """Measure joints; again where it is said how well."""
+        minutes = minutes_to_measure(self.gear, joints, self.opened)
+        self.opened |= {self.gear.joint(n).area for n in joints}
+        if needed is None:
+            self._step(Action.MEASURE, minutes, sentences.measure(self.gear, joints), joints)
+        else:
+            text = sentences.measure_again(joints, needed)
+            self._step(Action.MEASURE_AGAIN, minutes, text, joints, needed)
 
-    def _measure_again(self, joints: tuple[int, ...], needed: float) -> None:
-        minutes = self._open(minutes_to_measure(self.gear, joints, self.opened), joints)
-        text = sentences.measure_again(joints, needed)
-        self._step(Action.MEASURE_AGAIN, minutes, text, joints, needed)
-
-    def _restore(
-        self, joints: tuple[int, ...], best: RepairSet | None, *, expected: bool
-    ) -> _PlanBuilder:
+    def _restore(self, joints: tuple[int, ...], best: RepairSet | None, *, expected: bool) -> None:
         """Restore joints; where a reading over the limit is in doubt it is taken again first."""
         if not expected:
             self._reread()
@@ -574,27 +561,21 @@ class _PlanBuilder:
         text = sentences.restore(joints, self.over, best, unread=unread, expected=expected)
         self._step(Action.RESTORE, minutes, text, joints)
         self.opened = frozenset()
-        return self
 
     def _reread(self) -> bool:
         """Take the readings in doubt again, once in a plan; whether there are any."""
         doubted = self._joints(self.facts.doubted[self.row])
         if doubted and not self.taken_again:
-            self._measure_again(doubted, BETTER_GAUGES_IN[-1])
+            self._measure(doubted, BETTER_GAUGES_IN[-1])
             self.taken_again = True
         return self.taken_again
 
     def _restore_over_limit(self) -> _PlanBuilder:
         """Restore what can be today; a reading in doubt is taken again also where it cannot."""
         self._reread()
-        return self._restore(self.over, None, expected=False) if self.over else self
-
-    def _open(self, minutes: float, joints: tuple[int, ...]) -> float:
-        self.opened |= {self.gear.joint(n).area for n in joints}
-        return minutes
-
-    def _place(self, number: int) -> int:
-        return self.numbers.index(number)
+        if self.over:
+            self._restore(self.over, None, expected=False)
+        return self
 
     def _joints(self, places: Mask) -> tuple[int, ...]:
         """Numbers of joints in the order of their rank."""
@@ -626,10 +607,10 @@ class _PlanBuilder:
             return found
         joints = first.joints
         if first.action is Action.MEASURE:
-            while joints and minutes_to_measure(self.gear, joints, self._at_first) > left:
+            while joints and minutes_to_measure(self.gear, joints, self.at_first) > left:
                 joints = joints[:-1]
             if joints:
-                minutes = minutes_to_measure(self.gear, joints, self._at_first)
+                minutes = minutes_to_measure(self.gear, joints, self.at_first)
                 step = replace(
                     first,
                     joints=joints,
@@ -640,10 +621,6 @@ class _PlanBuilder:
         question = sentences.does_not_fit(first, left, found.open_question)
         stop = Step(Action.CONTINUE, (), 0.0, None, sentences.STOP_FOR_TODAY)
         return Plan((stop,), End.CANNOT_CLEAR, question)
-
-    @property
-    def _at_first(self) -> frozenset[str]:
-        return frozenset(self.inspection.open_areas)
 
 
 def _verdicts_after_limits(cases: Cases, judged: Judged) -> list[Verdict]:

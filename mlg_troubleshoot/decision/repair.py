@@ -73,26 +73,6 @@ def subsets_of(gear: Gear) -> Subsets:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Search:
-    """How far each subset, restored, stays inside the conformance limit, for some gears.
-
-    slack_in: margin less worst case less its guard band, unmeasured joints at their limit; −inf for
-    a subset that
-        restores what is new or unmeasured, or leaves a joint over its limit. [in]
-    """
-
-    table: Subsets
-    slack_in: Array
-
-    def quickest(self, relief_in: Array | float = 0.0) -> Places:
-        """Place of the quickest sufficient subset if the worst case is less by `relief_in`; −1 if
-        none is.
-        """
-        enough = self.slack_in >= -np.broadcast_to(relief_in, len(self.slack_in))[:, None]
-        return _surest(self.table, self.slack_in, enough)
-
-
 def _surest(table: Subsets, slack_in: Array, among: Mask) -> Places:
     """The quickest of some subsets; of equally many joints in equal minutes the one with most
     slack; −1 if none.
@@ -115,9 +95,12 @@ def removable(cases: Cases) -> Mask:
     )
 
 
-def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
-    """Judge all subsets of all gears by the second-order expansion, anchored at the exact worst
-    case `worst_in`.
+def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Array:
+    """How far each subset, restored, stays inside the conformance limit, (n, subsets): margin less
+    worst case less its guard band, unmeasured joints at their limit. [in]
+
+    By the second-order expansion, anchored at the exact worst case `worst_in`; −inf for a subset
+    that restores what is new or unmeasured, or leaves a joint over its limit.
     """
     table = subsets_of(cases.gear)
     linkages = responses(cases.gear)
@@ -150,7 +133,7 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
         )
         u = np.sqrt(np.maximum(gauges, 0.0) + cases.margin_u_in[part] ** 2 + geometry + model**2)
         slack[part] = (cases.margin_in[part] - after - SCORE * u).T
-    return Search(table, np.where(barred | ~np.isfinite(slack), -np.inf, slack))
+    return np.where(barred | ~np.isfinite(slack), -np.inf, slack)
 
 
 def _restored_worst(linkages: Sequence[Response], now_in: Array, less_in: Array) -> Array:
@@ -214,20 +197,20 @@ def _variance(members: Array) -> Array:
     return np.asarray(np.maximum(square - total * total / n, 0.0) / max(n - 1, 1))
 
 
-def calibrated(cases: Cases, found: Search) -> Search:
-    """The search, shifted so that it is exact for the quickest subset of each gear that is about
-    sufficient.
+def calibrated(cases: Cases, slack_in: Array) -> Array:
+    """What a search found, shifted so that it is exact for the quickest subset of each gear that is
+    about sufficient. [in]
     """
-    near = found.quickest(_ABOUT_IN)
+    near = _surest(subsets_of(cases.gear), slack_in, slack_in >= -_ABOUT_IN)
     rows = np.flatnonzero(near > 0)
     if not len(rows):
-        return found
+        return slack_in
     prediction, _ = _restored(cases, rows, near[rows])
     u = prediction.standard_uncertainty(cases.margin_u_in[rows])
     exact = cases.margin_in[rows] - prediction.displacement_in - SCORE * u
     shift = np.zeros(len(cases))
-    shift[rows] = np.where(np.isfinite(exact), exact - found.slack_in[rows, near[rows]], 0.0)
-    return Search(found.table, found.slack_in + shift[:, None])
+    shift[rows] = np.where(np.isfinite(exact), exact - slack_in[rows, near[rows]], 0.0)
+    return slack_in + shift[:, None]
 
 
 def _restored(cases: Cases, rows: Places, places: Places) -> tuple[Prediction, Array]:
@@ -254,8 +237,8 @@ def repair_sets(cases: Cases, upper: Prediction, wanted: Places) -> list[tuple[R
         return result
     some = cases.take(wanted)
     table = subsets_of(cases.gear)
-    found = search(some, upper.displacement_in[wanted], upper.u_clearances_in[wanted])
-    chosen = _quickest_sets(table, calibrated(some, found).slack_in)
+    slack = search(some, upper.displacement_in[wanted], upper.u_clearances_in[wanted])
+    chosen = _quickest_sets(table, calibrated(some, slack))
     rows = np.repeat(np.arange(len(wanted)), [len(places) for places in chosen])
     if not len(rows):
         return result

@@ -208,15 +208,15 @@ def test_the_search_knows_what_every_set_leaves_with_unread_joints_at_their_limi
     )
     upper = predict_batch(cases).upper
     found = repair.search(cases, upper.displacement_in, upper.u_clearances_in)
-    sets = np.flatnonzero(np.isfinite(found.slack_in[0]))
+    sets = np.flatnonzero(np.isfinite(found[0]))
     now, n = cases.filled(gear.limits_in)[0], len(sets)
-    rows = np.where(found.table.members[sets], np.minimum(0.0005, now), now)
+    rows = np.where(repair.subsets_of(gear).members[sets], np.minimum(0.0005, now), now)
     exact = predict(
         gear, cases.inspections * n, rows, np.repeat(cases.measured, n, axis=0), np.full(n, 0.0005)
     )
     slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(n))
     assert n >= 64
-    assert found.slack_in[0, sets] == pytest.approx(slack, abs=0.0005)
+    assert found[0, sets] == pytest.approx(slack, abs=0.0005)
 
 
 def test_an_allowance_counts_on_what_an_extension_adds(gear: Gear) -> None:
@@ -235,8 +235,8 @@ def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_re
     cases = Cases.of(gear, [inspected(joints, margin_in=0.045, gauge_u_in=0.003)])
     upper = predict_batch(cases).upper
     found = repair.search(cases, upper.displacement_in, upper.u_clearances_in)
-    sets = np.flatnonzero(np.isfinite(found.slack_in[0]))
-    rows = np.where(found.table.members[sets], 0.0005, cases.clearance_in)
+    sets = np.flatnonzero(np.isfinite(found[0]))
+    rows = np.where(repair.subsets_of(gear).members[sets], 0.0005, cases.clearance_in)
     exact = predict(
         gear,
         cases.inspections * len(sets),
@@ -245,7 +245,7 @@ def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_re
         np.full(len(sets), 0.003),
     )
     slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(len(sets)))
-    assert found.slack_in[0, sets] == pytest.approx(slack, abs=0.0005)
+    assert found[0, sets] == pytest.approx(slack, abs=0.0005)
 
 
 def test_a_set_that_only_just_suffices_is_found(gear: Gear) -> None:
@@ -276,7 +276,7 @@ def test_a_set_that_the_exact_prediction_does_not_confirm_is_not_offered(
     cases, table = Cases.of(gear, [inspected(FULL_FAILURE)]), repair.subsets_of(gear)
     # A search that holds joint 3 alone to suffice, which leaves less than 95 %.
     alone = (table.members.sum(axis=1) == 1) & table.members[:, 2]
-    held = repair.Search(table, np.where(alone, 0.01, -np.inf)[None])
+    held = np.where(alone, 0.01, -np.inf)[None]
     monkeypatch.setattr(repair, "search", lambda *_given: held)
     monkeypatch.setattr(repair, "calibrated", lambda _cases, found: found)
     upper = cases.predict(cases.filled(gear.limits_in))
