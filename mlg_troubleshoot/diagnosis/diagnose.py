@@ -491,15 +491,13 @@ def _explained(
     block = blocks[best.context - 1] if best.context else None
     known = every.kept.take(others)
     spread = np.diag(every.size[others] ** 2)
-    count = len(chosen)
-    data = problem.expected
     if block is not None:
         known = np.hstack([block.columns, known])
         spread = block_diag(block.covariance, spread)
-        count += block.columns.shape[1]
-        data = data - block.mean_in
-    values, covariance = shrunk(finding.noise, effects.take(chosen), known, spread, data)
-    values[len(chosen) : count] += 0.0 if block is None else block.mean
+    values, covariance = shrunk(
+        finding.noise, effects.take(chosen), known, spread, problem.expected
+    )
+    count = len(chosen) + (0 if block is None else block.columns.shape[1])
     told = finding.problem, finding.follows, finding.noise
     return _Case(*told, scene, chosen, block, values[:count], covariance[:count, :count])
 

@@ -128,8 +128,8 @@ class MisfitProblem:
                     (b.cause.name, None),
                     float(np.log(shares[b.cause.name] * b.share)),
                     b.columns,
+                    None if b.changes is None else b.skew,
                     b.root,
-                    b.mean,
                 )
                 for b in self.blocks
             ),
@@ -280,10 +280,9 @@ def explain(problem: MisfitProblem) -> Finding:
 def _settled(finding: Finding) -> NoiseModel:
     """Noise with the scatter between tails that is likeliest given what is reported."""
     found = finding.posterior
-    context = found.contexts[finding.best.context]
-    held = finding.noise.with_effects(context.independent_in)
+    held = finding.noise.with_effects(found.contexts[finding.best.context].independent_in)
     columns = found.effects.kept.take(finding.best.members)
-    fitted = fit(held, columns, finding.problem.expected - context.mean_in)
+    fitted = fit(held, columns, finding.problem.expected)
     return finding.noise.with_tails(fitted.tail_ratio)
 
 

@@ -65,8 +65,7 @@ def measure_gain(
     fold, held_out_by = folds(noise, columns)
     expected = misfit - EXPECTED_SLOPE * predicted
     known = None if block is None else (block.columns, block.covariance)
-    supposed = 0.0 if block is None else block.mean_in
-    correction = supposed + held_out_part(noise, columns, expected - supposed, fold, known)
+    correction = held_out_part(noise, columns, expected, fold, known)
     before = misfit
     after = misfit - correction
     drawn = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else np.arange(len(misfit))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -99,25 +99,22 @@ class Context:
     name: what is wrong if it acts, None where nothing does. log_prior: logarithm of how often it is
     expected. shared_in, shape (n, j): its effects, each per unit of its size. root, shape (j, k):
     of the covariance of these sizes; None if they are independent, with one standard deviation
-    each. mean: expectation of every size. listed: True if it stands on the list of causes.
+    each. correction: what its true prior adds to the log-likelihood of the normal
+    one, given what rows say of its sizes, aᵀx − xᵀQx / 2. listed: True if it stands on the list of
+    causes.
     """
 
     name: Key | None
     log_prior: float
     shared_in: Array
+    correction: Callable[[Array, Array], float] | None = None
     root: Array | None = None
-    mean: float = 0.0
     listed: bool = True
 
     @property
     def root_of(self) -> Array:
         """Root of the covariance of the sizes, shape (j, k)."""
         return np.eye(self.shared_in.shape[1]) if self.root is None else self.root
-
-    @property
-    def mean_in(self) -> Array:
-        """What is expected of it in each row, shape (n,)."""
-        return np.asarray(self.mean * self.shared_in.sum(axis=1))
 
     @property
     def independent_in(self) -> Array:

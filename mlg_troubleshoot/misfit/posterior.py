@@ -243,10 +243,10 @@ class _Search:
                 for name in key:
                     names[name] = names.get(name, 0.0) + likely
             if about.shared_in.shape[1] and total > 1e-3:
-                left = self.data - self.effects.kept.take(places) @ at.own.values - about.mean_in
+                left = self.data - self.effects.kept.take(places) @ at.own.values
                 independent = about.independent_in
                 wide = self.noise.with_effects(independent)
-                expected += total * (about.mean_in + wide.share_of(independent, left))
+                expected += total * wide.share_of(independent, left)
         acting = np.array([name is not None for name in self.effects.names], bool)
         expected += self.effects.kept.times(np.where(acting, size, 0.0))
         listed |= {context.name for context in self.contexts if context.listed}

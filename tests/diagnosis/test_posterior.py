@@ -70,7 +70,6 @@ CONTEXTS = (
     Context.none(N),
     Context(("all", None), -2.0, RNG.standard_normal((N, 3)), root=ROOT),
 )
-WITH_MEAN = (*CONTEXTS, replace(CONTEXTS[1], mean=-0.4))
 DATA = COLUMNS[:, 1] * 0.9 + np.linalg.cholesky(
     1.69 * (np.diag(NOISE.relative**2) + NOISE.factors(0.5) @ NOISE.factors(0.5).T)
 ) @ RNG.standard_normal(N)
@@ -90,7 +89,7 @@ def brute(members: tuple[int, ...], context: Context, given: Effects) -> float:
         ]
         held = given.columns[:, list(members)] * spread
         covariance = np.diag(NOISE.relative**2) + low @ low.T + held @ held.T
-        mean = given.columns[:, list(members)] @ given.mean[list(members)] + context.mean_in
+        mean = given.columns[:, list(members)] @ given.mean[list(members)]
         found = multivariate_normal(np.zeros(N), covariance)
         each = [found.logpdf((DATA - mean) / np.exp(s)) - N * s for s in grid]
         whole.append(np.logaddexp.reduce(each) - np.log(len(BELIEFS.sizes)))
@@ -99,7 +98,7 @@ def brute(members: tuple[int, ...], context: Context, given: Effects) -> float:
 
 
 def alone(members: tuple[int, ...], context: int, given: Effects) -> float:
-    found = Marginal(Products(NOISE, given, DATA, BELIEFS), WITH_MEAN[context])
+    found = Marginal(Products(NOISE, given, DATA, BELIEFS), CONTEXTS[context])
     return found.explanation(context, members).log_posterior
 
 
@@ -107,12 +106,12 @@ FREE = replace(effects(), sign=np.zeros(P))
 SETS = [(), (0,), (5,), (0, 3), (1, 3, 4)]
 
 
-@pytest.mark.parametrize("context", [0, 1, 2])
+@pytest.mark.parametrize("context", [0, 1])
 @pytest.mark.parametrize("members", SETS[1:])
 def test_a_set_is_as_likely_as_bayes_rule_written_out_says(
     members: tuple[int, ...], context: int
 ) -> None:
-    expected = brute(members, WITH_MEAN[context], FREE) - brute((), CONTEXTS[0], FREE)
+    expected = brute(members, CONTEXTS[context], FREE) - brute((), CONTEXTS[0], FREE)
     found = alone(members, context, FREE) - alone((), 0, FREE)
     assert found == pytest.approx(expected, abs=0.01)
 

@@ -112,10 +112,39 @@ def test_resting_places_of_pins_have_the_moments_of_their_angles(
         else np.radians(spread_deg) * rng.standard_normal(n)
     )
     change = np.cos(angles) - 1.0
+    found = LoadDirections().covariances(gear.model, ())[k]
+    assert found[0, 0] == pytest.approx(np.mean(change**2), abs=0.007)
+    assert found[0, 1] == pytest.approx(np.mean(change) ** 2, abs=0.007)
+
+
+@pytest.mark.parametrize(
+    ("k", "mean", "variance"), [(0, 0.9092, 0.0151), (1, 0.7346, 0.1063), (3, 0.0, 0.5)]
+)
+def test_directions_have_the_mean_and_variance_of_the_cosine_of_their_angles(
+    gear: Gear, k: int, mean: float, variance: float
+) -> None:
+    # exp(-s^2/2) and (1 - exp(-s^2))^2 / 2 for normal angles of s = 25 and 45 degrees; 0 and 1/2
+    # all around.
     scene, _rows = build_scene(gear.model, fleet(gear.model), gear.discrepancies)
-    block = LoadDirections().blocks(scene, ())[k]
-    assert block.mean == pytest.approx(np.mean(change), abs=0.008)
-    assert np.diag(block.covariance) == pytest.approx(np.var(change), abs=0.003)
+    covariance = LoadDirections().blocks(scene, ())[k].covariance
+    assert covariance[0, 0] == pytest.approx((1.0 - mean) ** 2 + variance, abs=1e-3)
+    assert covariance[0, 1] == pytest.approx((1.0 - mean) ** 2, abs=1e-3)
+
+
+def test_a_skewed_prior_counts_the_mean_over_what_it_draws() -> None:
+    rng, covariance = np.random.default_rng(2), np.array([[0.3, 0.1], [0.1, 0.2]])
+    changes = np.cos(np.radians(45.0) * rng.standard_normal(1000)) - 1.0
+    block = Block(LoadDirections(), (3, 5), np.ones((4, 2)), covariance, 0.0, changes=changes)
+    # The first joint is known less well than the second.
+    along, square = np.array([-7.0, -150.0]), np.array([[40.0, 10.0], [10.0, 300.0]])
+    skewed = np.stack(np.meshgrid(changes, changes), axis=-1).reshape(-1, 2)
+    plain = rng.multivariate_normal(np.zeros(2), covariance, 400_000)
+    mean = [
+        np.mean(np.exp(x @ along - 0.5 * np.einsum("ij,ij->i", x @ square, x)))
+        for x in (skewed, plain)
+    ]
+    assert block.skew(along, square) == pytest.approx(float(np.log(mean[0] / mean[1])), abs=0.05)
+    assert replace(block, changes=None).skew(along, square) == 0.0
 
 
 def test_factors_of_all_joints_have_intervals_of_95_percent() -> None:
