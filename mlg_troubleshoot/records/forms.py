@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
@@ -17,9 +17,15 @@ from mlg_troubleshoot.decision.columns import (
 )
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.records.cells import Cell, column_letters
-from mlg_troubleshoot.records.headers import UNKNOWN, recognise
+from mlg_troubleshoot.records.headers import UNKNOWN, Field, recognise
 from mlg_troubleshoot.records.layout import ColumnReader
-from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
+from mlg_troubleshoot.records.model import (
+    CellPlace,
+    ColumnReading,
+    ReadOptions,
+    SheetLayout,
+    TableInHand,
+)
 from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow
 from mlg_troubleshoot.records.tables import Collected
@@ -50,55 +56,46 @@ class Form:
 def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     kinds: dict[int, list[Column]] = {}
     for _, cells in rows:
-        for index, cell in enumerate(cells[:4]):
-            text = cell if isinstance(cell, str) else ""
-            found = recognise(text, options.joints).field
-            if found is not None:
-                kinds.setdefault(index, []).append(found.column)
-                break
+        fields = ((i, _field(cell, options)) for i, cell in enumerate(cells[:4]))
+        for index, field in islice(((i, f) for i, f in fields if f is not None), 1):
+            kinds.setdefault(index, []).append(field.column)
     column = max(kinds, key=lambda index: len(kinds[index]), default=0)
     known = kinds.get(column, [])
     if len(known) < 3 or not {*IDENTITY} & {*known} or CLEARANCE not in known:
         return None
-    ours = any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1])
-    value_column = column + 1
-    if not ours:
-        labelled = [
-            cells for _, cells in rows if column < len(cells) and isinstance(cells[column], str)
-        ]
-        filled = Counter(
-            i for cells in labelled for i in range(column + 1, len(cells)) if cells[i] is not None
-        )
-        # Merged labels push the values further to the right.
-        if filled and column + 1 not in filled:
-            value_column = min(filled)
-    lines = []
-    for number, cells in rows:
-        label = cells[column] if column < len(cells) else None
-        if isinstance(label, str) and _is_line(label, options):
-            lines.append(
-                (number, label, cells[value_column] if value_column < len(cells) else None)
-            )
-    gears = [
-        i
-        for i in range(column + 1, max(len(c) for _, c in rows))
-        if _is_gear(rows, column, i, options)
+    labelled = [
+        (number, label, cells)
+        for number, cells in rows
+        if column < len(cells) and isinstance(label := cells[column], str)
     ]
+    value_column = column + 1
+    if not any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1]):
+        filled = {
+            i for *_, cells in labelled for i, c in enumerate(cells) if i > column and c is not None
+        }
+        # Merged labels push the values further to the right.
+        if filled and value_column not in filled:
+            value_column = min(filled)
+    lines = [
+        (number, label, cells[value_column] if value_column < len(cells) else None)
+        for number, label, cells in labelled
+        if _is_line(label, options)
+    ]
+    held: dict[int, set[Column]] = {}
+    for _, label, cells in labelled:
+        named = _field(label, options)
+        if named is None:
+            continue
+        for i, value in enumerate(cells):
+            is_side = isinstance(value, str) and Side.spelt(value)
+            if i > column and value is not None and (named.column is not SIDE or is_side):
+                held.setdefault(i, set()).add(named.column)
+    gears = [i for i in sorted(held) if {SIDE, CLEARANCE} <= held[i]]
     return Form(lines, column, value_column, gears if len(gears) > 1 else ())
 
 
-def _is_gear(rows: Sequence[NumberedRow], labels: int, values: int, options: ReadOptions) -> bool:
-    """Whether a column holds the side and a clearance of a gear."""
-    held: set[Column] = set()
-    for _, cells in rows:
-        label = cells[labels] if max(labels, values) < len(cells) else None
-        value = cells[values] if isinstance(label, str) else None
-        field = recognise(label, options.joints).field if isinstance(label, str) else None
-        if field is None or value is None:
-            continue
-        if field.column is not SIDE or (isinstance(value, str) and Side.spelt(value)):
-            held.add(field.column)
-    return {SIDE, CLEARANCE} <= held
+def _field(cell: Cell, options: ReadOptions) -> Field | None:
+    return recognise(cell, options.joints).field if isinstance(cell, str) else None
 
 
 def _is_line(label: str, options: ReadOptions) -> bool:
@@ -120,23 +117,18 @@ def read_form(
             " sheet of its own.",
             sheet=sheet,
         )
-    letters = column_letters(form.label_column)
-    values = column_letters(form.value_column)
-    labels = [label for _, label, _ in form.lines]
-    label_places = [(row, f"{letters}{row}") for row, _, _ in form.lines]
-    value_places = [(row, f"{values}{row}") for row, _, _ in form.lines]
+    labels = [CellPlace.at(row, form.label_column, label) for row, label, _ in form.lines]
+    values = [CellPlace.at(row, form.value_column, label) for row, label, _ in form.lines]
     table = TableInHand(options, file, sheet, out.problems.append, options.decimal_comma)
-    columns = ColumnReader(table).place(labels, form.lines[0][0], places=label_places)
-    out.notes += filter(None, columns.notes())
+    first = form.lines[0][0]
+    columns = ColumnReader(table).place([label for _, label, _ in form.lines], first, places=labels)
     reader = RowReader(columns.placed, table)
-    named = list(zip((row for row, _, _ in form.lines), columns.placed, strict=True))
+    named = [(row, p) for (row, *_), p in zip(form.lines, columns.placed, strict=True)]
     ids = [row for row, p in named if p.field is not None and p.field.column is RECORD_ID]
-    start = ids[0] if ids else form.lines[0][0]
-    out.rows.append(reader.read(start, [value for _, _, value in form.lines], value_places))
-    out.notes += filter(None, [reader.settle_dates(out.rows)])
-    out.invalid_content[out.rows[0].source] = hash(tuple(value for _, _, value in form.lines))
+    cells = tuple(value for *_, value in form.lines)
+    out.rows.append(reader.read(ids[0] if ids else first, cells, values))
+    out.notes += filter(None, [*columns.notes(), reader.settle_dates(out.rows)])
+    out.invalid_content[out.rows[0].source] = hash(cells)
     read = tuple(ColumnReading(form.value_column, p.header, p.read_as, row) for row, p in named)
-    out.layouts.append(
-        SheetLayout(file, sheet, "form", form.lines[0][0], form.value_column + 1, read)
-    )
+    out.layouts.append(SheetLayout(file, sheet, "form", first, form.value_column + 1, read))
     return out

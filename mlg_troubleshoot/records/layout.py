@@ -208,67 +208,49 @@ class ColumnReader:
         # True if the program named the columns: then none can be renamed or mapped.
         self._by_hand = by_hand
 
-    def _recognise(self, text: str, index: int) -> tuple[Recognition, bool]:
-        """Read one header; True if the caller mapped it."""
-        options = self._options
-        for key, target in (*options.column_map.items(), *options.remembered_map.items()):
-            # Letters name a place in this table: nothing that was remembered from another knows it.
-            if tidy(key) == tidy(text) or (key in options.column_map and _names(key, text, index)):
-                return Recognition(parse_target(target, options.joints)), True
-        return _understood(text, options), False
-
     def place(
         self,
         headers: Sequence[str],
         row: int,
         *,
         units: Sequence[LengthUnit | None] = (),
-        places: Sequence[tuple[int, str]] | None = None,
+        places: Sequence[CellPlace] = (),
     ) -> Columns:
+        """Read the headers; they stand in one row of a table, or where the labels of a form do."""
+        at = places or [CellPlace.at(row, index, text) for index, text in enumerate(headers)]
         columns = Columns([])
-        readings: list[tuple[Recognition, bool]] = []
-        for index, text in enumerate(headers):
-            place = CellPlace.at(row, index, text)
-            if places is not None:
-                place = CellPlace(places[index][0], text, places[index][1])
-            found, mapped = self._recognise(text, index)
+        for index, (text, place, unit) in enumerate(zip_longest(headers, at, units)):
+            target = self._mapped_to(text, index)
+            if target is None:
+                found = _understood(text, self._options)
+            else:
+                found = Recognition(parse_target(target, self._options.joints))
             known = found.field
-            if known is not None and index < len(units) and units[index] is not None:
-                known = replace(known, unit=known.unit or units[index])
-            readings.append((found, mapped))
-            placed = PlacedField(index, text, known, bool(found.reason), place, mapped)
+            if known is not None:
+                known = replace(known, unit=known.unit or unit)
+            is_mapped = target is not None
+            placed = PlacedField(index, text, known, bool(found.reason), place, is_mapped)
+            placed.nearest = found.nearest
             columns.placed.append(placed)
             if placed.refused:
                 self._doubt(placed, found)
         self._joint_columns(columns)
         self._duplicates(columns)
-        for placed, (found, mapped) in zip(columns.placed, readings, strict=True):
+        for placed in columns.placed:
             if placed.header and not placed.refused:
-                self._note(columns, placed, found, mapped, in_form=places is not None)
+                _note(columns, placed, in_form=bool(places))
         self._missing(columns, row)
         self._unused_map(columns, row)
         return columns
 
-    def _note(
-        self,
-        columns: Columns,
-        placed: PlacedField,
-        found: Recognition,
-        mapped: bool,
-        *,
-        in_form: bool,
-    ) -> None:
-        if placed.field is None:
-            hint = ""
-            if found.nearest and not mapped:
-                hint = (
-                    f' (if it means {found.nearest}, pass --map "{placed.header}={found.nearest}")'
-                )
-            columns.carried.append(f'"{placed.header}"{hint}')
-        elif mapped or (
-            placed.header != placed.field.label if in_form else placed.header != placed.field.name
-        ):
-            columns.mapped.append(f'"{placed.header}" {placed.field.name}')
+    def _mapped_to(self, text: str, index: int) -> str | None:
+        """What the caller reads a header as; None if it is not mapped."""
+        named = self._options.column_map
+        for key, target in (*named.items(), *self._options.remembered_map.items()):
+            # Letters name a place in this table: nothing that was remembered from another knows it.
+            if tidy(key) == tidy(text) or (key in named and _names(key, text, index)):
+                return target
+        return None
 
     def _tell(self, code: str, placed: PlacedField, expected: str, remedy: str) -> None:
         self._table.tell(code, placed.header, expected, remedy, placed.place)
@@ -293,22 +275,19 @@ class ColumnReader:
         """Tell a long table from a wide one; a clearance without its joint is doubtful in a wide
         one.
         """
-        fields = [p.field for p in columns.placed if p.field is not None and not p.refused]
-        numbered = any(f.column.needs_joint and f.number is not None for f in fields)
-        loose = [
-            p
-            for p in columns.placed
-            if p.field and p.field.column.needs_joint and p.field.number is None
-        ]
-        joint = next((p for p in columns.placed if p.field and p.field.column is JOINT), None)
-        if joint is not None and loose and not numbered:
+        fields = [(p, p.field) for p in columns.placed if p.field is not None]
+        of_joints = [(p, field.number) for p, field in fields if field.column.needs_joint]
+        loose = [p for p, number in of_joints if number is None]
+        joint = [p for p, field in fields if field.column is JOINT][:1]
+        is_wide = len(loose) < len(of_joints)
+        if joint and loose and not is_wide:
             columns.is_long = True
             return
-        for p in [*loose, *([joint] if joint is not None and numbered else [])]:
-            self._refuse(
-                columns,
-                p,
+        for p in [*loose, *(joint if is_wide else [])]:
+            p.refused = True
+            self._tell(
                 "joint_missing",
+                p,
                 "a joint's number in the header, such as clearance_3_in, or a column joint next"
                 " to it",
                 "The header does not say which joint. "
@@ -316,84 +295,84 @@ class ColumnReader:
                 " clearance_3_in.",
             )
 
-    def _refuse(
-        self, columns: Columns, placed: PlacedField, code: str, expected: str, remedy: str
-    ) -> None:
-        columns.placed[placed.index] = replace(placed, refused=True)
-        self._tell(code, placed, expected, remedy)
-
     def _duplicates(self, columns: Columns) -> None:
         seen: dict[tuple[Column, int | None], PlacedField] = {}
-        for placed in list(columns.placed):
-            if placed.field is None or placed.refused:
+        for placed in columns.placed:
+            field = placed.field
+            if field is None or placed.refused:
                 continue
-            first = seen.setdefault(placed.field.quantity, placed)
+            first = seen.setdefault(field.quantity, placed)
             if first is placed:
                 continue
-            plain = [
-                p for p in (first, placed) if tidy(p.header).replace(" ", "_") == placed.field.name
-            ]
-            if not placed.field.column.is_length and len(plain) == 1:
+            plain = [p for p in (first, placed) if _in_one_word(p.header) == field.name]
+            if not field.column.is_length and len(plain) == 1:
                 # The column that bears the name is meant; the other one is another matter, such as
                 # the aircraft's type.
+                (seen[field.quantity],) = plain
                 other = placed if plain[0] is first else first
-                columns.placed[other.index] = replace(other, field=None)
-                seen[placed.field.quantity] = plain[0]
-                continue
-            if placed.field.column.carried:
+                other.field = None
+            elif field.column.carried:
                 # A second column of remarks is a column of its own.
-                columns.placed[placed.index] = replace(placed, field=None)
-                continue
-            columns.placed[first.index] = replace(columns.placed[first.index], refused=True)
-            self._refuse(
-                columns,
-                placed,
-                "header_duplicate",
-                f"one column for {placed.field.name}; {first.place.cell} {first.header!r} is one"
-                " already",
-                f"Remove one of the two, or pass --map {column_letters(placed.index)}=carry to use"
-                " the other.",
-            )
+                placed.field = None
+            else:
+                first.refused = placed.refused = True
+                self._tell(
+                    "header_duplicate",
+                    placed,
+                    f"one column for {field.name}; {first.place.cell} {first.header!r} is one"
+                    " already",
+                    f"Remove one of the two, or pass --map {column_letters(placed.index)}=carry to"
+                    " use the other.",
+                )
 
     def _missing(self, columns: Columns, row: int) -> None:
         fields = {p.field.column for p in columns.placed if p.field is not None}
-        unknown = [p.header for p in columns.placed if p.field is None and p.header]
-        missing = [
-            (column.name, f"a column {column.name}")
-            for column in (TAIL_NO, SIDE)
+        missing = {
+            column.name: f"a column {column.name}"
+            for column in (RECORD_ID, TAIL_NO, SIDE)
             if column not in fields and not (column is SIDE and self._table.side)
-        ]
-        if RECORD_ID not in fields and columns.is_long:
-            missing.insert(
-                0,
-                (
-                    RECORD_ID.name,
-                    f"a column {RECORD_ID.name} that identifies the rows of one inspection",
-                ),
-            )
-        elif RECORD_ID not in fields:
-            columns.ids_made = True
+        }
+        if RECORD_ID.name in missing and columns.is_long:
+            missing[RECORD_ID.name] += " that identifies the rows of one inspection"
+        else:
+            columns.ids_made = missing.pop(RECORD_ID.name, "") != ""
         clearance_refused = any(p.refused for p in columns.placed)
         if CLEARANCE not in fields and not clearance_refused and not fields >= set(STROKE):
-            missing.append(
-                ("clearance_1_in", "at least one clearance column, such as clearance_3_in")
-            )
-        for name, expected in missing:
-            close = difflib.get_close_matches(
-                name, [tidy(h).replace(" ", "_") for h in unknown], 1, 0.6
-            )
-            hint = next(
-                (h for h in unknown if close and tidy(h).replace(" ", "_") == close[0]), None
-            )
-            like = f' If "{hint}" is meant, pass --map "{hint}={name}".' if hint else ""
-            remedy = f"Add the column, or name the one that is meant with --map.{like}"
+            missing["clearance_1_in"] = "at least one clearance column, such as clearance_3_in"
+        unknown = {
+            _in_one_word(p.header): p.header
+            for p in reversed(columns.placed)
+            if p.field is None and p.header
+        }
+        for name, expected in missing.items():
+            remedy = "Add the column, or name the one that is meant with --map."
+            for close in difflib.get_close_matches(name, unknown, 1, 0.6):
+                hint = unknown[close]
+                remedy += f' If "{hint}" is meant, pass --map "{hint}={name}".'
             self._table.tell("column_missing", None, expected, remedy, CellPlace(row, name))
 
     def _unused_map(self, columns: Columns, row: int) -> None:
+        headers = [p.header for p in columns.placed if p.header]
         for key in self._options.column_map:
             if not any(_names(key, p.header, p.index) for p in columns.placed):
-                headers = ", ".join(p.header for p in columns.placed if p.header)
-                expected = f"one of the headers of the table: {headers[:200]}"
-                near = nearest(key, [p.header for p in columns.placed if p.header])
-                remedy = f"Correct the header named in --map.{near}"
+                expected = f"one of the headers of the table: {', '.join(headers)[:200]}"
+                remedy = f"Correct the header named in --map.{nearest(key, headers)}"
                 self._table.tell("map_header_unknown", key, expected, remedy, CellPlace(row, key))
+
+
+def _note(columns: Columns, placed: PlacedField, *, in_form: bool) -> None:
+    """Note a header that is not canonical, with what it was read as."""
+    known = placed.field
+    named = f'"{placed.header}"'
+    if known is not None:
+        if placed.is_mapped or placed.header != (known.label if in_form else known.name):
+            columns.mapped.append(f"{named} {known.name}")
+        return
+    if placed.nearest and not placed.is_mapped:
+        meant = placed.nearest
+        named += f' (if it means {meant}, pass --map "{placed.header}={meant}")'
+    columns.carried.append(named)
+
+
+def _in_one_word(header: str) -> str:
+    return tidy(header).replace(" ", "_")

@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from mlg_troubleshoot.decision.columns import JOINT, RECORD_ID, Column
+from mlg_troubleshoot.decision.columns import JOINT, RECORD_ID
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, column_letters, show, stored
+from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, show, stored
 from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.records.model import CellPlace, TableInHand, to_correct
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
@@ -19,116 +19,102 @@ _JOINT_TEXT = re.compile(r"(?:joint|jt|j)?\W*(?:no|nr|number|#)?\W*0?(\d{1,3})",
 
 @dataclass(slots=True)
 class _Group:
+    """The rows of one record as one row, and where each of its cells stands."""
+
     row: int
     cells: list[Cell]
-    places: list[tuple[int, str]]
+    places: list[CellPlace]
     bad: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+
+    def put(self, slot: int, place: CellPlace, cell: Cell) -> Cell:
+        """Put a cell where none stands yet; return the one that stands there and differs."""
+        there = self.cells[slot]
+        if cell is None or there == cell:
+            return None
+        if there is None:
+            self.cells[slot] = cell
+            self.places[slot] = place
+        return there
 
 
 class LongReader:
     """Gathers the rows of a long table and reads each record as one row of a wide one."""
 
     def __init__(self, placed: Sequence[PlacedField], table: TableInHand) -> None:
-        options = table.options
+        joints = table.options.joints
         self._table = table
-        self._placed = list(placed)
-        self._record = self._find(RECORD_ID)
-        self._joint = self._find(JOINT)
-        self._per_joint = [p for p in placed if p.field is not None and p.field.column.needs_joint]
-        # What is of one reading, not of the whole inspection.
-        self._own = [*self._per_joint, *([] if self._joint is None else [self._joint])]
-        wide: list[PlacedField] = [
-            replace(p, field=None, refused=True) if p in self._own else p for p in placed
-        ]
+        self._names = dict(zip(map(tidy, joints.names), joints.numbers, strict=False))
+        self._record, self._joint = (
+            next((p for p in placed if p.read_as == column.name), None)
+            for column in (RECORD_ID, JOINT)
+        )
+        per_joint = [(p, p.field) for p in placed if p.field and p.field.column.needs_joint]
+        self._readings = [p for p, _ in per_joint]
+        # The others are of the whole inspection.
+        self._shared = [p for p in placed if p not in (*self._readings, self._joint)]
         # The joint's own columns stay in place but empty; each joint's reading gets a column behind
         # them.
+        self._wide: list[PlacedField] = [
+            p if p in self._shared else replace(p, field=None, refused=True) for p in placed
+        ]
+        self._width = len(placed)
         self._slots: dict[tuple[int, int], int] = {}
-        for p in self._per_joint:
-            for joint in options.joints.numbers:
-                self._slots[p.index, joint] = len(wide)
-                own_field = None if p.field is None else replace(p.field, number=joint)
-                wide.append(replace(p, index=len(wide), field=own_field))
-        self._width = len(wide)
-        joints = options.joints
-        self._names = dict(zip(map(tidy, joints.names), joints.numbers, strict=False))
+        for p, of_any in per_joint:
+            for number in joints.numbers:
+                slot = self._slots[p.index, number] = len(self._wide)
+                self._wide.append(replace(p, index=slot, field=replace(of_any, number=number)))
         self._groups: dict[str | int, _Group] = {}
-        self.reader = RowReader(wide, table)
-
-    def _find(self, column: Column) -> PlacedField | None:
-        return next(
-            (
-                p
-                for p in self._placed
-                if p.field is not None and p.field.column is column and not p.refused
-            ),
-            None,
-        )
+        self.reader = RowReader(self._wide, table)
 
     def add(self, row: int, cells: Cells) -> None:
-        width = len(self._placed)
-        filled = [*cells[:width], *[None] * (width - len(cells))]
-        record = filled[self._record.index] if self._record is not None else None
+        filled = [*cells[: self._width], *[None] * (self._width - len(cells))]
+        record = show(filled[self._record.index]).strip() if self._record is not None else ""
         # A row without a record id stands alone.
-        key = show(record).strip() or row
-        group = self._groups.get(key)
+        group = self._groups.get(record or row)
         if group is None:
-            places = [(row, f"{column_letters(i)}{row}") for i in range(self._width)]
-            group = _Group(row, [*filled, *[None] * (self._width - width)], places)
-            for p in self._own:
-                group.cells[p.index] = None
-            self._groups[key] = group
-        else:
-            self._same_elsewhere(group, row, filled)
-        self._take_reading(group, row, filled)
-
-    def _same_elsewhere(self, group: _Group, row: int, filled: Cells) -> None:
-        """Check that what belongs to the whole inspection is the same in each of its rows."""
-        for p in self._placed:
-            here = filled[p.index]
-            there = group.cells[p.index]
-            if p in self._own or here is None or here == there:
-                continue
-            if there is None:
-                group.cells[p.index] = here
-                group.places[p.index] = (row, f"{column_letters(p.index)}{row}")
-            elif p.field is not None:
-                expected = f"{show(there)}, as in cell {group.places[p.index][1]}"
+            places = [CellPlace.at(row, p.index, p.header) for p in self._wide]
+            group = self._groups[record or row] = _Group(row, [None] * len(places), places)
+        for p in self._shared:
+            place = CellPlace.at(row, p.index, p.header)
+            other = group.put(p.index, place, filled[p.index])
+            if other is not None and p.field is not None:
+                expected = f"{show(other)}, as in cell {group.places[p.index].cell}"
                 remedy = "All rows of one record must agree. Correct one of them, or the record id."
-                self._fault(group, (p, row, here), "record_contradicts", expected, remedy)
+                fault = CellFaultError("record_contradicts", expected, remedy)
+                self._fault(group, place, filled[p.index], fault)
+        if self._joint is not None:
+            self._take_readings(group, row, filled, self._joint)
 
-    def _take_reading(self, group: _Group, row: int, filled: Cells) -> None:
-        if self._joint is None:
+    def _take_readings(self, group: _Group, row: int, filled: Cells, joint: PlacedField) -> None:
+        said = filled[joint.index]
+        readings = [p for p in self._readings if filled[p.index] is not None]
+        if said is None and not readings:
             return
-        cell = filled[self._joint.index]
-        readings = [(p, filled[p.index]) for p in self._per_joint if filled[p.index] is not None]
-        if cell is None and not readings:
-            return
-        joint = self._joint_number(cell)
-        if joint is None:
-            code = "joint_missing" if cell is None else "joint_unknown"
+        number = self._joint_number(said)
+        if number is None:
+            code = "joint_missing" if said is None else "joint_unknown"
             expected = f"a joint number from {self._table.options.joints.span}"
-            self._fault(
-                group, (self._joint, row, cell), code, expected, "Enter the joint's number."
-            )
+            fault = CellFaultError(code, expected, "Enter the joint's number.")
+            self._fault(group, CellPlace.at(row, joint.index, joint.header), said, fault)
             return
-        for p, reading in readings:
-            slot = self._slots[p.index, joint]
-            place = (row, f"{column_letters(p.index)}{row}")
-            first = group.cells[slot]
-            if first is None:
-                group.cells[slot] = reading
-                group.places[slot] = place
-            elif first == reading:
+        for p in readings:
+            slot = self._slots[p.index, number]
+            place = CellPlace.at(row, p.index, p.header)
+            reading = filled[p.index]
+            if group.cells[slot] == reading:
                 group.warnings.append(
-                    f"joint {joint} is given twice with the same reading (row {row})"
+                    f"joint {number} is given twice with the same reading (row {row})"
                 )
-            else:
+            other = group.put(slot, place, reading)
+            if other is not None:
                 expected = (
-                    f"one reading of joint {joint}; cell {group.places[slot][1]} says {show(first)}"
+                    f"one reading of joint {number}; cell {group.places[slot].cell} says"
+                    f" {show(other)}"
                 )
                 remedy = "Keep the right one, or correct the joint number."
-                self._fault(group, (p, row, reading), "joint_twice", expected, remedy)
+                fault = CellFaultError("joint_twice", expected, remedy)
+                self._fault(group, place, reading, fault)
 
     def _joint_number(self, cell: Cell) -> int | None:
         cell = stored(cell)
@@ -142,19 +128,10 @@ class LongReader:
             number = int(match[1]) if match is not None else self._names.get(text)
         return number if number in self._table.options.joints.numbers else None
 
-    def _fault(
-        self,
-        group: _Group,
-        place: tuple[PlacedField, int, Cell],
-        code: str,
-        expected: str,
-        remedy: str,
-    ) -> None:
-        p, row, cell = place
-        if p.header not in group.bad:
-            group.bad.append(p.header)
-        fault = CellFaultError(code, expected, remedy)
-        self._table.tell_fault(fault, cell, CellPlace.at(row, p.index, p.header))
+    def _fault(self, group: _Group, place: CellPlace, cell: Cell, fault: CellFaultError) -> None:
+        if place.header is not None and place.header not in group.bad:
+            group.bad.append(place.header)
+        self._table.tell_fault(fault, cell, place)
 
     def finish(self) -> list[Inspection | InvalidRow]:
         done: list[Inspection | InvalidRow] = []

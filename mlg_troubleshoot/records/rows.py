@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 import zlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import date, timedelta
 from functools import lru_cache
+from operator import itemgetter
 from pathlib import PurePath
-from typing import Any, NamedTuple
+from typing import Any
 
 from mlg_troubleshoot.decision.columns import (
     AXIAL_FLOAT,
@@ -90,7 +92,7 @@ _MISSING_CONVENTION = (
     ),
 )
 _MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
-_FIELDS = frozenset(field.name for field in fields(Inspection))
+_FIELDS = frozenset(each.name for each in fields(Inspection))
 
 
 def place_in_file(record_id: str) -> str:
@@ -106,20 +108,20 @@ _END = re.compile(r"(?:(?P<below><=?|≤|no[ -]?go)|(?:>=?|≥|go))\s*(?=[\d.,])
 _NO_END = "Measure with a gauge that reaches further, or leave it blank if it was not measured."
 
 
-class _WaitingDate(NamedTuple):
-    place: CellPlace
-    raw: Cell
-    fault: AmbiguousDateError
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class PlacedField:
+    """A column of a table in hand, or a line of a form: its header, and what that means.
+
+    nearest: the canonical column that an unknown header may mean.
+    """
+
     index: int
     header: str
     field: Field | None
     refused: bool = False
     place: CellPlace = NOWHERE
     is_mapped: bool = False
+    nearest: str | None = None
 
     @property
     def read_as(self) -> str | None:
@@ -127,29 +129,29 @@ class PlacedField:
         return None if self.field is None or self.refused else self.field.name
 
 
-class _LengthKind(NamedTuple):
-    """How a length is read, whichever joint it is of: equal cells of one kind are one length."""
-
-    column: Column
-    unit: LengthUnit | None
-    above_zero: bool
-
-
-class _LengthColumn(NamedTuple):
-    at: int
-    field: Field
-    kind: _LengthKind
+# How a length is read, whichever joint it is of; equal cells of one kind are one length: the
+# column, its unit, and whether it must be above zero.
+_LengthKind = tuple[Column, LengthUnit | None, bool]
 
 
 @dataclass(slots=True)
 class _Found:
     """What the cells of one row say; lengths as entered and what each is in inches."""
 
-    values: dict[Column, Any]
-    carried: dict[str, str]
-    lengths: dict[Column, dict[int, float]]
-    entered: dict[int, EnteredClearance]
-    plunger: list[tuple[float, LengthUnit]]
+    convention: ClearanceConvention | None
+    values: dict[Column, Any] = field(default_factory=dict)
+    carried: dict[str, str] = field(default_factory=dict)
+    lengths: dict[Column, dict[int, float]] = field(default_factory=dict)
+    entered: dict[int, EnteredClearance] = field(default_factory=dict)
+    plunger: list[tuple[float, LengthUnit]] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def scale(self) -> ClearanceConvention:
+        """Without its convention a reading is checked as the largest radial value that it may
+        be.
+        """
+        return self.convention or ClearanceConvention.TOTAL_PLAY
 
 
 class RowReader:
@@ -162,27 +164,28 @@ class RowReader:
         self._width = max(self._placed, default=-1) + 1
         good = [(p.index, p.field) for p in placed if p.field is not None and not p.refused]
         self._refused = [p.index for p in placed if p.refused]
-        self._at = {field.column: index for index, field in reversed(good)}
+        self._at = {known.column: index for index, known in reversed(good)}
         self._makes_ids = all(p.field is None or p.field.column is not RECORD_ID for p in placed)
-        lengths = [
-            _LengthColumn(
-                index,
-                field,
-                _LengthKind(field.column, field.unit, field.column.is_above_zero(field.number)),
+        self._lacking = [
+            column.name
+            for column, is_known in zip(
+                IDENTITY, (self._makes_ids, False, table.side is not None), strict=True
             )
-            for index, field in good
-            if field.column.is_length
+            if column not in self._at and not is_known
         ]
-        clearances = [each for each in lengths if each.field.column is CLEARANCE]
         # Clearances stand first, in the order of the joints, whatever the order of their columns.
-        self._lengths = [
-            *sorted(clearances, key=lambda each: each.field.number or 0),
-            *(each for each in lengths if each not in clearances),
+        ordered = sorted(
+            good, key=lambda each: each[1].number or 0 if each[1].column is CLEARANCE else math.inf
+        )
+        self._lengths: list[tuple[int, Field, _LengthKind]] = [
+            (index, known, (known.column, known.unit, known.column.is_above_zero(known.number)))
+            for index, known in ordered
+            if known.column.is_length
         ]
         self._others = [
-            (index, field.column)
-            for index, field in good
-            if not field.column.is_length and field.column not in (CONVENTION, UNIT, JOINT)
+            (index, known.column)
+            for index, known in good
+            if not known.column.is_length and known.column not in (CONVENTION, UNIT, JOINT)
         ]
         # The readings of a fleet repeat: what was understood once is not taken apart again.
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)
@@ -200,11 +203,11 @@ class RowReader:
             for p in placed
             if p.field is None or p.field.column.holds not in (Holds.LENGTH, Holds.NUMBER)
         ]
-        self._blankable = [index for index, field in good if field.column.blank_by_word]
+        self._blankable = [index for index, known in good if known.column.blank_by_word]
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
         self._row = 0
-        self._places: Sequence[tuple[int, str]] | None = None
+        self._places: Sequence[CellPlace] = ()
         self._cells: Cells = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
@@ -213,7 +216,7 @@ class RowReader:
         # Which orders fit the dates that are written as numbers, and the dates of rows that wait
         # for the others.
         self._date_orders = set(DateOrder)
-        self._waiting: dict[RowSource, _WaitingDate] = {}
+        self._waiting: dict[RowSource, tuple[AmbiguousDateError, Cell, CellPlace]] = {}
 
     def _names_of_unread(self, placed: Sequence[PlacedField]) -> list[tuple[int, str]]:
         """The columns that are only carried because they are unknown, each under its own name."""
@@ -229,49 +232,48 @@ class RowReader:
         return named
 
     def read(
-        self, row: int, cells: Cells, places: Sequence[tuple[int, str]] | None = None
+        self, row: int, cells: Cells, places: Sequence[CellPlace] = ()
     ) -> Inspection | InvalidRow:
         """Read one row; every bad cell is reported once."""
         self._begin(row, cells, places)
-        warnings: list[str] = []
-        convention = self._read_convention()
-        unit = self._read_row_unit()
-        found = self._read_cells(convention, unit, warnings)
-        question = self._unit_question(found, convention, warnings)
+        found = _Found(self._read_convention())
+        self._read_cells(found, self._read_row_unit())
+        question = self._unit_question(found)
         source = self._table.source(row)
-        for place, fault in sorted(self._faults, key=lambda fault: fault[0]):
+        for index, fault in sorted(self._faults, key=itemgetter(0)):
             if isinstance(fault, AmbiguousDateError):
-                self._waiting[source] = _WaitingDate(self._place(place), self._cells[place], fault)
+                self._waiting[source] = fault, self._cells[index], self._place(index)
             else:
-                self._tell(place, fault)
+                self._tell(index, fault)
         record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
         if SIDE not in self._at:
             side = self._table.side
         identity = {"record_id": record_id, "tail_no": tail_no, "side": side}
-        given: dict[str, Any] = {**identity, "convention": convention, "source": source}
+        given: dict[str, Any] = {**identity, "convention": found.convention, "source": source}
         if self._bad or None in given.values():
-            said = tuple(warnings)
-            named = [self._place(index).cell for index in sorted(self._bad) if index >= 0]
-            understood = self._inspection(found, **given)
+            bad = sorted(index for index in self._bad if index >= 0)
+            named = [self._placed[index].header for index in bad]
+            named += [name for name in self._lacking if name not in named]
+            named += [CONVENTION.name] if -1 in self._bad else []
             return InvalidRow(
                 **identity,
-                correct=self._correct(),
-                warnings=said,
+                correct=tuple(named),
+                warnings=tuple(found.warnings),
                 source=source,
-                understood=understood,
-                cells=tuple(cell for cell in named if cell is not None),
+                understood=self._inspection(found, **given),
+                cells=tuple(cell for index in bad if (cell := self._place(index).cell)),
             )
-        self._warn(found, warnings)
-        return self._inspection(found, **given, unit_question=question, warnings=tuple(warnings))
+        self._warn(found)
+        said = tuple(found.warnings)
+        return self._inspection(found, **given, unit_question=question, warnings=said)
 
     @staticmethod
     def _inspection(found: _Found, **given: Any) -> Inspection:
         """What was read of a row; of one that cannot be judged, as far as it could be read."""
-        scale: ClearanceConvention = given["convention"] or ClearanceConvention.TOTAL_PLAY
         lengths = found.lengths
         clearance = lengths.pop(CLEARANCE, {})
         gauge_u = {
-            joint: value / scale.per_radial
+            joint: value / found.scale.per_radial
             for joint, value in lengths.pop(GAUGE_U, {}).items()
             if joint in (0, *clearance)
         }
@@ -294,19 +296,11 @@ class RowReader:
             **given,
         )
 
-    def _read_cells(
-        self,
-        convention: ClearanceConvention | None,
-        row_unit: LengthUnit | None,
-        warnings: list[str],
-    ) -> _Found:
+    def _read_cells(self, found: _Found, row_unit: LengthUnit | None) -> None:
         """Read every cell but those that say how to read the others."""
-        found = _Found({}, {}, {}, {}, [])
         if self._makes_ids:
             found.values[RECORD_ID] = self._made_id()
-        # Without its convention a reading can still be checked, as the largest radial value that it
-        # may be.
-        self._read_lengths(found, convention or ClearanceConvention.TOTAL_PLAY, row_unit, warnings)
+        self._read_lengths(found, row_unit)
         for index, column in self._others:
             value = self._noted(column, index)
             if value is not None and column.carried:
@@ -317,17 +311,11 @@ class RowReader:
             cell = self._cells[index]
             if cell is not None:
                 found.carried[name] = writable(show(cell))
-        self._look_for_words(found, convention)
-        return found
+        self._look_for_words(found)
 
-    def _read_lengths(
-        self,
-        found: _Found,
-        scale: ClearanceConvention,
-        row_unit: LengthUnit | None,
-        warnings: list[str],
-    ) -> None:
-        for index, field, kind in self._lengths:
+    def _read_lengths(self, found: _Found, row_unit: LengthUnit | None) -> None:
+        scale = found.scale
+        for index, of, kind in self._lengths:
             cell = self._cells[index]
             if cell is None:
                 continue
@@ -336,19 +324,19 @@ class RowReader:
             except CellFaultError as fault:
                 self._fault(index, fault)
                 continue
-            number = field.number or 0
+            number = of.number or 0
             if entered.bound:
                 warning, end = self._at_an_end(number, length, entered)
-                warnings.append(warning)
+                found.warnings.append(warning)
                 if end is None:
                     continue
                 length = end
-            found.lengths.setdefault(kind.column, {})[number] = length
-            if kind.column is CLEARANCE:
+            found.lengths.setdefault(of.column, {})[number] = length
+            if of.column is CLEARANCE:
                 found.entered[number] = entered
                 if length > self._options.clearance_confirm_above_in + ROUNDING_IN:
-                    warnings.append(self._confirm_text(number, length, entered, scale))
-            elif kind.column is PLUNGER_DISPLACEMENT:
+                    found.warnings.append(self._confirm_text(number, length, entered, scale))
+            elif of.column is PLUNGER_DISPLACEMENT:
                 found.plunger.append((length, entered.unit))
 
     def _value(self, column: Column, index: int) -> Any:
@@ -377,27 +365,27 @@ class RowReader:
         )
         raise CellFaultError(f"{column.name}_missing", column.asked, remedy)
 
-    def _warn(self, found: _Found, warnings: list[str]) -> None:
+    def _warn(self, found: _Found) -> None:
         """Say what of a good row is of no use, or unusual."""
         clearance = found.lengths.get(CLEARANCE, {})
         if CLEARANCE in self._at and not clearance:
-            warnings.append("no clearance is given: no joint was measured")
+            found.warnings.append("no clearance is given: no joint was measured")
         elif len(clearance) > 1 and not any(clearance.values()):
-            warnings.append(
+            found.warnings.append(
                 "every clearance is 0: a zero is read as measured; leave a joint blank if it was"
                 " not measured"
             )
         alone = [column for column in STROKE if column in found.lengths]
         if len(alone) == 1:
             (other,) = set(STROKE) - set(alone)
-            warnings.append(f"{alone[0].filled} is not used: the row has no {other.filled}")
+            found.warnings.append(f"{alone[0].filled} is not used: the row has no {other.filled}")
         idle = [
             f"#{joint}"
             for joint in found.lengths.get(GAUGE_U, {})
             if joint and joint not in clearance
         ]
         if idle:
-            warnings.append(
+            found.warnings.append(
                 f"standard uncertainty of the gauge at joint {', '.join(idle)} is not used: the"
                 " joint has no reading"
             )
@@ -433,7 +421,7 @@ class RowReader:
         )
         return InvalidRow(record_id, None, None, ("row",), (), self._table.source(row))
 
-    def _begin(self, row: int, cells: Cells, places: Sequence[tuple[int, str]] | None) -> None:
+    def _begin(self, row: int, cells: Cells, places: Sequence[CellPlace]) -> None:
         """Take up a row: fill it to the width of the header, and leave out what was not
         measured.
         """
@@ -451,11 +439,12 @@ class RowReader:
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
 
-    def _look_for_words(self, found: _Found, convention: ClearanceConvention | None) -> None:
+    def _look_for_words(self, found: _Found) -> None:
         """Stop a row in which a column that is only carried says that the gear failed, or that the
         clearances were read in another way or another unit.
         """
         units = {entered.unit for entered in found.entered.values()}
+        stated = found.convention
         for placed in self._unread_words:
             cell = self._cells[placed.index]
             if not isinstance(cell, str):
@@ -463,23 +452,21 @@ class RowReader:
             said = convention_word(cell)
             unit = UNIT_SPELLINGS.get(plain_text(cell).lower())
             if OUTCOME not in found.values and says_failed(cell):
-                self._elsewhere(placed, OUTCOME)
-            elif said is not None and (
-                convention is None or said.per_radial != convention.per_radial
-            ):
-                self._elsewhere(placed, CONVENTION)
+                column = OUTCOME
+            elif said is not None and (stated is None or said.per_radial != stated.per_radial):
+                column = CONVENTION
             elif unit is not None and units and unit not in units:
-                self._elsewhere(placed, UNIT)
-
-    def _elsewhere(self, placed: PlacedField, column: Column) -> None:
-        what = column.filled
-        remedy = (
-            f'If it is the {what}, pass --map "{placed.header}={column.name}"; else'
-            f' "{placed.header}=carry".'
-        )
-        expected = f"the {what} in a column {column.name}"
-        self._fault(placed.index, CellFaultError(f"{what}_elsewhere", expected, remedy))
-        self._bad.add(placed.index)
+                column = UNIT
+            else:
+                continue
+            what = column.filled
+            remedy = (
+                f'If it is the {what}, pass --map "{placed.header}={column.name}"; else'
+                f' "{placed.header}=carry".'
+            )
+            expected = f"the {what} in a column {column.name}"
+            self._fault(placed.index, CellFaultError(f"{what}_elsewhere", expected, remedy))
+            self._bad.add(placed.index)
 
     def _made_id(self) -> str:
         cells = [show(cell) for cell in self._cells]
@@ -519,7 +506,7 @@ class RowReader:
 
     def _is_curve_alone(self) -> bool:
         """A position along the stroke needs no clearance, and then no convention of one."""
-        filled = {each.kind.column for each in self._lengths if self._cells[each.at] is not None}
+        filled = {of.column for i, of, _ in self._lengths if self._cells[i] is not None}
         return filled >= set(STROKE) and CLEARANCE not in filled
 
     def _read_row_unit(self) -> LengthUnit | None:
@@ -528,9 +515,9 @@ class RowReader:
             return self._options.unit
         unit: LengthUnit | None = self._noted(UNIT, index)
         against = [
-            (i, field.unit)
-            for i, field, _ in self._lengths
-            if field.unit not in (None, unit) and self._cells[i] is not None
+            (i, of.unit)
+            for i, of, _ in self._lengths
+            if of.unit not in (None, unit) and self._cells[i] is not None
         ]
         if unit is None or not against:
             return unit or self._options.unit
@@ -635,8 +622,8 @@ class RowReader:
     def _fault(self, index: int, fault: CellFaultError) -> None:
         """Note a fault; where the cell bears the verdict, the row cannot be judged then."""
         self._faults.append((index, fault))
-        field = self._placed[index].field
-        if field is None or field.column.bears_verdict:
+        of = self._placed[index].field
+        if of is None or of.column.bears_verdict:
             self._bad.add(index)
 
     def _tell(self, index: int, fault: CellFaultError) -> None:
@@ -649,11 +636,9 @@ class RowReader:
             self._table.tell(fault.code, placed.header, expected, fault.remedy, placed.place)
 
     def _place(self, index: int) -> CellPlace:
-        header = self._placed[index].header
-        if self._places is None:
-            return CellPlace.at(self._row, index, header)
-        row, cell = self._places[index]
-        return CellPlace(row, header, cell)
+        if self._places:
+            return self._places[index]
+        return CellPlace.at(self._row, index, self._placed[index].header)
 
     def _read_date(self, cell: Filled) -> date:
         if isinstance(cell, str):
@@ -671,58 +656,37 @@ class RowReader:
         """
         if not self._waiting:
             return ""
-        order = next(iter(self._date_orders)) if len(self._date_orders) == 1 else None
-        for waiting in self._waiting.values():
-            if order is None:
-                self._table.tell_fault(waiting.fault, waiting.raw, waiting.place)
+        if len(self._date_orders) != 1:
+            for waiting in self._waiting.values():
+                self._table.tell_fault(*waiting)
+            return ""
+        (order,) = self._date_orders
         for place, row in enumerate(rows):
-            if order is not None and row.source in self._waiting and isinstance(row, Inspection):
-                rows[place] = replace(
-                    row, inspection_date=self._waiting[row.source].fault.days[order]
-                )
-        return (
-            ""
-            if order is None
-            else f"dates are read as {order.words}: no other order fits all dates of the column"
-        )
+            if row.source in self._waiting and isinstance(row, Inspection):
+                fault, *_ = self._waiting[row.source]
+                rows[place] = replace(row, inspection_date=fault.days[order])
+        return f"dates are read as {order.words}: no other order fits all dates of the column"
 
-    def _unit_question(
-        self, found: _Found, convention: ClearanceConvention | None, warnings: list[str]
-    ) -> str:
+    def _unit_question(self, found: _Found) -> str:
         """Refuse readings that cannot be of the stated unit; return what must be asked before the
         gear is cleared.
         """
-        if (
-            convention is None
-            or self._options.small_readings_true
-            or found.values.get(SMALL_READINGS_TRUE)
-        ):
+        confirmed = self._options.small_readings_true or found.values.get(SMALL_READINGS_TRUE)
+        if found.convention is None or confirmed:
             return ""
         clearance = found.lengths.get(CLEARANCE, {})
-        fit = judge_unit(clearance, found.entered, convention, self._options)
+        fit = judge_unit(clearance, found.entered, found.convention, self._options)
         if fit.scale is UnitFit.TOO_SMALL and not self._options.asks:
             quantity = (CLEARANCE, fit.joints[0])
-            index = next(i for i, field, _ in self._lengths if field.quantity == quantity)
+            index = next(i for i, of, _ in self._lengths if of.quantity == quantity)
             expected = "readings of new or worn parts in the unit that is stated"
             remedy = f"{fit.question[:1].upper()}{fit.question[1:]}"
             self._fault(index, CellFaultError("readings_too_small", expected, remedy))
         elif fit.question:
-            warnings.append(fit.question)
+            found.warnings.append(fit.question)
         plunger = {plunger_question(value, unit, self._options) for value, unit in found.plunger}
         asked = sorted(plunger - {""})
-        warnings += asked
+        found.warnings += asked
         if fit.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL):
             asked.insert(0, fit.question)
         return Sentence.joined(asked)
-
-    def _correct(self) -> tuple[str, ...]:
-        """Return the columns to correct, in the order of the table; missing columns stand last."""
-        named = [self._placed[index].header for index in sorted(self._bad) if index >= 0]
-        for column in IDENTITY:
-            made = column is RECORD_ID and self._makes_ids
-            given = made or (column is SIDE and self._table.side is not None)
-            if column not in self._at and column.name not in named and not given:
-                named.append(column.name)
-        if -1 in self._bad:
-            named.append(CONVENTION.name)
-        return tuple(named)
