@@ -48,7 +48,7 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
         raise UsageError(
             f"--set needs {', '.join(missing)}",
             "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention"
-            " RADIAL, DIAMETRAL or TOTAL_PLAY): there is no default.",
+            " RADIAL, DIAMETRAL or TOTAL_PLAY): it has no default.",
         )
     values: dict[str, object] = {RECORD_ID.name: "-", **flags.typed}
     labels: dict[str, str] = {}

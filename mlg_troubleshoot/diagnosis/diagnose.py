@@ -498,8 +498,16 @@ def _explained(
         finding.noise, effects.take(chosen), known, spread, problem.expected
     )
     count = len(chosen) + (0 if block is None else block.columns.shape[1])
-    told = finding.problem, finding.follows, finding.noise
-    return _Case(*told, scene, chosen, block, values[:count], covariance[:count, :count])
+    return _Case(
+        finding.problem,
+        finding.follows,
+        finding.noise,
+        scene,
+        chosen,
+        block,
+        values[:count],
+        covariance[:count, :count],
+    )
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:

@@ -121,7 +121,7 @@ class ModelExtension(Result):
     rows : int
         Rows that they were fitted to.
     unread : tuple of int
-        Joints that none of these rows had a clearance of.
+        Joints of which these rows had no clearance.
     """
 
     gear: Gear

@@ -142,11 +142,11 @@ class DiagnosisTable(Result):
         return np.array([str(i) for i in range(len(self))]) if tail is None else tail
 
     def numbers(self, name: str) -> Array:
-        """A quantity of each row, NaN where there is none, shape (n,)."""
+        """A quantity of each row, NaN where the table has no such column, shape (n,)."""
         return self.quantities.get(name, np.full(len(self), np.nan))
 
     def texts(self, name: str) -> Texts:
-        """A factor of each row, empty where there is none, shape (n,)."""
+        """A factor of each row, empty where the table has no such column, shape (n,)."""
         return self.factors.get(name, np.full(len(self), ""))
 
     @property

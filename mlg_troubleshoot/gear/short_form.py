@@ -199,7 +199,7 @@ class _Builder:
             raise self.file.fail(("links", driven), expected)
         guided = form.guides_deg | form.guides
         if read.position_of is not None and read.position_of not in guided:
-            expected = f"a point with a guide: {', '.join(guided) or 'there is none'}"
+            expected = f"a point with a guide: {', '.join(guided) or 'no point has one'}"
             raise self.file.fail(("output", "position_of"), expected)
         if not form.joints:
             raise self.file.fail(("joints",), "at least one point with its limit in inches")

@@ -181,7 +181,7 @@ def find(store: Store, record_id: str) -> Record:
         return found[0]
     if not found:
         raise UsageError(
-            f"there is no record {record_id!r} in {store.place}",
+            f"no record {record_id!r} in {store.place}",
             "See the records: mlg history TAIL SIDE",
         )
     named = ", ".join(

@@ -95,7 +95,7 @@ def _residuals(
     residuals = _rows(result, unit)
     known = residuals.columns
     if against not in known:
-        raise UsageError(f"there is no column {against!r}", f"Give one of {', '.join(known)}.")
+        raise UsageError(f"no column {against!r}", f"Give one of {', '.join(known)}.")
     column = diagnosis_figures.against_column(residuals, against)
     before = diagnosis_figures.residual_plot(residuals, column, "before")
     if not result.diagnosis.causes:
@@ -124,7 +124,7 @@ def _life(result: Lives, *, tail: str = "", side: str = "", unit: str = "in") ->
     ]
     if not wanted:
         known = ", ".join(life.name for life in result.lives[:5])
-        raise UsageError(f"there is no gear {tail} {side}".rstrip(), f"Give one of: {known}.")
+        raise UsageError(f"no gear {tail} {side}".rstrip(), f"Give one of: {known}.")
     life = wanted[0]
     lengths = Lengths(LengthUnit.parse(unit))
     return [fleet_figures.wear_figure(life, result.forecasts[life.key], result.gear, lengths)]
@@ -152,7 +152,7 @@ def plot(result: Any, name: str = "", **how: Any) -> Picture:
         )
     name = name or next(iter(known))
     if name not in known:
-        raise UsageError(f"there is no picture {name!r}", f"Give one of {', '.join(known)}.")
+        raise UsageError(f"no picture {name!r}", f"Give one of {', '.join(known)}.")
     drawings = known[name](result, **how)
     if not drawings:
         raise UsageError(f"the picture {name!r} needs a linkage that closes", "")

@@ -159,7 +159,7 @@ def to_frame(result: Any, of: str = "") -> pd.DataFrame:
         ]
         if name and not any(name in row for row in rows):
             known = ", ".join(_tables(lists, rows))
-            raise UsageError(f"there is no table {name!r}", f"Give one of {known}.")
+            raise UsageError(f"no table {name!r}", f"Give one of {known}.")
         frame = _frame(within) if name else pd.DataFrame(_columns(lists))
     if isinstance(result, CheckResult) and name == "inspections":
         frame.index = _index(result)

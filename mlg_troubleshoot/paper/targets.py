@@ -148,5 +148,5 @@ def targets_file(gear: Gear) -> Path:
 def load_targets(path: Path) -> tuple[Target, ...]:
     remedy = "Write one like hawker-800xp-targets.toml next to the gear file."
     if not path.exists():
-        raise GearFileError(f"{path.name}: there are no printed numbers to compare with", remedy)
+        raise GearFileError(f"{path.name}: no printed numbers to compare with", remedy)
     return read_toml(path, TargetsFile).content.targets

@@ -286,7 +286,7 @@ def _by_alias(
 
 
 def _resembles_plunger(words: list[str], has_unit: bool) -> Recognition:
-    """Doubt a length of the plunger that none of its columns names."""
+    """Doubt a length of the plunger that matches no column of the plunger."""
     if has_unit and "plunger" in words and not set(words) & _OTHER_MATTER:
         return _doubt(
             "it may be the measured displacement of the plunger", PLUNGER_DISPLACEMENT.name

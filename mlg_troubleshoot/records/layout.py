@@ -70,7 +70,7 @@ class Columns:
         read = ["each header was read as: " + ", ".join(self.mapped)] * bool(self.mapped)
         if self.ids_made:
             read.append(
-                "there is no record_id: each inspection is named after the file, its row and its"
+                "no record_id column: each inspection is named after the file, its row and its"
                 " content"
             )
         carried = "unknown column, carried to the report: " + ", ".join(self.carried)

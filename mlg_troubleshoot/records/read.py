@@ -376,7 +376,7 @@ def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) 
         names = ", ".join(repr(s.name) for s in book.sheets)
         known = f"one of its sheets: {names}"
         remedy = "Correct the name given with --sheet."
-        raise FileRefusedError("sheet_unknown", f"there is no sheet {wanted!r}", known, remedy)
+        raise FileRefusedError("sheet_unknown", f"no sheet {wanted!r}", known, remedy)
     sheet = by_name[0]
     if sheet.hidden:
         found.notes.append(f"sheet {sheet.name!r} is hidden; it was read because it was named")

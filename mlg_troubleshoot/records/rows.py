@@ -361,7 +361,7 @@ class RowReader:
         remedy = (
             "Enter it; a row without it cannot be used."
             if column.choices is None
-            else f"Enter {column.asked}; there is no default."
+            else f"Enter {column.asked}; it has no default."
         )
         raise CellFaultError(f"{column.name}_missing", column.asked, remedy)
 

@@ -495,7 +495,7 @@ def read_areas(cell: Filled, areas: Collection[str]) -> tuple[str, ...]:
 
 
 def _written_day(text: str, order: DateOrder | None, expected: str, latest: date) -> date:
-    no_such_day = "There is no such day in the calendar."
+    no_such_day = "The calendar does not have this day."
     try:
         day = written_day(text)
     except ValueError:

@@ -277,15 +277,12 @@ def _mean_mark(plot: Plot, x: float, values: Array) -> None:
     plot.canvas.line(px, low, px, high, width=1.6)
     for end in (low, high):
         plot.canvas.line(px - 3, end, px + 3, end, width=1.6)
-    plot.canvas.rectangle(
-        px - 3,
-        py - 3,
-        6,
-        6,
-        fill=PAPER,
-        colour=INK,
-        width=1.4,
-    )
+    _square(plot.canvas, px, py)
+
+
+def _square(canvas: Canvas, x: float, y: float) -> None:
+    """The mark of a mean."""
+    canvas.rectangle(x - 3, y - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
 
 
 def lanes(title: str, across: Axis, names: Sequence[str], high: float = 20.0) -> Plot:
@@ -294,7 +291,7 @@ def lanes(title: str, across: Axis, names: Sequence[str], high: float = 20.0) ->
     """
     margins = {"left": 62.0, "top": 22.0, "bottom": 38.0}
     height = margins["top"] + high * len(names) + margins["bottom"]
-    canvas = Canvas(_PLOT[0], height, title, f"one line for each of {', '.join(names)}")
+    canvas = Canvas(_PLOT[0], height, title, f"one line per name: {', '.join(names)}")
     plot = Plot(canvas, across, Axis("", float(len(names)), 0.0), **margins)
     plot.draw_vertical_grid()
     left, top, right, _ = plot.area
@@ -328,16 +325,7 @@ def tail_strips(residuals: Residuals) -> list[Markup]:
             own = values[tails == tail].tolist()
             for value in own:
                 _point(plot.canvas, *plot.at(value, place + 0.5), after=after)
-            x, y = plot.at(float(np.mean(own)), place + 0.5)
-            plot.canvas.rectangle(
-                x - 3,
-                y - 3,
-                6,
-                6,
-                fill=PAPER,
-                colour=INK,
-                width=1.4,
-            )
+            _square(plot.canvas, *plot.at(float(np.mean(own)), place + 0.5))
         figures.append(plot.canvas.svg())
     return figures
 

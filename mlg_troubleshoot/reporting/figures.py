@@ -309,14 +309,7 @@ class Plot:
         for value, text in marks or [(value, number(value, decimals_of(ticks))) for value in ticks]:
             x, _ = self.at(value, self.y.low)
             self.canvas.line(x, y1, x, y1 + 4, colour=SOFT)
-            self.canvas.text(
-                x,
-                y1 + 14,
-                text,
-                size=_TICK_SIZE,
-                anchor="middle",
-                colour=SOFT,
-            )
+            self._tick_label(x, y1 + 14, text)
         self.canvas.line(x0, y1, x1, y1, colour=SOFT)
         self.canvas.line(x0, y0, x0, y1, colour=SOFT)
         middle = (x0 + x1) / 2
@@ -329,6 +322,9 @@ class Plot:
             font_size=10.0,
             fill=INK,
         )
+
+    def _tick_label(self, x: float, y: float, text: str) -> None:
+        self.canvas.text(x, y, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
 
     def draw_vertical_grid(self) -> None:
         """Draw the horizontal axis with a line at each tick, a stronger one at zero."""
@@ -344,15 +340,7 @@ class Plot:
                 colour=SOFT if value == 0.0 else RULE,
                 width=1.0 if value == 0.0 else 0.5,
             )
-            text = number(value, decimals_of(ticks))
-            self.canvas.text(
-                x,
-                y1 + 13,
-                text,
-                size=_TICK_SIZE,
-                anchor="middle",
-                colour=SOFT,
-            )
+            self._tick_label(x, y1 + 13, number(value, decimals_of(ticks)))
         self.canvas.line(x0, y1, x1, y1, colour=SOFT)
         middle = (x0 + x1) / 2
         self.canvas.text(middle, y1 + 27, self.x.label, size=10, anchor="middle")

@@ -293,7 +293,7 @@ class Store:
             )
         except NoSuchModuleError as error:
             raise UsageError(
-                f"--store {self.place}: there is no such driver", Place.REMEDY
+                f"--store {self.place}: the driver is not known", Place.REMEDY
             ) from error
         except ModuleNotFoundError as error:
             raise UsageError(

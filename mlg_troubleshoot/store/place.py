@@ -90,7 +90,7 @@ def _file(url: sql.URL, shown: str) -> Path:
         file = Path(name).expanduser()
         mode = file.stat().st_mode
     except RuntimeError:
-        raise UsageError(f"--store {shown!r}: there is no such user", Place.REMEDY) from None
+        raise UsageError(f"--store {shown!r}: the user is not known", Place.REMEDY) from None
     except (OSError, ValueError):
         return file
     if not stat.S_ISREG(mode):

@@ -48,7 +48,7 @@ SLIPS = ("x25.4", "x2.54", "wrong pin", "swapped pair")
 
 
 def numbers_of_the_ten() -> np.ndarray:
-    """Coordinates, hinge, dihedral and axis in degrees, stroke: one row a linkage, from the data
+    """Coordinates, hinge, dihedral and axis in degrees, stroke: one row per linkage, from the data
     files alone.
     """
     reference = tomllib.loads(GEAR.path.read_text(encoding="utf-8"))
@@ -303,7 +303,7 @@ def orders(
 
 
 def follow(count: int, seed: int) -> None:
-    """Print how many readings ``next`` needs beside the template's order."""
+    """Print how many readings ``next`` needs, compared with the template's order."""
     rng, linkage = np.random.default_rng(seed), SurveyedLinkage(GEAR)
     prior = Prior(linkage)
     needed: list[tuple[list[int], list[int]]] = []

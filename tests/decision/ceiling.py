@@ -5,7 +5,7 @@ This oracle reads with the errors of the world's own gauges, of which it knows s
 knows how gears wear there and where their pins rest. Which joints it reads beside those in the
 row is chosen afterwards, the best for each gear, so that hardly any plan takes fewer minutes. It
 reads the plunger, restores the quickest set after which a second repair is rare enough, reads the
-plunger again and retracts. Beside it stand the fewest sound joints that whoever knows all must
+plunger again and retracts. With it are printed the fewest sound joints that whoever knows all must
 restore, and how far the plunger alone can tell failures by clearance from others.
 """
 

@@ -44,9 +44,7 @@ FIRST_SEED = 34_000
 def tasks(
     cases: list[str], fleets: int, first_seed: int, beside: bool, rows: int | None = None
 ) -> list[tuple[int, Task]]:
-    """Case, form, seed, the cause beside it and the rows of every fleet, with a number of its
-    own.
-    """
+    """Case, form, seed, further cause and rows of every fleet, each with a number."""
     causes = list(CATALOGUE)
     listed = []
     for case in cases:

@@ -2,7 +2,7 @@
 
     python -m tests.hidden_effect.compare --fleets 50 --workers 2
 
-Needs the extra ``study``. The figure is the root mean square of what is left of the hidden effect
+Needs the extra ``study``. The figure is the root mean square of the residual of the hidden effect
 on rows that were not used: in range (tails held out) and extrapolating (from rows of small to rows
 of large prediction).
 """

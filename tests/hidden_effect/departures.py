@@ -180,7 +180,7 @@ def _hit(name: list[str | None], truth: list[str | None]) -> bool:
 
 
 def _false(r: Record, beside: str = "") -> bool:
-    """Something is named that is not there, apart from one cause that may stand beside it."""
+    """Something is named that is not there, apart from one cause that may act as well."""
     names = [n for n in r["named"] if n[0] != beside]
     return any(not any(_hit(n, t) for t in r["truth"]) for n in names)
 

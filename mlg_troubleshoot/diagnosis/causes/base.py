@@ -216,7 +216,7 @@ def offset(scene: Scene, where: ArrayLike, value: float) -> Adjustment:
 
 
 def share_never_read(scene: Scene, rows: Mask | slice = slice(None)) -> float:
-    """Share of joints that none of these rows has in what all joints could move the plunger by.
+    """Share of the joints that were never read in what all joints could move the plunger by.
     [1]
     """
     never = ~np.isfinite(scene.table.clearance_in[rows]).any(axis=0)

@@ -687,7 +687,7 @@ def blemished_fleet(
     seed : int
         Seed; the same case, form and seed give the same fleet.
     beside : str, optional
-        A listed cause that is hidden beside the blemish, at S = 14.
+        A listed cause that is hidden in addition to the blemish, at S = 14.
     rows : int, optional
         Rows of the table before the blemish, even; drawn from 60 to 400 if None [-].
 
