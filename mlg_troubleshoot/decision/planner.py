@@ -294,10 +294,9 @@ class _PlanBuilder:
         worn = self.facts.causes.worn[self.row] * self.facts.causes.leverage
         numbers = self.numbers
         likely = sorted(following, key=lambda n: -worn[numbers.index(n)])
-        # What is over its limit already does not suffice, or there would be nothing to read. Where
-        # nobody read any joint, two are restored on average.
-        more = 1 if self.cases.measured[self.row].any() else 2
-        joints = (*self.over, *likely[:more])
+        # What is over its limit already does not suffice, or there would be nothing to read: one
+        # joint more is restored on average.
+        joints = (*self.over, *likely[:1])
         without = [n for n in joints if not self.cases.restorable[self.row, numbers.index(n)]]
         if without:
             return self._restore_over_limit()._stop_for_today(without)

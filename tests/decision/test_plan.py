@@ -123,6 +123,12 @@ def test_a_joint_whose_own_uncertainty_is_stated_is_not_measured_again(
     assert found.next_action.action is Action.CONTINUE
 
 
+def test_before_any_reading_one_joint_is_expected_to_be_restored(judge: Judge) -> None:
+    steps = judge({}, outcome=Outcome.FAILED).plan.steps
+    (restored,) = (step for step in steps if step.action is Action.RESTORE)
+    assert len(restored.joints) == 1
+
+
 def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) -> None:
     steps = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).plan.steps
     # Sidestay 15 min with two joints of 10 min, still open for two restorations of 120 min each.
