@@ -488,12 +488,10 @@ def _explained(
     every = finding.posterior.effects
     chosen = tuple(k for k in best.members if k < len(moving))
     others = [k for k in best.members if k >= len(moving)]
-    block = blocks[best.context - 1] if best.context else None
-    known = every.kept.take(others)
-    spread = np.diag(every.size[others] ** 2)
-    if block is not None:
-        known = np.hstack([block.columns, known])
-        spread = block_diag(block.covariance, spread)
+    context = finding.posterior.contexts[best.context]
+    block = blocks[best.context - 1] if best.context and context.listed else None
+    known = np.hstack([context.shared_in, every.kept.take(others)])
+    spread = block_diag(context.root_of @ context.root_of.T, np.diag(every.size[others] ** 2))
     values, covariance = shrunk(
         finding.noise, effects.take(chosen), known, spread, problem.expected
     )
@@ -739,17 +737,16 @@ def _gain(case: _Case) -> Gain:
 
     What else acts, being one of a set, is noise of the size that it was found with.
     """
-    noise = case.noise
     block = case.block
     said = case.follows.said
     keys = [case.problem.candidates[k].key for k in case.chosen]
     firm = [place for place, key in enumerate(keys) if key in said]
     others = [case.effect(place)[:, None] for place in range(len(keys)) if place not in firm]
-    if block is not None and (block.cause.name, None) not in said:
-        others = [*others, block.effects_in]
+    context = case.posterior.contexts[case.best.context]
+    if context.name not in said:
+        others.append(context.independent_in)
         block = None
-    if others:
-        noise = noise.with_effects(np.hstack(others))
+    noise = case.noise.with_effects(np.hstack(others)) if others else case.noise
     return measure_gain(
         noise,
         case.columns[:, firm],

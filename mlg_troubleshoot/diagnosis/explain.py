@@ -8,14 +8,14 @@ large stands in `Beliefs` and with each cause; the rest is arithmetic.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import erfc, sqrt
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, log_sum, rms
+from mlg_troubleshoot.arrays import Array, log_sum, numbered, rms
 from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
@@ -34,6 +34,8 @@ _ROUNDS = 3
 # Computing only: rows that may be a slip each, those that lie furthest off.
 _MOST_SLIPS = 500
 _BY = " × "
+# Waves that stand for a random walk: nine tenths of its variance and more (Karhunen and Loève).
+_WAVES = 3
 
 
 @dataclass(frozen=True)
@@ -118,8 +120,8 @@ class MisfitProblem:
         )
         return Effects.joined([listed, free, slips])
 
-    def contexts(self) -> list[Context]:
-        """Nothing, or all-joint effects."""
+    def contexts(self, scale_in: float) -> list[Context]:
+        """Nothing, all-joint effects, or aircraft that wander."""
         shares = self._shares()
         return [
             Context.none(len(self.misfit)),
@@ -133,7 +135,27 @@ class MisfitProblem:
                 )
                 for b in self.blocks
             ),
+            *self._wandering(scale_in),
         ]
+
+    def _wandering(self, scale_in: float) -> Iterator[Context]:
+        """Each aircraft wanders in time on its own, as far on average as an effect on no list."""
+        day = self.bank.smooth.get("day")
+        tails = numbered(self.rows.tails)
+        if day is None or not tails.any():
+            return
+        since = (day - day.min()) / np.ptp(day)
+        own = tails[:, None] == np.arange(tails.max() + 1)
+        turns = (np.arange(_WAVES) + 0.5) * np.pi
+        waves = np.sin(since[:, None] * turns) * 2.0 / turns
+        shapes = (own[:, :, None] * waves[:, None, :]).reshape(len(day), -1)
+        often = self._shares()[UNLISTED] / (len({*self.bank.variables}) + 2)
+        yield Context(
+            (UNLISTED, _BY.join(("tail_no", "day"))),
+            float(np.log(often)),
+            self.beliefs.shape_size * scale_in * shapes,
+            listed=False,
+        )
 
     def _shares(self) -> dict[str, float]:
         """How often each cause is expected in a table; one that it cannot test looks like none that
@@ -264,7 +286,7 @@ def explain(problem: MisfitProblem) -> Finding:
     data = problem.expected
     rows = problem.rows
     noise = build_noise(data, rows)
-    contexts = problem.contexts()
+    contexts = problem.contexts(noise.scale_in)
     found = posterior(noise, data, problem.effects(noise), contexts, problem.beliefs)
     for _ in range(_ROUNDS - 1):
         before = found.likeliest[0]
@@ -332,4 +354,4 @@ def _unlisted(found: MisfitPosterior) -> tuple[tuple[str, ...], float]:
             if found.effects.names[k] == name:
                 column = found.effects.kept.take([k])
                 return variables, float(abs(value) * rms(column))
-    return variables, 0.0
+    return variables, float(rms(found.expected_in))

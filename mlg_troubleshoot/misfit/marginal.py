@@ -65,8 +65,7 @@ class Products:
 
     def _held(self, weighted: Array) -> Array:
         """Products of all effects with weighted columns, (levels, n, k): (levels, k, p)."""
-        flat = weighted.swapaxes(1, 2).reshape(-1, len(self.data))
-        return self.columns.onto(flat).reshape(len(weighted), -1, self.columns.p)
+        return np.array([self.columns.onto(level.T) for level in weighted])
 
     def onto(self, columns: Array) -> tuple[Array, Array, Array]:
         """Products of other columns with the effects, (levels, k, p), with the data, (levels, k),
