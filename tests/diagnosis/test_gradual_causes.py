@@ -114,6 +114,14 @@ def test_bases_that_differ_are_not_scatter_of_the_readers_who_work_there(tmp_pat
     assert {(c["cause"], c["target"]) for c in said["causes"]} == set(truth.causes)
 
 
+def test_aircraft_that_wander_each_on_its_own_are_on_no_list(tmp_path: Path) -> None:
+    rows, _truth = blemished_fleet("walk", "strong", 61_003, rows=150)
+    write_rows(rows, tmp_path / "fleet.csv")
+    said = mlg("diagnose", tmp_path / "fleet.csv", "--json").json
+    assert (said["verdict"], said["causes"]) == ("UNLISTED", [])
+    assert said["unlisted_variables"] == ["tail_no", "day"]
+
+
 def test_a_step_of_all_aircraft_is_not_a_modification(gear: Gear) -> None:
     def all_from(table: DiagnosisTable, _over: Array) -> Array:
         return 0.006 * (table.quantities["day"] >= 350)
