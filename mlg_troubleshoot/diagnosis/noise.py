@@ -63,17 +63,32 @@ _ROUNDS = 2
 class Rows:
     """What is known of the rows before their misfit is looked at.
 
-    predicted_in, shape (n,): prediction. [in] tails, gears, shape (n,): tail and single gear of
-    each row. u_filled_in, u_shared_in, shape (n,): further standard deviation of a row by
-    clearances that were not read: its own, and common to its gear's rows. [in] unread_in, shape (n,
-    k): what joints that nobody read may add or lack in all rows together, each at one standard
-    deviation. [in] along_in, shape (n, k): what is not known of rows along the stroke, and of
-    digits that may be cut off, each at one standard deviation. [in] drawn_in, shape (n,): by how
-    much the prediction from the readings as they are lies above the one with all of them drawn to
-    their expectation. [in] trends, shape (n, k): shapes of trends and habits that are always there
-    in some small measure. [1] readers, shape (n, k): rows of each gauge, and of each technician.
-    [1] own, shape (n, k): rows of each value of a column that only this table has, which may be
-    shifted: that is not scatter between readers. [1]
+    Attributes
+    ----------
+    predicted_in : ndarray, shape (n,)
+        Prediction. [in]
+    tails, gears : ndarray of str, shape (n,)
+        Tail and single gear of each row.
+    u_filled_in : ndarray, shape (n,)
+        Further standard deviation of each row by clearances that were not read. [in]
+    u_shared_in : ndarray, shape (n,)
+        The same, common to all rows of a gear. [in]
+    unread_in : ndarray, shape (n, k)
+        What joints that nobody read may add or take away in all rows together, each at one
+        standard deviation. [in]
+    along_in : ndarray, shape (n, k)
+        What is not known of rows along the stroke, and of digits that may be cut off, each at one
+        standard deviation. [in]
+    drawn_in : ndarray, shape (n,)
+        Prediction from the readings as they are, minus the prediction with all readings shrunk
+        to their expectation. [in]
+    trends : ndarray, shape (n, k)
+        Shapes of trends and habits that are always present in some small measure. [1]
+    readers : tuple of ndarray, shape (n, k) each
+        Rows of each gauge, and of each technician. [1]
+    own : ndarray, shape (n, k)
+        Rows of each value of a column that only this table has. Their shifts are not counted as
+        scatter between readers. [1]
     """
 
     predicted_in: Array

@@ -52,12 +52,21 @@ _DEGREE = 6
 class Block:
     """All-joint effects with what is known of them beforehand.
 
-    cause: `LoadDirections` or `OtherGeometry`. joints: joints that were read. columns, shape (n,
-    k): what each of them contributes: the effect of a change of its factor by one; then further
-        effects. [in]
-    covariance, shape (k, k): covariance of the changes of the factors about none. [1] share:
-    how likely it is of the blocks of its cause. [1] changes, shape (m,): equally likely changes
-    of a joint, skewed: most lose little, a few lose much. [1]
+    Attributes
+    ----------
+    cause : JointFactors
+        `LoadDirections` or `OtherGeometry`.
+    joints : tuple of int
+        Joints that were read.
+    columns : ndarray, shape (n, k)
+        For each joint, the effect of changing its factor by one; then further effects. [in]
+    covariance : ndarray, shape (k, k)
+        Covariance of the changes of the factors, whose mean is zero. [1]
+    share : float
+        Probability of this block among the blocks of its cause. [1]
+    changes : ndarray, shape (m,), optional
+        Equally likely changes of a joint. They are skewed: most joints lose little, a few lose
+        much. [1]
     """
 
     cause: JointFactors
