@@ -102,6 +102,19 @@ def test_aircraft_that_change_on_dates_of_their_own_are_named_together(gear: Gea
     ]
 
 
+def test_aircraft_that_may_not_have_changed_are_not_named(tmp_path: Path) -> None:
+    rows, truth = blemished_fleet("modification", "strong", 5_540_013, rows=150)
+    write_rows(rows, tmp_path / "fleet.csv")
+    (cause,) = mlg("diagnose", tmp_path / "fleet.csv", "--json").json["causes"]
+    ((name, changed),) = truth.causes
+    assert cause["cause"] == name
+    assert _tails(cause["target"]) < _tails(str(changed))
+
+
+def _tails(target: str) -> set[str]:
+    return set(target.removeprefix("tails ").split(","))
+
+
 def test_a_column_of_the_tables_own_is_named_with_its_value(gear: Gear) -> None:
     table = fleet(gear.model, modified, rows=200)
     assert names(gear, own_column(table, np.zeros(200))) == [("modification", "mod_status POST")]

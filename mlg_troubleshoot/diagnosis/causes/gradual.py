@@ -177,12 +177,12 @@ class _Steps:
 
     @property
     def sure(self) -> list[str]:
-        """As many aircraft as have it together as surely as anything that is said; the likeliest
-        ones at least.
+        """As many aircraft as have it together with half of the doubt that a name may leave (the
+        other half is that of its cause); the two likeliest at least.
         """
         order = sorted(self.shown, key=lambda tail: -self.shown[tail])
         together = np.cumprod([self.shown[tail] for tail in order])
-        count = max(int(np.sum(together >= Beliefs().sure)), _LEAST_AIRCRAFT)
+        count = max(int(np.sum(together >= (1.0 + Beliefs().sure) / 2.0)), 2)
         return sorted(order[:count])
 
 
