@@ -493,7 +493,7 @@ def _explained(
     known = np.hstack([context.shared_in, every.kept.take(others)])
     spread = block_diag(context.root_of @ context.root_of.T, np.diag(every.size[others] ** 2))
     values, covariance = shrunk(
-        finding.noise, effects.take(chosen), known, spread, problem.expected
+        context.behind(finding.noise), effects.take(chosen), known, spread, problem.expected
     )
     count = len(chosen) + (0 if block is None else block.columns.shape[1])
     return _Case(
@@ -743,10 +743,12 @@ def _gain(case: _Case) -> Gain:
     firm = [place for place, key in enumerate(keys) if key in said]
     others = [case.effect(place)[:, None] for place in range(len(keys)) if place not in firm]
     context = case.posterior.contexts[case.best.context]
+    noise = case.noise
     if context.name not in said:
-        others.append(context.independent_in)
+        noise = context.within(noise)
         block = None
-    noise = case.noise.with_effects(np.hstack(others)) if others else case.noise
+    if others:
+        noise = noise.with_effects(np.hstack(others))
     return measure_gain(
         noise,
         case.columns[:, firm],

@@ -145,16 +145,15 @@ class MisfitProblem:
         if day is None or not tails.any():
             return
         since = (day - day.min()) / np.ptp(day)
-        own = tails[:, None] == np.arange(tails.max() + 1)
         turns = (np.arange(_WAVES) + 0.5) * np.pi
         waves = np.sin(since[:, None] * turns) * 2.0 / turns
-        shapes = (own[:, :, None] * waves[:, None, :]).reshape(len(day), -1)
         often = self._shares()[UNLISTED] / (len({*self.bank.variables}) + 2)
         yield Context(
             (UNLISTED, _BY.join(("tail_no", "day"))),
             float(np.log(often)),
-            self.beliefs.shape_size * scale_in * shapes,
+            np.empty((len(day), 0)),
             listed=False,
+            of_tails_in=self.beliefs.shape_size * scale_in * waves,
         )
 
     def _shares(self) -> dict[str, float]:
@@ -302,7 +301,7 @@ def explain(problem: MisfitProblem) -> Finding:
 def _settled(finding: Finding) -> NoiseModel:
     """Noise with the scatter between tails that is likeliest given what is reported."""
     found = finding.posterior
-    held = finding.noise.with_effects(found.contexts[finding.best.context].independent_in)
+    held = found.contexts[finding.best.context].within(finding.noise)
     columns = found.effects.kept.take(finding.best.members)
     fitted = fit(held, columns, finding.problem.expected)
     return finding.noise.with_tails(fitted.tail_ratio)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -128,7 +129,7 @@ class DiagnosisTable(Result):
         """Names of the texts that only this table has: a modification, a base, a shop."""
         return tuple(name for name in self.factors if name not in FACTORS)
 
-    @property
+    @cached_property
     def gears(self) -> Texts:
         """The single gear of each row, tail and side, shape (n,)."""
         if not {TAIL_NO.variable, SIDE.variable} <= set(self.factors):

@@ -180,8 +180,10 @@ def gears_of(table: DiagnosisTable) -> Places:
         order = visits(table).values()
         for rows in order:
             known = rows[np.isfinite(landings[rows])]
-            begun[known] = _overhauls(landings[known])
-            falls += int(np.sum(np.diff(landings[known]) < 0.0))
+            fall = int(np.sum(np.diff(landings[known]) < 0.0))
+            if fall:
+                begun[known] = _overhauls(landings[known])
+                falls += fall
         if falls > _MOST_FALLS * max(len(table) - len(order), 1):
             begun[:] = 0
     numbers = of_gear + (of_gear.max(initial=0) + 1) * begun

@@ -38,7 +38,9 @@ class NoiseModel:
     scale_in: the common standard deviation as it was estimated. [in] chain, shape (n,): number of
     the series in which a row follows others, if rows do. time, shape (n,): when, in usual steps of
     a series. correlation: of the own scatter of two rows of a series one usual step apart; rows
-    further apart are less alike by a power of it (a process that forgets, Jones 1980). [1]
+    further apart are less alike by a power of it (a process that forgets, Jones 1980). [1] of_tail,
+    shape (n, k): further scatter that the rows of a tail have in common, each in its own measures,
+    which are independent. [1]
     """
 
     relative: Array
@@ -55,6 +57,7 @@ class NoiseModel:
     time: Array | None = None
     correlation: float = 0.0
     of_gear: Array | None = None
+    of_tail: Array | None = None
     _roots: dict[float, _Root] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
@@ -125,6 +128,10 @@ class NoiseModel:
         """Add effects of unknown size, each at one standard deviation."""
         return replace(self, loadings=np.hstack([self.loadings, effects_in / self.scale_in]))
 
+    def with_tails_apart(self, scatter_in: Array) -> NoiseModel:
+        """Add what the rows of each tail have in common, (n, k), at one standard deviation."""
+        return replace(self, of_tail=scatter_in / self.scale_in)
+
     def share_of(self, effects_in: Array, data: Array) -> Array:
         """What effects of unknown size that are part of this covariance most likely explain of data
         (BLUP). [in]
@@ -163,9 +170,12 @@ class NoiseModel:
     def _groups(self, tail_ratio: float) -> list[tuple[Wholes, Array]]:
         """Group of each row and what rows of one have in common, gears first. [1]"""
         one = np.ones(len(self.relative))
-        found = [(self.gears, self.gear_ratio * one), (self.tails, tail_ratio * one)]
+        found = [(self.gears, self.gear_ratio * one)]
         if self.of_gear is not None:
-            found.insert(1, (self.gears, self.of_gear))
+            found.append((self.gears, self.of_gear))
+        if self.of_tail is not None:
+            found.extend((self.tails, scatter) for scatter in self.of_tail.T)
+        found.append((self.tails, tail_ratio * one))
         return [(group, scatter) for group, scatter in found if scatter.any()]
 
     def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.misfit.columns import EffectColumns
+from mlg_troubleshoot.misfit.covariance import NoiseModel
 
 # What is wrong, and in what: a cause with its target.
 Key = tuple[str, str | None]
@@ -101,7 +102,8 @@ class Context:
     of the covariance of these sizes; None if they are independent, with one standard deviation
     each. correction: what its true prior adds to the log-likelihood of the normal
     one, given what rows say of its sizes, aᵀx − xᵀQx / 2. listed: True if it stands on the list of
-    causes.
+    causes. of_tails_in, shape (n, w): effects that each tail has in a size of its own, at one
+    standard deviation.
     """
 
     name: Key | None
@@ -110,6 +112,7 @@ class Context:
     correction: Callable[[Array, Array], float] | None = None
     root: Array | None = None
     listed: bool = True
+    of_tails_in: Array | None = None
 
     @property
     def root_of(self) -> Array:
@@ -120,6 +123,22 @@ class Context:
     def independent_in(self) -> Array:
         """Independent effects of one standard deviation each, shape (n, k)."""
         return self.shared_in if self.root is None else self.shared_in @ self.root
+
+    def behind(self, noise: NoiseModel) -> NoiseModel:
+        """Noise with what each tail has in a size of its own."""
+        return noise if self.of_tails_in is None else noise.with_tails_apart(self.of_tails_in)
+
+    def within(self, noise: NoiseModel) -> NoiseModel:
+        """Noise with all its effects."""
+        return self.behind(noise).with_effects(self.independent_in)
+
+    def share_of(self, noise: NoiseModel, data: Array) -> Array:
+        """What its effects most likely explain of data (BLUP). [in]"""
+        wide = self.within(noise)
+        found = wide.share_of(self.independent_in, data)
+        for scatter in () if self.of_tails_in is None else self.of_tails_in.T:
+            found += wide.share_of_groups(scatter, noise.tails, data)
+        return found
 
     @staticmethod
     def none(n: int) -> Context:

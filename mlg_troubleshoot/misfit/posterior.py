@@ -98,8 +98,15 @@ class _Search:
     _alone: dict[tuple[int, frozenset[int]], Explanation] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        products = Products(self.noise, self.effects, self.data, self.beliefs)
-        self.marginals = [Marginal(products, context) for context in self.contexts]
+        given = self.effects, self.data, self.beliefs
+        products = Products(self.noise, *given)
+        self.marginals = [
+            Marginal(
+                products if each.of_tails_in is None else Products(each.behind(self.noise), *given),
+                each,
+            )
+            for each in self.contexts
+        ]
         self.once, self.number = self.effects.numbered
 
     def alone(self, context: int, members: frozenset[int]) -> Explanation:
@@ -242,11 +249,9 @@ class _Search:
                 together[key] = together.get(key, 0.0) + likely
                 for name in key:
                     names[name] = names.get(name, 0.0) + likely
-            if about.shared_in.shape[1] and total > 1e-3:
+            if about.name is not None and total > 1e-3:
                 left = self.data - self.effects.kept.take(places) @ at.own.values
-                independent = about.independent_in
-                wide = self.noise.with_effects(independent)
-                expected += total * wide.share_of(independent, left)
+                expected += total * about.share_of(self.noise, left)
         acting = np.array([name is not None for name in self.effects.names], bool)
         expected += self.effects.kept.times(np.where(acting, size, 0.0))
         listed |= {context.name for context in self.contexts if context.listed}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from dataclasses import fields, replace
 from itertools import combinations, product
 from pathlib import Path
@@ -207,6 +208,40 @@ def test_no_set_within_one_step_is_likelier_than_the_one_that_is_found() -> None
     for context, near in steps:
         chance = truth.get((context, tuple(sorted(near))), 0.0)
         assert chance <= truth[best.context, best.members] + 1e-12
+
+
+@pytest.mark.parametrize("small", [0, 100_000])
+def test_what_each_tail_has_in_a_size_of_its_own_weighs_as_much_as_written_out(
+    small: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mlg_troubleshoot.misfit.covariance._SMALL", small)
+    waves = np.random.default_rng(4).standard_normal((N, 2))
+    of_tail = NOISE.tails[:, None] == np.arange(5)
+    columns = (of_tail[:, :, None] * waves[:, None, :]).reshape(N, 10)
+    walk = ("walk", None)
+    written_out = search(contexts=(*CONTEXTS, Context(walk, 2.0, columns)))
+    kept = Context(walk, 2.0, np.empty((N, 0)), of_tails_in=waves)
+    found = search(contexts=(*CONTEXTS, kept))
+    assert written_out.names[walk] > 0.1
+    assert found.names == pytest.approx(written_out.names)
+    assert found.expected_in == pytest.approx(written_out.expected_in)
+
+
+def test_a_thousand_tails_with_sizes_of_their_own_take_the_memory_of_a_few_columns() -> None:
+    n = 3_000
+    rng = np.random.default_rng(5)
+    tails = np.arange(n) % 1_000
+    noise = replace(NoiseModel.white(n), tails=tails, gears=tails)
+    walk = Context(("walk", None), 0.0, np.empty((n, 0)), of_tails_in=rng.standard_normal((n, 3)))
+    effects = Effects.free(rng.standard_normal((n, 2)), [("a", None), ("b", None)], -3.0, 1.0)
+    data = rng.standard_normal(n)
+    tracemalloc.start()
+    try:
+        posterior(noise, data, effects, (Context.none(n), walk), Beliefs())
+        written_out = 8 * n * 3 * 1_000
+        assert tracemalloc.get_traced_memory()[1] < 0.1 * written_out
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_context_far_ahead_of_every_single_effect_does_not_hide_two_that_act_together() -> None:
