@@ -28,19 +28,38 @@ FAR = 3.0
 class NoiseModel:
     """Covariance of the rows: diagonal scatter, common scatter of each tail, bias and slope.
 
-    relative, shape (n,): standard deviation of each row in units of the common one. [1] tails,
-    shape (n,): number of the tail of each row. gears, shape (n,): number of the single gear of each
-    row. loadings, shape (n, k): bias, slope and small trends, each at one standard deviation in
-    units of the common one. [1] floor_in: scatter that every row has at least. [in] gear_ratio:
-    scatter between the gears of one tail over the scatter of a row. [1] of_gear, shape (n,):
-    further scatter that the rows of a gear have in common, each in its own measure. [1]
-    tail_ratios: ratios of the scatter between tails to the scatter of a row that are tried. [1]
-    scale_in: the common standard deviation as it was estimated. [in] chain, shape (n,): number of
-    the series in which a row follows others, if rows do. time, shape (n,): when, in usual steps of
-    a series. correlation: of the own scatter of two rows of a series one usual step apart; rows
-    further apart are less alike by a power of it (a process that forgets, Jones 1980). [1] of_tail,
-    shape (n, k): further scatter that the rows of a tail have in common, each in its own measures,
-    which are independent. [1]
+    Attributes
+    ----------
+    relative : ndarray, shape (n,)
+        Standard deviation of each row in units of the common one. [1]
+    tails, gears : ndarray of int, shape (n,)
+        Number of the tail, and of the single gear, of each row.
+    loadings : ndarray, shape (n, k)
+        Bias, slope and small trends, each at one standard deviation in units of the common one. [1]
+    floor_in : float
+        Scatter that every row has at least. [in]
+    gear_ratio : float
+        Scatter between the gears of one tail over the scatter of a row. [1]
+    tail_ratios : tuple of float
+        Ratios of the scatter between tails to the scatter of a row that are tried. [1]
+    scale_in : float
+        The common standard deviation as it was estimated. [in]
+    absorbed : int
+        How many of the first loadings are nuisance parameters; each takes as much as one row tells.
+    tail_chances : tuple of float
+        Probability of each of the `tail_ratios` beforehand; alike if empty. [1]
+    chain : ndarray of int, shape (n,), optional
+        Number of the series in which a row follows others.
+    time : ndarray, shape (n,), optional
+        When each row was taken, in usual steps of a series.
+    correlation : float
+        Of the own scatter of two rows of a series one usual step apart; rows further apart are less
+        alike by a power of it (a process that forgets, Jones 1980). [1]
+    of_gear : ndarray, shape (n,), optional
+        Further scatter that the rows of a gear have in common, each row in its own measure. [1]
+    of_tail : ndarray, shape (n, k), optional
+        Further scatter that the rows of a tail have in common, column by column and independent of
+        each other, each row in its own measure. [1]
     """
 
     relative: Array

@@ -25,14 +25,30 @@ _OF_EACH = ("listed", "log_prior", "size", "scales", "least", "sign", "mean", "r
 class Effects:
     """Effects that may act, several variants under one name; each has a size that is not known.
 
-    columns, shape (n, p): effect of each per unit of its size, written out or not. names: what each
-    is a variant of, None where it is an entry error, nothing that anybody has to correct. listed,
-    shape (p,): True if it stands on the list of causes. log_prior, shape (p,): logarithm of how
-    often each is expected in a set of data. size, shape (p,): standard deviation of its size.
-    scales, shape (p,): True where that is one of several. least, shape (p,): what is smaller does
-    not matter. sign, shape (p,): +1 or −1 where it can have one sign only, else 0. mean, shape
-    (p,): the only size that it can have, 0 where it is free. rarity: the part of log_prior that is
-    not belief, shape (p,): variants that the rows were searched for and that are not listed.
+    Attributes
+    ----------
+    columns : ndarray or EffectColumns, shape (n, p)
+        Effect of each per unit of its size.
+    names : sequence of Key or None
+        What each is a variant of; None where it is an entry error, nothing that anybody has to
+        correct.
+    listed : ndarray of bool, shape (p,)
+        True if it stands on the list of causes.
+    log_prior : ndarray, shape (p,)
+        Logarithm of how often each is expected in a set of data.
+    size : ndarray, shape (p,)
+        Standard deviation of its size.
+    scales : ndarray of bool, shape (p,)
+        True where that standard deviation is one of several that are tried.
+    least : ndarray, shape (p,)
+        A smaller standard deviation is not tried: so small an effect does not matter.
+    sign : ndarray, shape (p,)
+        +1 or −1 where the size can have one sign only, else 0.
+    mean : ndarray, shape (p,)
+        The only size that it can have, 0 where it is free.
+    rarity : ndarray, shape (p,), or float
+        The part of `log_prior` that is not belief: variants that the rows were searched for and
+        that are not listed.
     """
 
     columns: Array | EffectColumns
@@ -97,13 +113,24 @@ class Effects:
 class Context:
     """Effects that act all together or not at all, with what is known of them beforehand.
 
-    name: what is wrong if it acts, None where nothing does. log_prior: logarithm of how often it is
-    expected. shared_in, shape (n, j): its effects, each per unit of its size. root, shape (j, k):
-    of the covariance of these sizes; None if they are independent, with one standard deviation
-    each. correction: what its true prior adds to the log-likelihood of the normal
-    one, given what rows say of its sizes, aᵀx − xᵀQx / 2. listed: True if it stands on the list of
-    causes. of_tails_in, shape (n, w): effects that each tail has in a size of its own, at one
-    standard deviation.
+    Attributes
+    ----------
+    name : Key or None
+        What is wrong if it acts; None where nothing does.
+    log_prior : float
+        Logarithm of how often it is expected.
+    shared_in : ndarray, shape (n, j)
+        Its effects, each per unit of its size.
+    correction : callable, optional
+        What its true prior adds to the log-likelihood of the normal one, given what rows say of its
+        sizes, aᵀx − xᵀQx / 2.
+    root : ndarray, shape (j, k), optional
+        Root of the covariance of the sizes; None if they are independent, with one standard
+        deviation each.
+    listed : bool
+        True if it stands on the list of causes.
+    of_tails_in : ndarray, shape (n, w), optional
+        Effects that each tail has in a size of its own, at one standard deviation. [in]
     """
 
     name: Key | None
@@ -148,10 +175,18 @@ class Context:
 
 @dataclass(frozen=True)
 class Explanation:
-    """A context with some effects in it, by their places, and how likely it is.
+    """A context with some effects in it, and how likely it is.
 
-    log_posterior: up to a constant that all explanations of the same data share. values, shape
-    (k,): expected size of each member.
+    Attributes
+    ----------
+    context : int
+        Place of the context.
+    members : tuple of int
+        Places of the effects.
+    log_posterior : float
+        Up to a constant that all explanations of the same data share.
+    values : ndarray, shape (k,)
+        Expected size of each member.
     """
 
     context: int

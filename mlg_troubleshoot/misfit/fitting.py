@@ -16,9 +16,16 @@ from mlg_troubleshoot.misfit.covariance import NoiseModel
 class Fit:
     """Least-squares fit of some columns under the noise model.
 
-    values, shape (k,): parameters. errors, shape (k,): their standard errors. log_likelihood:
-    profiled over scale and tail scatter. [1] tail_ratio, scale: scatter between tails over scatter
-    of a row [1], common standard deviation [in].
+    Attributes
+    ----------
+    values, errors : ndarray, shape (k,)
+        Parameters, and their standard errors.
+    log_likelihood : float
+        Profiled over scale and scatter between tails. [1]
+    tail_ratio : float
+        Scatter between tails over scatter of a row. [1]
+    scale : float
+        Common standard deviation. [in]
     """
 
     values: Array

@@ -25,11 +25,20 @@ Members = tuple[int, ...]
 class Products:
     """Inner products of effects with each other and with the data under one noise.
 
-    A level is one ratio of the scatter between tails. square, along, shape (levels, p): of each
-    effect with itself and with the data. rest, shape (levels,): of the data. log, shape (levels,):
-    logarithm of the covariance's determinant, less twice that of the level's chance. spread, shape
-    (sizes, p): standard deviation of each effect's size in units of the noise's scale; every_spread
-    the same in each level.
+    A level is one ratio of the scatter between tails.
+
+    Attributes
+    ----------
+    square, along : ndarray, shape (levels, p)
+        Product of each effect with itself, and with the data.
+    rest : ndarray, shape (levels,)
+        Product of the data with themselves.
+    log : ndarray, shape (levels,)
+        Logarithm of the covariance's determinant, less twice that of the level's chance.
+    spread : ndarray, shape (sizes, p)
+        Standard deviation of each effect's size in units of the noise's scale.
+    every_spread : ndarray, shape (sizes * levels, p)
+        The same in each level.
     """
 
     def __init__(self, noise: NoiseModel, effects: Effects, data: Array, beliefs: Beliefs) -> None:
@@ -85,9 +94,16 @@ class Products:
 class _Given:
     """Products of all effects once some of them are integrated out; levels are sizes by tails.
 
-    square, along: of each effect with itself and with the data, (levels, p). rest: of the data,
-    (levels,). log: logarithm of the covariance's determinant, and of the chances of signs,
-    (levels,). values: expected sizes of the members, (levels, k).
+    Attributes
+    ----------
+    square, along : ndarray, shape (levels, p)
+        Product of each effect with itself, and with the data.
+    rest : ndarray, shape (levels,)
+        Product of the data with themselves.
+    log : ndarray, shape (levels,)
+        Logarithm of the covariance's determinant, and of the chances of signs.
+    values : ndarray, shape (levels, k)
+        Expected sizes of the members.
     """
 
     square: Array

@@ -28,14 +28,30 @@ _TRACE = float(np.exp(-2 * REACH))
 class MisfitPosterior:
     """How likely explanations of one set of data are.
 
-    likeliest: explanations that were looked at as a whole, likeliest first, with their
-    logarithmic probability. names: probability that something of each name acts. nothing: that
-    nothing of any name does. unlisted: that something acts that is on no list. together:
-    probability of each set of names. of_effect, shape (p,): of each effect. over_nothing, shape
-    (p,): logarithm of the odds of each alone against nothing at all. expected_size, shape (p,):
-    expected size of each effect, whether it acts or not. expected_in, shape (n,):
-    expected effect on each row of all that acts but slips. log_evidence: logarithm of the
-    likelihood of the data under all that was looked at, up to a constant of the rows.
+    Attributes
+    ----------
+    likeliest : tuple of Explanation
+        Explanations that were looked at as a whole, likeliest first, with their logarithmic
+        probability.
+    names : dict
+        Probability that something of each name acts.
+    together : dict
+        Probability of each set of names.
+    of_effect : ndarray, shape (p,)
+        Probability of each effect.
+    over_nothing : ndarray, shape (p,)
+        Logarithm of the odds of each effect alone against nothing at all.
+    nothing : float
+        Probability that nothing of any name acts.
+    unlisted : float
+        Probability that something acts that is on no list.
+    expected_size : ndarray, shape (p,)
+        Expected size of each effect, whether it acts or not.
+    expected_in : ndarray, shape (n,)
+        Expected effect on each row of all that acts but slips. [in]
+    log_evidence : float
+        Logarithm of the likelihood of the data under all that was looked at, up to a constant of
+        the rows.
     """
 
     effects: Effects
