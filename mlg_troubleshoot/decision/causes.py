@@ -54,10 +54,20 @@ _LINKAGE = blur(PRIORS.linkage_u_in)
 class _Unread:
     """A gear of which nothing was read, with its pins at rest in one way.
 
-    by_share: characteristic functions of its joints by what they are worn to, (joints, shares,
-    terms); unread, worn: of unread ones, and of those beyond their limit, (levels, joints, terms).
-    fresh: of new parts, (joints, terms). bend: by how much each joint moves the
-    plunger on average. [1/in] exceeds: chance of leaving the margin, by level of wear. [1]
+    Attributes
+    ----------
+    amplification : ndarray, shape (joints,)
+        Amplification of each joint. [1]
+    bend : ndarray, shape (joints,)
+        By how much each joint moves the plunger on average, per clearance squared. [1/in]
+    by_share : ndarray, shape (joints, shares, terms)
+        Characteristic functions of the joints by what they are worn to.
+    unread, worn : ndarray, shape (levels, joints, terms)
+        The same of joints that nobody read, and of those beyond their limit, by level of wear.
+    fresh : ndarray, shape (joints, terms)
+        The same of new parts.
+    exceeds : ndarray, shape (levels,)
+        Chance of leaving the margin, by level of wear. [1]
     """
 
     pins: Pins
@@ -103,12 +113,24 @@ def _unread(gear: Gear) -> tuple[_Unread, _Unread]:
 class _Believed:
     """What is believed of n gears if their pins rest in one way.
 
-    fits: density of the plunger's reading. levels: chances of the levels of wear, (n, levels). [1]
-    worn: chance that each unread joint is beyond its limit. [1] waves: characteristic function of
-    each joint given the plunger's reading, (n, joints, terms); sums: of all together whatever it
-    reads, (n, terms). exceeds: chance that the joints hold the plunger beyond its margin, whatever
-    it reads; usually: the same of a gear of the fleet of which nothing was read. [1] by_share:
-    density of the plunger's reading by what each joint in doubt is worn to, (readings, shares).
+    Attributes
+    ----------
+    fits : ndarray
+        Density of the plunger's reading.
+    levels : ndarray, shape (n, levels)
+        Chances of the levels of wear. [1]
+    worn : ndarray, shape (n, joints)
+        Chance that each unread joint is beyond its limit. [1]
+    waves : ndarray, shape (n, joints, terms)
+        Characteristic function of each joint given the plunger's reading.
+    sums : ndarray, shape (n, terms)
+        Characteristic function of all joints together, whatever the plunger reads.
+    exceeds : ndarray, shape (n,)
+        Chance that the joints hold the plunger beyond its margin, whatever it reads. [1]
+    usually : float
+        The same of a gear of the fleet of which nothing was read. [1]
+    by_share : ndarray, shape (readings, shares)
+        Density of the plunger's reading by what each joint in doubt is worn to.
     """
 
     unread: _Unread

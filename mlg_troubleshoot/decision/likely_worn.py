@@ -107,8 +107,13 @@ def _clearances(one: Cases) -> _Clearances:
 class _Given:
     """The clearances given the plunger's reading, where pins rest in one way.
 
-    waves: characteristic function of each clearance, (joints, places, terms). density: chance of
-    each clearance, (joints, places). [1]
+    waves, shape (joints, places, terms): characteristic function of what each place of each
+    clearance does to the plunger.
+
+    Attributes
+    ----------
+    density : ndarray, shape (joints, places)
+        Chance of each place of each clearance. [1]
     """
 
     def __init__(self, before: _Clearances, waves: Array, reading_in: float, u_in: float) -> None:

@@ -67,10 +67,18 @@ CONFIRM, NOT_CLOSING = map(_correction, (sentences.CONFIRM, sentences.CHECK_ENTR
 class Judged:
     """What the verdict found about n gears.
 
-    order: places of the joints in the order of their rank. p_within, u_in: chance that the worst
-    case is within the margin, its uncertainty against the margin. [1, in] questions: as
-    `Cases` says them, found once. joints_done: gears that retracted, with every joint read and none
-    over its limit.
+    Attributes
+    ----------
+    order : ndarray of int, shape (n, joints)
+        Places of the joints in the order of their rank.
+    p_within : ndarray, shape (n,)
+        Chance that the worst case is within the margin. [1]
+    u_in : ndarray, shape (n,)
+        Uncertainty of the worst case against the margin. [in]
+    questions : sequence of str
+        What `Cases` asks about each gear, found once.
+    joints_done : ndarray of bool, shape (n,)
+        Gears that retracted, with every joint read and none over its limit.
     """
 
     verdicts: Sequence[Verdict]

@@ -69,8 +69,12 @@ class Doubted:
     A gauge may have an error of scale, and a reading may be the total play; neither is likely of a
     joint that was measured again.
 
-    rows, joints: places of the gears and of their joints. chances: of `SHARES`, not normalised,
-    (readings, shares). [1]
+    Attributes
+    ----------
+    rows, joints : ndarray of int, shape (readings,)
+        Places of the gears and of their joints.
+    chances : ndarray, shape (readings, shares)
+        Chance of each of `SHARES`, not normalised. [1]
     """
 
     rows: Places

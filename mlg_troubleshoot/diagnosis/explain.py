@@ -42,11 +42,22 @@ _WAVES = 3
 class MisfitProblem:
     """The data of one table with all that may explain them.
 
-    misfit, shape (n,): measured less predicted. [in]
-    columns: effects of the candidates. [in / unit]
-    blocks: all-joint effects.
-    causes: all causes, those that the table cannot test included.
-    doubtful: True if all-joint effects cannot be named, because clearances are missing or cut off.
+    Attributes
+    ----------
+    misfit : ndarray, shape (n,)
+        Measured less predicted. [in]
+    candidates : sequence of Candidate
+        Variants of the listed causes.
+    columns : EffectColumns, shape (n, p)
+        Effects of the candidates. [in / unit]
+    bank : Bank
+        Shapes of what is on no list.
+    blocks : sequence of Block
+        All-joint effects.
+    causes : sequence of Cause
+        All causes, those that the table cannot test included.
+    doubtful : bool
+        True if all-joint effects cannot be named, because clearances are missing or cut off.
     """
 
     misfit: Array
@@ -196,8 +207,12 @@ class WeighedCause:
 class Finding:
     """What the posterior says.
 
-    follows: the verdict, with the posterior that it follows from. noise: the noise under which all
-    are compared.
+    Attributes
+    ----------
+    follows : Conclusion
+        The verdict, with the posterior that it follows from.
+    noise : NoiseModel
+        The noise under which all are compared.
     """
 
     problem: MisfitProblem

@@ -90,12 +90,17 @@ class LikelyClearances:
     """Clearances behind the readings, those that were not read filled, and what is not known of
     them.
 
-    likely_in, shape (n, n_joints): most likely radial clearances. [in] u_row_in, u_gear_in,
-    u_fleet_in, shape (n, n_joints): standard uncertainty of what was not read: of each row, common
-        to a gear's rows, common to all rows; where no wear was read, that of the gear is all that
-        is supposed. [in]
-    shown_in, shape (n, n_joints): what the gauge most likely showed. [in]
-    together, shape (n, k): further changes of u_fleet_in, of all joints that nobody read alike. [1]
+    Attributes
+    ----------
+    likely_in : ndarray, shape (n, n_joints)
+        Most likely radial clearances. [in]
+    u_row_in, u_gear_in, u_fleet_in : ndarray, shape (n, n_joints)
+        Standard uncertainty of what was not read: of each row, common to a gear's rows, common to
+        all rows. Where no wear was read, that of the gear is all that is supposed. [in]
+    shown_in : ndarray, shape (n, n_joints)
+        What the gauge most likely showed. [in]
+    together : ndarray, shape (n, k)
+        Further changes of `u_fleet_in`, of all joints that nobody read alike. [1]
     """
 
     likely_in: Array

@@ -133,10 +133,14 @@ class Pile:
 
 @dataclass(frozen=True)
 class Written:
-    """Intervals of what the gauge showed, shape (n, n_joints). [in]
+    """Intervals of what the gauge showed.
 
-    low, high: ends of the interval of each value; NaN of a blank that may be anything. lower: how
-    often a value below its interval is written so as well. [1]
+    Attributes
+    ----------
+    low, high : ndarray, shape (n, n_joints)
+        Ends of the interval of each value; NaN of a blank that may be anything. [in]
+    lower : ndarray, shape (n, n_joints)
+        How often a value below its interval is written so as well. [1]
     """
 
     low: Array

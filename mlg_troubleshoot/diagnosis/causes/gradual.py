@@ -166,9 +166,15 @@ class Modification(RowShift):
 class _Steps:
     """Which aircraft have a step of one size, and from which day on.
 
-    days: the likeliest first day of each that more likely has it than not. shown: how likely each
-    of them has rows on both sides of the step. [1] rarity: logarithm of the likelihood over all
-    aircraft and days, less that with these and their own best size.
+    Attributes
+    ----------
+    days : dict of str to float
+        The likeliest first day of each aircraft that more likely has a step than not.
+    shown : dict of str to float
+        Probability of each of them that it has rows on both sides of its step. [1]
+    rarity : float
+        Logarithm of the likelihood over all aircraft and days, less that with these days and their
+        own best size.
     """
 
     days: dict[str, float]
