@@ -25,8 +25,14 @@ DAYS_PER_YEAR = 365.25
 class LengthUnit(StrEnum):
     """A unit that a length may be entered in.
 
-    per_inch: how many of this unit make one inch. words: the unit in full, in the plural.
-    decimals: that show a length to about 0.0001 in.
+    Attributes
+    ----------
+    per_inch : float
+        How many of this unit make one inch.
+    words : str
+        The unit in full, in the plural.
+    decimals : int
+        Decimals that show a length to about 0.0001 in.
     """
 
     per_inch: float

@@ -277,8 +277,12 @@ class InvalidRow:
     """A data row that cannot be judged, with the columns to correct; its problems stand in the list
     of problems.
 
-    understood: what could be read of it, None if nothing; what it lacks is None there. cells: what
-    a spreadsheet program calls what is to be corrected, as far as it has cells.
+    Attributes
+    ----------
+    understood : Inspection or None
+        What could be read of it, None if nothing; what it lacks is None there.
+    cells : tuple of str
+        What a spreadsheet program calls what is to be corrected, as far as it has cells.
     """
 
     record_id: str | None

@@ -21,13 +21,23 @@ LEAST_TAILS = 4
 class Gain:
     """Held-out misfit and decisions before and after.
 
-    rms_before_in, rms_after_in: root mean square misfit of held-out rows. [in] share_interval: 95 %
-    interval of the share of the mean square misfit that is removed, over tails. [1]
-    false_within_before, false_within_after: rows predicted within whose measured displacement is
-    outside. false_outside_before, false_outside_after: rows predicted outside whose measured
-    displacement is within. verdicts_changed: records whose predicted side of the margin changes.
-    held_out_by: what was held out together: ``tail`` or ``row``. better: True if held-out rows
-        are likelier with the extension than without, and their misfit is smaller.
+    Attributes
+    ----------
+    rms_before_in, rms_after_in : float
+        Root mean square misfit of held-out rows. [in]
+    share_interval : tuple of float
+        95 % interval of the share of the mean square misfit that is removed, over tails. [1]
+    false_within_before, false_within_after : int
+        Rows predicted within whose measured displacement is outside.
+    false_outside_before, false_outside_after : int
+        Rows predicted outside whose measured displacement is within.
+    verdicts_changed : tuple of str
+        Records whose predicted side of the margin changes.
+    held_out_by : str
+        What was held out together: ``tail`` or ``row``.
+    better : bool
+        True if held-out rows are likelier with the extension than without, and their misfit is
+        smaller.
     """
 
     rms_before_in: float

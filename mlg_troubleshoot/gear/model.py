@@ -29,11 +29,27 @@ class Calibration:
 class LinkageModel:
     """One calibrated linkage, ready to be solved for batches of clearances.
 
-    mechanism: the linkage, given at mid-position. stroke: input at Down Lock and at mid-position,
-    the release stroke. [in] calibration: what the plunger does without clearance. mid: output of
-    the mechanism at mid-position without clearance. [in] rate: calibration rate k of P(s) = P(0) +
-    k (p(s) − p(0)); its sign makes over-travel positive. [1] Raises `MechanismError` if the linkage
-    does not close over the whole stroke without clearance.
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The linkage, given at mid-position.
+    stroke : tuple of float
+        Input at Down Lock and at mid-position, the release stroke. [in]
+    calibration : Calibration
+        What the plunger does without clearance.
+
+    Attributes
+    ----------
+    mid : float
+        Output of the mechanism at mid-position without clearance. [in]
+    rate : float
+        Calibration rate k of P(s) = P(0) + k (p(s) − p(0)); its sign makes over-travel positive.
+        [1]
+
+    Raises
+    ------
+    MechanismError
+        If the linkage does not close over the whole stroke without clearance.
     """
 
     def __init__(

@@ -91,8 +91,14 @@ class ShortForm(Table):
 class NewGear:
     """A short form as it was understood.
 
-    values: the full gear file. steps: how each point is located, in words. assumed: what the short
-    form does not state, in words.
+    Attributes
+    ----------
+    values : dict
+        The full gear file.
+    steps : tuple of str
+        How each point is located, in words.
+    assumed : tuple of str
+        What the short form does not state, in words.
     """
 
     values: dict[str, Any]

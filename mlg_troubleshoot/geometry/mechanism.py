@@ -131,10 +131,17 @@ class Guided:
     """A joint on a line that starts at a point of the mechanism, at the distance from it that the
     coordinates give.
 
-    across: of a second line that starts at `upstream`, and the joint is where both meet (dyad RPP);
-    None for the end of a link from `upstream`, on the side where the coordinates put it (RRP).
-    virtual_links: they displace that second line, or that link. driven: true if the joint is the
-    end of an actuator along the line, whose extension is the input; they then displace the joint.
+    Attributes
+    ----------
+    across
+        Direction of a second line that starts at `upstream`: the joint is where both meet (dyad
+        RPP). None for the end of a link from `upstream`, on the side where the coordinates put it
+        (RRP).
+    virtual_links
+        They displace that second line, or that link.
+    driven : bool
+        True if the joint is the end of an actuator along the line, whose extension is the input;
+        virtual links then displace the joint.
     """
 
     joint: str
@@ -165,10 +172,24 @@ class Output:
 class Mechanism:
     """Planes, points and steps of one mechanism at its reference position.
 
-    planes: planes, parents first. steps: steps in the order of the mechanism, from the input to the
-    output. reference_input: input at which the points are given. [in or rad] virtual_links: numbers
-    of all virtual links, in order. Raises `MechanismError` if a plane, point, step or the output
-    refers to what is not there, a point is located never or twice, or a virtual link is used twice.
+    Attributes
+    ----------
+    planes : tuple of Plane
+        Parents first.
+    points : tuple of Point
+        Where the joints and fixed points are.
+    steps : tuple of Step
+        In the order of the mechanism, from the input to the output.
+    reference_input : float
+        Input at which the points are given. [in or rad]
+    virtual_links : tuple of int
+        Numbers of all virtual links, in order.
+
+    Raises
+    ------
+    MechanismError
+        If a plane, point, step or the output refers to what is not there, a point is located never
+        or twice, or a virtual link is used twice.
     """
 
     planes: tuple[Plane, ...]

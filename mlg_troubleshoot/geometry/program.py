@@ -50,13 +50,19 @@ class Closure:
 class Program:
     """Formulas that locate every joint of a mechanism, in order, and its numbers by name.
 
-    parameters: every number of the mechanism by name: ``point.E.x``, ``length.3-5``, ``sign.5`` …
-    [in, rad or 1]
-      Names of a mechanism stand here and nowhere in the formulas: whatever they are, they are never
-      run.
-    lines: assignments (name, expression); each name is assigned once. joints: names of the two
-    coordinates of each point, in its plane. virtual_links: how many virtual links there are, each
-    the two inputs ``vx{i}`` and ``vy{i}`` by its place. [in]
+    Attributes
+    ----------
+    parameters : dict
+        Every number of the mechanism by name: ``point.E.x``, ``length.3-5``, ``sign.5`` … Names of
+        a mechanism stand here and nowhere in the formulas: whatever they are, they are never run.
+        [in, rad or 1]
+    lines : tuple of (str, str)
+        Assignments (name, expression); each name is assigned once.
+    joints : dict
+        Names of the two coordinates of each point, in its plane.
+    virtual_links : int
+        How many virtual links there are, each the two inputs ``vx{i}`` and ``vy{i}`` by its place.
+        [in]
     """
 
     parameters: dict[str, Any]

@@ -18,9 +18,15 @@ from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 class Conclusion:
     """What a posterior says.
 
-    sure: names that act, the likeliest first, whatever else does. never: names that only stand for
-    what the data cannot test. firm: names that are said even if something acts that is on no list:
-    it has nothing in common with their form.
+    Attributes
+    ----------
+    sure : tuple of Key
+        Names that act, the likeliest first, whatever else does.
+    never : frozenset of Key
+        Names that only stand for what the data cannot test.
+    firm : frozenset of Key
+        Names that are said even if something acts that is on no list: it has nothing in common with
+        their form.
     """
 
     posterior: MisfitPosterior

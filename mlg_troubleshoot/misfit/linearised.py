@@ -45,9 +45,18 @@ def key_of(name: str) -> Key:
 class FittedPoint:
     """The simulation where some suspects fit best, the others nominal.
 
-    values: of all parameters. rest, shape (N,): reading less prediction. columns, shape (N, p):
-    change of each reading for one trial of each parameter. whole, shape (N,): misfit with all
-    suspects at nominal, as far as the columns say. arrived, condition: of the fit, as in `Fitted`.
+    Attributes
+    ----------
+    values : ndarray
+        Values of all parameters.
+    rest : ndarray, shape (N,)
+        Reading less prediction.
+    columns : ndarray, shape (N, p)
+        Change of each reading for one trial of each parameter.
+    whole : ndarray, shape (N,)
+        Misfit with all suspects at nominal, as far as the columns say.
+    arrived, condition
+        Of the fit, as in `Fitted`.
     """
 
     values: Array

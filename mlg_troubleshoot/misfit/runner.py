@@ -39,9 +39,17 @@ _KNOWN = 1e-5
 class Fitted:
     """Where a fit ended.
 
-    values: of all parameters. base, shape (N,): prediction of the readings there. arrived: True if
-    a further step would change next to nothing. condition: of the fitted columns at their own
-    length; 1 where each moves the readings in its own way. [1]
+    Attributes
+    ----------
+    values : ndarray
+        Values of all parameters.
+    base : ndarray, shape (N,)
+        Prediction of the readings there.
+    arrived : bool
+        True if a further step would change next to nothing.
+    condition : float
+        Condition of the fitted columns at their own length; 1 where each moves the readings in its
+        own way. [1]
     """
 
     values: Array

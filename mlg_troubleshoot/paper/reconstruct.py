@@ -43,10 +43,17 @@ _LARGE_IN = 22
 class Reconstruction:
     """A linkage that was searched for.
 
-    linkage: the linkage, its coordinates rounded to 1e-4 in. numbers: free numbers of the linkage:
-    coordinates, angles, stroke. determined: directions in the space of these numbers that the
-    binding targets determine. loosest: numbers that can change most while every target stays met to
-    first order, with their part. [1]
+    Attributes
+    ----------
+    linkage : Linkage
+        Its coordinates rounded to 1e-4 in.
+    numbers : int
+        How many numbers of the linkage are free: coordinates, angles, stroke.
+    determined : int
+        How many directions in the space of these numbers the binding targets determine.
+    loosest : tuple of (str, float)
+        Numbers that can change most while every target stays met to first order, with their part.
+        [1]
     """
 
     linkage: Linkage

@@ -118,8 +118,13 @@ _UNIT_MARKS = frozenset("\"'°″′”’%‰")
 class NumberFormat:
     """What a number format makes of a number.
 
-    width: digits that a format such as ``000`` fills up with zeros. sections: the text of each
-    section, with a mark where the number stands; none if the format adds no words to numbers.
+    Attributes
+    ----------
+    width : int
+        Digits that a format such as ``000`` fills up with zeros.
+    sections : tuple of str
+        Text of each section, with a mark where the number stands; none if the format adds no words
+        to numbers.
     """
 
     is_date: bool = False

@@ -37,9 +37,16 @@ from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 class Header:
     """A header as found.
 
-    row: its row (the lower one of two), counted from 1. texts: one for each field, trailing blanks
-    included. rows_used: the rows that belong to it: one, or two where the header has two rows or a
-    row of units below. units: unit of each column from a row of units; empty without one.
+    Attributes
+    ----------
+    row : int
+        Its row (the lower one of two), counted from 1.
+    texts : tuple of str
+        One for each field, trailing blanks included.
+    rows_used : tuple of int
+        Rows that belong to it: one, or two where the header has two rows or a row of units below.
+    units : tuple of LengthUnit or None
+        Unit of each column from a row of units; empty without one.
     """
 
     row: int
