@@ -168,6 +168,23 @@ def test_an_outcome_is_taken_back(visit: Visit, store: SessionStore) -> None:
     assert life(store).inspections[-1].inspection.outcome == "FAILED"
 
 
+def test_a_second_undo_goes_one_change_further_back(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36")
+    visit(*GEAR, "retracted")
+    visit(*GEAR, "u")
+    visit(*GEAR, "u")
+    found = life(store).inspections[-1].inspection
+    assert (found.outcome, found.readings_in) == ("FAILED", ())
+
+
+def test_nothing_is_left_to_undo_once_all_changes_are(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36")
+    visit(*GEAR, "u")
+    assert "undo" not in visit(*GEAR, "").screen
+
+
 def test_a_repair_is_recorded_and_taken_back_with_its_record(
     visit: Visit, store: SessionStore
 ) -> None:

@@ -54,7 +54,7 @@ class Visit:
     """The last inspection of a gear as it counts today.
 
     `read_on` is the day on which each reading was entered, `before` the answers before the last
-    change, `todo` what NEXT asks for, `minutes` how long that takes. [min]
+    change that was not undone, `todo` what NEXT asks for, `minutes` how long that takes. [min]
     """
 
     record: Record
@@ -166,6 +166,7 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
         todo = restored
         said = Sentence(f"Restored since, as the records say: {names}. Enter the new clearances.")
     versions = _versions(life, latest.record)
+    standing = _not_undone([answers_of(inspection_from(v), gear, "") for v in versions])
     verdict = latest.result.get("verdict")
     return Visit(
         latest.record,
@@ -178,9 +179,7 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
         todo,
         joints,
         float(step.get("minutes") or 0.0) if todo and not restored else 0.0,
-        answers_of(inspection_from(versions[-2]), gear, latest.record.digest)
-        if len(versions) > 1
-        else None,
+        replace(standing[-2], continues=latest.record.digest) if len(standing) > 1 else None,
     )
 
 
@@ -204,6 +203,17 @@ def _versions(life: GearLife, last: Record) -> list[Record]:
         if record.digest == chain[-1].body["supersedes"]:
             chain.append(record)
     return chain[::-1]
+
+
+def _not_undone(versions: list[Answers]) -> list[Answers]:
+    """The versions that lead to the last one, a change and its undoing left out."""
+    standing: list[Answers] = []
+    for version in versions:
+        if version in standing[-2:-1]:
+            standing.pop()
+        else:
+            standing.append(version)
+    return standing
 
 
 def _read_on(versions: list[Record]) -> Mapping[int, str]:
