@@ -278,7 +278,9 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
     closes = np.isfinite(said.displacement_in)
     if plunger.beyond[i]:
         explained = sentences.explained(
-            float(plunger.explained_at_most_in[i]), float(plunger.unexplained_in[i])
+            float(plunger.explained_at_most_in[i]),
+            float(plunger.unexplained_in[i]),
+            by_read=not said.unread or abs(mean) <= said.bound_in,
         )
         then = (
             Sentence.of("{} Predicted: {}.", explained, said.words)

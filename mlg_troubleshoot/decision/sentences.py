@@ -258,9 +258,11 @@ def larger_margin(stated_in: float, of_the_gear_in: float) -> Sentence:
     )
 
 
-def explained(explained_in: float, unexplained_in: float) -> Sentence:
+def explained(explained_in: float, unexplained_in: float, *, by_read: bool) -> Sentence:
+    """What joint clearances explain of a displacement beyond its margin."""
     if unexplained_in <= 0.0:
-        return Sentence("Joint clearances can explain all of it.")
+        then = "" if by_read else " if joints that were not read are worn"
+        return Sentence(f"Joint clearances can explain all of it{then}.")
     return Sentence.of(
         "Joint clearances explain at most {} of it; {} has another cause.",
         Length(explained_in),

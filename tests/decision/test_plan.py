@@ -56,6 +56,16 @@ def test_an_unmeasured_joint_may_explain_a_displacement_up_to_its_limit(judge: J
     assert some.explained_at_most_in == pytest.approx(min(0.030, some.predicted_upper_in or 0.0))
 
 
+@pytest.mark.parametrize(("third", "condition"), [(None, True), (0.016, False)])
+def test_what_only_joints_that_were_not_read_could_do_is_said_with_that_condition(
+    third: float | None, condition: bool, judge: Judge
+) -> None:
+    read = {1: 0.0035, 2: 0.004} | ({} if third is None else {3: third})
+    found = judge(read, readings_in=(0.045,))
+    assert "Joint clearances can explain all of it" in found.headline
+    assert ("if joints that were not read are worn" in found.headline) is condition
+
+
 def test_without_a_reading_nothing_is_explained(judge: Judge) -> None:
     found = judge(every_joint(0.001))
     assert (found.explained_at_most_in, found.unexplained_in) == (None, None)
