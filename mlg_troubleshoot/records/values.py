@@ -328,8 +328,9 @@ def _read_choice(column: Column, cell: Filled) -> StrEnum:
     if isinstance(cell, str) and cell in choices:
         return choices[cell]
     text = plain_text(cell) if isinstance(cell, str) else ""
-    name = re.sub(r"[\s\-]+", "_", text).upper()
-    found = choices.get(name) or (column.spelt(text) if column.spelt is not None else None)
+    name = re.sub(r"[\s\-]+", "_", text).casefold()
+    alike = {word.casefold(): choice for word, choice in choices.items()}
+    found = alike.get(name) or (column.spelt(text) if column.spelt is not None else None)
     if found is not None:
         return found
     if isinstance(cell, OddCell):

@@ -5,12 +5,16 @@ its row.
 from __future__ import annotations
 
 import datetime
+from collections.abc import Callable
 from dataclasses import replace
+from enum import StrEnum
 
 import pytest
 
+from mlg_troubleshoot.decision.columns import COLUMNS, Column
 from mlg_troubleshoot.decision.inspection import Approach, Inspection, InvalidRow, Outcome, Side
 from mlg_troubleshoot.records import ReadOptions
+from mlg_troubleshoot.records.values import read_value
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 HEADER = (
@@ -101,6 +105,18 @@ def test_the_usual_spellings_of_the_right_side_are_read(read, table, side):
 
 def test_a_side_in_lower_case_is_read(read, table):
     assert inspection(read(table(rows=[("R1", "N1", " rh ", *GOOD[3:])]))).side is Side.RH
+
+
+@pytest.mark.parametrize(
+    ("column", "choice"),
+    [(column, choice) for column in COLUMNS for choice in column.choices or ()],
+    ids=lambda value: getattr(value, "name", str(value)),
+)
+@pytest.mark.parametrize("written", [str.upper, str.lower, str.title])
+def test_a_word_of_a_few_is_read_in_upper_and_lower_case(
+    column: Column, choice: StrEnum, written: Callable[[str], str]
+) -> None:
+    assert read_value(column, written(choice.value)) is choice
 
 
 def test_a_missing_convention_is_an_error_of_each_row(read, table):
