@@ -25,6 +25,7 @@ from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.decision.waves import FREQUENCIES, HELD, RANDOM, blur
 from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, Doubted, level_chances
+from mlg_troubleshoot.gear.gear import ROUNDING_IN
 
 
 def explain(one: Cases, causes: Causes | None = None) -> Posterior:
@@ -66,7 +67,8 @@ def explain(one: Cases, causes: Causes | None = None) -> Posterior:
     called = tuple(chance.joints for chance in chances if chance.probability > 0.5)
     none = chance_of_none(gear.joint_numbers)
     looked = one.inspections[0].rigging_checked not in (None, RiggingCheck.NO)
-    said = _text(chances, called, none, rigging, looked=looked)
+    pushed = reading > one.margin_in[0] + ROUNDING_IN
+    said = _text(chances, called, none, rigging, looked=looked, pushed=pushed)
     return Posterior(tuple(chances), none, rigging, intervals, called, said)
 
 
@@ -156,6 +158,7 @@ def _text(
     not_clearance: float,
     *,
     looked: bool,
+    pushed: bool,
 ) -> str:
     likely = [chance for chance in chances[:2] if chance.probability >= 1.0 - CONFORMANCE]
     ranked = ", then ".join(
@@ -175,10 +178,12 @@ def _text(
             f" ({percent(not_clearance)})."
         )
     if called:
-        return f"The measured displacement points to wear: most likely worn {ranked}.{also}"
+        shown = "The measured displacement points" if pushed else "The readings point"
+        return f"{shown} to wear: most likely worn {ranked}.{also}"
     if not likely:
         return f"Probably no joint is beyond its limit ({percent(none)}).{also}"
+    shown = "The measured displacement does" if pushed else "The readings do"
     return (
-        "The measured displacement does not show which joint is worn: no joint beyond its limit"
-        f" {percent(none)}; most likely worn {ranked}.{also}"
+        f"{shown} not show which joint is worn: no joint beyond its limit {percent(none)}; most"
+        f" likely worn {ranked}.{also}"
     )

@@ -197,3 +197,13 @@ def test_a_rigging_that_was_looked_at_is_not_named_again(
 ) -> None:
     row = inspected(every_joint(0.001), readings_in=(0.045,), rigging_checked=looked)
     assert said in explain(Cases.of(gear, [row])).text
+
+
+@pytest.mark.parametrize(
+    ("reading_in", "said"), [(0.006, "The readings point"), (0.045, "The measured displacement")]
+)
+def test_a_plunger_within_its_margin_is_not_said_to_point_to_wear(
+    gear: Gear, reading_in: float, said: str
+) -> None:
+    row = inspected(every_joint(0.001) | {3: 0.012}, readings_in=(reading_in,))
+    assert explain(Cases.of(gear, [row])).text.startswith(said)
