@@ -25,7 +25,7 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import chance_beyond
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 from mlg_troubleshoot.units import Length, Sentence
 
 
@@ -106,6 +106,11 @@ class Cases:
     @property
     def over_limit(self) -> Mask:
         return self.gear.over_limit(self.clearance_in)
+
+    @property
+    def beyond_margin(self) -> Mask:
+        """Gears whose plunger was measured beyond its margin."""
+        return np.abs(self.mean_in) > self.margin_in + ROUNDING_IN
 
     @property
     def critical_missing(self) -> Mask:

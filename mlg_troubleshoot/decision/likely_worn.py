@@ -25,7 +25,6 @@ from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.decision.waves import FREQUENCIES, HELD, RANDOM, blur
 from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, Doubted, level_chances
-from mlg_troubleshoot.gear.gear import ROUNDING_IN
 
 
 def explain(one: Cases, causes: Causes | None = None) -> Posterior:
@@ -67,7 +66,7 @@ def explain(one: Cases, causes: Causes | None = None) -> Posterior:
     called = tuple(chance.joints for chance in chances if chance.probability > 0.5)
     none = chance_of_none(gear.joint_numbers)
     looked = one.inspections[0].rigging_checked not in (None, RiggingCheck.NO)
-    pushed = reading > one.margin_in[0] + ROUNDING_IN
+    pushed = bool(one.beyond_margin[0])
     said = _text(chances, called, none, rigging, looked=looked, pushed=pushed)
     return Posterior(tuple(chances), none, rigging, intervals, called, said)
 

@@ -11,7 +11,6 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.case import Cases, plunger_u
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.prediction import Prediction
-from mlg_troubleshoot.gear.gear import ROUNDING_IN
 from mlg_troubleshoot.units import SLIPS, ClearanceConvention, Length, LengthUnit, Sentence
 
 
@@ -43,7 +42,7 @@ def compare(cases: Cases, upper: Prediction) -> Compared:
     at_most = np.where(np.isfinite(bound), np.minimum(size, bound), size)
     u = np.hypot(cases.mean_u_in, upper.standard_uncertainty(np.zeros(len(cases))))
     return Compared(
-        beyond=size > cases.margin_in + ROUNDING_IN,
+        beyond=cases.beyond_margin,
         clears=size + 2.0 * np.hypot(cases.mean_u_in, cases.margin_u_in) <= cases.margin_in,
         explained=~(size > at_most + 2.0 * u),
         explained_at_most_in=at_most,

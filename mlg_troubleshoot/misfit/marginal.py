@@ -92,14 +92,12 @@ class Products:
 
 @dataclass(frozen=True)
 class _Given:
-    """Products of all effects once some of them are integrated out; levels are sizes by tails.
+    """`Products` once some effects are integrated out; levels are sizes by tails.
 
     Attributes
     ----------
-    square, along : ndarray, shape (levels, p)
-        Product of each effect with itself, and with the data.
-    rest : ndarray, shape (levels,)
-        Product of the data with themselves.
+    square, along, rest : ndarray
+        As in `Products`.
     log : ndarray, shape (levels,)
         Logarithm of the covariance's determinant, and of the chances of signs.
     values : ndarray, shape (levels, k)
