@@ -19,7 +19,7 @@ from mlg_troubleshoot.arrays import Array, log_sum, numbered, rms
 from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
-from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
+from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, less_expected
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.conclusion import Conclusion
@@ -73,7 +73,7 @@ class MisfitProblem:
     @property
     def expected(self) -> Array:
         """Misfit less what pins scatter. [in]"""
-        return self.misfit - EXPECTED_SLOPE * self.rows.predicted_in
+        return less_expected(self.misfit, self.rows.predicted_in)
 
     @cached_property
     def shapes(self) -> EffectColumns:

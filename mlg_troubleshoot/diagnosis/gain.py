@@ -8,7 +8,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes, rms
 from mlg_troubleshoot.diagnosis.causes.together import Block
-from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
+from mlg_troubleshoot.diagnosis.noise import less_expected
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.fitting import folds_of, held_out_part, likelier
@@ -73,7 +73,7 @@ def measure_gain(
     cannot teach it.
     """
     fold, held_out_by = folds(noise, columns)
-    expected = misfit - EXPECTED_SLOPE * predicted
+    expected = less_expected(misfit, predicted)
     known = None if block is None else (block.columns, block.covariance)
     correction = held_out_part(noise, columns, expected, fold, known)
     before = misfit

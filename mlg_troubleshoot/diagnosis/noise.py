@@ -173,6 +173,11 @@ def _levels(table: DiagnosisTable, name: str) -> Array:
     return np.asarray(texts[:, None] == levels[levels != ""], float)
 
 
+def less_expected(misfit: Array, predicted_in: Array) -> Array:
+    """Misfit less what pins scatter. [in]"""
+    return misfit - EXPECTED_SLOPE * predicted_in
+
+
 def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:
     """Estimate the noise from the misfit; effects of unknown size, and of the curve, are not
     scatter but its doubt.

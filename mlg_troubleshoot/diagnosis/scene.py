@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -78,7 +79,7 @@ def _scene(
         along = np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)])
         shared_in = np.zeros(len(table))
     along = np.hstack([along, np.sum(slopes, axis=1, keepdims=True) * cut_off(table)])
-    return scene, Rows(
+    rows = Rows(
         scene.over_in,
         table.tails,
         table.gears,
@@ -89,6 +90,9 @@ def _scene(
         np.nan_to_num(read - scene.over_in),
         *small_trends(table),
     )
+    misfit = scene.expected_in
+    noise = build_noise(misfit, rows) if np.isfinite(misfit).all() else None
+    return replace(scene, noise=noise), rows
 
 
 def scene_at(

@@ -16,5 +16,6 @@ __all__ = [
     "posterior",
     "simulation",
     "simulation_result",
+    "steps",
     "verdict",
 ]

@@ -5,12 +5,10 @@ technician who learns, a modification that only some gears have.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, log_sum
 from mlg_troubleshoot.diagnosis.causes.base import (
     MOST_UNREAD,
     Candidate,
@@ -24,15 +22,16 @@ from mlg_troubleshoot.diagnosis.causes.reading import (
     dated,
     days_since,
 )
-from mlg_troubleshoot.diagnosis.noise import FREEDOM, growth
 from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.steps import common_step
 from mlg_troubleshoot.units import DAYS_PER_YEAR
 
 # A gauge is calibrated once a year; in which month is not known.
 _MONTHS = 12
-# Aircraft from which on a step is one of several; turns in which steps and their size settle. [1]
+# Aircraft from which on a step is one of several; those among them that show it within their rows,
+# and so can be named. [1]
 _LEAST_AIRCRAFT = 3
-_TURNS = 20
+_LEAST_NAMED = 2
 _TAILS = "tails "
 # Times in which a beginner comes down to a third of what he was off, from two months on, each
 # twice the last. [d]
@@ -131,13 +130,21 @@ class Modification(RowShift):
         datable = "tail_no" in table.factors and "day" in table.quantities and not table.doubt
         if not datable or share_never_read(scene) > MOST_UNREAD:
             return
-        misfit = table.measured_in - scene.over_in
+        day = table.quantities["day"]
+        known = np.isfinite(day) & (table.tails != "")
+        if scene.noise is None or not known.any():
+            return
+        noise = scene.noise.take(known)
         for direction in (1.0, -1.0):
-            steps = _likeliest_steps(scene, direction * misfit)
-            if steps is not None and len(steps.shown) >= _LEAST_AIRCRAFT:
-                since = {tail: change_date(scene, day) or day for tail, day in steps.days.items()}
-                target = _TAILS + ",".join(steps.sure)
-                yield Candidate(self, target, {"steps": since}, rarity=steps.rarity)
+            found = common_step(
+                table.tails[known], day[known], scene.expected_in[known], noise, direction
+            )
+            if found is None:
+                continue
+            if len(found.since) >= _LEAST_AIRCRAFT and len(found.seen) >= _LEAST_NAMED:
+                since = {tail: change_date(scene, at) or at for tail, at in found.since.items()}
+                target = _TAILS + ",".join(_sure(found.seen))
+                yield Candidate(self, target, {"steps": since}, rarity=found.rarity)
 
     def rows(self, candidate: Candidate) -> Mapping[str, str]:
         """Those with that value, or all."""
@@ -162,34 +169,14 @@ class Modification(RowShift):
         return f"Readings {'of' if of_aircraft else 'with'} {target} are shifted{each}"
 
 
-@dataclass(frozen=True)
-class _Steps:
-    """Which aircraft have a step of one size, and from which day on.
-
-    Attributes
-    ----------
-    days : dict of str to float
-        The likeliest first day of each aircraft that more likely has a step than not.
-    shown : dict of str to float
-        Probability of each of them that it has rows on both sides of its step. [1]
-    rarity : float
-        Logarithm of the likelihood over all aircraft and days, less that with these days and their
-        own best size.
+def _sure(seen: Mapping[str, float]) -> list[str]:
+    """As many aircraft as have a step together with half of the doubt that a name may leave (the
+    other half is that of its cause); the two likeliest at least.
     """
-
-    days: dict[str, float]
-    shown: dict[str, float]
-    rarity: float
-
-    @property
-    def sure(self) -> list[str]:
-        """As many aircraft as have it together with half of the doubt that a name may leave (the
-        other half is that of its cause); the two likeliest at least.
-        """
-        order = sorted(self.shown, key=lambda tail: -self.shown[tail])
-        together = np.cumprod([self.shown[tail] for tail in order])
-        count = max(int(np.sum(together >= (1.0 + Beliefs().sure) / 2.0)), 2)
-        return sorted(order[:count])
+    order = sorted(seen, key=lambda tail: -seen[tail])
+    together = np.cumprod([seen[tail] for tail in order])
+    count = max(int(np.sum(together >= (1.0 + Beliefs().sure) / 2.0)), _LEAST_NAMED)
+    return sorted(order[:count])
 
 
 def _apart(scene: Scene, column: str) -> list[str]:
@@ -200,82 +187,3 @@ def _apart(scene: Scene, column: str) -> list[str]:
     if len({*texts} - {""}) == 2 and len(found) == 2:
         return [max(found, key=lambda value: float(np.nanmean(days[texts == value])))]
     return found
-
-
-def _likeliest_steps(scene: Scene, misfit: Array) -> _Steps | None:
-    """Find the aircraft that have a step up of one size, if there is one.
-
-    Each is modified or not with equal chance, on each of its days with equal chance, its first one
-    among them; size, level and scatter by expectation and maximisation. The likeliest steps with
-    their own best size stand for all that are near them: rarity is what they fit better than all
-    together.
-    """
-    day = scene.table.quantities["day"]
-    known = np.isfinite(day + misfit)
-    values = misfit[known]
-    if not len(values):
-        return None
-    days = day[known]
-    tails = scene.table.tails[known]
-    rows = {tail: np.flatnonzero(tails == tail) for tail in levels(tails)}
-    # One visit after it is enough: that other aircraft have the same step holds it.
-    offered = {tail: np.unique(days[own]) for tail, own in rows.items()}
-    after = {tail: days[rows[tail]] >= at[:, None] for tail, at in offered.items()}
-    centred = values - np.median(values)
-    relative = growth(centred, scene.over_in[known])
-    # Of rows as they are, and with the step.
-    chance = np.array([centred <= 0.0, centred > 0.0], float)
-    likely = np.zeros(chance.shape, bool)
-    far = np.ones(chance.shape)
-    shown: dict[str, float] = {}
-    first: dict[str, float] = {}
-    together = 0.0
-    for _turn in range(_TURNS):
-        fitted = _two_levels(values, relative, chance * far)
-        if fitted is None:
-            return None
-        density, far = fitted
-        gain = density[1] - density[0]
-        together = float(density[0].sum())
-        first = {}
-        shown = {}
-        chance[1] = 0.0
-        likely[1] = False
-        for tail, at in offered.items():
-            gains = after[tail] @ gain[rows[tail]]
-            each = np.log(0.5) + np.r_[0.0, gains - np.log(len(at))]
-            total = float(log_sum(each))
-            together += total
-            own = np.exp(each - total)
-            chance[1, rows[tail]] = own[1:] @ after[tail]
-            if own[0] < 0.5:
-                best = int(np.argmax(gains))
-                first[tail] = float(at[best])
-                likely[1, rows[tail]] = after[tail][best]
-                if best:
-                    shown[tail] = float(own[2:].sum())
-        chance[0] = 1.0 - chance[1]
-    likely[0] = ~likely[1]
-    for _turn in range(_TURNS):
-        fitted = _two_levels(values, relative, likely * far)
-        if fitted is None:
-            return None
-        density, far = fitted
-    return _Steps(first, shown, together - float(density[likely].sum()))
-
-
-def _two_levels(values: Array, relative: Array, weight: Array) -> tuple[Array, Array] | None:
-    """Fit two levels, the second one higher, and a scatter to rows by their weights: log-density of
-    each row at either, and the weight of a row so far out in the tails of Student's t, both (2, n).
-    """
-    weight = weight / relative**2
-    if not weight.sum(axis=1).all():
-        return None
-    middle = weight @ values / weight.sum(axis=1)
-    if middle[1] <= middle[0]:
-        return None
-    off = values - middle[:, None]
-    scatter = np.sqrt(np.sum(weight * off**2) / len(values))
-    square = (off / (scatter * relative)) ** 2
-    density = -0.5 * (FREEDOM + 1.0) * np.log1p(square / FREEDOM) - np.log(scatter)
-    return density, (FREEDOM + 1.0) / (FREEDOM + square)
