@@ -198,6 +198,7 @@ class Run:
             SessionStore,
             ask_inspection,
         )
+        from mlg_troubleshoot.workflows.keep import take_back_repair
 
         wanted = self._wanted
         gear = load_gear(self._asked.gear)
@@ -218,6 +219,8 @@ class Run:
             if visit is None and answers.continues:
                 before = find(inspection.tail_no, inspection.side)
                 inspection, before = by_hand.continued(inspection, answers.continues, before)
+            if before is not None:
+                take_back_repair(self._records.kept, before.record, inspection)
             unit = answers.unit or self._asked.unit or LengthUnit.INCH
             result = task.check_inspection(inspection, self._asked, self._place)
             match entry.effect:

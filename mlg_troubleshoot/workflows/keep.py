@@ -193,6 +193,11 @@ def supersede(store: Store, wrong: Record, result: CheckResult, options: CheckOp
     return record
 
 
+def take_back_repair(store: Store, wrong: Record, right: Inspection) -> None:
+    """Void the repair that only a kept inspection states, before what takes its place is judged."""
+    store.add(_repairs_taken_back(store, wrong, right))
+
+
 def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[Record]:
     """Void the repair that came with an inspection which states it no longer."""
     was, stands = (stated_repair(row) for row in (inspection_from(wrong), right))

@@ -197,6 +197,22 @@ def test_a_repair_is_recorded_and_taken_back_with_its_record(
     assert life(store).inspections[-1].inspection.clearance_in[3] == 0.009
 
 
+@pytest.mark.parametrize("repair", [("n 3 5", "3", "3"), ("g corrected",)])
+def test_a_repair_that_is_taken_back_does_not_count_in_the_verdict_then(
+    visit: Visit, store: SessionStore, repair: tuple[str, ...]
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36")
+    before = life(store).latest
+    visit(*GEAR, *repair)
+    screen = visit(*GEAR, "u").screen
+    after = life(store).latest
+    assert before is not None
+    assert after is not None
+    assert after.result["plan"] == before.result["plan"]
+    assert "what is older does not count" not in screen
+
+
 def test_a_repair_that_was_recorded_elsewhere_opens_its_joints(
     visit: Visit, store: SessionStore
 ) -> None:
