@@ -489,6 +489,11 @@ RESTORED_JOINTS = Column(
     ),
     bears_verdict=True,
 )
+MEASURED_AGAIN = Column(
+    name="measured_again",
+    holds=Holds.JOINTS,
+    meaning="Joints that were measured a second time, with another gauge, for example 3.",
+)
 RIGGING_CHECKED = Column(
     name="rigging_checked",
     holds=Holds.CHOICE,
@@ -516,11 +521,7 @@ OF_THE_DAY: tuple[Column, ...] = (
         meaning="When the outcome was seen, if that was after the repair.",
     ),
     RIGGING_CHECKED,
-    Column(
-        name="measured_again",
-        holds=Holds.JOINTS,
-        meaning="Joints that were measured a second time, with another gauge, for example 3.",
-    ),
+    MEASURED_AGAIN,
     Column(
         name="cannot_reach",
         holds=Holds.JOINTS,

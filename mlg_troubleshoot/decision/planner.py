@@ -197,8 +197,8 @@ class _PlanBuilder:
             return NOT_CLOSING
         if self.judged.questions[i] and not self.judged.plunger.beyond[i]:
             return CONFIRM
-        found = self._course()
-        return self._within_the_day(replace(found, open_question=self._open_question(found)))
+        found = self._within_the_day(self._course())
+        return replace(found, open_question=self._open_question(found))
 
     def _course(self) -> Plan:
         if self.cases.failed[self.row]:
@@ -503,10 +503,12 @@ class _PlanBuilder:
         if self.over != self.over_limit:
             return self._stop_for_today()
         restored = any(step.action is Action.RESTORE for step in self.steps)
+        unread = self._left_unread()
         text = sentences.done(
             repaired=restored,
             recorded=self.inspection.is_repaired and not restored,
-            unread=bool(self._left_unread()),
+            read=len(self.numbers) - len(unread),
+            unread=len(unread),
         )
         self._step(Action.DONE, 0.0, text)
         return Plan(tuple(self.steps), End.DONE)
@@ -598,13 +600,13 @@ class _PlanBuilder:
         left = self._joints(self.facts.open[i])
         never = None
         if left and found.steps[0].action in (Action.CONTINUE, Action.DONE):
-            minutes = minutes_to_measure(self.gear, left, self.opened)
+            minutes = minutes_to_measure(self.gear, left, self.at_first)
             never = sentences.never_read(left, minutes)
         asked = {n for step in found.steps for n in step.joints}
         unread = self._joints(~cases.measured[i] & ~cases.reachable[i])
         over = self._joints(cases.over_limit[i] & ~cases.restorable[i])
         shut = sentences.open_question([n for n in unread if n not in asked], over)
-        return " ".join(said for said in (shut, never) if said) or None
+        return " ".join(said for said in (found.open_question, shut, never) if said) or None
 
     def _within_the_day(self, found: Plan) -> Plan:
         """The plan as far as the minutes of the day reach; its first step is one that fits."""
@@ -625,7 +627,7 @@ class _PlanBuilder:
                     text=sentences.measure(self.gear, joints),
                 )
                 return replace(found, steps=(step, *found.steps[1:]))
-        question = sentences.does_not_fit(first, left, found.open_question)
+        question = sentences.does_not_fit(first, left)
         stop = Step(Action.CONTINUE, (), 0.0, None, sentences.STOP_FOR_TODAY)
         return Plan((stop,), End.CANNOT_CLEAR, question)
 

@@ -91,11 +91,14 @@ def go_on(end: End, *, failed: bool, beyond: bool, looked: bool, look_again: str
     return f"{GO_ON[end]} {look_again}".rstrip()
 
 
-def done(*, repaired: bool, recorded: bool, unread: bool) -> str:
-    """Step DONE; `recorded`: the inspection names the repair already; `unread`: some joints were
-    never read.
+def done(*, repaired: bool, recorded: bool, read: int, unread: int) -> str:
+    """Step DONE; `recorded`: the inspection names the repair already; `read`, `unread`: how many
+    joints were read, and how many never.
     """
-    stands = f"{'The joints that were read' if unread else 'Joints'} are within limits"
+    if not read:
+        stands = "No joint was read"
+    else:
+        stands = f"{'The joints that were read' if unread else 'Joints'} are within limits"
     if recorded:
         then = ", and the repair is entered here: sign it off in the aircraft's records. This"
     elif repaired:
@@ -181,10 +184,9 @@ def stop_for_today(over: Sequence[int], if_worn: Sequence[int], barred: Sequence
     return f"{STOP}{because}. Hand over what stays open."
 
 
-def does_not_fit(step: Step, left: float, before: str | None) -> str:
+def does_not_fit(step: Step, left: float) -> str:
     """What stays open because the minutes of the day do not suffice."""
-    said = f"To {step.words} takes {step.minutes:.0f} min; {left:.0f} min are left today."
-    return f"{said} {before}" if before else said
+    return f"To {step.words} takes {step.minutes:.0f} min; {left:.0f} min are left today."
 
 
 @dataclass(frozen=True, slots=True)

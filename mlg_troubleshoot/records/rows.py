@@ -22,6 +22,7 @@ from mlg_troubleshoot.decision.columns import (
     GAUGE_U,
     IDENTITY,
     JOINT,
+    MEASURED_AGAIN,
     OUTCOME,
     PLUNGER_DISPLACEMENT,
     RECORD_ID,
@@ -55,6 +56,7 @@ from mlg_troubleshoot.records.headers import Field
 from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand
 from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.unit_fit import (
+    RowUnit,
     UnitFit,
     judge_unit,
     plunger_question,
@@ -676,6 +678,9 @@ class RowReader:
             return ""
         clearance = found.lengths.get(CLEARANCE, {})
         fit = judge_unit(clearance, found.entered, found.convention, self._options)
+        again = {*found.lengths.get(GAUGE_U, {}), *found.values.get(MEASURED_AGAIN, ())}
+        if fit.scale is UnitFit.LARGE and again.issuperset(fit.joints):
+            fit = RowUnit()
         if fit.scale is UnitFit.TOO_SMALL and not self._options.asks:
             quantity = (CLEARANCE, fit.joints[0])
             index = next(i for i, of, _ in self._lengths if of.quantity == quantity)

@@ -51,6 +51,12 @@ def test_every_joint_is_named(shown: Run, width: int) -> None:
         assert re.search(rf"#{number} {' .*'.join(name.split())}", words), f"#{number} {name}"
 
 
+def test_one_further_note_is_one_note() -> None:
+    worn = ["--set", "2=.0081in", "--set", "3=.0082in", "--measured", "-.005in"]
+    whose = ["--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--outcome", "FAILED"]
+    assert "1 more note; " in mlg("check", *whose, *worn).out
+
+
 @WIDTHS
 def test_no_heading_is_cut_off(shown: Run, width: int) -> None:
     assert "…" not in shown.out

@@ -94,6 +94,20 @@ def test_a_rigging_set_right_counts_as_a_repair(judge: Judge) -> None:
     assert found.next_action.action is Action.READ_PLUNGER
 
 
+def test_done_of_a_gear_of_which_no_joint_was_read_speaks_of_no_joint_within_limits(
+    judge: Judge,
+) -> None:
+    found = judge(
+        {},
+        outcome=Outcome.RETRACTED,
+        outcome_date=NOON,
+        rigging_checked=RiggingCheck.CORRECTED,
+        repair_date=MORNING,
+    )
+    assert found.end is End.DONE
+    assert found.next_action.text.startswith("No joint was read, and the repair is entered here")
+
+
 def test_joints_that_read_like_new_on_a_gear_that_failed_are_asked_about(judge: Judge) -> None:
     found = judge(every_joint(0.002, j3=0.0005), outcome=Outcome.FAILED, readings_in=(0.06,))
     assert found.next_action.action is Action.CHECK_RIGGING

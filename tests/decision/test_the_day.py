@@ -120,6 +120,13 @@ def test_unread_joints_are_not_mentioned_before_the_plan_ends(judge: Judge) -> N
     assert judge({3: 0.002}).plan.open_question is None
 
 
+def test_a_plan_that_the_minutes_cut_off_names_the_joints_that_nobody_read(judge: Judge) -> None:
+    read = dict.fromkeys(SIDESTAY, 0.001) | {3: 0.013}
+    found = judge(read, outcome=Outcome.RETRACTED, measured_again=(3,), minutes_available=20)
+    assert found.next_action.text.startswith("Stop for today")
+    assert "#9, #10, #8, #6, #7 were not read" in (found.plan.open_question or "")
+
+
 def test_done_does_not_say_that_joints_that_nobody_read_are_within_limits(judge: Judge) -> None:
     repaired = {"restored_joints": (3,), "repair_date": datetime(2026, 3, 2, 9)}
     done = judge({3: 0.0005}, **repaired, inspection_date=date(2026, 3, 2))

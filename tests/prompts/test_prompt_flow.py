@@ -11,7 +11,7 @@ from mlg_troubleshoot.cli.output import to_ascii
 from mlg_troubleshoot.cli.prompts import Answers, Session, SessionStore, ask_inspection
 from mlg_troubleshoot.cli.prompts.answers import judge, plunger_in
 from mlg_troubleshoot.cli.prompts.conversation import Effect, Turn, answer
-from mlg_troubleshoot.cli.prompts.flow import Ask, Flow
+from mlg_troubleshoot.cli.prompts.flow import Ask, Flow, State
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.decision.columns import PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck, Side
@@ -270,6 +270,12 @@ def test_help_says_what_where_and_how(flow: Flow) -> None:
 
 def test_help_names_the_joint_that_acts_alike(flow: Flow) -> None:
     assert "Moves the plunger like #5" in said(play(flow, ["#3", "?"]))
+
+
+def test_help_at_the_rigging_says_what_each_answer_means(flow: Flow) -> None:
+    told = said(answer(flow, State(Ask.STEP, Answers(), "rigging_checked"), "?"))
+    assert "g yes: rigging and lock roller were checked and are right" in told
+    assert "g corrected: one of them was set right" in told
 
 
 @pytest.mark.parametrize("place", range(4))

@@ -132,6 +132,19 @@ def test_millimetres_mostly_over_the_limit_are_asked_about_as_thou(gear):
     assert any("were they read in thou," in warning for warning in row.warnings), row.warnings
 
 
+def test_a_reading_over_its_limit_is_asked_about_until_another_gauge_has_confirmed_it(gear):
+    worn = (0.003, 0.003, 0.025)
+    row, _ = judged(gear, worn, LengthUnit.INCH, LengthUnit.INCH)
+    assert any("(#3) is above the limit: was it read" in said for said in row.warnings)
+
+
+@pytest.mark.parametrize("again", [{"measured_again": "3"}, {"gauge_u_3_in": "0.0003"}])
+def test_a_reading_that_another_gauge_has_confirmed_is_not_asked_about(gear, again):
+    worn = (0.003, 0.003, 0.025)
+    row, _ = judged(gear, worn, LengthUnit.INCH, LengthUnit.INCH, **again)
+    assert not any("is above the limit: was it read" in said for said in row.warnings)
+
+
 def test_the_play_of_new_parts_is_stated_in_the_convention_of_the_row(gear):
     diametral = [2 * value for value in (0.0004, 0.0004, 0.0004)]
     row, _ = judged(

@@ -472,6 +472,10 @@ MORE_HELP = (
     note(
         "n: enter the clearances as after the repair. p, f and r typed after n count as after it.",
     ),
+    note(
+        "g yes: rigging and lock roller were checked and are right. g corrected: one of them was"
+        " set right, which counts as a repair.",
+    ),
     note("All on one line is fine: f p .041 m .028 n 3 5. w none: no longer so; x removes all."),
 )
 

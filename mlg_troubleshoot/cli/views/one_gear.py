@@ -57,7 +57,8 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
     if not detail:
         more = len(judgement.warnings) - len(notes)
         screen.print(
-            f"{more} more notes; " * (more > 0) + "--detail: all joints, repairs, uncertainty",
+            f"{more} more {'note' if more == 1 else 'notes'}; " * (more > 0)
+            + "--detail: all joints, repairs, uncertainty",
             style="dim",
         )
     if not has_room:
