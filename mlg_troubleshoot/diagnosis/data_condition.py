@@ -339,6 +339,10 @@ def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
         )
 
 
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
     """Landings of a gear that fall over time: at overhauls, where its wear begins anew, or not."""
     landings = table.numbers("gear_landings")
@@ -347,27 +351,27 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
     order = visits(table)
     numbers = gears_of(table)
     fell: list[str] = []
-    pooled = overhauls = gears = 0
+    renewed: list[int] = []
+    pooled = gears = 0
     for name, rows in order.items():
         known = rows[np.isfinite(landings[rows])]
         falls = np.diff(landings[known]) < 0.0
         anew = falls & (np.diff(numbers[known]) != 0)
-        overhauls += int(anew.sum())
+        renewed += [int(anew.sum())] * bool(anew.any())
         pooled += (count := int(falls.sum() - anew.sum()))
         fell += [name] * (count > 0)
         gears += int(falls.any())
     if not gears:
         return
-    times = f"{pooled} time{'s' if pooled > 1 else ''}"
-    named = f"gears {_first(fell)}: {times}" if fell else ""
-    at = f"at {overhauls} overhaul{'s' if overhauls > 1 else ''}" if overhauls else ""
+    named = f"gear{'s' * (len(fell) > 1)} {_first(fell)}: {_counted(pooled, 'time')}"
+    at = f"at {_counted(sum(renewed), 'overhaul')} of {_counted(len(renewed), 'gear')}"
     slip = (
         "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"
         " before and after is taken as one"
     )
     yield DataCondition(
         "landings_fall",
-        ", and ".join(text for text in (named, at) if text),
+        ", and ".join([named] * bool(fell) + [at] * bool(renewed)),
         gears / len(order),
         slip if fell else "the wear of a gear begins anew there",
         "landings since overhaul, and the date of the overhaul",

@@ -261,7 +261,7 @@ def test_of_recognised_overhauls_only_their_number_is_said(gear: Gear) -> None:
         landings[4:6] -= 1200.0
 
     (found,) = data_condition(with_landings(gear, overhauled), gear)[0]
-    assert (found.kind, found.where) == ("landings_fall", "at 1 overhaul")
+    assert (found.kind, found.where) == ("landings_fall", "at 1 overhaul of 1 gear")
     assert "begins anew" in found.effect
 
 
@@ -271,7 +271,7 @@ def test_overhauls_are_counted_apart_from_landings_that_fall_otherwise(gear: Gea
         landings[9] = 12.0
 
     (found,) = data_condition(with_landings(gear, both), gear)[0]
-    assert found.where == "gears N101: 1 time, and at 1 overhaul"
+    assert found.where == "gear N101: 1 time, and at 1 overhaul of 1 gear"
     assert found.share == pytest.approx(2 / 20)
 
 
