@@ -253,7 +253,7 @@ def test_landings_that_fall_are_said_with_their_gear(gear: Gear) -> None:
         landings[3] = 12.0
 
     (found,) = data_condition(with_landings(gear, one_is_mistyped), gear)[0]
-    assert (found.kind, found.where) == ("landings_fall", "gears N100: 1 time")
+    assert (found.kind, found.where) == ("landings_fall", "gear N100: 1 time")
 
 
 def test_of_recognised_overhauls_only_their_number_is_said(gear: Gear) -> None:
