@@ -144,10 +144,10 @@ def _listed(table: DiagnosisTable, rows: Mask) -> str:
     several = rows.sum() > 1
     people = set(table.people[rows]) - {""}
     whose = f" of technician {people.pop()}" if len(people) == 1 and several else ""
-    return f"row{'s' if several else ''} {_first([str(n) for n in table.row[rows]])}{whose}"
+    return f"row{'s' if several else ''} {first_few([str(n) for n in table.row[rows]])}{whose}"
 
 
-def _first(names: list[str]) -> str:
+def first_few(names: list[str]) -> str:
     """Eight of some names, and how many more there are."""
     more = f" and {len(names) - 8} more" if len(names) > 8 else ""
     return ", ".join(names[:8]) + more
@@ -363,7 +363,7 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
         gears += int(falls.any())
     if not gears:
         return
-    named = f"gear{'s' * (len(fell) > 1)} {_first(fell)}: {_counted(pooled, 'time')}"
+    named = f"gear{'s' * (len(fell) > 1)} {first_few(fell)}: {_counted(pooled, 'time')}"
     at = f"at {_counted(sum(renewed), 'overhaul')} of {_counted(len(renewed), 'gear')}"
     slip = (
         "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"

@@ -18,7 +18,7 @@ from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, offered
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
-from mlg_troubleshoot.diagnosis.data_condition import DataCondition
+from mlg_troubleshoot.diagnosis.data_condition import DataCondition, first_few
 from mlg_troubleshoot.diagnosis.explain import (
     Finding,
     MisfitProblem,
@@ -533,14 +533,14 @@ def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
     """Refuse a table in which so many rows look wrong that the whole table is wrong, not single
     cells.
     """
-    wrong = len({fault.place for fault in faults})
-    if wrong > max(_MANY_FAULTS * read, 5):
+    rows = [str(row) for _place, row in sorted({(fault.place, fault.row) for fault in faults})]
+    if len(rows) > max(_MANY_FAULTS * read, 5):
         column = Counter(fault.column for fault in faults).most_common(1)[0][0]
         raise InconclusiveDataError(
-            f"{wrong} of {read} rows look wrong, most often in {column}: these are not errors in"
-            " single cells",
+            f"{len(rows)} of {read} rows look wrong, most often in {column} (rows"
+            f" {first_few(rows)}): these are not errors in single cells",
             "Check the unit and the convention of the clearances, and the unit of the"
-            " displacements, column by column.",
+            " displacements, in these rows: did one technician, base or gauge write them?",
         )
 
 
