@@ -294,7 +294,8 @@ def _what(event: dict[str, Any], unit: LengthUnit) -> str:
     match event["kind"]:
         case "assessment":
             found = event["predicted_displacement_in"]
-            worst = "" if found is None else f", worst case {Length(found).said_in(unit)}"
+            # It is zero only where no joint has play, or none was read.
+            worst = f", worst case {Length(found).said_in(unit)}" if found else ""
             return str(event["verdict"]).replace("_", " ") + worst
         case "repair":
             return f"restored {joint_list(event['joints'])}"

@@ -178,6 +178,19 @@ def test_a_second_undo_goes_one_change_further_back(visit: Visit, store: Session
     assert (found.outcome, found.readings_in) == ("FAILED", ())
 
 
+def test_the_unit_stays_where_the_undone_answer_was_the_first_reading(visit: Visit) -> None:
+    visit(*GEAR, "m", "d", "done", "f", *ENTERS, "")
+    screen = visit(*GEAR, "y", "m", "1.1", "u", "y", "s").screen
+    assert screen.count("Unit of your readings?") == 1
+
+
+def test_what_stays_open_stands_with_next_at_the_second_visit(visit: Visit) -> None:
+    visit(*GEAR, "t", "t", *PLAY, "f p 36 w 3 a 3", *ENTERS, "")
+    screen = visit(*GEAR, "").screen
+    assert "NEXT: Stop for today" in screen
+    assert "OPEN: #3 is over the limit and cannot be restored today." in screen
+
+
 def test_nothing_is_left_to_undo_once_all_changes_are(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
     visit(*GEAR, "y", "36")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from datetime import datetime
 from itertools import combinations
 from typing import Any
 
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Rejected
-from mlg_troubleshoot.decision.inspection import Outcome, Side
+from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.sentences import rigging_sentence
 from mlg_troubleshoot.errors import Problem
@@ -32,6 +33,34 @@ def test_identity_stands_before_the_verdict(failure: Made) -> None:
         < failure.text.find("N123AB")
         < failure.text.find("OUTSIDE MARGIN", failure.text.find("R-2024-0117"))
     )
+
+
+def test_a_repair_that_is_signed_off_stands_with_the_identity(judge: Judge, make: Make) -> None:
+    repaired = judge(
+        SOUND,
+        restored_joints=(3, 5),
+        rigging_checked=RiggingCheck.CORRECTED,
+        repair_date=datetime(2024, 5, 18, 9, 30, 12),
+        measured_again=(3,),
+    )
+    said = make(repaired, formats=("html",)).text
+    assert "Restored #3 and #5" in said.replace("\u00a0", " ")
+    assert "Rigging and lock roller corrected" in said
+    assert "Repaired on 2024-05-18 09:30" in said
+    assert "Measured again #3" in said
+
+
+def test_an_outcome_before_the_repair_is_called_so(judge: Judge, make: Make) -> None:
+    repaired = judge(SOUND, restored_joints=(3,), repair_date=datetime(2024, 5, 18, 9, 30))
+    assert "Outcome FAILED before the repair" in make(repaired, formats=("html",)).text
+
+
+def test_which_joints_explain_the_displacement_is_said_as_on_the_screen(
+    judge: Judge, make: Make
+) -> None:
+    found = judge(SOUND, readings_in=(0.002,))
+    assert found.posterior is not None
+    assert found.posterior.text in make(found, formats=("html",)).text.replace("\u00a0", " ")
 
 
 def test_the_side_stands_alone_in_large_letters(failure: Made) -> None:

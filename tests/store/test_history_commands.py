@@ -248,6 +248,16 @@ def test_the_hit_rate_of_the_advice_is_in_the_json_with_its_interval(
     assert life()["advice"] == expected
 
 
+def test_no_worst_case_is_stated_of_a_visit_on_which_no_joint_was_read(
+    tmp_path: Path, place: Path
+) -> None:
+    seen = visit(1, 0.0, outcome="FAILED", plunger_displacement_in="0.041")
+    keep(tmp_path, {n: "" if re.match(r"clearance_\d", n) else text for n, text in seen.items()})
+    shown = mlg("history", "N123", "LH", "--no-forecast").out
+    assert "OUTSIDE MARGIN" in shown
+    assert "worst case" not in shown
+
+
 def test_a_life_is_shown_in_the_unit_that_the_user_reads(
     place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -190,6 +190,7 @@ def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
         rows.append(f"#{number} {what}")
     kind = "" if answers.convention is None else f" ({CONVENTION_NAMES[answers.convention]})"
     more = [f"{BY_NAME[name].plain} {text}" for name, text in answers.more.items()]
+    stays = visit.stays_open
     return (
         BLANK,
         line(
@@ -202,6 +203,7 @@ def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
         *((note("; ".join(more)),) if more else ()),
         line((f"Last verdict: {visit.verdict}", Tone.STRONG)),
         line((f"NEXT: {at_prompt(said_in(visit.next, unit))}", Tone.STRONG)),
+        *(() if stays is None else (line((f"OPEN: {said_in(stays, unit)}", Tone.STRONG)),)),
     )
 
 

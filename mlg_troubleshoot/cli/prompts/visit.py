@@ -54,7 +54,8 @@ class Visit:
     """The last inspection of a gear as it counts today.
 
     `read_on` is the day on which each reading was entered, `before` the answers before the last
-    change that was not undone, `todo` what NEXT asks for, `minutes` how long that takes. [min]
+    change that was not undone, `todo` what NEXT asks for, `minutes` how long that takes [min],
+    `stays_open` what was not settled.
     """
 
     record: Record
@@ -68,6 +69,7 @@ class Visit:
     joints: tuple[int, ...]
     minutes: float = 0.0
     before: Answers | None = None
+    stays_open: Sentence | None = None
 
     def begun(self, today: date | None, gear: Gear) -> Answers:
         """The answers with what NEXT asks for still to come, on the day of this visit.
@@ -103,7 +105,9 @@ class Visit:
 
     def read_in(self, unit: LengthUnit | None) -> Visit:
         """The visit in the unit that was just chosen, where no clearance says which."""
-        return replace(self, answers=replace(self.answers, unit=self.answers.unit or unit))
+        unit = self.answers.unit or unit
+        before = self.before and replace(self.before, unit=self.before.unit or unit)
+        return replace(self, answers=replace(self.answers, unit=unit), before=before)
 
     def spent(self, answers: Answers, today: date | None) -> Answers:
         """The answers once NEXT is done: of the minutes of its day it takes some, those of another
@@ -160,6 +164,7 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
     joints = tuple(step.get("joints", ()))
     todo = joints if action in _WITH_JOINTS else () if asked is None else (asked,)
     said = _with_lengths(str(step.get("text", "")))
+    question = latest.result.get("open_question")
     if restored:
         names = ", ".join(f"#{joint}" for joint in restored)
         action = Action.MEASURE
@@ -180,6 +185,7 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
         joints,
         float(step.get("minutes") or 0.0) if todo and not restored else 0.0,
         replace(standing[-2], continues=latest.record.digest) if len(standing) > 1 else None,
+        _with_lengths(question) if question and not restored else None,
     )
 
 
