@@ -191,6 +191,14 @@ def test_what_stays_open_stands_with_next_at_the_second_visit(visit: Visit) -> N
     assert "OPEN: #3 is over the limit and cannot be restored today." in screen
 
 
+def test_a_stop_that_the_day_forced_says_how_the_day_is_changed(visit: Visit) -> None:
+    visit(*GEAR, "t", "t", *PLAY, "f p 36 w 3 a 3 t 600", *ENTERS, "")
+    screen = visit(*GEAR, "").screen
+    assert "t 240 = minutes left" in screen.replace("\u00a0", " ")
+    assert "w none = spare at hand" in screen.replace("\u00a0", " ")
+    assert "c none" not in screen.replace("\u00a0", " ")
+
+
 def test_nothing_is_left_to_undo_once_all_changes_are(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
     visit(*GEAR, "y", "36")

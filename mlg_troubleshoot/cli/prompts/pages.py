@@ -12,7 +12,7 @@ from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.cli.prompts.visit import Visit
 from mlg_troubleshoot.decision.columns import BY_NAME, DATE, MARGIN, PLUNGER_DISPLACEMENT
-from mlg_troubleshoot.decision.plan import Action
+from mlg_troubleshoot.decision.plan import STOP, Action
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, said_in, with_unit
 
@@ -207,6 +207,10 @@ def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
     )
 
 
+# What is typed where the day allows more than it did.
+_LIFTED = {"t 240": "minutes left", "w none": "spare at hand", "c none": "within reach"}
+
+
 def next_page(visit: Visit) -> Page:
     """What can follow a result: each is one key."""
     pairs = [
@@ -222,6 +226,9 @@ def next_page(visit: Visit) -> Page:
         kept = "The repair is in the records. " * visit.row.is_repaired
         end = f"{kept}r writes the report to sign."
         shown.insert(0, line(("DONE. ", Tone.GOOD), end))
+    if visit.next.startswith(STOP):
+        lifted = [(how, what) for how, what in _LIFTED.items() if DAY[how[0]] in visit.answers.more]
+        shown.insert(0, keys(*lifted))
     return Page(tuple(shown), " " + "y, " * bool(visit.todo) + "another letter, or Enter = done > ")
 
 
