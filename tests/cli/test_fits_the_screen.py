@@ -16,7 +16,7 @@ from mlg_troubleshoot import Inspection, Side
 from mlg_troubleshoot.cli.output import console
 from mlg_troubleshoot.cli.prompts import RichTerminal, pages
 from mlg_troubleshoot.cli.views import one_gear
-from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows import check as task
 from tests.cli.conftest import ROOT, mlg, row
@@ -39,6 +39,16 @@ SAID = {
         no_spare=(3,),
         minutes_available=100.0,
     ),
+    "stopped": replace(
+        GEAR,
+        clearance_in=MANY,
+        readings_in=(0.036,),
+        outcome=Outcome.FAILED,
+        measured_again=tuple(MANY),
+        rigging_checked=RiggingCheck.YES,
+        no_spare=(3,),
+        minutes_available=100.0,
+    ),
 }
 
 
@@ -50,7 +60,9 @@ def test_verdict_next_and_keys_fit_on_24_lines_with_all_joints_read(
     monkeypatch.setenv("COLUMNS", str(width))
     result = task.check_inspection(SAID[gear], task.CheckOptions(), None)
     one_gear.show(result.judgements[0], result.gear, console(), detail=False)
-    visit: Any = SimpleNamespace(todo=(3,), before=object(), action=None)
+    day = SimpleNamespace(more={"no_spare": "3", "minutes_available": "100"})
+    said = result.judgements[0].next_action.text
+    visit: Any = SimpleNamespace(todo=(3,), before=object(), action=None, next=said, answers=day)
     page = pages.next_page(visit)
     RichTerminal().say(page.lines)
     shown = capsys.readouterr()
