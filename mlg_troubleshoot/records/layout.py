@@ -23,6 +23,7 @@ from mlg_troubleshoot.records.headers import (
     Recognition,
     near_miss,
     nearest,
+    parse_canonical,
     parse_target,
     recognise,
     tidy,
@@ -90,7 +91,9 @@ def _names(key: str, text: str, index: int) -> bool:
 
 
 def header_score(cells: Cells, options: ReadOptions) -> int:
+    """Twice the columns that the cells name, surely or in doubt, and the doubts that name none."""
     known: set[tuple[Column, int | None]] = set()
+    meant: set[tuple[Column, int | None]] = set()
     doubtful = 0
     for index, cell in enumerate(cells):
         if isinstance(cell, str):
@@ -98,13 +101,15 @@ def header_score(cells: Cells, options: ReadOptions) -> int:
             found = UNKNOWN if mapped else recognise(cell, options.joints)
             known |= set() if found.field is None else {found.field.quantity}
             doubtful += mapped or bool(found.reason)
+            nearest_field = parse_canonical(found.nearest or "", options.joints)
+            meant |= set() if nearest_field is None else {nearest_field.quantity}
     columns = {column for column, _ in known}
     core = len(columns & {*IDENTITY, CLEARANCE}) + bool(doubtful)
     # A table of clearances alone is also a table: what it lacks is then named column by column.
     clearances = sum(column is CLEARANCE and number is not None for column, number in known)
     if clearances < 2 and (core < 2 or len(known) + doubtful < 3):
         return 0
-    return 2 * len(known) + doubtful
+    return 2 * len(known | meant) + doubtful - len(meant)
 
 
 def find_header(

@@ -229,6 +229,24 @@ def test_12_a_merged_header_of_two_rows_is_read_as_one(read, xlsx):
     assert result.rows[0].source.row == 3
 
 
+def test_12_both_rows_of_a_merged_header_count_though_the_upper_one_names_the_convention(
+    read, xlsx
+):
+    def merge(book):
+        sheet = book.worksheets[0]
+        for cells in ("A1:A2", "B1:B2", "C1:G1"):
+            sheet.merge_cells(cells)
+
+    rows = [
+        ["Aircraft", "Side", "Clearance [mm] radial"],
+        [None, None, *(f"Joint {joint}" for joint in range(1, 6))],
+        ["N1", "LH", 0.33, 0.18, 0.2, 0.2, 0.2],
+    ]
+    result = read(xlsx(rows, merge), "t.xlsx", convention="RADIAL")
+    assert [p.cell for p in result.problems] == ["C2", "D2", "E2", "F2", "G2"]
+    assert {p.code for p in result.problems} == {"header_doubtful"}
+
+
 def test_12_an_unknown_header_of_two_rows_is_an_error_and_its_second_row_no_inspection(read, xlsx):
     rows = [["Identity", None, None, None, "Wear", None], ["a", "b", "c", "d", "e", "f"], GOOD]
     result = read(xlsx(rows, two_rows), "t.xlsx")
