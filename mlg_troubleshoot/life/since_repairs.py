@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from typing import TYPE_CHECKING
 
@@ -31,8 +31,8 @@ class Repair:
     day: date
     joints: frozenset[int]
     rerigged: bool
-    said_by: str
-    row: int | None = None
+    said_by: str = field(compare=False)
+    row: int | None = field(default=None, compare=False)
 
 
 def key_of(row: Inspection) -> GearKey:

@@ -8,12 +8,19 @@ from itertools import islice
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
-from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.inspection import Inspection, surely_later
 from mlg_troubleshoot.decision.judge_rows import AT_ONCE
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearKey, find, life_of, warnings_of, without_dashes
-from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
+from mlg_troubleshoot.life.folding import (
+    GearKey,
+    GearLife,
+    find,
+    life_of,
+    warnings_of,
+    without_dashes,
+)
+from mlg_troubleshoot.life.since_repairs import Repair, key_of, stated_repair
 from mlg_troubleshoot.parallel import Blocks, Progress
 from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
@@ -199,12 +206,18 @@ def take_back_repair(store: Store, wrong: Record, right: Inspection) -> None:
 
 
 def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[Record]:
-    """Void the repair that came with an inspection which states it no longer."""
-    was, stands = (stated_repair(row) for row in (inspection_from(wrong), right))
-    if was is None or (stands and (was.day, was.joints) == (stands.day, stands.joints)):
+    """Void the repair that came with an inspection which states it no longer; a later one that it
+    states is a second repair.
+    """
+    kept = inspection_from(wrong)
+    was, stands = stated_repair(kept), stated_repair(right)
+    if was is None or was == stands:
+        return []
+    if stands is not None and surely_later(right.repair_date, kept.repair_date):
         return []
     life = life_of(store, wrong.tail_no, wrong.side)
-    earlier = (r.seq for r in life.records if r.kind in _ENTERED and r.seq < wrong.seq)
+    first = _first_to_state(was, wrong, life)
+    earlier = (r.seq for r in life.records if r.kind in _ENTERED and r.seq < first.seq)
     before = max(earlier, default=0)
     return [
         Record(
@@ -216,8 +229,20 @@ def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[
             packed({"voids": repair.digest, "why": "taken back with the answer that stated it"}),
         )
         for repair in life.repairs
-        if before < repair.seq < wrong.seq
+        if before < repair.seq < first.seq
     ]
+
+
+def _first_to_state(repair: Repair, last: Record, life: GearLife) -> Record:
+    """The version of an inspection with which its repair was entered."""
+    by_digest = {record.digest: record for record in life.records}
+    first = last
+    while first.kind is RecordKind.CORRECTION:
+        older = by_digest.get(first.body["supersedes"])
+        if older is None or stated_repair(inspection_from(older)) != repair:
+            break
+        first = older
+    return first
 
 
 def judged_by(gear: Gear, options: CheckOptions) -> dict[str, Any]:

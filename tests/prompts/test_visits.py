@@ -234,6 +234,40 @@ def test_a_repair_that_is_taken_back_does_not_count_in_the_verdict_then(
     assert "what is older does not count" not in screen
 
 
+def test_a_repair_is_taken_back_after_what_was_answered_since(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "n 3 5", "3", "3")
+    visit(*GEAR, "p 4")
+    visit(*GEAR, "u")
+    assert len(life(store).repairs) == 1
+    visit(*GEAR, "u")
+    assert life(store).repairs == ()
+
+
+def test_a_second_repair_leaves_the_record_of_the_first(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "n 3", "3")
+    visit(*GEAR, "n 5", "3")
+    assert [repair.body["joints"] for repair in life(store).repairs] == [[3], [5]]
+
+
+def test_a_re_rigging_after_a_repair_asks_for_no_clearance_again(visit: Visit) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "n 3", "3")
+    assert "SHORT LINK INNER BEARING" not in visit(*GEAR, "g corrected").screen
+
+
+def test_a_re_rigging_after_a_repair_is_taken_back_alone(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "n 3", "3")
+    visit(*GEAR, "g corrected")
+    assert [r.kind for r in life(store).repairs] == [RecordKind.REPAIR, RecordKind.RERIG]
+    visit(*GEAR, "u")
+    assert [r.kind for r in life(store).repairs] == [RecordKind.REPAIR]
+
+
 def test_a_repair_that_was_recorded_elsewhere_opens_its_joints(
     visit: Visit, store: SessionStore
 ) -> None:

@@ -316,6 +316,9 @@ class Flow:
         text = answers.more.get(repaired)
         if text is None or answers.more.get("repair_date") == before.more.get("repair_date"):
             return answers
+        if answers.changed_since(before) >= {DAY["g"]} and text == before.more.get(repaired):
+            # The rigging alone was set right.
+            return answers
         read = judge_more(repaired, text, answers.unit, self.gear)
         return answers.with_more(open_areas=None).reopened(read.restored_joints)
 
