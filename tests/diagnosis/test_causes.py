@@ -10,14 +10,14 @@ from datetime import date, timedelta
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Cause, Scene
+from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Cause, Scene, diagnose
 from mlg_troubleshoot.diagnosis.causes import JointContact, OutOfPlaneTilt, RiggingOffset
 from mlg_troubleshoot.diagnosis.scene import effect_columns
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Gear
 
-from .conftest import fleet, only, scene_of
+from .conftest import Array, fleet, only, scene_of
 
 BY_NAME = {cause.name: cause for cause in CATALOGUE}
 # The names, the columns they need and the allowed sign of the parameter, from the contract and the
@@ -364,6 +364,20 @@ def test_a_gear_whose_worn_joints_were_never_read_has_no_rigging_change(gear: Ge
     targets = {c.target for c in RiggingOffset().candidates(scene)}
     assert "tail N103 LH" not in targets
     assert "tail N103 RH" in targets
+
+
+def test_a_re_rigging_after_the_first_visit_is_named_with_its_day(gear: Gear) -> None:
+    second = 0.0
+
+    def from_the_second_visit_on(table: DiagnosisTable, _over: Array) -> Array:
+        nonlocal second
+        own = table.tails == "N103"
+        second = float(np.unique(table.quantities["day"][own])[1])
+        return -0.01 * (own & (table.quantities["day"] >= second))
+
+    table = fleet(gear.model, from_the_second_visit_on, rows=200)
+    (cause,) = diagnose(gear.model, table, gear.discrepancies).causes
+    assert (cause.candidate.target, cause.candidate.setting["day"]) == ("tail N103", second)
 
 
 def test_a_rigging_change_acts_from_its_day_on(scene: Scene) -> None:

@@ -48,16 +48,16 @@ def days_since(scene: Scene, setting: Mapping[str, Any]) -> Array:
     return np.asarray(days - start)
 
 
-def _change_days(days: Array, least: int, most: int) -> list[float]:
-    """Days between which a change may lie, so that enough rows of two days at least stand on both
-    sides: one visit alone is more likely misread.
+def _change_days(days: Array, least: int, most: int, before: int = 2) -> list[float]:
+    """Days between which a change may lie, so that enough rows stand on both sides: of two days at
+    least after it (one visit alone is more likely misread), and of some before it.
     """
     known = np.sort(days[np.isfinite(days)])
     begins = np.diff(known, prepend=known[:1]) > 0.0
     seen = np.cumsum(begins)
     place = np.arange(len(known))
     enough = (place >= least) & (place <= len(known) - least)
-    days = known[begins & enough & (seen >= 2) & (seen < seen.max(initial=0))]
+    days = known[begins & enough & (seen >= before) & (seen < seen.max(initial=0))]
     if len(days) > most:
         days = days[np.linspace(0, len(days) - 1, most).round().astype(int)]
     return [*map(float, days)]
@@ -235,7 +235,8 @@ class RiggingOffset(RowShift):
                 side = str(table.factors["side"][rows][0])
                 groups.append((f"tail {v}", {"tail": tail, "side": side}, rows))
         for label, setting, rows in groups:
-            for day in (None, *_change_days(days[rows], 1, 12)):
+            # One visit before it is enough: the shift itself is held by those after it.
+            for day in (None, *_change_days(days[rows], 1, 12, before=1)):
                 # What was not read in any of its rows may be worn instead.
                 since = rows if day is None else rows & (days >= day)
                 if share_never_read(scene, since) <= MOST_UNREAD:
