@@ -104,6 +104,16 @@ class GearLife:
     def latest(self) -> KeptInspection | None:
         return self.inspections[-1] if self.inspections else None
 
+    def versions(self, last: Record) -> list[Record]:
+        """An inspection from its first entry to the given one."""
+        chain = [last]
+        for record in reversed(self.records):
+            if chain[-1].kind is not RecordKind.CORRECTION:
+                break
+            if record.digest == chain[-1].body["supersedes"]:
+                chain.append(record)
+        return chain[::-1]
+
 
 def lives(
     store: Store, tail: str | None = None, side: str | None = None

@@ -14,13 +14,12 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import (
     GearKey,
-    GearLife,
     find,
     life_of,
     warnings_of,
     without_dashes,
 )
-from mlg_troubleshoot.life.since_repairs import Repair, key_of, stated_repair
+from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
 from mlg_troubleshoot.parallel import Blocks, Progress
 from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
@@ -216,9 +215,13 @@ def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[
     if stands is not None and surely_later(right.repair_date, kept.repair_date):
         return []
     life = life_of(store, wrong.tail_no, wrong.side)
-    first = _first_to_state(was, wrong, life)
-    earlier = (r.seq for r in life.records if r.kind in _ENTERED and r.seq < first.seq)
-    before = max(earlier, default=0)
+    entered = [record.seq for record in life.records if record.kind in _ENTERED]
+    stating = {
+        version.seq
+        for version in life.versions(wrong)
+        if (repair := stated_repair(inspection_from(version))) is not None
+        and (stands is None or repair == was)
+    }
     return [
         Record(
             RecordKind.VOID,
@@ -229,20 +232,8 @@ def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[
             packed({"voids": repair.digest, "why": "taken back with the answer that stated it"}),
         )
         for repair in life.repairs
-        if before < repair.seq < first.seq
+        if min((seq for seq in entered if seq > repair.seq), default=0) in stating
     ]
-
-
-def _first_to_state(repair: Repair, last: Record, life: GearLife) -> Record:
-    """The version of an inspection with which its repair was entered."""
-    by_digest = {record.digest: record for record in life.records}
-    first = last
-    while first.kind is RecordKind.CORRECTION:
-        older = by_digest.get(first.body["supersedes"])
-        if older is None or stated_repair(inspection_from(older)) != repair:
-            break
-        first = older
-    return first
 
 
 def judged_by(gear: Gear, options: CheckOptions) -> dict[str, Any]:

@@ -246,6 +246,15 @@ def test_a_repair_is_taken_back_after_what_was_answered_since(
     assert life(store).repairs == ()
 
 
+def test_a_repair_is_taken_back_after_a_re_rigging_was(visit: Visit, store: SessionStore) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "n 3", "3")
+    visit(*GEAR, "g corrected")
+    visit(*GEAR, "u")
+    visit(*GEAR, "u")
+    assert life(store).repairs == ()
+
+
 def test_a_second_repair_leaves_the_record_of_the_first(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
     visit(*GEAR, "n 3", "3")

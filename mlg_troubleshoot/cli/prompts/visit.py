@@ -35,7 +35,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife, KeptInspection, lives, without_dashes
 from mlg_troubleshoot.life.since_repairs import since_repairs
-from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_from
+from mlg_troubleshoot.store import Record, Store, inspection_from
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence, parse_length
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
@@ -170,7 +170,7 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
         action = Action.MEASURE
         todo = restored
         said = Sentence(f"Restored since, as the records say: {names}. Enter the new clearances.")
-    versions = _versions(life, latest.record)
+    versions = life.versions(latest.record)
     standing = _not_undone([answers_of(inspection_from(v), gear, "") for v in versions])
     verdict = latest.result.get("verdict")
     return Visit(
@@ -198,17 +198,6 @@ def _with_lengths(kept: str) -> Sentence:
         for place, each in enumerate(_LENGTH.split(kept))
     ]
     return Sentence.of("{}" * len(parts), *parts)
-
-
-def _versions(life: GearLife, last: Record) -> list[Record]:
-    """An inspection from its first entry to what stands now."""
-    chain = [last]
-    for record in reversed(life.records):
-        if chain[-1].kind is not RecordKind.CORRECTION:
-            break
-        if record.digest == chain[-1].body["supersedes"]:
-            chain.append(record)
-    return chain[::-1]
 
 
 def _not_undone(versions: list[Answers]) -> list[Answers]:
