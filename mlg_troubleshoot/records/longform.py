@@ -65,7 +65,7 @@ class LongReader:
                 slot = self._slots[p.index, number] = len(self._wide)
                 self._wide.append(replace(p, index=slot, field=replace(of_any, number=number)))
         self._groups: dict[str | int, _Group] = {}
-        self.reader = RowReader(self._wide, table)
+        self.reader = RowReader(self._wide, table, makes_ids=False)
 
     def add(self, row: int, cells: Cells) -> None:
         filled = [*cells[: self._width], *[None] * (self._width - len(cells))]

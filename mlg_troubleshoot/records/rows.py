@@ -157,9 +157,14 @@ class _Found:
 
 
 class RowReader:
-    """Reads the rows of one table, each bad cell reported once."""
+    """Reads the rows of one table, each bad cell reported once.
 
-    def __init__(self, placed: Sequence[PlacedField], table: TableInHand) -> None:
+    makes_ids: without a column of record ids a row is named after its place and content.
+    """
+
+    def __init__(
+        self, placed: Sequence[PlacedField], table: TableInHand, *, makes_ids: bool = True
+    ) -> None:
         self._table = table
         self._options = table.options
         self._placed = {p.index: p for p in placed}
@@ -167,7 +172,9 @@ class RowReader:
         good = [(p.index, p.field) for p in placed if p.field is not None and not p.refused]
         self._refused = [p.index for p in placed if p.refused]
         self._at = {known.column: index for index, known in reversed(good)}
-        self._makes_ids = all(p.field is None or p.field.column is not RECORD_ID for p in placed)
+        self._makes_ids = makes_ids and all(
+            p.field is None or p.field.column is not RECORD_ID for p in placed
+        )
         self._lacking = [
             column.name
             for column, is_known in zip(
@@ -632,6 +639,9 @@ class RowReader:
         placed = self._placed[index]
         if fault.code != "unit_missing":
             self._table.tell_fault(fault, self._cells[index], self._place(index))
+        elif self._at.get(UNIT) in self._bad:
+            # The row names a unit, and its cell is told of.
+            return
         elif placed.place.cell not in self._without_unit:
             self._without_unit.add(placed.place.cell)
             expected = "a unit: in, thou or mm"

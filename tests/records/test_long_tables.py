@@ -102,3 +102,21 @@ def test_axial_floats_are_also_read_in_a_long_table(read, table):
     header = (*HEADER, "axial_float_mm")
     rows = [(*ROWS[0], 0.1), (*ROWS[2], None)]
     assert dict(read(table(header, rows)).rows[0].axial_float_in) == {3: pytest.approx(0.1 / 25.4)}
+
+
+def test_without_a_column_of_record_ids_no_reading_is_judged_as_an_inspection_of_its_own(
+    read, table
+):
+    rows = [("N1", "LH", "RADIAL", 3, 0.013), ("N1", "LH", "RADIAL", 5, 0.007)]
+    result = read(table(HEADER[1:], rows))
+    assert [(p.code, p.column) for p in result.problems] == [("column_missing", "record_id")]
+    assert [row.correct for row in result.rows] == [("record_id",)] * 2
+
+
+def test_a_row_whose_unit_is_not_known_is_asked_for_that_unit_alone(read, table):
+    header = (*HEADER[:5], "clearance", "unit")
+    rows = [
+        ("R1", "N1", "LH", "RADIAL", 3, 0.33, "mm"),
+        ("R2", "N1", "RH", "RADIAL", 3, 0.33, "cm"),
+    ]
+    assert [p.cell for p in read(table(header, rows)).problems] == ["G3"]
