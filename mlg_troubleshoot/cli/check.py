@@ -140,7 +140,8 @@ class Wanted(CheckOutputs):
         str | None,
         typer.Option(
             metavar="same|apart",
-            help="Whether tails that differ only in case, blanks or dashes are one aircraft.",
+            help="Whether tails that differ only in case, blanks, dashes or O for 0 are one"
+            " aircraft.",
         ),
     ] = None
     remember: options.Remember = False

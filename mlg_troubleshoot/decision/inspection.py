@@ -53,6 +53,11 @@ _SIDES = {
 }
 
 
+def plain_tail(tail: str) -> str:
+    """A tail number without what people write differently: case, blanks and dashes, O for 0."""
+    return re.sub(r"[\s_‐-―−-]+", "", tail).casefold().replace("o", "0")
+
+
 class Outcome(StrEnum):
     """What the gear did."""
 

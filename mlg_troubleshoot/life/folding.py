@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import inf
 from typing import Any
 
-from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.decision.inspection import Inspection, Side, plain_tail
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order
 from mlg_troubleshoot.store import (
@@ -150,7 +149,7 @@ def life_of(store: Store, tail: str, side: str) -> GearLife:
     side = Side.parse(side).value
     life = lives(store, tail, side).get((tail, side))
     if life is None:
-        near = [f"{t} {s}" for t, s in store.gears() if without_dashes(t) == without_dashes(tail)]
+        near = [f"{t} {s}" for t, s in store.gears() if plain_tail(t) == plain_tail(tail)]
         raise UsageError(
             f"no records of {tail} {side} in {store.place}",
             f"The store has {', '.join(near)}."
@@ -161,11 +160,6 @@ def life_of(store: Store, tail: str, side: str) -> GearLife:
         # What stands there and cannot be read is named before anything is added to it.
         _ = kept.inspection
     return life
-
-
-def without_dashes(tail: str) -> str:
-    """A tail number without what people write differently: case, blanks and dashes."""
-    return re.sub(r"[\s_‐-―−-]+", "", tail).casefold()
 
 
 def warnings_of(store: Store, keys: Collection[GearKey]) -> list[str]:

@@ -12,7 +12,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, cast
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.cells import writable
@@ -22,6 +22,7 @@ from mlg_troubleshoot.records.frames import FRAME, FrameSheet, as_frame, in_fram
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
 from mlg_troubleshoot.records.model import FileRead, ReadOptions, ReadResult
 from mlg_troubleshoot.records.row_consistency import (
+    alike_tails,
     history_warnings,
     order_warnings,
     settle_duplicates,
@@ -451,6 +452,11 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     problems += settle_duplicates(rows, layouts, contents)
     slips = history_warnings(rows)
     backwards = order_warnings(rows, layouts)
+    tails: dict[str, RowSource] = {}
+    for row in rows:
+        if row.tail_no is not None:
+            tails.setdefault(row.tail_no, row.source)
+    alike = alike_tails(tails) if len(tails) > 1 else []
     said_backwards = [*dict.fromkeys(backwards.values())]
     for place in {*slips, *backwards}:
         said = filter(None, (slips.get(place), backwards.get(place)))
@@ -463,6 +469,8 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         tuple(problems),
         (
             *(note for _, found in results for note in found.notes),
+            *alike[:_NAMED],
+            *([f"{len(alike) - _NAMED} more tails are alike"] if len(alike) > _NAMED else []),
             *said_backwards[:_NAMED],
             *([_falls_elsewhere(len(said_backwards))] if len(said_backwards) > _NAMED else []),
             *([_asked_about([rows[place] for place in sorted(slips)])] if slips else []),

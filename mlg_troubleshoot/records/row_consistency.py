@@ -10,10 +10,16 @@ from itertools import pairwise
 from statistics import median
 
 from mlg_troubleshoot.decision.columns import DATE, LANDINGS, RECORD_ID, Column
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
+from mlg_troubleshoot.decision.inspection import (
+    Inspection,
+    InvalidRow,
+    RowSource,
+    Side,
+    plain_tail,
+)
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.life.chronology import Moment, contradictions
-from mlg_troubleshoot.records.cells import column_letters
+from mlg_troubleshoot.records.cells import column_letters, quote
 from mlg_troubleshoot.records.model import SheetLayout, to_correct
 from mlg_troubleshoot.units import SLIPS
 
@@ -164,6 +170,19 @@ def _copies(seen: Sequence[Inspection]) -> dict[int, str]:
             said = "the same inspection, entered twice?"
         found[at] = f"all clearances are those of {where(before.source)}: {said}"
     return found
+
+
+def alike_tails(tails: Mapping[str, RowSource]) -> list[str]:
+    """Say which tail numbers may be one that is written in several ways, each with a row of it."""
+    alike: dict[str, list[str]] = {}
+    for tail, source in tails.items():
+        alike.setdefault(plain_tail(tail), []).append(f"{quote(tail, 40)!r} ({where(source)})")
+    return [
+        f"tails {' and '.join(same)} differ only in case, blanks, dashes or O for 0, and"
+        " are taken as different aircraft: correct the one that is wrong"
+        for same in alike.values()
+        if len(same) > 1
+    ]
 
 
 def order_warnings(

@@ -41,7 +41,7 @@ def forecast(
     Raises
     ------
     StoreError
-        If two spellings of a tail number differ only in case, blanks or dashes.
+        If two spellings of a tail number differ only in case, blanks, dashes or O for 0.
     """
     known = load_gear(gear)
     if isinstance(inspections, Store):

@@ -8,7 +8,7 @@ from itertools import islice
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
-from mlg_troubleshoot.decision.inspection import Inspection, surely_later
+from mlg_troubleshoot.decision.inspection import Inspection, plain_tail, surely_later
 from mlg_troubleshoot.decision.judge_rows import AT_ONCE
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -17,7 +17,6 @@ from mlg_troubleshoot.life.folding import (
     find,
     life_of,
     warnings_of,
-    without_dashes,
 )
 from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
 from mlg_troubleshoot.parallel import Blocks, Progress
@@ -295,22 +294,22 @@ def _agrees(store: Store, kept: Record, new: Record) -> bool:
 def _settled_tails(
     tails: Iterable[str], store: Store, same_tail: Callable[[str, str], bool] | None
 ) -> dict[str, str]:
-    """Spellings that differ only in case, blanks or dashes: never one aircraft without being
-    asked.
+    """Spellings that differ only in case, blanks, dashes or O for 0: never one aircraft without
+    being asked.
     """
     known = dict.fromkeys(tail for tail, _side in store.gears())
     by_spelling: dict[str, str] = {}
     for tail in known:
-        by_spelling.setdefault(without_dashes(tail), tail)
+        by_spelling.setdefault(plain_tail(tail), tail)
     settled: dict[str, str] = {}
     for tail in dict.fromkeys(tails):
-        other = by_spelling.setdefault(without_dashes(tail), tail)
+        other = by_spelling.setdefault(plain_tail(tail), tail)
         if tail in known or other == tail:
             continue
         if same_tail is None:
             raise StoreError(
-                f"tail {tail!r} differs from {other!r} only in case, blanks or dashes; nothing was"
-                " kept",
+                f"tail {tail!r} differs from {other!r} only in case, blanks, dashes or O for 0;"
+                " nothing was kept",
                 "Correct it, or pass --tails same (one aircraft) or --tails apart (two).",
             )
         if same_tail(tail, other):

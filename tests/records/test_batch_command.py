@@ -301,6 +301,15 @@ def test_the_worst_gear_stands_first_and_every_gear_on_one_line(mixed):
     ]
 
 
+def test_an_undated_or_invalid_row_is_not_counted_as_a_gear(tmp_path):
+    days = ("2024-03-04", "2025-03-04", "2099-03-04")
+    header = [*HEADER, "inspection_date"]
+    rows = [header, *(sound(f"R{n}", inspection_date=day) for n, day in enumerate(days))]
+    file = workbook(tmp_path / "days.xlsx", ("Inspections", rows))
+    said = "1 gear, the latest inspection of each, and every row that is undated or invalid;"
+    assert mlg("check", file).out.splitlines()[1] == said
+
+
 def test_joints_over_their_limit_are_counted_over_the_batch(mixed):
     assert "Joints over their limit (number of gears): #10 (1)." in mlg("check", mixed).out
     every = mlg("check", mixed, "--all").out

@@ -145,3 +145,12 @@ def test_landings_that_fall_in_many_gears_are_counted_beyond_the_eighth_and_note
     assert [("never fall" in note) for note in said] == [True] * 8 + [False]
     assert said[-1].startswith("Landings fall at 2 more places")
     assert sum("never fall" in " ".join(found) for found in warnings(result).values()) == len(rows)
+
+
+@pytest.mark.parametrize(("tail", "notes"), [("N1O3", 1), ("n-103", 1), ("N1C3", 0)])
+def test_tails_that_may_be_one_aircraft_are_named_with_their_rows(read, table, tail, notes):
+    header = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in")
+    rows = [("R1", "N103", "LH", "RADIAL", 0.003), ("R2", tail, "LH", "RADIAL", 0.003)]
+    said = f"'N103' (row 2 of t.csv) and {tail!r} (row 3 of t.csv) differ only in"
+    result = read(table(header, rows), "t.csv")
+    assert sum(said in note for note in result.notes) == notes

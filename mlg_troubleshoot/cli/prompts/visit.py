@@ -29,11 +29,11 @@ from mlg_troubleshoot.decision.columns import (
     RESTORED_JOINTS,
     RIGGING_CHECKED,
 )
-from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.decision.inspection import Inspection, Side, plain_tail
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearLife, KeptInspection, lives, without_dashes
+from mlg_troubleshoot.life.folding import GearLife, KeptInspection, lives
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.store import Record, Store, inspection_from
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence, parse_length
@@ -142,7 +142,7 @@ def last_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
     """The last inspection of a gear, under whichever spelling of its tail number it is kept."""
     if store.is_new:
         return None
-    kept = [t for t, s in store.gears() if s == side and without_dashes(t) == without_dashes(tail)]
+    kept = [t for t, s in store.gears() if s == side and plain_tail(t) == plain_tail(tail)]
     if not kept or (tail not in kept and len(kept) > 1):
         return None
     key = (tail if tail in kept else kept[0], side.value)

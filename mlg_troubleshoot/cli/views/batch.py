@@ -28,8 +28,11 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
     screen.print(f"{len(lines)} inspections: {said}")
     latest, earlier = latest_of_each_gear(lines)
     if earlier and not every:
-        gears = "1 gear" if len(latest) == 1 else f"{len(latest)} gears"
-        screen.print(f"{gears}, the latest inspection of each; --all shows every inspection.")
+        known = {(line.tail_no, line.side) for line in lines if line.tail_no and line.side}
+        gears = "1 gear" if len(known) == 1 else f"{len(known)} gears"
+        alone = any(lines[place].day is None for place in latest)
+        also = ", and every row that is undated or invalid" if alone else ""
+        screen.print(f"{gears}, the latest inspection of each{also}; --all shows every inspection.")
     places = worst_first(lines, (*latest, *earlier)) if every else latest
     ordered = [lines[place] for place in places]
     headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance>", "next"]
