@@ -179,7 +179,8 @@ def show_gears(found: Lives, *, ahead: bool) -> None:
                 line.next_action or "-",
             ]
         )
-    said = f"{len(lines)} gears; 'inspect' is the joint to inspect first today"
+    gears = "1 gear" if len(lines) == 1 else f"{len(lines)} gears"
+    said = f"{gears}; 'inspect' is the joint to inspect first today"
     if ahead:
         said += (
             "; landings left are those from the last inspection, median (5 %): to the limit of any"

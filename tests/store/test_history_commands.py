@@ -379,6 +379,11 @@ def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(
     assert told["gears"][0]["worst_joint"] == 3
 
 
+def test_a_fleet_of_one_gear_is_one_gear(tmp_path: Path, place: Path) -> None:
+    keep(tmp_path, visit(1, 0.001))
+    assert "1 gear; " in mlg("fleet", "--no-forecast").out
+
+
 def test_a_fleet_without_landings_has_no_forecast_and_says_null(
     tmp_path: Path, place: Path
 ) -> None:
