@@ -50,8 +50,8 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
             "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention"
             " RADIAL, DIAMETRAL or TOTAL_PLAY): it has no default.",
         )
-    values: dict[str, object] = {RECORD_ID.name: "-", **flags.typed}
-    labels: dict[str, str] = {}
+    values = {RECORD_ID.name: "-", **flags.typed}
+    labels = {}
     for text in flags.values or ():
         name, sign, written = text.partition("=")
         number = name.strip().lstrip("#")

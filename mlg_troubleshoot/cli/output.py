@@ -116,8 +116,8 @@ class DataConsole(Console):
     def length(self, value_in: float, *, sign: bool = False) -> str:
         return self.unit.shown(value_in, sign=sign)
 
-    def sentence(self, said: str, style: str = "") -> None:
-        self.print(self.said(said), style=style)
+    def sentence(self, said: str) -> None:
+        self.print(self.said(said))
 
     def said(self, sentence: str) -> str:
         """Say a sentence of this program, its lengths in the unit that the user reads."""

@@ -37,14 +37,33 @@ class Verdict(StrEnum):
 class JointFinding:
     """One line of the ranked table.
 
-    contribution_in: plunger amplification × radial clearance; both None if not measured. [in]
-    first_order, total_order: sensitivity indices of the precomputed table (Eqs. 1 and 2). [1]
-    plunger_amplification: A_iP at mid-position in the limit of small clearance (Eq. 8). [1] rank,
-    rank_range: order in which to inspect, from 1, and how it varies over the ensemble of
-    geometries. alike: joints at the other end of the same link: plunger data alone cannot
-    distinguish them. allowance_in: how much further this joint alone may wear until the worst case
-    reaches the margin; None if it is
-        not measured or the worst case is beyond the margin already. [in]
+    Attributes
+    ----------
+    joint : int
+        Number of the joint, from 1.
+    name : str
+        Its name.
+    clearance_in : float or None
+        Radial clearance; None if it was not measured. [in]
+    limit_in : float
+        Largest clearance allowed. [in]
+    over_limit : bool
+        Whether the clearance is beyond the limit.
+    contribution_in : float or None
+        Plunger amplification × radial clearance; None if it was not measured. [in]
+    first_order, total_order : float
+        Sensitivity indices of the precomputed table (Eqs. 1 and 2). [1]
+    plunger_amplification : float
+        A_iP at mid-position in the limit of small clearance (Eq. 8). [1]
+    rank : int
+        Place in the order in which to inspect, from 1.
+    rank_range : tuple of int
+        First and last place over the ensemble of geometries.
+    alike : tuple of int
+        Joints at the other end of the same link: plunger data alone cannot distinguish them.
+    allowance_in : float or None
+        How much further this joint alone may wear until the worst case reaches the margin; None if
+        it is not measured or the worst case is beyond the margin already. [in]
     """
 
     joint: int
@@ -119,15 +138,24 @@ class ReadingWorth:
 
 @dataclass(frozen=True, slots=True)
 class MeasuringAdvice:
-    """Which joint to measure next, the best one first, and whether one may stop: no reading will
-    change the verdict.
+    """Which joint to measure next, and whether one may stop: no reading will change the verdict.
 
-    verdict: the verdict that stands if one may stop, else the verdict so far. expected_within:
-    chance that the gear is within its margin, unmeasured joints taken by their distribution. For
-        the advice only: a verdict takes them at their bounds. [1]
-    expected: WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is enough to go on troubleshooting,
-    INCONCLUSIVE
-        where measuring the other joints would hardly settle it, else None.
+    Attributes
+    ----------
+    worth : tuple of ReadingWorth
+        What reading each unmeasured joint is worth, the best one first.
+    stop : bool
+        Whether one may stop.
+    verdict : Verdict
+        The verdict that stands if one may stop, else the verdict so far.
+    expected_within : float
+        Chance that the gear is within its margin, unmeasured joints taken by their distribution.
+        For the advice only: a verdict takes them at their bounds. [1]
+    expected : Verdict or None
+        WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is enough to go on troubleshooting,
+        INCONCLUSIVE where measuring the other joints would hardly settle it, else None.
+    text : str
+        The advice in words.
     """
 
     worth: tuple[ReadingWorth, ...]

@@ -155,18 +155,37 @@ class _Believed:
 class Causes:
     """What is believed of n gears.
 
-    joints, rigging, elsewhere: chances that a failure is one of the joints, of the rigging or lock
-    roller, or of something that leaves the plunger within its margin. [1]
-    worn: chance that each joint is beyond its limit. [1]
-    levels: chances of the levels of wear, (n, levels). [1]
-    exceeds: chance with random directions that the joints hold the plunger beyond its margin,
-    unread ones by their wear, whatever the plunger reads. [1]
-    before_plunger: how many failures of the joints there are for each of something else, by the
-    readings of the joints alone. [1]
-    loaded: chance that loads hold the pins near their worst directions, the joints being the cause.
-    [1] outside, within: densities of the plunger's reading where the joints hold it beyond its
-    margin and where they do not, with random pins and with held ones; by_rigging: where rigging
-    does, by how many such failures there are for each of the joints. [1]
+    Attributes
+    ----------
+    cases : Cases
+        The gears.
+    joints, rigging, elsewhere : ndarray, shape (n,)
+        Chances that a failure is one of the joints, of the rigging or lock roller, or of something
+        that leaves the plunger within its margin. [1]
+    worn : ndarray, shape (n, joints)
+        Chance that each joint is beyond its limit. [1]
+    levels : ndarray, shape (n, levels)
+        Chances of the levels of wear. [1]
+    exceeds : ndarray, shape (n,)
+        Chance with random directions that the joints hold the plunger beyond its margin, unread
+        ones by their wear, whatever the plunger reads. [1]
+    before_plunger : ndarray, shape (n,)
+        How many failures of the joints there are for each of something else, by the readings of the
+        joints alone. [1]
+    loaded : ndarray, shape (n,)
+        Chance that loads hold the pins near their worst directions, the joints being the cause. [1]
+    outside, within : tuple of ndarray, shape (n,)
+        Densities of the plunger's reading where the joints hold it beyond its margin and where they
+        do not, with random pins and with held ones. [1]
+    by_rigging : ndarray, shape (n,)
+        The same density where rigging does, by how many such failures there are for each of the
+        joints. [1]
+    mean_in : ndarray, shape (n, joints)
+        Clearances, read or expected. [in]
+    u_in : ndarray, shape (n,)
+        Standard uncertainty of the plunger's reading. [in]
+    by_pins : tuple of _Believed
+        What is believed with random pins and with held ones.
     """
 
     cases: Cases
@@ -193,7 +212,7 @@ class Causes:
             joints, elsewhere = each.of_failures(outside, within)
             failed = joints + elsewhere + self.by_rigging
             likely.append(np.where(self.cases.failed, failed, outside + within))
-        return np.asarray(likely[1] / np.maximum(likely[0], 1e-300))
+        return likely[1] / np.maximum(likely[0], 1e-300)
 
     @property
     def leverage(self) -> Array:
@@ -274,7 +293,7 @@ class Causes:
         left = np.prod(np.where(members[:, :, None], 1.0, waves), axis=1) * _LINKAGE
         if not np.isfinite(x):
             new = np.prod(np.where(members[:, :, None], unread.fresh, 1.0), axis=1)
-            return np.asarray(1.0 - inside(left * new, np.full(len(left), margin)))
+            return 1.0 - inside(left * new, np.full(len(left), margin))
         gone = np.prod(np.where(members[:, :, None], waves, 1.0), axis=1)
         gone = gone * blur(self.u_in[row])
         gone = gone * SMOOTHED

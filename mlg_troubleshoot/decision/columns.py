@@ -46,24 +46,60 @@ def _joined(words: tuple[str, ...]) -> str:
 class Column:
     """One column: its name without number and unit, and everything that is known of it.
 
-    meaning: one sentence or two; in braces its own numbers and those of the gear (`template`).
-    spellings: headers as people write them, separated by ``|``.
-    low, high: what can be meant; of a length in inches, and no limit where the gear says it.
-    above_zero: zero is not a value. scales: its bound is that of the radial value.
-    unit: of a number. choices: the words that it takes; spelt: other ways to write them;
-    hints: words that are refused, and the choice that may be meant.
-    expected: what a refusal asks for; made from the range where it is empty.
-    fills: the field of an inspection; joint_fills: the same for the columns of single joints.
-    copies: columns of repeat readings in the template.
-    bears_verdict: a mistake in it changes a verdict, so the row is not judged.
-    carried: it travels to the report unread.
-    blank_by_word: a word such as ``n/a`` says that nothing was measured.
-    covariate: place among the covariates of a diagnosis, from 1; 0 for any other column.
-    effort: place in the order of what it takes to record it in addition to clearances, from 1.
-    words: what the column is about, in a sentence.
-    sign_off: place on the sign-off page of the prompts, from 1; prompt, prompt_word: what is asked
-    there, and the word that leads back to it.
-    in_template: it stands in the workbook and in its form.
+    Attributes
+    ----------
+    name : str
+        The name.
+    holds : Holds
+        Kind of value.
+    meaning : str
+        One sentence or two; in braces its own numbers and those of the gear (`template`).
+    need : Need
+        Whether it must be there.
+    spellings : str
+        Headers as people write them, separated by ``|``.
+    low, high : float
+        What can be meant, no limit where the gear says it. [in, or the column's unit]
+    above_zero : bool
+        Zero is not a value.
+    scales : bool
+        Its bound is that of the radial value.
+    unit : str
+        Unit of a number.
+    choices : type of StrEnum, optional
+        The words that it takes.
+    spelt : callable, optional
+        Other ways to write them.
+    hints : mapping of str to str
+        Words that are refused, and the choice that may be meant.
+    expected : str
+        What a refusal asks for; made from the range where it is empty.
+    fills : str, optional
+        The field of an inspection.
+    joint_fills : str
+        The same for the columns of single joints.
+    needs_joint : bool
+        Its header names a joint.
+    copies : int
+        Columns of repeat readings in the template.
+    bears_verdict : bool
+        A mistake in it changes a verdict, so the row is not judged.
+    carried : bool
+        It travels to the report unread.
+    blank_by_word : bool
+        A word such as ``n/a`` says that nothing was measured.
+    covariate : int
+        Place among the covariates of a diagnosis, from 1; 0 for any other column.
+    effort : int
+        Place in the order of what it takes to record it in addition to clearances, from 1.
+    words : str
+        What the column is about, in a sentence.
+    sign_off : int
+        Place on the sign-off page of the prompts, from 1.
+    prompt, prompt_word : str
+        What is asked there, and the word that leads back to it.
+    in_template : bool
+        It stands in the workbook and in its form.
     """
 
     name: str

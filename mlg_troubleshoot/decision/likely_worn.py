@@ -75,9 +75,16 @@ def explain(one: Cases, causes: Causes | None = None) -> Posterior:
 class _Clearances:
     """What the joints of one gear may be worn to before its plunger is read.
 
-    at_in: possible clearances, (joints, places). [in]
-    chances: of each at each level of wear, (levels, joints, places); sound: which are within their
-    limit. levels: chances of the levels. [1]
+    Attributes
+    ----------
+    at_in : ndarray, shape (joints, places)
+        Possible clearances. [in]
+    chances : ndarray, shape (levels, joints, places)
+        Chance of each at each level of wear. [1]
+    sound : ndarray of bool, shape (joints, places)
+        Which are within their limit.
+    levels : ndarray, shape (levels,)
+        Chances of the levels. [1]
     """
 
     at_in: Array

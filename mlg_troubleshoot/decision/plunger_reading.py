@@ -19,11 +19,15 @@ class Compared:
     """Measured displacements of n gears compared with what the joints can explain, unmeasured
     joints at their limit.
 
-    beyond, clears: measured beyond the margin; within it by two standard uncertainties. explained:
-    false where the displacement is beyond what the joints can explain by two standard
-    uncertainties. explained_at_most_in, unexplained_in: what of it they explain at most, and what
-    they cannot; NaN without a
-        reading. [in]
+    Attributes
+    ----------
+    beyond, clears : ndarray of bool, shape (n,)
+        Measured beyond the margin; within it by two standard uncertainties.
+    explained : ndarray of bool, shape (n,)
+        False where the displacement is beyond what the joints can explain by two standard
+        uncertainties.
+    explained_at_most_in, unexplained_in : ndarray, shape (n,)
+        What of it they explain at most, and what they cannot; NaN without a reading. [in]
     """
 
     beyond: Mask

@@ -55,10 +55,18 @@ def model_uncertainty(displacement_in: Array, residual_u_in: float | None) -> Ar
 class Prediction:
     """Predictions for n gears with one assumption about their unmeasured joints.
 
-    worst: worst displacements and directions of the reference linkage. [in, rad] spread_low_in,
-    spread_high_in: least and largest prediction over the ensemble. [in] u_readings_in: what the
-    uncertainty of each joint's reading adds, (n, joints); 0 where it was not measured. [in]
-    bound_in: worst case over all directions, where `worst` may be the displacement as loaded. [in]
+    Attributes
+    ----------
+    worst : WorstCase
+        Worst displacements and directions of the reference linkage. [in, rad]
+    spread_low_in, spread_high_in : ndarray, shape (n,)
+        Least and largest prediction over the ensemble. [in]
+    u_readings_in : ndarray, shape (n, joints)
+        What the uncertainty of each joint's reading adds; 0 where it was not measured. [in]
+    u_geometry_in, u_model_in : ndarray, shape (n,)
+        What the uncertainty of the geometry adds, and what that of the model does. [in]
+    bound_in : ndarray, shape (n,)
+        Worst case over all directions, where `worst` may be the displacement as loaded. [in]
     """
 
     worst: WorstCase

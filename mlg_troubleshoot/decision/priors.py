@@ -16,26 +16,36 @@ from mlg_troubleshoot.misfit.beliefs import Beliefs
 class Priors:
     """What is assumed of wear, gauges and failures.
 
-    joints_for_one_misrigged, joints_for_one_elsewhere: of the gears that failed, how many did so
-    through the joints for each that was mis-rigged, and for each that failed through something that
-    leaves the plunger within its margin.
-    offset: how far a wrong rigging moves the plunger: evenly, up to about so many margins. [1]
-    overlooked: chance that somebody overlooks what is wrong: a rigging that was looked at, or a
-    joint over its limit at the work that left the rigging wrong. [1]
-    loaded, scatter_deg: chance that loads hold all pins near their worst directions, and the
-    standard deviation of their angles then. [1, deg]
-    linkage_u_in: standard deviation of what the linkage of this gear adds to a sum of random
-    directions. [in]
-    levels: least and largest level of wear, in units of the limit. [1] alike: chance that the
-    joints of one gear have their level in common: as likely as not. [1]
-    worn_out: chance that a joint is worn out for a reason of its own, to between its limit and
-    twice its limit, at the least and at the largest level. Of prior wear that differs in scale and
-    shape from gear to gear (six kinds, drawn by other code), it left the least surprise (log loss)
-    about the cause and about unread joints. [1]
-    gauge_scale: standard deviation of the scale of a gauge, in addition to its stated
-    uncertainty. [1]
-    wrong_readings: readings of one gear that are the total play where the radial clearance is
-    stated, on average: as many as things that are wrong in any set of data.
+    Attributes
+    ----------
+    joints_for_one_misrigged, joints_for_one_elsewhere : float
+        Of the gears that failed, how many did so through the joints for each that was mis-rigged,
+        and for each that failed through something that leaves the plunger within its margin. [1]
+    offset : float
+        How far a wrong rigging moves the plunger: evenly, up to about so many margins. [1]
+    overlooked : float
+        Chance that somebody overlooks what is wrong: a rigging that was looked at, or a joint over
+        its limit at the work that left the rigging wrong. [1]
+    loaded : float
+        Chance that loads hold all pins near their worst directions. [1]
+    scatter_deg : float
+        Standard deviation of their angles then. [deg]
+    linkage_u_in : float
+        Standard deviation of what the linkage of this gear adds to a sum of random directions. [in]
+    levels : tuple of float
+        Least and largest level of wear, in units of the limit. [1]
+    alike : float
+        Chance that the joints of one gear have their level in common: as likely as not. [1]
+    worn_out : tuple of float
+        Chance that a joint is worn out for a reason of its own, to between its limit and twice its
+        limit, at the least and at the largest level. Of prior wear that differs in scale and shape
+        from gear to gear (six kinds, drawn by other code), it left the least surprise (log loss)
+        about the cause and about unread joints. [1]
+    gauge_scale : float
+        Standard deviation of the scale of a gauge, in addition to its stated uncertainty. [1]
+    wrong_readings : float
+        Readings of one gear that are the total play where the radial clearance is stated, on
+        average: as many as things that are wrong in any set of data. [1]
     """
 
     joints_for_one_misrigged: float = 3.0

@@ -102,7 +102,7 @@ def _surely_above(
     sure = gear.over_limit(clearance_in - _SURELY * gauge_u_in)
     may_be = gear.over_limit(clearance_in + _SURELY * gauge_u_in)
     rejected = sure[:, :, None] & ~may_be[:, None, :]
-    return np.asarray(rejected | (differ & (sure[:, :, None] | ~may_be[:, None, :])))
+    return rejected | (differ & (sure[:, :, None] | ~may_be[:, None, :]))
 
 
 def _places(over: Mask, contribution: Array, total_order: Array) -> Places:

@@ -33,11 +33,22 @@ _AS_NEW_IN = 1e-4
 class Subsets:
     """All subsets of a gear's joints, the quickest to restore first, then the smallest.
 
-    weights: the same as 0 and 1, for sums. [1]
-    binary: each as a number, its joints being the digits from the last on.
-    alike: the same number for subsets of equally many joints in equal minutes.
-    joints: numbers of the joints of each.
-    to_measure: minutes to read them.
+    Attributes
+    ----------
+    members : ndarray of bool, shape (subsets, joints)
+        Which joints each holds.
+    weights : ndarray, shape (subsets, joints)
+        The same as 0 and 1, for sums. [1]
+    minutes : ndarray, shape (subsets,)
+        Minutes to restore them. [min]
+    binary : ndarray of int, shape (subsets,)
+        Each as a number, its joints being the digits from the last on.
+    alike : ndarray of int, shape (subsets,)
+        The same number for subsets of equally many joints in equal minutes.
+    joints : sequence of tuple of int
+        Numbers of the joints of each.
+    to_measure : sequence of float
+        Minutes to read them. [min]
     """
 
     members: Mask

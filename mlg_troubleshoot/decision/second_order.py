@@ -26,11 +26,18 @@ _STEP_IN = 1e-3
 class Response:
     """Second-order expansion of one linkage at mid-position without clearance.
 
-    gradient: displacement by component of virtual link. [1]
-    curvature: second derivatives. [1/in]
-    amplification: length of each joint's gradient: A_iP of Eq. 8. [1]
-    worst_curvature: second derivatives along the over-travel directions. [1/in]
-    over_shift_in, under_shift_in: what the exact worst cases of one gear add to the expansion. [in]
+    Attributes
+    ----------
+    gradient : ndarray, shape (components,)
+        Displacement by component of virtual link. [1]
+    curvature : ndarray, shape (components, components)
+        Second derivatives. [1/in]
+    amplification : ndarray, shape (joints,)
+        Length of each joint's gradient: A_iP of Eq. 8. [1]
+    worst_curvature : ndarray, shape (joints, joints)
+        Second derivatives along the over-travel directions. [1/in]
+    over_shift_in, under_shift_in : float
+        What the exact worst cases of one gear add to the expansion. [in]
     """
 
     gradient: Array

@@ -40,7 +40,7 @@ def _bessel_table() -> Array:
 def _random(turns: Array) -> Array:
     """J₀ from a table. [1]"""
     table = _bessel_table()
-    return np.asarray(np.interp(turns, np.arange(len(table)) * 0.05, table))
+    return np.interp(turns, np.arange(len(table)) * 0.05, table)
 
 
 def _held(turns: Array) -> Array:
@@ -52,9 +52,14 @@ def _held(turns: Array) -> Array:
 class Pins:
     """How pins rest.
 
-    waves: characteristic function of a clearance, by frequency times what it can move. [1] sense:
-    chance of the sense of a displacement. [1] cosine: of the angle from the worst direction, root
-    mean square. [1]
+    Attributes
+    ----------
+    waves : callable
+        Characteristic function of a clearance, by frequency times what it can move. [1]
+    sense : float
+        Chance of the sense of a displacement. [1]
+    cosine : float
+        Cosine of the angle from the worst direction, root mean square. [1]
     """
 
     waves: Callable[[Array], Array]

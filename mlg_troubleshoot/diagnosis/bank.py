@@ -100,7 +100,7 @@ def _shapes(scene: Scene, smooth: Mapping[str, Array]) -> Iterator[tuple[Array, 
 
 def _quantities(scene: Scene) -> dict[str, Array]:
     table = scene.table
-    raw: dict[str, Array] = {"predicted": scene.over_in, **table.quantities}
+    raw = {"predicted": scene.over_in, **table.quantities}
     for j, joint in enumerate(scene.joints):
         raw[f"clearance_{joint}"] = scene.clearance_in[:, j]
     if table.axial_float_in is not None:

@@ -127,7 +127,7 @@ class NamedCause(Term):
         fixed = self.candidate.setting
         if "factors" in fixed:
             return {f"factor_{joint}": value for joint, value in fixed["factors"].items()}
-        shown: dict[str, float | str] = dict(self.candidate.cause.shown(self.value))
+        shown = dict(self.candidate.cause.shown(self.value))
         return shown | {
             name: fixed[name]
             for name in ("since", "until", "wear_exponent")
@@ -399,7 +399,7 @@ class _Case(Finding):
     @property
     def explained(self) -> Array:
         """What is likely to act does to each row. [in]"""
-        return np.asarray(self.columns @ self.values)
+        return self.columns @ self.values
 
     @property
     def accounts(self) -> list[tuple[Array, float]]:

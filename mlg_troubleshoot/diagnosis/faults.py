@@ -70,13 +70,22 @@ _MIXTURE_ROUNDS = 15
 class DataFault:
     """One cell that is most likely wrong.
 
-    place: row of the table, counted from 0.
-    row: row of the source, counted from 1.
-    record_id: identity of the row.
-    column: column.
-    kind: mm_as_in, factor_10, swapped_joints, swapped_side, implausible or restored_joint.
-    value: what was written.
-    suggested: what was most likely meant; used in the analysis only.
+    Attributes
+    ----------
+    place : int
+        Row of the table, counted from 0.
+    row : int
+        Row of the source, counted from 1.
+    record_id : str
+        Identity of the row.
+    column : str
+        Column of the cell.
+    kind : str
+        One of mm_as_in, factor_10, swapped_joints, swapped_side, implausible and restored_joint.
+    value : str
+        What was written.
+    suggested : str or None
+        What was most likely meant; used in the analysis only.
     """
 
     place: int
@@ -182,11 +191,24 @@ def _normal(off: Array, spread: Array | float) -> Array:
 class _Screen:
     """The rows of a table, and how likely each is as written or otherwise.
 
-    usual: clearances to expect.
-    rest, shape (n,): misfit beyond what is explained. [in]
-    explained, shape (n,): what is. [in]
-    scale_in, repeat_in: scatter of the misfits, and between the readings of a row. [in]
-    inspection, shape (n,): number of the inspection that a row is of.
+    Attributes
+    ----------
+    model : LinkageModel
+        The linkage that the rows are of.
+    table : DiagnosisTable
+        The rows.
+    usual : _Usual
+        Clearances to expect.
+    rest : ndarray, shape (n,)
+        Misfit beyond what is explained. [in]
+    explained : ndarray, shape (n,)
+        What is explained of it. [in]
+    scale_in : float
+        Scatter of the misfits. [in]
+    repeat_in : float
+        Scatter between the readings of a row. [in]
+    inspection : ndarray, shape (n,)
+        Number of the inspection that a row is of.
     """
 
     model: LinkageModel
@@ -206,7 +228,7 @@ class _Screen:
     def readings_of(self, cells: Array, along: Mask) -> Array:
         """Readings that the cells of rows make, along the stroke less the position at rest. [in]"""
         readings = cells[..., self.table.clearance_in.shape[1] : -1]
-        return np.asarray(readings - self._at_rest(cells[..., -1], along))
+        return readings - self._at_rest(cells[..., -1], along)
 
     def _at_rest(self, extension: Array, along: Mask) -> Array:
         """Position at rest of rows along the stroke, 0 of the others, as columns. [in]"""
@@ -245,7 +267,7 @@ class _Screen:
             return np.zeros(len(misfit))
         density = student(misfit[:, None] - self.rest[kept], self.scale_in)
         density = log_sum((density + np.log(weight[kept] / weight.sum())).T)
-        return np.asarray(np.where(np.isfinite(misfit), density, -np.inf))
+        return np.where(np.isfinite(misfit), density, -np.inf)
 
     def wear(self, places: Places, written: Array) -> Array:
         """Log-density of clearances by the wear of their gears, shape (n_places, n_errors). [1]"""

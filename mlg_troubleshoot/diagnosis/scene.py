@@ -136,7 +136,7 @@ def effect(scene: Scene, adjustment: Adjustment) -> Array:
         moved = (moved + nominal) * adjustment.rate_factor - nominal
     if adjustment.offset_in is not None:
         moved = moved + adjustment.offset_in
-    return np.asarray(moved - scene.over_in)
+    return moved - scene.over_in
 
 
 def effects_of(scene: Scene, candidates: Iterable[Candidate]) -> Iterator[Array]:

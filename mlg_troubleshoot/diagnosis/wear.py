@@ -238,8 +238,7 @@ def inspection_of(table: DiagnosisTable) -> Places:
     known = {"gear_landings", "day"} & set(table.quantities)
     parts = [np.nan_to_num(table.quantities[name], nan=-1.0) for name in sorted(known)]
     whole = np.column_stack([gears_of(table), *parts])
-    found: Places = np.unique(whole, axis=0, return_inverse=True)[1].ravel()
-    return found
+    return np.unique(whole, axis=0, return_inverse=True)[1].ravel()
 
 
 def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:

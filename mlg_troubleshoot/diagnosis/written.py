@@ -35,10 +35,15 @@ BY_CHANCE = 0.001
 class Blanks:
     """Cells that are blank because of what would have stood there.
 
-    whose: the technician; empty for the whole table.
-    cells, shape (n, n_joints): the blanks; a joint that is never read there is not among them.
-    below_in: what would have been read is less than this; None if joints were read until the first
-    that is worn: then the blanks depend on nothing but what was read. [in]
+    Attributes
+    ----------
+    whose : str
+        The technician; empty for the whole table.
+    cells : ndarray, shape (n, n_joints)
+        Which cells are such blanks; a joint that is never read there is not among them.
+    below_in : float or None
+        What would have been read is less than this; None if joints were read until the first that
+        is worn: then the blanks depend on nothing but what was read. [in]
     """
 
     whose: str
@@ -120,9 +125,17 @@ _FAR = 30.0
 class Pile:
     """A value that stands for others.
 
-    value: the value. [in] share: how much of all values it is. [1] end: -1 if all that is smaller
-    is written so, 1 if all that is larger, 0 if some of what is smaller.
-    lower: how often a smaller value is written so. [1]
+    Attributes
+    ----------
+    value : float
+        The value. [in]
+    share : float
+        How much of all values it is. [1]
+    end : int
+        −1 if all that is smaller is written so, 1 if all that is larger, 0 if some of what is
+        smaller.
+    lower : float
+        How often a smaller value is written so. [1]
     """
 
     value: float

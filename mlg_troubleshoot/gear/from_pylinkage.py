@@ -80,7 +80,7 @@ def short_form_of(
     theirs = _Theirs(file)
     inches = unit.per_inch
     driver = theirs.driver()
-    drive: dict[str, Any] = {"crank": driver.id, "travel": list(travel_deg)}
+    drive = {"crank": driver.id, "travel": list(travel_deg)}
     if driver.travel is not None:
         drive = {"actuator": driver.id, "travel": [end / inches for end in driver.travel]}
     return {
@@ -219,7 +219,7 @@ def _of_components(linkage: Any) -> dict[str, Any]:
     joints: list[dict[str, Any]] = []
     links: list[dict[str, Any]] = []
     for part, place in zip(linkage.components, places, strict=True):
-        joint: dict[str, Any] = {"id": part.name, "position": list(place)}
+        joint = {"id": part.name, "position": list(place)}
         joints.append(joint)
         match type(part).__name__:
             case "Ground":

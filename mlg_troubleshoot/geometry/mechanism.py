@@ -67,11 +67,19 @@ class Crank:
 class Dyad:
     """Two links that meet in a joint: the triangle A, B, C of section 3.1.
 
-    upstream, downstream: the joints at the other ends; the downstream one is a fixed pivot or
-    located before. sign: +1 if the joint lies to the left of the line from upstream to downstream,
-    else −1. [1] virtual_links: virtual links at the two ends of the upstream link: both displace it
-    in parallel (A**, Fig. 8b). driven: true if the upstream link is the actuator whose length is
-    the input.
+    Attributes
+    ----------
+    joint : str
+        The joint.
+    upstream, downstream : str
+        The joints at the other ends; the downstream one is a fixed pivot or located before.
+    sign : float
+        +1 if the joint lies to the left of the line from upstream to downstream, else −1. [1]
+    virtual_links : tuple of int
+        Virtual links at the two ends of the upstream link: both displace it in parallel (A**, Fig.
+        8b).
+    driven : bool
+        Whether the upstream link is the actuator whose length is the input.
     """
 
     joint: str

@@ -78,9 +78,7 @@ class Program:
         links = [f"v{axis}{i}" for i in range(self.virtual_links) for axis in "xy"]
         return (*links, *(f"p{i}" for i in range(len(self.parameters))))
 
-    def source(
-        self, results: tuple[str, ...], indent: str = "    ", *, release: bool = True
-    ) -> str:
+    def source(self, results: tuple[str, ...], *, release: bool = True) -> str:
         """Write the formulas that the given results need, as Python source."""
         needed = set(results)
         kept: list[tuple[str, str, set[str]]] = []
@@ -94,10 +92,10 @@ class Program:
         last = {used: i for i, (_, _, names) in enumerate(kept) for used in names}
         text = []
         for i, (name, expression, names) in enumerate(kept):
-            text.append(f"{indent}{name} = {expression}")
+            text.append(f"    {name} = {expression}")
             dead = sorted(n for n in names if last[n] == i and n in assigned and n not in results)
             if release and dead:
-                text.append(f"{indent}del {', '.join(dead)}")
+                text.append(f"    del {', '.join(dead)}")
         return "\n".join(text)
 
 

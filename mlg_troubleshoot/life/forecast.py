@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import date
+from functools import partial
 from hashlib import sha256
 from itertools import islice
 from math import inf
@@ -132,7 +133,6 @@ def forecast(
     lives: Sequence[GearLife],
     model: WearModel | None,
     gear: Gear,
-    progress: Callable[[str, int, int], None] = lambda _name, _done, _total: None,
 ) -> dict[GearKey, Forecast]:
     """Forecast gears from their last inspection on.
 
@@ -148,18 +148,12 @@ def forecast(
         and life.inspections[-1].inspection.gear_landings is not None
     ]
     if model is not None:
-        done = 0
         parts = [known[at : at + _GEARS_AT_ONCE] for at in range(0, len(known), _GEARS_AT_ONCE)]
-
-        def looked_at(part: Sequence[GearLife]) -> dict[GearKey, Forecast]:
-            return _forecast_part(part, forecasts, model, gear)
-
+        look = partial(_forecast_part, so_far=forecasts, model=model, gear=gear)
         # NumPy lets others work meanwhile.
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            for ahead in pool.map(looked_at, parts):
+            for ahead in pool.map(look, parts):
                 forecasts.update(ahead)
-                done += len(ahead)
-                progress("Looking ahead", done, len(known))
     found = ((life, forecasts.get(life.key, Forecast())) for life in lives)
     return {life.key: replace(ahead, due_date=_due_date(life, ahead)) for life, ahead in found}
 

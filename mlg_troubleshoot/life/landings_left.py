@@ -135,7 +135,7 @@ def _place_in(order: Order, line: FleetLine) -> tuple[float, tuple[int, float, G
 def fleet_lines(
     lines: Iterable[FleetLine],
     forecasts: Mapping[GearKey, Forecast],
-    order: Order = Order.WORST,
+    order: Order,
 ) -> list[FleetLine]:
     """The gears that were inspected, with their forecasts; worst first unless another order is
     asked for.

@@ -51,7 +51,7 @@ def stated_repair(row: Inspection, place: int | None = None) -> Repair | None:
 
 
 def since_repairs(
-    rows: Sequence[Inspection | InvalidRow], gear: Gear, store: Store | None = None
+    rows: Sequence[Inspection | InvalidRow], gear: Gear, store: Store | None
 ) -> Sequence[Inspection | InvalidRow]:
     """The rows as they count after the repairs that rows above them state or the store keeps: a
     repair on the day of a row or later makes its outcome, its plunger reading and what it says of

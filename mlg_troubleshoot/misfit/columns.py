@@ -27,7 +27,12 @@ _AT_ONCE = 64
 class EffectColumns:
     """Some columns of n rows each, p in all.
 
-    n: rows. blocks: places of some of the columns, and these, shape (n, k).
+    Attributes
+    ----------
+    n : int
+        Number of rows.
+    blocks : tuple of (ndarray, ColumnBlock)
+        Places of k of the columns, shape (k,), and these columns, shape (n, k).
     """
 
     n: int
@@ -148,7 +153,7 @@ class EffectColumns:
     def acting(self) -> Array:
         """Root mean square of each column over the rows in which it acts, shape (p,)."""
         rows = self.sums(_rows_of)
-        return np.asarray(np.sqrt(self.squares / np.maximum(rows, 1.0)))
+        return np.sqrt(self.squares / np.maximum(rows, 1.0))
 
 
 def _rows_of(block: ColumnBlock) -> Array:

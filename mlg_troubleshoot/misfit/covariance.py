@@ -130,18 +130,18 @@ class NoiseModel:
         fresh = scaled.copy()
         fresh[row] -= alike[:, None] * scaled[before]
         fresh[row] /= np.sqrt(1.0 - alike**2)[:, None]
-        return np.asarray(fresh)
+        return fresh
 
     def _own_precision_times(self, columns: Array) -> Array:
         """Multiply columns by the inverse covariance of the rows' own scatter."""
         row, before, alike = self._steps
         if not len(row):
-            return np.asarray(columns / self.relative[:, None] ** 2)
+            return columns / self.relative[:, None] ** 2
         fresh = self.own(columns)
         fresh[row] /= np.sqrt(1.0 - alike**2)[:, None]
         product = fresh.copy()
         product[before] -= alike[:, None] * fresh[row]
-        return np.asarray(product / self.relative[:, None])
+        return product / self.relative[:, None]
 
     def with_effects(self, effects_in: Array) -> NoiseModel:
         """Add effects of unknown size, each at one standard deviation."""
@@ -156,13 +156,13 @@ class NoiseModel:
         (BLUP). [in]
         """
         product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
-        return np.asarray(effects_in @ (effects_in.T @ product[:, 0]) / self.scale_in**2)
+        return effects_in @ (effects_in.T @ product[:, 0]) / self.scale_in**2
 
     def share_of_groups(self, scatter_in: Array, group: Wholes, data: Array) -> Array:
         """The same of what the rows of each group scatter alike, each in its own measure. [in]"""
         product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
         pull = np.bincount(group, scatter_in * product[:, 0])
-        return np.asarray(scatter_in * pull[group] / self.scale_in**2)
+        return scatter_in * pull[group] / self.scale_in**2
 
     def own_part(self, data: Array) -> tuple[Array, float]:
         """What each row scatters by itself, all that rows have in common taken out, and the share
@@ -208,7 +208,7 @@ class NoiseModel:
         found = low.T @ (low @ columns)
         for root in groups:
             found += root.T @ (root @ columns)
-        return np.asarray(found)
+        return found
 
     def square(self, data: Array, tail_ratio: float) -> Array:
         """Squared length of data sets under the inverse covariance."""

@@ -44,7 +44,7 @@ def basis_of(columns: Array, tolerance: float = 1e-7) -> Array:
     left, values, _right = np.linalg.svd(
         columns[:, size > 0.0] / size[size > 0.0], full_matrices=False
     )
-    return np.asarray(left[:, values > tolerance * values[0]])
+    return left[:, values > tolerance * values[0]]
 
 
 def project_out(columns: Array, fixed: Array) -> tuple[Array, Mask]:

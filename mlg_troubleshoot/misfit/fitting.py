@@ -100,10 +100,10 @@ def blocks_of(chain: Wholes, time: Array) -> Wholes:
     """
     many = int(chain.max()) + 1
     if many >= _FOLDS:
-        return np.asarray(chain % _FOLDS)
+        return chain % _FOLDS
     place = np.empty(len(chain), np.int64)
     place[np.lexsort((time, chain))] = np.arange(len(chain))
-    return np.asarray(place * _FOLDS // len(chain))
+    return place * _FOLDS // len(chain)
 
 
 def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bool:
@@ -125,7 +125,7 @@ def held_out_part(
     columns: Array,
     data: Array,
     fold: Wholes,
-    known: tuple[Array, Array] | None = None,
+    known: tuple[Array, Array] | None,
 ) -> Array:
     """What a model explains of each row that was fitted to the rows of the other folds alone. [in]
 

@@ -290,7 +290,7 @@ class Study:
         for index in self.outputs:
             middle = 1.4826 * float(np.median(np.abs(rest[index])))
             usual[index] = np.maximum(usual[index], middle)
-        return np.asarray(np.abs(rest) > FAR * usual)
+        return np.abs(rest) > FAR * usual
 
     def judged(self, start: FittedPoint) -> JudgedPoint:
         """Search from nothing; where that ends with a discrepancy, also from what explains most

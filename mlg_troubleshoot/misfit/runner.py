@@ -197,7 +197,7 @@ class Runner:
             both = forward and backward and not even
             change = (up - down) / 2.0 if both else up if forward else -down
             if np.any(change):
-                return np.asarray(change / step)
+                return change / step
         if not found:
             self.silent.add(k)
         return np.zeros(len(base))
@@ -224,7 +224,7 @@ class Runner:
 
     def within(self, values: Array) -> Array:
         """The nearest values within the bounds."""
-        return np.asarray(np.clip(values, self.low, self.high))
+        return np.clip(values, self.low, self.high)
 
     def fit(self, values: Array, active: Sequence[int], weigh: Callable[[Array], Array]) -> Fitted:
         """Fit some parameters to the readings within their bounds, from the values given
@@ -319,7 +319,7 @@ def least_squares(columns: Array, data: Array) -> Array:
     size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0.0, size, 1.0)
     found = np.linalg.lstsq(columns / size, data, rcond=1e-7)[0]
-    return np.asarray((found.T / size).T)
+    return (found.T / size).T
 
 
 def held_out(

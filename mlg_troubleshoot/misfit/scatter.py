@@ -103,7 +103,7 @@ class Readings:
             level[index] = max(
                 float(np.sqrt(np.mean(near**2) / spare)), self.floor / float(np.max(relative))
             )
-        return np.asarray(relative * level * np.maximum(1.0, size / level / FAR))
+        return relative * level * np.maximum(1.0, size / level / FAR)
 
     def _grown(self, left: Array) -> Array:
         """Relative scatter of each reading, of which a share grows with the prediction where second

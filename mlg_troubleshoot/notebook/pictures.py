@@ -15,10 +15,11 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.paper.study import StudyFindings
-from mlg_troubleshoot.reporting import diagnosis_figures, fleet_figures, inspection_figures
+from mlg_troubleshoot.reporting import diagnosis_figures, fleet_figures
 from mlg_troubleshoot.reporting.diagnosis_figures import Residuals
 from mlg_troubleshoot.reporting.figures import Style
 from mlg_troubleshoot.reporting.formats import Lengths
+from mlg_troubleshoot.reporting.inspection_figures import margin_gauge, plunger_curve
 from mlg_troubleshoot.reporting.picture import Picture
 from mlg_troubleshoot.reporting.schematic import blank_schematic, schematic
 from mlg_troubleshoot.reporting.study_figures import BarSeries, grouped_bars, release_curve
@@ -27,41 +28,34 @@ from mlg_troubleshoot.workflows.check import CheckResult
 from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
 from mlg_troubleshoot.workflows.history import Lives
 
-
-def _judged(result: CheckResult | Assessment, row: int, gear: Any) -> tuple[Assessment, Gear]:
-    """One gear of a result, by its place."""
-    if isinstance(result, Assessment):
-        return result, load_gear(gear)
-    judgement = result.judgements[row] if -1 < row < len(result.judgements) else None
-    if not isinstance(judgement, Assessment):
-        raise UsageError(
-            f"row {row} has nothing to draw", "Give the place of a row that was judged."
-        )
-    return judgement, result.gear
+_Draw = Callable[..., list[Markup]]
 
 
-def _margin(
-    result: CheckResult | Assessment, *, row: int = 0, gear: Any = DEFAULT_GEAR, unit: str = "in"
-) -> list[Markup]:
-    assessment, _ = _judged(result, row, gear)
-    drawn = inspection_figures.margin_gauge(assessment, Lengths(LengthUnit.parse(unit)))
-    return [] if drawn is None else [drawn]
+def _of_gear(draw: Callable[[Gear, Assessment, Lengths], list[Markup]]) -> _Draw:
+    """A picture of one gear of a result, by its place."""
+
+    def drawn(
+        result: CheckResult | Assessment,
+        *,
+        row: int = 0,
+        gear: Any = DEFAULT_GEAR,
+        unit: str = "in",
+    ) -> list[Markup]:
+        lengths = Lengths(LengthUnit.parse(unit))
+        if isinstance(result, Assessment):
+            return draw(load_gear(gear), result, lengths)
+        judgement = result.judgements[row] if -1 < row < len(result.judgements) else None
+        if not isinstance(judgement, Assessment):
+            raise UsageError(
+                f"row {row} has nothing to draw", "Give the place of a row that was judged."
+            )
+        return draw(result.gear, judgement, lengths)
+
+    return drawn
 
 
-def _linkage(
-    result: CheckResult | Assessment, *, row: int = 0, gear: Any = DEFAULT_GEAR, unit: str = "in"
-) -> list[Markup]:
-    assessment, known = _judged(result, row, gear)
-    drawn = schematic(known, assessment, Lengths(LengthUnit.parse(unit)))
-    return [panel for _, panel, _ in drawn.panels]
-
-
-def _stroke(
-    result: CheckResult | Assessment, *, row: int = 0, gear: Any = DEFAULT_GEAR, unit: str = "in"
-) -> list[Markup]:
-    assessment, known = _judged(result, row, gear)
-    lengths = Lengths(LengthUnit.parse(unit))
-    return [inspection_figures.plunger_curve(known, assessment, lengths)]
+def _linkage(gear: Gear, assessment: Assessment, lengths: Lengths) -> list[Markup]:
+    return [panel for _, panel, _ in schematic(gear, assessment, lengths).panels]
 
 
 def _blank(gear: Gear) -> list[Markup]:
@@ -130,9 +124,12 @@ def _life(result: Lives, *, tail: str = "", side: str = "", unit: str = "in") ->
     return [fleet_figures.wear_figure(life, result.forecasts[life.key], result.gear, lengths)]
 
 
-_Draw = Callable[..., list[Markup]]
 # The pictures of each result by name, the first one where no name is given.
-_OF_ONE_GEAR: dict[str, _Draw] = {"linkage": _linkage, "stroke": _stroke, "margin": _margin}
+_OF_ONE_GEAR: dict[str, _Draw] = {
+    "linkage": _of_gear(_linkage),
+    "stroke": _of_gear(lambda *one: [plunger_curve(*one)]),
+    "margin": _of_gear(lambda _gear, *one: [*filter(None, [margin_gauge(*one)])]),
+}
 _PICTURES: dict[type, dict[str, _Draw]] = {
     CheckResult: _OF_ONE_GEAR,
     Assessment: _OF_ONE_GEAR,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from functools import singledispatch
+from collections.abc import Callable
 from typing import Any
 
-import msgspec
 import pandas as pd
 
 from mlg_troubleshoot.decision.assessment import Assessment
@@ -15,7 +14,6 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Point
-from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.life.folding import lives
 from mlg_troubleshoot.life.landings_left import FleetLine
 from mlg_troubleshoot.paper.study import StudyFindings
@@ -42,93 +40,52 @@ _MAIN = ("inspections", "gears", "causes", "joints", "also_possible")
 _WHOSE = ("record_id", "tail_no", "side")
 
 
-@singledispatch
-def to_dict(result: Any) -> dict[str, Any]:
-    values: dict[str, Any] = plain(result)
-    return values
-
-
-@to_dict.register
-def _(result: CheckResult) -> dict[str, Any]:
-    return check_as_json(result.gear, result.judgements, result.problems, result.notes, result.seed)
-
-
-@to_dict.register
-def _(result: Assessment) -> dict[str, Any]:
-    return assessment_as_json(result)
-
-
-@to_dict.register
-def _(result: DiagnoseResult) -> dict[str, Any]:
-    return diagnosis_as_json(result.diagnosis, result.extension, result.notes)
-
-
-@to_dict.register
-def _(result: Diagnosis) -> dict[str, Any]:
-    return diagnosis_as_json(result, None)
-
-
-@to_dict.register
-def _(result: SurveyResult) -> dict[str, Any]:
-    return survey_as_json(result)
-
-
-@to_dict.register
-def _(result: StudyFindings) -> dict[str, Any]:
-    return study_as_json(result)
-
-
-@to_dict.register
-def _(result: IndexTable) -> dict[str, Any]:
-    values: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(result))
-    return values
-
-
-@to_dict.register
-def _(result: WorstCase) -> dict[str, Any]:
-    names = ("over_in", "under_in", "magnitude_in", "over_directions", "under_directions")
-    return {name: plain(getattr(result, name)) for name in names}
-
-
-@to_dict.register
-def _(result: Gear) -> dict[str, Any]:
-    return gear_as_json(result)
-
-
-@to_dict.register
-def _(result: Catalogue) -> dict[str, Any]:
+def _catalogue_as_json(catalogue: Catalogue) -> dict[str, Any]:
     names = ("name", "needs", "parameter", "trial", "plausible", "sign", "inspect", "separates")
     return {
         "causes": [
             {"sentence": cause.words("…"), **{name: plain(getattr(cause, name)) for name in names}}
-            for cause in result
+            for cause in catalogue
         ]
     }
 
 
-@to_dict.register
-def _(result: Lives) -> dict[str, Any]:
-    return fleet_as_json(result.lines, result.forecasts)
+def _worst_case_as_json(worst: WorstCase) -> dict[str, Any]:
+    names = ("over_in", "under_in", "magnitude_in", "over_directions", "under_directions")
+    return {name: plain(getattr(worst, name)) for name in names}
 
 
-@singledispatch
-def _more_tables(_result: Any) -> dict[str, list[Any]]:
+# What has a form of its own; any other result is written as it stands.
+_AS_JSON: dict[type, Callable[[Any], Any]] = {
+    CheckResult: lambda r: check_as_json(r.gear, r.judgements, r.problems, r.notes, r.seed),
+    Assessment: assessment_as_json,
+    DiagnoseResult: lambda r: diagnosis_as_json(r.diagnosis, r.extension, r.notes),
+    Diagnosis: lambda r: diagnosis_as_json(r, None),
+    SurveyResult: survey_as_json,
+    StudyFindings: study_as_json,
+    WorstCase: _worst_case_as_json,
+    Gear: gear_as_json,
+    Catalogue: _catalogue_as_json,
+    Lives: lambda r: fleet_as_json(r.lines, r.forecasts),
+}
+
+
+def to_dict(result: Any) -> dict[str, Any]:
+    written: dict[str, Any] = _AS_JSON.get(type(result), plain)(result)
+    return written
+
+
+def _more_tables(result: Any) -> dict[str, list[Any]]:
     """Tables that the JSON of a result does not hold."""
-    return {}
-
-
-@_more_tables.register
-def _(result: Gear) -> dict[str, list[Any]]:
-    points = [
-        {"linkage": linkage.name, "point": point.name, "plane": point.plane, **_place(point)}
-        for linkage in result.ensemble
-        for point in linkage.mechanism.points
-    ]
-    return {"ensemble": points}
-
-
-@_more_tables.register
-def _(result: Lives) -> dict[str, list[Any]]:
+    if isinstance(result, Gear):
+        points = [
+            {"linkage": linkage.name, "point": point.name, "plane": point.plane, **_place(point)}
+            for linkage in result.ensemble
+            for point in linkage.mechanism.points
+        ]
+        return {"ensemble": points}
+    if not isinstance(result, Lives):
+        return {}
     one_by_one = [
         life_as_json(life, result.forecasts[life.key], result.gear) for life in result.lives
     ]

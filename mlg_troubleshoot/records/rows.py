@@ -258,7 +258,7 @@ class RowReader:
         if SIDE not in self._at:
             side = self._table.side
         identity = {"record_id": record_id, "tail_no": tail_no, "side": side}
-        given: dict[str, Any] = {**identity, "convention": found.convention, "source": source}
+        given = {**identity, "convention": found.convention, "source": source}
         if self._bad or None in given.values():
             bad = sorted(index for index in self._bad if index >= 0)
             named = [self._placed[index].header for index in bad]
@@ -288,7 +288,7 @@ class RowReader:
         }
         readings = sorted(lengths.pop(PLUNGER_DISPLACEMENT, {}).items())
         floats = lengths.pop(AXIAL_FLOAT, {})
-        said: dict[str, Any] = {column.filled: value for column, value in found.values.items()}
+        said = {column.filled: value for column, value in found.values.items()}
         said.update({column.filled: value[0] for column, value in lengths.items()})
         other = {name: said.pop(name) for name in [*said] if name not in _FIELDS}
         return Inspection(
@@ -522,7 +522,7 @@ class RowReader:
         index = self._at.get(UNIT)
         if index is None or self._cells[index] is None:
             return self._options.unit
-        unit: LengthUnit | None = self._noted(UNIT, index)
+        unit = self._noted(UNIT, index)
         against = [
             (i, of.unit)
             for i, of, _ in self._lengths

@@ -143,7 +143,7 @@ def plain_text(text: str) -> str:
 def read_length(
     cell: Filled,
     unit: LengthUnit | None,
-    declared: LengthUnit | None = None,
+    declared: LengthUnit | None,
     *,
     signed: bool,
     decimal_comma: bool,
@@ -261,7 +261,7 @@ def read_number(
     *,
     decimal_comma: bool,
     expected: str,
-    units: tuple[str, ...] = (),
+    units: tuple[str, ...],
 ) -> float:
     if isinstance(cell, str):
         value = _written_number(plain_text(cell), decimal_comma, expected, units)

@@ -56,7 +56,7 @@ def _stroke(style: Stroke) -> dict[str, Any]:
     }
 
 
-def text_width(text: str, size: float = TEXT_SIZE) -> float:
+def text_width(text: str, size: float) -> float:
     wide = sum(2.0 if ord(c) > 0x2E80 else 1.0 for c in text)
     return wide * size * _CHARACTER
 

@@ -31,8 +31,8 @@ def fleet_document(
     forecasts: Mapping[GearKey, Forecast],
     gear: Gear,
     provenance: ReportProvenance,
-    unit: LengthUnit = LengthUnit.INCH,
-    order: Order = Order.WORST,
+    unit: LengthUnit,
+    order: Order,
 ) -> Document:
     """Make one page: one line per gear, worst first, with its landings left and the worst case over
     its inspections.
@@ -67,7 +67,7 @@ def life_document(
     ahead: Forecast,
     gear: Gear,
     provenance: ReportProvenance,
-    unit: LengthUnit = LengthUnit.INCH,
+    unit: LengthUnit,
 ) -> Document:
     """Make one gear's life: its last inspections side by side, what was restored between, landings
     left.

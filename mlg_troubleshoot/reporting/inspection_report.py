@@ -191,7 +191,7 @@ def batch_document(
     problems: Sequence[Problem],
     gear: Gear,
     provenance: ReportProvenance,
-    notes: Sequence[str] = (),
+    notes: Sequence[str],
     links: Mapping[int, tuple[str, str]] | None = None,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> Document:

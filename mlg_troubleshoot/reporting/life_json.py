@@ -58,7 +58,7 @@ def fleet_sheets(
     lives: Iterable[GearLife],
     forecasts: Mapping[GearKey, Forecast],
     gear: Gear,
-    order: Order = Order.WORST,
+    order: Order,
 ) -> dict[str, tuple[list[str], list[list[Any]]]]:
     """The sheets of a fleet's workbook: gears, readings, landings left of each joint, records."""
     by_key = {life.key: life for life in lives}

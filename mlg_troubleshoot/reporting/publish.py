@@ -159,7 +159,7 @@ def publish_all(
     *,
     formats: Sequence[str],
     page: str,
-    progress: Progress | None = None,
+    progress: Progress | None,
 ) -> list[WrittenReport]:
     """Write many documents, the PDFs in several child processes."""
     own = threading.local()

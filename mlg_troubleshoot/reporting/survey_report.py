@@ -29,7 +29,7 @@ def survey_document(
     result: SurveyResult,
     found: Survey,
     provenance: ReportProvenance,
-    unit: LengthUnit = LengthUnit.INCH,
+    unit: LengthUnit,
 ) -> Document:
     readings = [(r.words, r.value, r.u) for r in found.readings]
     mark = sha256(repr(readings).encode()).hexdigest()[:8]

@@ -248,7 +248,7 @@ def own_file() -> str:
     return str(user_data_path("mlg") / "store.sqlite")
 
 
-def files_of(place: str | Path | None = None) -> tuple[Path, ...]:
+def files_of(place: str | Path | None) -> tuple[Path, ...]:
     """Return the files of a store, with those that SQLite adds; none for a server."""
     try:
         file = Place(str(place or os.environ.get("MLG_STORE") or own_file())).file

@@ -101,7 +101,7 @@ class SurveyReading:
     @property
     def words(self) -> Sentence:
         """What is read, in words."""
-        at: str = ""
+        at = ""
         if self.extension is not None and self.driven_in == LengthUnit.INCH:
             at = Sentence.of(" at extension {}", Length(self.extension))
         elif self.extension is not None:

@@ -128,7 +128,7 @@ class Prior:
     """
 
     def __init__(self, linkage: SurveyedLinkage) -> None:
-        gear: Gear = linkage.gear
+        gear = linkage.gear
         members = np.array([linkage.vector(each) for each in gear.ensemble])
         angles = linkage.angles
         # The same direction, one turn further, is not a distance.

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.errors import TroubleshootError
-from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.workflows.check import (
     CheckOptions,
@@ -31,7 +30,7 @@ class Ability:
     remedy: str = ""
 
 
-def examine_installation(gear: str = DEFAULT_GEAR) -> tuple[Ability, ...]:
+def examine_installation(gear: str) -> tuple[Ability, ...]:
     """Try what an installation must be able to do: shipped tables, prediction, report, PDF with
     fonts.
     """

@@ -155,7 +155,7 @@ def _taught(
     gear: Gear,
     keys: Sequence[GearKey],
     remembered: Remembered,
-    progress: StageProgress = lambda _name, _done, _total: None,
+    progress: StageProgress,
 ) -> WearModel | None:
     """How joints wear, from as many gears as are needed of a large fleet."""
     from mlg_troubleshoot.life.forecast import (

@@ -146,7 +146,7 @@ def _repairs_of(row: Inspection, store: Store) -> list[Record]:
     known = [
         record for record in store.of_gear(*key_of(row)) if record.day == repair.day.isoformat()
     ]
-    body: dict[str, Any] = {"landings": None, "work_order": None}
+    body = {"landings": None, "work_order": None}
     kinds = {RecordKind.REPAIR: sorted(repair.joints), RecordKind.RERIG: repair.rerigged}
     return [
         Record(kind, "", *key_of(row), repair.day.isoformat(), packed(body | more))

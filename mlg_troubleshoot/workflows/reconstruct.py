@@ -28,13 +28,13 @@ LINKAGE = OutputKind.marked("is not a linkage that was reconstructed", _HEADING)
 def reconstruct_linkage(
     gear: str,
     *,
-    targets: Path | None = None,
-    seed: int = 0,
-    start: str | None = None,
-    name: str = "N",
-    minutes: float = 15.0,
-    out: Path | None = None,
-    progress: StageProgress | None = None,
+    targets: Path | None,
+    seed: int,
+    start: str | None,
+    name: str,
+    minutes: float,
+    out: Path | None,
+    progress: StageProgress | None,
 ) -> tuple[Reconstruction, str]:
     """Search a linkage, or polish the one named `start`; return it with its text for an ensemble
     file.

@@ -68,12 +68,24 @@ Key = tuple[str, str | None]
 class CausePlanned:
     """What the planned columns could say about one cause.
 
-    found_from_in: root mean square from which it is detected with 80 % power; None if it cannot be
-    tested. [in] told_apart_from_in: root mean square from which it is distinguished from that with
-    80 % power; None if never.
+    Attributes
+    ----------
+    cause, target : str
+        Name of the cause, and what it acts on; no target where it acts on nothing in particular.
+    found_from_in : float or None
+        Root mean square from which it is detected with 80 % power; None if it cannot be tested.
         [in]
-    further_column: cheapest column that halves that size, or makes it finite.
-    separating_reading: the reading that distinguishes them whatever the columns.
+    missing_column : str or None
+        Column that a test of it would need.
+    nearest : str or None
+        The cause that is most like it.
+    told_apart_from_in : float or None
+        Root mean square from which it is distinguished from that with 80 % power; None if never.
+        [in]
+    further_column : str or None
+        Cheapest column that halves that size, or makes it finite.
+    separating_reading : str
+        The reading that distinguishes them whatever the columns.
     """
 
     cause: str

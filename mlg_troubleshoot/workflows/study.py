@@ -152,8 +152,8 @@ def write_study_report(
     directory: Path,
     page: str,
     *,
-    unit: LengthUnit = LengthUnit.INCH,
-    remembered: str | None = None,
+    unit: LengthUnit,
+    remembered: str | None,
 ) -> WrittenReport:
     from mlg_troubleshoot.reporting.provenance import provenance_of
     from mlg_troubleshoot.reporting.publish import publish

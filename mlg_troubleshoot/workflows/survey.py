@@ -240,10 +240,10 @@ def write_survey_report(
     result: SurveyResult,
     file: Path,
     directory: Path,
-    page: str = "A4",
-    unit: LengthUnit = LengthUnit.INCH,
+    page: str,
+    unit: LengthUnit,
     *,
-    remembered: str | None = None,
+    remembered: str | None,
 ) -> WrittenReport | None:
     """Write the report of a survey; None if nothing follows from the table."""
     from mlg_troubleshoot.reporting.provenance import provenance_of

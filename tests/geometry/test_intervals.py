@@ -94,13 +94,16 @@ def test_a_range_of_angles_has_the_range_of_its_cosines(low: float, width: float
     assert found.low[0] >= cosines.min() - 0.01 * width**2 - 1e-12
 
 
-def _tip(x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
-    """A joint C on two links of lengths 3 and 2.5 from (x, y) and (4, 0), nearly in line."""
+def _tip(x: Any, y: Any, length: Any = 3.0) -> tuple[Any, Any, Any, Any]:
+    """A joint C on two links of lengths 3, or so, and 2.5 from (x, y) and (5.2, 0), nearly in
+    line.
+    """
     dx, dy = 5.2 - x, 0.0 - y
     apart = dx * dx + dy * dy
-    factors = (5.5 * 5.5 - apart) * (apart - 0.25)
+    longer, shorter = length + 2.5, length - 2.5
+    factors = (longer * longer - apart) * (apart - shorter * shorter)
     area = 0.5 * np.sqrt(factors)
-    along = 0.5 + 0.5 * (5.5 * 0.5) / apart
+    along = 0.5 + 0.5 * (longer * shorter) / apart
     across = area / apart
     return x + along * dx - across * dy, y + along * dy + across * dx, area, apart
 
@@ -121,6 +124,20 @@ def test_a_joint_narrowed_by_its_links_still_holds_every_true_position_slope_and
     )
     for k, part in enumerate(narrowed):
         _inside(part, lambda a, b, k=k: _tip(a, b)[k], grid)
+
+
+def test_a_joint_on_a_link_that_grows_still_holds_every_true_bend() -> None:
+    def tip(x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
+        return _tip(x, y, 3.0 + x + y)
+
+    low, high = np.array([[-0.01], [-0.01]]), np.array([[0.01], [0.01]])
+    x, y = variables(Interval(low, high))
+    length = 3.0 + x + y
+    c = tip(x, y)
+    narrowed = narrowed_by_links(c[:2], (x, y), (5.2, 0.0), length * length, c[2])
+    grid = 0.01 * np.stack(np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))).reshape(2, -1)
+    for k, part in enumerate(narrowed):
+        _inside(part, lambda a, b, k=k: tip(a, b)[k], grid)
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(1e-6, 0.0075), st.floats(0.0, 1.0))

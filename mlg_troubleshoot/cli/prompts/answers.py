@@ -116,7 +116,7 @@ class Answers:
 
     def with_more(self, **columns: str | None) -> Answers:
         """Return the answers with optional columns set, or taken away where they are None."""
-        merged: dict[str, str | None] = {**self.more, **columns}
+        merged = {**self.more, **columns}
         return replace(
             self, more=MappingProxyType({name: text for name in MORE if (text := merged.get(name))})
         )

@@ -98,7 +98,7 @@ def _heading_page(asked: str, kept: str | None, *shown: Line) -> Page:
     return Page((BLANK, *shown), f" {asked}{_keeps(kept)} > ")
 
 
-def tail_page(answers: Answers, unfinished: tuple[Session, ...] = ()) -> Page:
+def tail_page(answers: Answers, unfinished: tuple[Session, ...]) -> Page:
     if unfinished and answers.tail_no is None:
         resumes = f"Tail number (Enter resumes {identity(unfinished[0].answers)})"
         return _heading_page(resumes, None)
@@ -253,7 +253,7 @@ def joint_page(
     order: tuple[int, ...],
     number: int,
     width: int,
-    suggested: int | None = None,
+    suggested: int | None,
 ) -> Page:
     joint = gear.joint(number)
     place = order.index(number) + 1

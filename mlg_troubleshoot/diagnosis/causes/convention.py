@@ -168,7 +168,7 @@ def _rows_of(table: DiagnosisTable, setting: Any) -> Mask:
 def as_meant(table: DiagnosisTable, setting: Any) -> DiagnosisTable:
     """The table with the clearances of the group as they were meant."""
     rows = _rows_of(table, setting)
-    factor: Array = np.where(rows, 1.0 / setting["written_factor"], 1.0)
+    factor = np.where(rows, 1.0 / setting["written_factor"], 1.0)
     return replace(
         table,
         clearance_in=table.clearance_in * factor[:, None],

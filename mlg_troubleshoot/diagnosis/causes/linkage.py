@@ -5,7 +5,6 @@ pivots, levers.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -274,7 +273,7 @@ class JointContact(Cause):
             ):
                 continue
             rooms = np.quantile(a + b, (np.arange(_ROOMS) + 0.5) / _ROOMS).tolist()
-            forms: list[dict[str, Any]] = [{"room_in": room} for room in (None, *rooms)]
+            forms = [{"room_in": room} for room in (None, *rooms)]
             forms.insert(1, {"room_in": None, "smaller": "clearance"})
             for form in forms:
                 setting = {"pair": (first, second), **form}
