@@ -15,7 +15,7 @@ import pytest
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.data_figures import data_figures
-from mlg_troubleshoot.reporting.diagnosis_figures import Residuals
+from mlg_troubleshoot.reporting.diagnosis_figures import Residuals, tail_strips
 from mlg_troubleshoot.reporting.diagnosis_lines import cause_words, headline, seven_lines
 from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
 from mlg_troubleshoot.reporting.figures import INK
@@ -436,3 +436,11 @@ def test_blanks_are_drawn_only_where_there_are_some(gear: Gear) -> None:
     clearance[::3, 4] = np.nan
     assert "Blank clearances" not in drawn_of(gear, table)
     assert "Blank clearances" in drawn_of(gear, replace(table, clearance_in=clearance))
+
+
+def test_the_points_of_an_aircraft_stand_level_with_their_mean(gear: Gear) -> None:
+    found = diagnose(gear.model, fleet(gear.model, rows=60), gear.discrepancies)
+    (svg,) = tail_strips(Residuals(found, gear.joint_numbers, LengthUnit.INCH))
+    points = {float(y) for y in re.findall(r'cy="([-\d.]+)"', svg)}
+    means = {float(y) + 3 for y in re.findall(r'<rect x="[-\d.]+" y="([-\d.]+)" width="6"', svg)}
+    assert points == means

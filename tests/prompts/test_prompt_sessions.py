@@ -407,6 +407,15 @@ def test_a_damaged_draft_is_said_with_what_to_do_and_is_not_in_the_way_again(
     assert drafts(store)[0].content == content[:1_000_000] * (len(content) <= 1_000_000)
 
 
+def test_a_draft_of_a_million_characters_is_read_and_a_longer_one_is_not(
+    store: SessionStore,
+) -> None:
+    kept = Drafts(Store(store.place))
+    for length in (1_000_000, 1_000_001):
+        kept.save(Draft(str(length), store.owner, "another", False, "x" * length), ())
+    assert [len(draft.content) for draft in kept.newest_first()] == [0, 1_000_000]
+
+
 def test_a_damaged_draft_does_not_stop_a_new_inspection(gear: Gear, store: SessionStore) -> None:
     put_raw(store, "{")
     terminal = ScriptedTerminal([*HEADING, *TEN, *ENTERS, ""])
