@@ -207,3 +207,14 @@ def test_a_plunger_within_its_margin_is_not_said_to_point_to_wear(
 ) -> None:
     row = inspected(every_joint(0.001) | {3: 0.012}, readings_in=(reading_in,))
     assert explain(Cases.of(gear, [row])).text.startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("reading_in", "said"), [(0.03, "The readings do"), (0.031, "The measured displacement does")]
+)
+def test_a_plunger_at_its_margin_is_within_it_where_no_worn_joint_shows(
+    gear: Gear, reading_in: float, said: str
+) -> None:
+    read = {n: 0.0045 for n in gear.joint_numbers if n != 3}
+    row = inspected(read, readings_in=(reading_in,))
+    assert explain(Cases.of(gear, [row])).text.startswith(f"{said} not show which joint is worn")

@@ -283,6 +283,15 @@ def test_the_wear_of_a_gear_begins_anew_at_an_overhaul(gear: Gear) -> None:
     assert [len(set(gears_of(t)[:6].tolist())) for t in (table, anew)] == [1, 2]
 
 
+def test_gears_that_were_not_flown_do_not_hide_the_overhaul_of_another(gear: Gear) -> None:
+    table = histories(gear)
+    landings = table.quantities["gear_landings"].copy()
+    landings[3:6] -= 1000.0
+    landings[6:] = 5000.0
+    parked = replace(table, quantities={**table.quantities, "gear_landings": landings})
+    assert len(set(gears_of(parked)[:6].tolist())) == 2
+
+
 def test_one_mistyped_number_of_landings_is_not_an_overhaul(gear: Gear) -> None:
     table = histories(gear)
     for place, wrong in ((2, 9000.0), (3, 12.0)):

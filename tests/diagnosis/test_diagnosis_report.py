@@ -15,7 +15,11 @@ import pytest
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.data_figures import data_figures
-from mlg_troubleshoot.reporting.diagnosis_figures import Residuals, tail_strips
+from mlg_troubleshoot.reporting.diagnosis_figures import (
+    Residuals,
+    measured_against_predicted,
+    tail_strips,
+)
 from mlg_troubleshoot.reporting.diagnosis_lines import cause_words, headline, seven_lines
 from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
 from mlg_troubleshoot.reporting.figures import INK
@@ -444,3 +448,9 @@ def test_the_points_of_an_aircraft_stand_level_with_their_mean(gear: Gear) -> No
     points = {float(y) for y in re.findall(r'cy="([-\d.]+)"', svg)}
     means = {float(y) + 3 for y in re.findall(r'<rect x="[-\d.]+" y="([-\d.]+)" width="6"', svg)}
     assert points == means
+
+
+def test_figures_side_by_side_are_equally_wide(named: Made, gear: Gear) -> None:
+    residuals = Residuals(named.diagnosis, gear.joint_numbers, LengthUnit.INCH)
+    figures = [*tail_strips(residuals), measured_against_predicted(residuals)]
+    assert len({re.findall(r'width="([^"]*)"', svg)[0] for svg in figures}) == 1
