@@ -101,6 +101,13 @@ def test_a_second_repair_is_not_surer_than_sure_where_nothing_is_restored(gear: 
     assert found.second_repair(0, np.zeros((1, 10), bool))[0] == pytest.approx(1.0, abs=0.01)
 
 
+def test_new_joints_throughout_need_no_second_repair_where_the_plunger_was_not_read(
+    gear: Gear,
+) -> None:
+    found = causes_of(gear, every_joint(0.004))
+    assert found.second_repair(0, np.ones((1, 10), bool))[0] < 0.005
+
+
 def test_a_second_repair_is_likelier_after_one_that_rests_on_a_reading_in_doubt(gear: Gear) -> None:
     only = np.eye(10, dtype=bool)[[2]]
     once, twice = (

@@ -40,7 +40,7 @@ def test_the_bound_of_the_failure_case_holds_over_the_whole_stroke(
     gear: Gear, sense: float
 ) -> None:
     found = certified_bound(gear.model, FAILURE, sense)
-    assert found.bound_in - found.found_in <= 1e-6
+    assert 0.0 < found.bound_in - found.found_in <= 1e-6
     assert found.stroke_in == gear.model.stroke[1]
 
 
