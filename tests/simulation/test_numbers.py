@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mlg_troubleshoot.diagnosis import SimulationDiagnosis, Suspect, Verdict, diagnose_simulation
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Key
+from mlg_troubleshoot.misfit.linearised import Study
 from mlg_troubleshoot.misfit.posterior import posterior
 from mlg_troubleshoot.misfit.runner import Runner
 from mlg_troubleshoot.misfit.scatter import Readings
@@ -160,3 +162,12 @@ def test_of_suspects_named_at_nine_in_ten_nine_in_ten_are_wrong() -> None:
         right += [true["abcd".index(cause.name)] != 0.0 for cause in found.causes]
     assert len(right) >= 5
     assert np.mean(right) >= 0.8
+
+
+def test_a_reading_is_far_by_what_is_usual_of_its_output() -> None:
+    outputs = (np.arange(10), np.arange(10, 20))
+    relative = np.repeat([1.0, 4.0], 10)
+    rest = np.zeros(20)
+    rest[[0, 10]] = 1.2 * FAR
+    far = Study._far(SimpleNamespace(outputs=outputs), rest, relative)
+    assert np.flatnonzero(far).tolist() == [0]
