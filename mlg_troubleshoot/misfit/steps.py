@@ -71,8 +71,10 @@ def common_step(
     fitted: list[_Mixture] = []
     for (ratio, log_chance), square in zip(of_groups.tail_levels, squares, strict=True):
         product, log_determinant = of_groups.precision_times(known, ratio)
+        inner = known.T @ product
+        inner[-1, -1] = noise.floored(inner[-1, -1])
         mixture = _Mixture(
-            known.T @ product,
+            inner,
             columns.onto(product.T),
             square,
             group_of,

@@ -12,12 +12,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, plain_tail, surely_
 from mlg_troubleshoot.decision.judge_rows import AT_ONCE
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import (
-    GearKey,
-    find,
-    life_of,
-    warnings_of,
-)
+from mlg_troubleshoot.life.folding import GearKey, find, life_of, warnings_of
 from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
 from mlg_troubleshoot.parallel import Blocks, Progress
 from mlg_troubleshoot.records.rows import place_in_file

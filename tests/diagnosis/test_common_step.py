@@ -96,6 +96,16 @@ def test_a_group_that_is_shifted_from_its_first_row_on_does_not_show_its_step() 
     assert set(found_in(DATA).seen) == {"A", "C"}
 
 
+def test_steps_without_any_scatter_are_found() -> None:
+    found = found_in(4.0 * after(TRUE), replace(NOISE, floor_in=1e-3))
+    assert found.since == TRUE
+    assert np.isfinite(found.rarity)
+
+
+def test_data_that_are_all_zero_have_no_step() -> None:
+    assert common_step(GROUPS, TIMES, np.zeros(N), replace(NOISE, floor_in=1e-3), 1.0) is None
+
+
 def test_steps_down_are_steps_up_of_the_opposite() -> None:
     down = found_in(-DATA, direction=-1.0)
     assert (down.since, down.rarity) == (TRUE, pytest.approx(found_in(DATA).rarity))
