@@ -434,10 +434,16 @@ def _asked_about(rows: Sequence[Inspection | InvalidRow]) -> str:
     )
 
 
+def _elsewhere(what: str, count: int) -> str:
+    """How many more notes there are than those that are named."""
+    more = count - _NAMED
+    return f"{what} at {more} more place{'s' * (more > 1)}"
+
+
 def _falls_elsewhere(count: int) -> str:
     return (
-        f"Landings fall at {count - _NAMED} more places, as after an overhaul; the notes of their"
-        " rows name them (--json, --report)."
+        f"{_elsewhere('Landings fall', count)}, as after an overhaul; the notes of their rows name"
+        " them (--json, --report)."
     )
 
 
@@ -470,7 +476,7 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         (
             *(note for _, found in results for note in found.notes),
             *alike[:_NAMED],
-            *([f"{len(alike) - _NAMED} more tails are alike"] if len(alike) > _NAMED else []),
+            *([_elsewhere("Tails look alike", len(alike))] if len(alike) > _NAMED else []),
             *said_backwards[:_NAMED],
             *([_falls_elsewhere(len(said_backwards))] if len(said_backwards) > _NAMED else []),
             *([_asked_about([rows[place] for place in sorted(slips)])] if slips else []),

@@ -131,19 +131,20 @@ def test_a_note_of_the_file_names_the_inspections_that_do_not_fit(read, table):
     ]
 
 
+@pytest.mark.parametrize(("gears", "more"), [(9, "1 more place, as"), (10, "2 more places, as")])
 def test_landings_that_fall_in_many_gears_are_counted_beyond_the_eighth_and_noted_in_each(
-    read, table
+    read, table, gears, more
 ):
     header = (*HEADER, "inspection_date", "gear_landings")
     rows = [
         (f"{n}-{k}", f"N{n}", "LH", "RADIAL", *LEFT[:4], LEFT[4] + 0.0001 * k, date, landings)
-        for n in range(10)
+        for n in range(gears)
         for k, (date, landings) in enumerate((("2026-03-02", 900), ("2026-05-02", 90)))
     ]
     result = read(table(header, rows))
     said = [note for note in result.notes if "andings" in note]
     assert [("never fall" in note) for note in said] == [True] * 8 + [False]
-    assert said[-1].startswith("Landings fall at 2 more places")
+    assert said[-1].startswith(f"Landings fall at {more}")
     assert sum("never fall" in " ".join(found) for found in warnings(result).values()) == len(rows)
 
 
