@@ -130,6 +130,7 @@ class Listed:
     measured: bool
     severity: tuple[int, int, float]
     failed: bool
+    repaired: bool
     over_limit: tuple[int, ...]
     worst_in: float | None
     margin_in: float | None
@@ -149,6 +150,7 @@ class Listed:
             a is not None and a.basis is Basis.MEASURED,
             _severity(judgement),
             a is not None and a.inspection.outcome is Outcome.FAILED,
+            a is not None and a.inspection.is_repaired,
             () if a is None else tuple(f.joint for f in a.joints if f.over_limit),
             a.predicted_displacement_in if a is not None and a.inspection.clearance_in else None,
             None if a is None else a.margin_in,
@@ -174,13 +176,19 @@ def latest_of_each_gear(lines: Sequence[Listed]) -> tuple[list[int], list[int]]:
     """Places of the latest inspection of each gear and of the earlier ones, both worst first.
 
     A row whose gear or date is not known stands by itself: nothing says that it is an earlier one.
+    Of several on the last day the one that states a repair is the latest, else the worst: their
+    order in the table does not say which is later.
     """
-    last: dict[object, tuple[date, int]] = {}
+    last: dict[object, int] = {}
+
+    def order(place: int) -> tuple[date, bool, tuple[float, ...], int]:
+        line = lines[place]
+        return line.day or date.min, line.repaired, tuple(-x for x in line.severity), place
+
     for place, line in enumerate(lines):
         key = place if line.day is None else (line.tail_no, line.side)
-        if key not in last or (line.day or date.min) >= last[key][0]:
-            last[key] = line.day or date.min, place
-    latest = {place for _, place in last.values()}
+        last[key] = max(last.get(key, place), place, key=order)
+    latest = set(last.values())
     return worst_first(lines, latest), worst_first(lines, set(range(len(lines))) - latest)
 
 

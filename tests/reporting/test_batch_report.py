@@ -218,6 +218,18 @@ def test_an_inspection_without_a_date_is_not_an_earlier_one(
     assert len(earlier) == 2
 
 
+def test_of_two_inspections_of_one_day_the_worse_is_shown(judge: Judge) -> None:
+    one_day = [judge(values, inspection_date=date(2024, 3, 1)) for values in (FAILURE, SOUND)]
+    assert latest_of_each_gear(listed(one_day)) == ([0], [1])
+
+
+def test_an_inspection_after_a_repair_is_later_than_another_of_its_day(judge: Judge) -> None:
+    day = date(2024, 3, 1)
+    after = judge(SOUND, inspection_date=day, restored_joints=(3,), repair_date=day)
+    one_day = [after, judge(FAILURE, inspection_date=day)]
+    assert latest_of_each_gear(listed(one_day)) == ([0], [1])
+
+
 def test_a_gear_that_cannot_be_cleared_has_no_probability_that_would_clear_it(
     judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
 ) -> None:

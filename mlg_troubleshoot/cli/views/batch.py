@@ -31,8 +31,10 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
         known = {(line.tail_no, line.side) for line in lines if line.tail_no and line.side}
         gears = "1 gear" if len(known) == 1 else f"{len(known)} gears"
         alone = any(lines[place].day is None for place in latest)
+        days = Counter((line.tail_no, line.side, line.day) for line in lines if line.day)
+        worst = ", of several on one day the worst" if max(days.values()) > 1 else ""
         also = ", and every row that is undated or invalid" if alone else ""
-        screen.print(f"{gears}, the latest inspection of each{also}; --all shows every inspection.")
+        screen.print(f"{gears}, the latest inspection of each{worst}{also}; --all shows every inspection.")
     places = worst_first(lines, (*latest, *earlier)) if every else latest
     ordered = [lines[place] for place in places]
     headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance>", "next"]
