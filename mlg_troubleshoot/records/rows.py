@@ -280,12 +280,10 @@ class RowReader:
     def _inspection(found: _Found, **given: Any) -> Inspection:
         """What was read of a row; of one that cannot be judged, as far as it could be read."""
         lengths = found.lengths
+        per_radial = found.scale.per_radial
         clearance = lengths.pop(CLEARANCE, {})
-        gauge_u = {
-            joint: value / found.scale.per_radial
-            for joint, value in lengths.pop(GAUGE_U, {}).items()
-            if joint in (0, *clearance)
-        }
+        gauge_u = lengths.pop(GAUGE_U, {})
+        common_u = gauge_u.pop(0, None)
         readings = sorted(lengths.pop(PLUNGER_DISPLACEMENT, {}).items())
         floats = lengths.pop(AXIAL_FLOAT, {})
         said = {column.filled: value for column, value in found.values.items()}
@@ -294,9 +292,9 @@ class RowReader:
         return Inspection(
             clearance_in=clearance,
             entered=found.entered,
-            gauge_u_is_default=0 not in gauge_u,
-            gauge_u_in=gauge_u.pop(0, DEFAULT_GAUGE_U_IN),
-            gauge_u_by_joint_in=gauge_u,
+            gauge_u_is_default=common_u is None,
+            gauge_u_in=DEFAULT_GAUGE_U_IN if common_u is None else common_u / per_radial,
+            gauge_u_by_joint_in={j: u / per_radial for j, u in gauge_u.items() if j in clearance},
             readings_in=tuple(value for _, value in readings),
             axial_float_in=floats,
             other_columns=other,
@@ -704,4 +702,4 @@ class RowReader:
         found.warnings += asked
         if fit.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL):
             asked.insert(0, fit.question)
-        return Sentence.joined(asked)
+        return Sentence.joined(asked) if asked else ""

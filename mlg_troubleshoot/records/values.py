@@ -9,6 +9,7 @@ import re
 from collections.abc import Collection, Mapping
 from datetime import date, datetime, time
 from enum import StrEnum
+from functools import lru_cache
 from typing import Any
 
 from mlg_troubleshoot.decision.columns import OUTCOME, Column, Holds
@@ -302,11 +303,17 @@ def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[
     return float(text)
 
 
+@lru_cache(maxsize=16_384)
+def _shared(text: str) -> str:
+    """One object for a tail or a gauge that many rows name."""
+    return text
+
+
 def read_text(cell: Filled, expected: str, *, required: bool = False) -> str:
     """Read an identifier or another text; numbers keep the digits they show."""
     if isinstance(cell, str):
         if cell.isascii() and cell.isprintable():
-            return cell.strip()
+            return _shared(cell.strip())
         text = plain_text(cell)
         if UNWRITABLE.search(text):
             raise CellFaultError("text_unwritable", expected)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import pickle
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -416,6 +417,9 @@ def _judge(
     waiting = [zlib.compress(block, 1) for block in pickled]
     rows.clear()
     del counting
+    if total > AT_ONCE:
+        # What the rows took is given back before they are judged, not when the collector next runs.
+        gc.collect()
     fleet = None
     if store is not None:
         from mlg_troubleshoot.life.looking_back import expected_of

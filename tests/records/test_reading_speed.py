@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import gc
+import io
 import json
 import random
 import subprocess
 import sys
+import tracemalloc
 import zipfile
 
 import pytest
 
+from mlg_troubleshoot.records import ReadOptions, read_many
 from tests.machine import SLOWER
 
 MEASURE = """
@@ -129,12 +133,35 @@ def test_fifty_thousand_rows_of_forty_columns_are_read_in_time_and_memory(tmp_pa
     assert raw < library
 
 
+def csv_text(rows):
+    rng = random.Random(2)
+    return "\n".join(
+        ",".join(map(str, cells)) for cells in [HEADER, *(row(n, rng) for n in range(rows))]
+    )
+
+
+def test_a_row_that_was_read_takes_two_and_a_half_thousand_bytes():
+    table = io.BytesIO(csv_text(2_000).encode())
+    read_many([io.BytesIO(csv_text(1).encode())], ReadOptions())
+    tracemalloc.start()
+    try:
+        read = read_many([table], ReadOptions())
+        assert len(read.rows) == 2_000
+        gc.collect()
+        assert tracemalloc.get_traced_memory()[0] < 2_000 * 2_500
+    finally:
+        tracemalloc.stop()
+
+
+def test_the_same_tail_in_many_rows_is_one_text():
+    first, second = read_many([io.BytesIO(csv_text(301).encode())], ReadOptions()).rows[::300]
+    assert first.tail_no is second.tail_no
+
+
 @pytest.mark.slow
 def test_ten_thousand_rows_of_csv_are_read_in_time(tmp_path):
-    rng = random.Random(2)
     path = tmp_path / "big.csv"
-    lines = [",".join(map(str, cells)) for cells in [HEADER, *(row(n, rng) for n in range(10_000))]]
-    path.write_text("\n".join(lines))
+    path.write_text(csv_text(10_000))
     judged, peak, _, _, rows, problems = measure(path)
     print(f"read and checked {judged:.1f} s, {peak:.0f} MB")
     assert (rows, problems) == (10_000, 0)
