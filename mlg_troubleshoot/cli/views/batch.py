@@ -34,7 +34,9 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
         days = Counter((line.tail_no, line.side, line.day) for line in lines if line.day)
         worst = ", of several on one day the worst" if max(days.values()) > 1 else ""
         also = ", and every row that is undated or invalid" if alone else ""
-        screen.print(f"{gears}, the latest inspection of each{worst}{also}; --all shows every inspection.")
+        screen.print(
+            f"{gears}, the latest inspection of each{worst}{also}; --all shows every inspection."
+        )
     places = worst_first(lines, (*latest, *earlier)) if every else latest
     ordered = [lines[place] for place in places]
     headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance>", "next"]
