@@ -123,6 +123,11 @@ def test_a_check_of_one_file_loads_no_room_that_it_does_not_use(output: list[str
     assert {f"mlg_troubleshoot.{room}" for room in unused} & rooms == set()
 
 
+def test_a_command_loads_none_of_the_others() -> None:
+    others = {"diagnose", "doctor", "fleet", "gear", "history", "study", "survey", "template"}
+    assert {f"mlg_troubleshoot.cli.{name}" for name in others} & modules_of(*ONE_GEAR) == set()
+
+
 def test_predict_gives_the_failure_case() -> None:
     worst = mlg.predict(FAILURE)
     assert worst.magnitude_in == pytest.approx([0.0472], abs=2e-4)

@@ -1,4 +1,6 @@
-"""The commands of ``mlg``. Nothing heavy is imported before one of them runs."""
+"""The commands of ``mlg``. Only the one that is asked for is imported, and nothing heavy before it
+runs.
+"""
 
 from __future__ import annotations
 
@@ -12,23 +14,12 @@ from typing import Any, cast
 import typer
 from typer.core import TyperGroup
 
-from mlg_troubleshoot.cli import (
-    check,
-    diagnose,
-    doctor,
-    fleet,
-    gear,
-    history,
-    new_gear,
-    options,
-    reconstruct,
-    study,
-    survey,
-    template,
-)
+from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.boundary import Boundary
 from mlg_troubleshoot.errors import ExitCode
 
+# In the order of the help; each stands in the module of its name, as `app`.
+_COMMANDS = ("check", "diagnose", "template", "fleet", "doctor", "study", "history", "gear")
 _ASK_FOR_HELP = frozenset(("--help", "-h"))
 
 
@@ -64,6 +55,18 @@ class CommandGroup(TyperGroup):
             code = super().main(given or ["--help"], *more, **{**named, "standalone_mode": False})
             raise SystemExit(code if given else ExitCode.USAGE)
 
+    def list_commands(self, _ctx: Any) -> list[str]:
+        return [*_COMMANDS]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        # One that is not known is compared with all of them.
+        for name in (cmd_name,) if cmd_name in _COMMANDS else _COMMANDS:
+            if name not in self.commands:
+                module = import_module(f"mlg_troubleshoot.cli.{name}")
+                self.commands[name] = typer.main.get_command(module.app)
+                _unwrap_help(self.commands[name])
+        return super().get_command(ctx, cmd_name)
+
     def invoke(self, ctx: Any) -> Any:
         """Also run the command behind the boundary: on its way out typer says nothing of an
         interrupt.
@@ -84,32 +87,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-gear_app = typer.Typer(
-    name="gear",
-    help=(
-        "Show the model in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it."
-    ),
-    invoke_without_command=True,
-)
 
 
 @app.callback()
 def program(_version: options.Version = False) -> None:
     """Options of every command."""
-
-
-app.command(epilog=check.EPILOG)(check.check)
-app.command(epilog=diagnose.EPILOG)(diagnose.diagnose)
-app.command(epilog="Example: [b]mlg template inspections.xlsx[/b]")(template.template)
-app.command(epilog=fleet.EPILOG)(fleet.fleet)
-app.add_typer(history.history_app())
-app.add_typer(gear_app)
-gear_app.callback(epilog="Example: [b]mlg gear verify[/b]")(gear.show)
-gear_app.command(epilog="Example: [b]mlg gear verify[/b]")(gear.verify)
-gear_app.command(epilog=new_gear.EPILOG)(new_gear.new)
-gear_app.command(epilog="Example: [b]mlg gear draw gear.svg[/b]")(new_gear.draw)
-gear_app.command(epilog=reconstruct.EPILOG)(reconstruct.reconstruct)
-gear_app.command(epilog=gear.SEPARABLE)(gear.separable)
-gear_app.command(epilog=survey.EPILOG)(survey.survey)
-app.command(epilog="Example: [b]mlg doctor[/b]")(doctor.doctor)
-app.command(epilog=study.EPILOG)(study.study)

@@ -182,3 +182,6 @@ def check(
     from mlg_troubleshoot.cli.check_run import Run
 
     raise typer.Exit(Run(files or [], flags, tables, wanted).run())
+
+
+app = options.alone(check, EPILOG)

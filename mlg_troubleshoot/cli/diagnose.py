@@ -137,3 +137,6 @@ def _show(diagnosis: Diagnosis, unit: LengthUnit) -> None:
     for line in seven_lines(diagnosis):
         said = output.text(line.text, "not bold")
         console.print(output.text(f"{line.number} {line.word:<7}", "bold").append_text(said))
+
+
+app = options.alone(diagnose, EPILOG)

@@ -27,3 +27,6 @@ def doctor(
         output.show_page("doctor", output.console(), findings=findings)
     lacking = any(f.needed and not f.works for f in findings)
     raise typer.Exit(ExitCode.ATTENTION if lacking else ExitCode.FINE)
+
+
+app = options.alone(doctor, "Example: [b]mlg doctor[/b]")

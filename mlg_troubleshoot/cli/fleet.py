@@ -106,3 +106,6 @@ def fleet(
     if xlsx is not None:
         found.write_workbook(xlsx)
     history.write_pages(found, shown, settings, fleet=True)
+
+
+app = options.alone(fleet, EPILOG)

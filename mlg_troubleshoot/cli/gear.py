@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.cli import new_gear, options, output, reconstruct, survey
 from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 
@@ -102,3 +102,20 @@ def _number(n: Computed) -> dict[str, object]:
     own = {"computed": n.computed, "status": n.status, "holds": n.holds}
     said = {"tolerance": n.target.accepted, "should_hold": n.target.expected}
     return written(VerifiedNumber, n.target, **own, **said)
+
+
+app = typer.Typer(
+    name="gear",
+    help=(
+        "Show the model in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it."
+    ),
+    invoke_without_command=True,
+    add_completion=False,
+)
+app.callback(epilog="Example: [b]mlg gear verify[/b]")(show)
+app.command(epilog="Example: [b]mlg gear verify[/b]")(verify)
+app.command(epilog=new_gear.EPILOG)(new_gear.new)
+app.command(epilog="Example: [b]mlg gear draw gear.svg[/b]")(new_gear.draw)
+app.command(epilog=reconstruct.EPILOG)(reconstruct.reconstruct)
+app.command(epilog=SEPARABLE)(separable)
+app.command(epilog=survey.EPILOG)(survey.survey)

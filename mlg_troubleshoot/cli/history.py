@@ -501,18 +501,17 @@ def ask_tail(tail: str, kept: str) -> bool:
     )
 
 
-def history_app() -> typer.Typer:
-    app = typer.Typer(
-        name="history",
-        cls=HistoryGroup,
-        help=(
-            "Show the records of each gear ([b]mlg history[/b], [b]mlg history TAIL LH[/b]) and add"
-            " repairs, corrections and outcomes."
-        ),
-        epilog=EPILOG,
-    )
-    app.command(_SHOW, hidden=True)(show)
-    for command in (repair, rerig, correct, void, outcome, verify, export):
-        app.command()(command)
-    app.command("import")(import_chain)
-    return app
+app = typer.Typer(
+    name="history",
+    cls=HistoryGroup,
+    help=(
+        "Show the records of each gear ([b]mlg history[/b], [b]mlg history TAIL LH[/b]) and add"
+        " repairs, corrections and outcomes."
+    ),
+    epilog=EPILOG,
+    add_completion=False,
+)
+app.command(_SHOW, hidden=True)(show)
+for command in (repair, rerig, correct, void, outcome, verify, export):
+    app.command()(command)
+app.command("import")(import_chain)

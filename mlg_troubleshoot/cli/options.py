@@ -342,6 +342,13 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
+def alone(command: Callable[..., None], epilog: str) -> typer.Typer:
+    """A command that has no others below it."""
+    app = typer.Typer(add_completion=False)
+    app.command(epilog=epilog)(command)
+    return app
+
+
 def dask_client(address: str) -> Any:
     try:
         distributed: Any = import_module("distributed")

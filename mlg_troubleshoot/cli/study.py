@@ -140,3 +140,6 @@ def study(flags: StudyFlags, _version: options.Version = False) -> None:
     shown = flags.begin(flags.gear, [flags.given], outputs)
     with study_run.asked(flags) as (known, wanted):
         study_run.run(known, wanted, flags, shown)
+
+
+app = options.alone(study, EPILOG)

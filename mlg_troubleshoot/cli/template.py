@@ -43,3 +43,6 @@ def template(
         output.write(f"Written: {file}. Fill it in, then: mlg check {file} --report DIR")
     else:
         output.write(f"Written: {file}. Print it, fill it in, then enter it: mlg check")
+
+
+app = options.alone(template, "Example: [b]mlg template inspections.xlsx[/b]")

@@ -33,8 +33,10 @@ _SINES = np.sin(FREQUENCIES[:, None] * AT_IN)
 @lru_cache(maxsize=1)
 def _bessel_table() -> Array:
     # A quarter of a turn says all, and with 100 points as much as a double can hold.
-    turns = (np.arange(100) + 0.5) * np.pi / 200
-    return np.asarray(np.mean(np.cos(np.arange(0.0, 260.0, 0.05)[:, None] * np.sin(turns)), axis=1))
+    turns = 1j * np.sin((np.arange(100) + 0.5) * np.pi / 200)
+    steps = np.exp(np.arange(0.0, 4.0, 0.05)[:, None] * turns)
+    begins = np.exp(np.arange(0.0, 260.0, 4.0)[:, None] * turns)
+    return np.asarray((begins @ steps.T).real.ravel() / len(turns))
 
 
 def _random(turns: Array) -> Array:
