@@ -13,7 +13,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mlg_troubleshoot.cli import by_hand, history, options, output
+import typer
+
+from mlg_troubleshoot.cli import by_hand, options, output
 from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
@@ -364,4 +366,10 @@ class Run:
             same = options.one_of(options.Tails, self._wanted.tails, "--tails")
             return lambda _new, _kept: same is options.Tails.SAME
         # A command with a FILE never waits for a key.
-        return history.ask_tail if self._asks else None
+        return _ask_tail if self._asks else None
+
+
+def _ask_tail(tail: str, kept: str) -> bool:
+    return typer.confirm(
+        f"Tail {tail!r} differs from {kept!r} only in spelling. Is it the same aircraft?", err=True
+    )

@@ -495,12 +495,6 @@ def import_chain(*, file: Chain, records: options.Records) -> None:
     output.say(f"Imported: {added.new} records; {added.known} were there already.")
 
 
-def ask_tail(tail: str, kept: str) -> bool:
-    return typer.confirm(
-        f"Tail {tail!r} differs from {kept!r} only in spelling. Is it the same aircraft?", err=True
-    )
-
-
 app = typer.Typer(
     name="history",
     cls=HistoryGroup,
