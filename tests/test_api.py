@@ -128,6 +128,13 @@ def test_a_command_loads_none_of_the_others() -> None:
     assert {f"mlg_troubleshoot.cli.{name}" for name in others} & modules_of(*ONE_GEAR) == set()
 
 
+def test_a_life_is_shown_without_loading_the_prompts(tmp_path: Path) -> None:
+    store = f"--store={tmp_path / 'kept.sqlite'}"
+    loaded = modules_of("history", "N1", "LH", store)
+    assert "mlg_troubleshoot.store" in loaded
+    assert "mlg_troubleshoot.cli.prompts" not in loaded
+
+
 def test_predict_gives_the_failure_case() -> None:
     worst = mlg.predict(FAILURE)
     assert worst.magnitude_in == pytest.approx([0.0472], abs=2e-4)

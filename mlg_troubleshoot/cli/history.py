@@ -68,7 +68,6 @@ def show(
 ) -> None:
     """Show all gears with their latest state, or the life of one gear with its forecast."""
     from mlg_troubleshoot.cli.progress import stages
-    from mlg_troubleshoot.cli.prompts.visit import unit_entered
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.reporting import life_json
     from mlg_troubleshoot.workflows import history
@@ -108,7 +107,7 @@ def show(
         )
     latest = found.lives[0].latest
     if latest is not None:
-        settings = shown.seen(settings, unit_entered(latest.inspection))
+        settings = shown.seen(settings, latest.inspection.unit_entered)
     for life in found.lives:
         if shown.as_json:
             output.write_json(life_json.life_as_json(life, found.forecasts[life.key], known))

@@ -5,6 +5,7 @@ inches.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date, datetime
@@ -248,6 +249,12 @@ class Inspection(Result):
             if column in self.other_columns
             else getattr(self, column, None)
         )
+
+    @property
+    def unit_entered(self) -> LengthUnit:
+        """The unit of most readings."""
+        units = Counter(entered.unit for entered in self.entered.values())
+        return units.most_common(1)[0][0] if units else LengthUnit.INCH
 
     @property
     def is_repaired(self) -> bool:

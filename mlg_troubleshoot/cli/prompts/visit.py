@@ -5,7 +5,6 @@ for.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from datetime import date
@@ -225,15 +224,9 @@ def _read_on(versions: list[Record]) -> Mapping[int, str]:
     return days
 
 
-def unit_entered(row: Inspection) -> LengthUnit:
-    """The unit of most readings of an inspection."""
-    units = Counter(entered.unit for entered in row.entered.values())
-    return units.most_common(1)[0][0] if units else LengthUnit.INCH
-
-
 def answers_of(row: Inspection, gear: Gear, continues: str) -> Answers:
     """An inspection as answers, each as it was typed."""
-    unit = unit_entered(row)
+    unit = row.unit_entered
     joints = {
         joint: _answer(row, joint) if joint in row.clearance_in else NOT_MEASURED
         for joint in gear.joint_numbers
