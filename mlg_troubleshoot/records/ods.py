@@ -83,8 +83,8 @@ class _OdsSheet(Sheet):
         self._merged: list[MergedRange] = []
 
     def merged(self) -> Sequence[MergedRange]:
-        """Return those of the rows read so far."""
-        return tuple(self._merged)
+        """Return those of the rows read so far; more are added as more are read."""
+        return self._merged
 
     def _read(self) -> Iterator[NumberedRow]:
         self._merged.clear()

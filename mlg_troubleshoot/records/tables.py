@@ -8,16 +8,16 @@ from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from pathlib import PurePath
 
-from mlg_troubleshoot.decision.columns import CLEARANCE, IDENTITY, SIDE, TAIL_NO
+from mlg_troubleshoot.decision.columns import CLEARANCE, IDENTITY, RECORD_ID, SIDE, TAIL_NO
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.records.cells import Cells, column_letters, quote
+from mlg_troubleshoot.records.cells import Cells, Filled, column_letters, quote
 from mlg_troubleshoot.records.headers import UNKNOWN, recognise, tidy
 from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header, header_score
 from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
-from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet
+from mlg_troubleshoot.records.source import FileRefusedError, MergedRange, NumberedRow, Sheet
 from mlg_troubleshoot.units import ClearanceConvention
 
 _PROGRESS_ROWS = 500
@@ -168,6 +168,19 @@ class _Table:
         self._texts = tuple(text or None for text in header.texts)
         self._width = len(header.texts) if delimiter is not None else None
         self._out = out
+        self._sheet = sheet
+        # A workbook's cell that is merged over several rows says the same of each; of a reading it
+        # is not known which gear's it is, nor of which row a record's name.
+        self._of_several = [
+            p.index
+            for p in columns.placed
+            if delimiter is None and p.field is not None and not p.field.column.is_length
+            if p.field.column is not RECORD_ID or columns.is_long
+        ]
+        self._above: dict[int, tuple[int, Filled]] = {}
+        self._last_rows: dict[tuple[int, int], int] = {}
+        self._merged: Sequence[MergedRange] | None = None
+        self._filled_in = 0
         self._repeated = 0
         self._aside: list[str] = []
         self._dates = ""
@@ -185,6 +198,7 @@ class _Table:
             return
         if self._stands_aside(number, cells):
             return
+        cells = self._with_merged(number, cells)
         self._second = self._second or self._begins_again(number, cells)
         width = self._width
         collect = self._out.rows.append
@@ -203,6 +217,29 @@ class _Table:
             collect(read)
             if read.__class__ is InvalidRow:
                 self._out.invalid_content[read.source] = hash(tuple(cells))
+
+    def _with_merged(self, number: int, cells: Cells) -> Cells:
+        """Cells of a row, with those that are merged with a filled one above."""
+        for index in self._of_several:
+            cell = cells[index] if index < len(cells) else None
+            if cell is not None:
+                self._above[index] = number, cell
+            elif index in self._above:
+                top, above = self._above[index]
+                if number <= self._last_row(top, index):
+                    cells = [*cells, *[None] * (index + 1 - len(cells))]
+                    cells[index] = above
+                    self._filled_in += 1
+        return cells
+
+    def _last_row(self, top: int, index: int) -> int:
+        """The last row of the merged cells that begin in a row and a column; 0 if none do."""
+        if self._merged is None:
+            self._merged = self._sheet.merged()
+        # An ods tells them row by row.
+        for first, left, last, _right in islice(self._merged, len(self._last_rows), None):
+            self._last_rows[first, left] = last
+        return self._last_rows.get((top, index), 0)
 
     def _begins_again(self, number: int, cells: Cells) -> FileRefusedError | None:
         """Refuse what stands below the header of another table: its columns may be others."""
@@ -268,6 +305,9 @@ class _Table:
                 else "a repeated header row was"
             )
             notes.append(f"{again} skipped")
+        if self._filled_in:
+            those = "cells that are" if self._filled_in > 1 else "cell that is"
+            notes.append(f"{self._filled_in} blank {those} merged with one above read as it is")
         if self._aside:
             count = (
                 f"{len(self._aside)} rows are not inspections"

@@ -64,6 +64,32 @@ def test_the_template_saved_by_libreoffice_reads_back(samples, suffix):
     check(samples / f"template_filled.{suffix}")
 
 
+@pytest.fixture(params=["xlsx", "ods", "xls"])
+def merged(request, samples):
+    """Tails and dates that are merged over the rows of both gears; below them one is missing."""
+    return read_inspections(samples / f"merged.{request.param}", ReadOptions())
+
+
+def test_a_cell_that_is_merged_over_rows_says_the_same_of_each(merged):
+    said = [(row.tail_no, row.side, str(row.inspection_date)) for row in merged.inspections]
+    assert said == [
+        ("N101", "LH", "2026-03-01"),
+        ("N101", "RH", "2026-03-01"),
+        ("N102", "LH", "2026-03-02"),
+        ("N102", "RH", "2026-03-02"),
+    ]
+    assert any("4 blank cells that are merged with one above" in note for note in merged.notes)
+
+
+def test_a_blank_cell_below_merged_ones_stays_blank(merged):
+    assert [problem.cell for problem in merged.problems] == ["A6"]
+
+
+def test_a_reading_that_is_merged_over_rows_is_that_of_the_first(merged):
+    first, second, *_ = merged.inspections
+    assert (first.clearance_in[3], 3 in second.clearance_in) == (0.005, False)
+
+
 def open_document(file, part, old, new):
     """Return an OpenDocument file with something replaced in one of its parts."""
     buffer = io.BytesIO()

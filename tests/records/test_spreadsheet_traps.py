@@ -247,6 +247,18 @@ def test_12_both_rows_of_a_merged_header_count_though_the_upper_one_names_the_co
     assert {p.code for p in result.problems} == {"header_doubtful"}
 
 
+def test_12_a_merged_record_name_is_of_one_inspection_only_in_a_long_table(read, xlsx):
+    def merge(book):
+        book.worksheets[0].merge_cells("A2:A3")
+
+    header = ["record_id", "tail_no", "side", "clearance_convention", "joint", "clearance_in"]
+    rows = [header, ["R1", *GOOD[1:4], 3, 0.013], [None, *GOOD[1:4], 5, 0.007]]
+    result = read(xlsx(rows, merge), "t.xlsx")
+    assert [dict(row.clearance_in) for row in result.inspections] == [{3: 0.013, 5: 0.007}]
+    wide = read(xlsx([HEADER, GOOD, [None, *GOOD[1:]]], merge), "t.xlsx")
+    assert [row.record_id for row in wide.rows] == ["R1", None]
+
+
 def test_12_an_unknown_header_of_two_rows_is_an_error_and_its_second_row_no_inspection(read, xlsx):
     rows = [["Identity", None, None, None, "Wear", None], ["a", "b", "c", "d", "e", "f"], GOOD]
     result = read(xlsx(rows, two_rows), "t.xlsx")
