@@ -88,7 +88,7 @@ def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
 
     typed = flags.typed
     unit = declared.unit or LengthUnit.INCH
-    placeholders = {RECORD_ID.name: "-", TAIL_NO.name: "-", CONVENTION.name: "RADIAL"}
+    placeholders = {RECORD_ID.name: "-", TAIL_NO.name: "0", CONVENTION.name: "RADIAL"}
     judged = _judged({SIDE.name: "LH", **typed, **placeholders}, {}, flags, declared)
     with_unit = {
         name: text if text[-1:].isalpha() else f"{text} {unit}"

@@ -37,7 +37,7 @@ from mlg_troubleshoot.records.values import CellFaultError, read_text
 from mlg_troubleshoot.units import LengthUnit
 
 # Who and which gear a value is judged for before that is known.
-NOBODY = {RECORD_ID.name: "-", TAIL_NO.name: "-", SIDE.name: "LH"}
+NOBODY = {RECORD_ID.name: "0", TAIL_NO.name: "0", SIDE.name: "LH"}
 
 
 def judge_row(

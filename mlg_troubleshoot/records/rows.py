@@ -29,6 +29,7 @@ from mlg_troubleshoot.decision.columns import (
     SIDE,
     SMALL_READINGS_TRUE,
     STROKE,
+    TAIL_NO,
     UNIT,
     Column,
     Holds,
@@ -67,6 +68,7 @@ from mlg_troubleshoot.records.values import (
     AmbiguousDateError,
     CellFaultError,
     convention_word,
+    is_no_name,
     plain_text,
     read_areas,
     read_date,
@@ -348,7 +350,8 @@ class RowReader:
 
     def _value(self, column: Column, index: int) -> Any:
         cell = self._cells[index]
-        if cell is not None:
+        # Gears that nobody can name are not one gear.
+        if cell is not None and not (column is TAIL_NO and is_no_name(cell)):
             if column is DATE:
                 return self._read_date(cell)
             if column.holds is Holds.MOMENT:

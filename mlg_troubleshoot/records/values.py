@@ -111,6 +111,8 @@ NOT_MEASURED = frozenset(
         ),
     )
 )
+# What they write for a name that they do not know.
+_NO_NAME = NOT_MEASURED | {"unknown", "unk", "tbd", "tba"}
 
 _ODD_CELLS = {OddKind.NO_VALUE: "formula_without_value", OddKind.DATE: "cell_is_date"}
 
@@ -301,6 +303,14 @@ def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[
     if not _PLAIN.fullmatch(text):
         raise CellFaultError("not_a_number", expected)
     return float(text)
+
+
+def is_no_name(cell: Filled) -> bool:
+    """Whether a cell says that a name is not known."""
+    if not isinstance(cell, str):
+        return False
+    said = plain_text(cell).casefold()
+    return said in _NO_NAME or not any(character.isalnum() for character in said)
 
 
 @lru_cache(maxsize=16_384)

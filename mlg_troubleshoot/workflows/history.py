@@ -45,7 +45,7 @@ _AT_ONCE = 100
 _MOST_BYTES = 120_000_000
 _LONGEST_LINE = 4_000_000
 # What a row must have besides what is to be judged.
-_ANY_ROW = {"record_id": "-", "tail_no": "-", "side": "LH", "clearance_convention": "RADIAL"}
+_ANY_ROW = {"record_id": "0", "tail_no": "0", "side": "LH", "clearance_convention": "RADIAL"}
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)

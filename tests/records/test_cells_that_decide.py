@@ -197,3 +197,15 @@ def test_a_sheet_that_is_not_read_is_named(tmp_path, gear, sheet):
     notes = " ".join(read_many([tmp_path / "t.xlsx"], ReadOptions.of(gear, sheet=sheet)).notes)
     assert "hidden sheets were not read: 'hidden'" in notes
     assert "no header of inspections, not read: sheet 'RH'" in notes
+
+
+@pytest.mark.parametrize("word", ["?", "-", "n/a", "N/A", "unknown", "TBD"])
+def test_gears_that_nobody_can_name_are_not_one_gear(tmp_path, word):
+    read = read_many([table(tmp_path, tail_no=word)], ReadOptions())
+    assert not read.inspections
+    assert [(problem.cell, problem.value) for problem in read.problems] == [("B2", word)]
+
+
+def test_a_tail_may_begin_with_such_a_word(tmp_path):
+    read = read_many([table(tmp_path, tail_no="NA-1")], ReadOptions())
+    assert read.inspections[0].tail_no == "NA-1"
