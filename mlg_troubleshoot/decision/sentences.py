@@ -58,8 +58,8 @@ FAILED_AND_UNREAD = (
     " plunger is read within its margin."
 )
 _BEYOND_NOT_EXPLAINED = (
-    "Joint clearances do not explain the plunger position: suspect rigging or the lock roller"
-    " first, then the plunger gauge and parts outside the listed joints."
+    "Joint clearances do not explain the plunger position. If rigging and lock roller were set"
+    " right, read the plunger again; if they are right, refer the gear to engineering."
 )
 _BEYOND_AND_LOOKED = (
     "Joint clearances do not explain the plunger position, and rigging and lock roller were"

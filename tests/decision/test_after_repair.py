@@ -125,7 +125,7 @@ def test_a_blank_outcome_is_not_a_complaint(judge: Judge) -> None:
 def test_what_the_joints_cannot_explain_names_rigging_and_lock_roller_first(judge: Judge) -> None:
     found = judge(every_joint(0.002), outcome=Outcome.FAILED, readings_in=(0.085,))
     assert found.next_action.action is Action.CHECK_RIGGING
-    assert "suspect rigging or the lock roller first" in found.plan.steps[-1].text
+    assert "If rigging and lock roller were set right, read" in found.plan.steps[-1].text
 
 
 def test_a_rigging_that_was_looked_at_is_not_checked_again(judge: Judge) -> None:
