@@ -112,6 +112,13 @@ def test_a_tail_number_stays_as_it_was_typed(flow: Flow) -> None:
     assert play(flow, ["  007 "], Answers()).state.answers.tail_no == "007"
 
 
+@pytest.mark.parametrize("typed", ["n/a", "unknown", "--"])
+def test_a_word_in_place_of_a_tail_number_is_asked_again(flow: Flow, typed: str) -> None:
+    turn = play(flow, [typed], Answers())
+    assert (turn.state.ask, turn.state.answers.tail_no) == (Ask.TAIL, None)
+    assert "Type the tail number" in said(turn)
+
+
 @pytest.mark.parametrize("missing", ["tail_no", "side", "unit", "convention"])
 def test_what_a_flag_gave_is_not_asked(flow: Flow, missing: str) -> None:
     asked = flow.begin(replace(RADIAL_INCHES, **{missing: None})).state.ask

@@ -199,10 +199,12 @@ class Flow:
         return doubt.yes() if anew is not None and anew.retyped == doubt.retyped else turn
 
     def _tail(self, state: State, typed: str) -> Turn[State]:
+        from mlg_troubleshoot.records.values import is_no_name
+
         answers = state.answers
         if not typed and answers.tail_no is None and self.unfinished and not state.from_review:
             return self._on_with(self.unfinished[0], answers)
-        if not typed and answers.tail_no is None:
+        if is_no_name(typed) and (typed or answers.tail_no is None):
             return again(state, _not_taken(typed, "Type the tail number, for example N123AB."))
         return self.begin(replace(answers, tail_no=typed or answers.tail_no), state.from_review)
 
