@@ -85,11 +85,11 @@ def _judged(
 def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
     """What the flags answer already of the questions on a terminal, judged as a row would be."""
     from mlg_troubleshoot.cli.prompts.answers import LENGTHS, REST, Answers
+    from mlg_troubleshoot.records.gate import NOBODY
 
     typed = flags.typed
     unit = declared.unit or LengthUnit.INCH
-    placeholders = {RECORD_ID.name: "-", TAIL_NO.name: "0", CONVENTION.name: "RADIAL"}
-    judged = _judged({SIDE.name: "LH", **typed, **placeholders}, {}, flags, declared)
+    judged = _judged({**NOBODY, CONVENTION.name: "RADIAL", **typed}, {}, flags, declared)
     with_unit = {
         name: text if text[-1:].isalpha() else f"{text} {unit}"
         for name, text in typed.items()

@@ -28,7 +28,7 @@ from mlg_troubleshoot.life.landings_left import FleetLine, Order
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.parallel import Progress, StageProgress
 from mlg_troubleshoot.records import ReadOptions, admit
-from mlg_troubleshoot.records.gate import judge_text
+from mlg_troubleshoot.records.gate import NOBODY, judge_text
 from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.store import Added, Broken, Record, RecordKind, Store, StoreError, packed
 from mlg_troubleshoot.units import LengthUnit
@@ -45,7 +45,7 @@ _AT_ONCE = 100
 _MOST_BYTES = 120_000_000
 _LONGEST_LINE = 4_000_000
 # What a row must have besides what is to be judged.
-_ANY_ROW = {"record_id": "0", "tail_no": "0", "side": "LH", "clearance_convention": "RADIAL"}
+_ANY_ROW = {**NOBODY, "clearance_convention": "RADIAL"}
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)

@@ -155,6 +155,12 @@ def test_flags_answer_questions_beforehand(start: Start) -> None:
     assert finish(child) == 130
 
 
+def test_a_tail_from_a_flag_that_is_none_is_refused_before_anything_is_asked(start: Start) -> None:
+    child = start("check", "--tail", "n/a", "--side", "RH")
+    child.expect_exact("--tail 'n/a': expected a tail number")
+    assert finish(child) == 2
+
+
 def test_a_joint_that_was_just_skipped_is_not_asked_for_next(start: Start) -> None:
     child = start(
         "check", "--tail", "N77", "--side", "RH", "--unit", "in", "--convention", "RADIAL"
