@@ -198,7 +198,8 @@ class _Table:
             return
         if self._stands_aside(number, cells):
             return
-        cells = self._with_merged(number, cells)
+        if self._of_several:
+            cells = self._with_merged(number, cells)
         self._second = self._second or self._begins_again(number, cells)
         width = self._width
         collect = self._out.rows.append

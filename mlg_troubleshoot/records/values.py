@@ -111,8 +111,8 @@ NOT_MEASURED = frozenset(
         ),
     )
 )
-# What they write for a name that they do not know.
-_NO_NAME = NOT_MEASURED | {"unknown", "unk", "tbd", "tba"}
+# What they write for a tail that they do not know; NA and NONE may be tails.
+_NO_NAME = frozenset(("n/a", "n.a.", "unknown", "not known", "tbd", "tba"))
 
 _ODD_CELLS = {OddKind.NO_VALUE: "formula_without_value", OddKind.DATE: "cell_is_date"}
 
