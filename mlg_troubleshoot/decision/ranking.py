@@ -181,13 +181,13 @@ def latest_of_each_gear(lines: Sequence[Listed]) -> tuple[list[int], list[int]]:
     """
     last: dict[object, int] = {}
 
-    def order(place: int) -> tuple[date, bool, tuple[float, ...], int]:
+    def order(place: int) -> tuple[date, bool, tuple[float, ...]]:
         line = lines[place]
-        return line.day or date.min, line.repaired, tuple(-x for x in line.severity), place
+        return line.day or date.min, line.repaired, tuple(-x for x in line.severity)
 
     for place, line in enumerate(lines):
         key = place if line.day is None else (line.tail_no, line.side)
-        last[key] = max(last.get(key, place), place, key=order)
+        last[key] = max(place, last.get(key, place), key=order)
     latest = set(last.values())
     return worst_first(lines, latest), worst_first(lines, set(range(len(lines))) - latest)
 

@@ -310,6 +310,20 @@ def test_an_undated_or_invalid_row_is_not_counted_as_a_gear(tmp_path):
     assert mlg("check", file).out.splitlines()[1] == said
 
 
+@pytest.mark.parametrize(
+    ("days", "said"),
+    [
+        (("2024-03-04", "2025-03-04"), "the latest inspection of each;"),
+        (("2024-03-04", "2024-03-04"), "the latest inspection of each, of several on one day the"),
+    ],
+)
+def test_a_batch_says_which_of_several_inspections_of_a_day_it_shows(tmp_path, days, said):
+    header = [*HEADER, "inspection_date"]
+    rows = [header, *(sound(f"R{n}", inspection_date=day) for n, day in enumerate(days))]
+    file = workbook(tmp_path / "days.xlsx", ("Inspections", rows))
+    assert f"1 gear, {said}" in mlg("check", file).out
+
+
 def test_joints_over_their_limit_are_counted_over_the_batch(mixed):
     assert "Joints over their limit (number of gears): #10 (1)." in mlg("check", mixed).out
     every = mlg("check", mixed, "--all").out

@@ -259,6 +259,15 @@ def test_12_a_merged_record_name_is_of_one_inspection_only_in_a_long_table(read,
     assert [row.record_id for row in wide.rows] == ["R1", None]
 
 
+def test_12_a_merged_cell_at_the_end_of_a_row_is_read_for_each_row(read, xlsx):
+    def merge(book):
+        book.worksheets[0].merge_cells("G2:G3")
+
+    rows = [[*HEADER, "technician_id"], [*GOOD, "T1"], ["R2", *GOOD[1:]]]
+    result = read(xlsx(rows, merge), "t.xlsx")
+    assert [row.technician_id for row in result.inspections] == ["T1", "T1"]
+
+
 def test_12_an_unknown_header_of_two_rows_is_an_error_and_its_second_row_no_inspection(read, xlsx):
     rows = [["Identity", None, None, None, "Wear", None], ["a", "b", "c", "d", "e", "f"], GOOD]
     result = read(xlsx(rows, two_rows), "t.xlsx")
