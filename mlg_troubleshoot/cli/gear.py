@@ -104,13 +104,12 @@ def _number(n: Computed) -> dict[str, object]:
     return written(VerifiedNumber, n.target, **own, **said)
 
 
-app = typer.Typer(
+app = options.commands(
     name="gear",
     help=(
         "Show the model in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it."
     ),
     invoke_without_command=True,
-    add_completion=False,
 )
 app.callback(epilog="Example: [b]mlg gear verify[/b]")(show)
 app.command(epilog="Example: [b]mlg gear verify[/b]")(verify)

@@ -494,7 +494,7 @@ def import_chain(*, file: Chain, records: options.Records) -> None:
     output.say(f"Imported: {added.new} records; {added.known} were there already.")
 
 
-app = typer.Typer(
+app = options.commands(
     name="history",
     cls=HistoryGroup,
     help=(
@@ -502,7 +502,6 @@ app = typer.Typer(
         " repairs, corrections and outcomes."
     ),
     epilog=EPILOG,
-    add_completion=False,
 )
 app.command(_SHOW, hidden=True)(show)
 for command in (repair, rerig, correct, void, outcome, verify, export):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import StrEnum
-from functools import wraps
+from functools import partial, wraps
 from importlib import import_module
 from inspect import Parameter, Signature, get_annotations, signature
 from pathlib import Path
@@ -342,9 +342,12 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
+commands = partial(typer.Typer, add_completion=False, rich_markup_mode="rich")
+
+
 def alone(command: Callable[..., None], epilog: str) -> typer.Typer:
     """A command that has no others below it."""
-    app = typer.Typer(add_completion=False)
+    app = commands()
     app.command(epilog=epilog)(command)
     return app
 
