@@ -666,6 +666,12 @@ def test_the_heading_can_be_changed_from_the_review(
     assert (turn.state.ask, getattr(turn.state.answers, name)) == (Ask.REVIEW, value)
 
 
+def test_a_tail_is_not_changed_into_a_word(flow: Flow) -> None:
+    turn = play(flow, [*TEN, *ENTERS, "tail", "n/a"])
+    before = play(flow, [*TEN, *ENTERS]).state.answers.tail_no
+    assert (turn.state.ask, turn.state.answers.tail_no) == (Ask.TAIL, before)
+
+
 def test_enter_at_the_review_computes(flow: Flow) -> None:
     assert play(flow, [*TEN, *ENTERS, ""]).effect is Effect.COMPUTE
 
