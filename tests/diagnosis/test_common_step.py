@@ -96,6 +96,12 @@ def test_a_group_that_is_shifted_from_its_first_row_on_does_not_show_its_step() 
     assert set(found_in(DATA).seen) == {"A", "C"}
 
 
+def test_a_group_that_may_be_shifted_from_its_first_row_on_shows_its_step_less_surely() -> None:
+    first_of_c = (GROUPS == "C") & (TIMES == VISITS["C"][0])
+    found = found_in(DATA + 2.2 * first_of_c)
+    assert 0.5 < found.seen["C"] < 0.95 < found.seen["A"]
+
+
 def test_steps_without_any_scatter_are_found() -> None:
     found = found_in(4.0 * after(TRUE), replace(NOISE, floor_in=1e-3))
     assert found.since == TRUE
