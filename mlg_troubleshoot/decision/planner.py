@@ -470,10 +470,13 @@ class _PlanBuilder:
         """Restore, read the plunger, retract the gear: done. Where something over its limit must
         wait for its spare, that comes after it.
         """
-        if not expected and self.over != self.over_limit:
+        waits = self.over != self.over_limit
+        if waits and not expected:
             return self._restore_over_limit()._stop_for_today()
         ranked = self._joints(np.array([n in joints for n in self.numbers]))
         self._restore(ranked, best, expected=expected)
+        if waits:
+            return self._stop_for_today()
         self._read_the_plunger()
         return self._retract()
 
@@ -602,10 +605,9 @@ class _PlanBuilder:
         if left and found.steps[0].action in (Action.CONTINUE, Action.DONE):
             minutes = minutes_to_measure(self.gear, left, self.at_first)
             never = sentences.never_read(left, minutes)
-        asked = {n for step in found.steps for n in step.joints}
         unread = self._joints(~cases.measured[i] & ~cases.reachable[i])
         over = self._joints(cases.over_limit[i] & ~cases.restorable[i])
-        shut = sentences.open_question([n for n in unread if n not in asked], over)
+        shut = sentences.open_question(unread, over)
         return " ".join(said for said in (found.open_question, shut, never) if said) or None
 
     def _within_the_day(self, found: Plan) -> Plan:

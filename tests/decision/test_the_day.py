@@ -187,6 +187,18 @@ def test_no_plunger_is_read_while_a_joint_over_its_limit_waits_for_its_spare(jud
     assert found.next_action.text.startswith("Stop for today: #3")
 
 
+def test_no_plunger_is_expected_to_be_read_while_a_joint_waits_for_its_spare(judge: Judge) -> None:
+    read = {1: 0.0021, 3: 0.0026, 4: 0.0002, 5: 0.0045, 6: 0.011}
+    read |= {7: 0.0037, 8: 0.0044, 9: 0.0007, 10: 0.0021}
+    found = judge(read, outcome=Outcome.FAILED, readings_in=(0.0429,), no_spare=(6,))
+    assert [(step.action, step.joints) for step in found.plan.steps] == [
+        (Action.MEASURE, (2,)),
+        (Action.RESTORE, (2,)),
+        (Action.CONTINUE, ()),
+    ]
+    assert found.plan.steps[-1].text.startswith("Stop for today: #6 must be restored")
+
+
 def test_what_has_no_spare_is_not_expected_to_be_restored_once_it_is_read(judge: Judge) -> None:
     unread = {n: c for n, c in every_joint(0.003, j2=0.0065).items() if n not in (1, 3, 6, 9)}
     with_spare, without = (
