@@ -509,7 +509,7 @@ class _PlanBuilder:
         unread = self._left_unread()
         text = sentences.done(
             repaired=restored,
-            recorded=self.inspection.is_repaired and not restored,
+            recorded=self.inspection.is_repaired,
             read=len(self.numbers) - len(unread),
             unread=len(unread),
         )

@@ -99,10 +99,10 @@ def done(*, repaired: bool, recorded: bool, read: int, unread: int) -> str:
         stands = "No joint was read"
     else:
         stands = f"{'The joints that were read' if unread else 'Joints'} are within limits"
-    if recorded:
-        then = ", and the repair is entered here: sign it off in the aircraft's records. This"
-    elif repaired:
+    if repaired:
         then = "; record the repair. This"
+    elif recorded:
+        then = ", and the repair is entered here: sign it off in the aircraft's records. This"
     else:
         then = ". No further action on the joints; this"
     return f"{stands}{then} is not a release to service."

@@ -114,6 +114,14 @@ def test_joints_that_read_like_new_on_a_gear_that_failed_are_asked_about(judge: 
     assert "If #3 were restored after the failure" in found.next_action.text
 
 
+def test_a_further_repair_is_to_be_recorded(judge: Judge) -> None:
+    found = judge(
+        every_joint(0.0003, j10=0.0148), restored_joints=(3,), repair_date=date(2026, 3, 1)
+    )
+    assert found.plan.steps[0].action is Action.RESTORE
+    assert "record the repair" in found.plan.steps[-1].text
+
+
 def test_a_blank_outcome_is_not_a_complaint(judge: Judge) -> None:
     found = judge(every_joint(0.0003, j10=0.0148))
     assert [(s.action, s.joints) for s in found.plan.steps] == [
