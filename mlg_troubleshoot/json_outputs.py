@@ -254,6 +254,13 @@ class ExtensionGain(TypedDict):
     verdicts_changed: list[str]
 
 
+class RowFarOff(TypedDict):
+    """A row that lies too far off for scatter and that nothing explains."""
+
+    record_id: str
+    residual_in: float
+
+
 class Remainder(TypedDict):
     """What no named cause explains."""
 
@@ -262,6 +269,7 @@ class Remainder(TypedDict):
     looks_like_noise: bool
     rms_in: Size
     expected_from_gauges_in: Size | None
+    rows_far_off: list[RowFarOff]
 
 
 class ConditionOfData(TypedDict):

@@ -349,8 +349,11 @@ def _warnings(
         for finding in findings
         if finding.over_limit and finding.clearance_in is not None
     ]
+    read = [f.clearance_in for f in findings if f.clearance_in is not None]
     if all(f.clearance_in == f.limit_in for f in findings):
         warnings.append(sentences.LIMITS_WRITTEN)
+    else:
+        warnings += sentences.one_value(read)
     down_lock = inspection.plunger_down_lock_in
     low, high = gear.down_lock_range
     if down_lock is not None and not low <= down_lock <= high:

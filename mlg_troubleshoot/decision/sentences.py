@@ -31,6 +31,8 @@ LIMITS_WRITTEN = (
     "Every clearance is the limit of its joint: if limits were written in place of readings, the"
     " verdict says nothing of this gear; enter what was read."
 )
+# So many joints that read the same were hardly each read. [1]
+LEAST_ALIKE = 5
 _SET_THAT_HOLDS = (
     "set of joints that can be restored brings the worst case within the margin with"
     f" {100.0 * CONFORMANCE:.0f} % probability."
@@ -70,6 +72,19 @@ STOP_FOR_TODAY = (
     " stays open."
 )
 RETRACT = "Retract the gear (trial retraction). Enter the outcome with its date and time."
+
+
+def one_value(read_in: Sequence[float]) -> list[str]:
+    """Say that all joints read one clearance that is not zero, if so many do. [in]"""
+    if len(read_in) < LEAST_ALIKE or len(set(read_in)) > 1 or read_in[0] <= 0.0:
+        return []
+    return [
+        Sentence.of(
+            "Every clearance is {}, hardly a reading of each joint: if they were filled in, the"
+            " verdict says nothing of this gear; enter what was read.",
+            Length(read_in[0]),
+        )
+    ]
 
 
 def percent(share: float) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import pdtrc
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, numbered
+from mlg_troubleshoot.decision.sentences import LEAST_ALIKE
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import gears_of, visits
 from mlg_troubleshoot.diagnosis.written import (
@@ -27,8 +28,6 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 
-# With fewer joints nothing is said of a row. [1]
-_LEAST_JOINTS = 5
 # Share of clearances that are known to be cut off, from which their effects are. [1]
 _MANY_CUT = 0.1
 
@@ -163,7 +162,7 @@ def _duplicates(table: DiagnosisTable) -> Mask:
     again[first] = False
     # A row that says hardly anything is not known to stand twice.
     read = np.isfinite(table.clearance_in).sum(axis=1) + np.isfinite(table.readings_in).sum(axis=1)
-    return np.asarray(again & (read >= _LEAST_JOINTS))
+    return np.asarray(again & (read >= LEAST_ALIKE))
 
 
 def _before(table: DiagnosisTable) -> Places:
@@ -184,7 +183,7 @@ def _copies(table: DiagnosisTable) -> Mask:
     both = (values > least) & (values[before] > 0.0) & later[:, None]
     same = both & (values == values[before])
     count = both.sum(axis=1)
-    full = (same.sum(axis=1) == count) & (count >= _LEAST_JOINTS) & ~table.along
+    full = (same.sum(axis=1) == count) & (count >= LEAST_ALIKE) & ~table.along
     full &= ~np.any(np.nan_to_num(values) != np.nan_to_num(values[before]), axis=1)
     others = both & ~full[:, None]
     usual = (same & others).sum(axis=0) / np.maximum(others.sum(axis=0), 1)
@@ -204,7 +203,7 @@ def _identical(table: DiagnosisTable) -> Mask:
     low = np.where(known, values, np.inf).min(axis=1)
     count = known.sum(axis=1)
     same = (np.where(known, values, -np.inf).max(axis=1) == low) & (low > 0.0)
-    same &= (count >= _LEAST_JOINTS) & ~table.along
+    same &= (count >= LEAST_ALIKE) & ~table.along
     _found, often = np.unique(values[known & ~same[:, None]], return_counts=True)
     alike = float(np.sum((often / max(often.sum(), 1)) ** 2))
     return np.asarray(same & (len(values) * alike ** np.maximum(count - 1.0, 0.0) < BY_CHANCE))

@@ -242,6 +242,9 @@ class Diagnosis(Result):
         What reading and clearance gauges alone would leave. [in]
     remainder_is_noise : bool
         True if the residual is noise, more likely than not.
+    far_off_in : mapping of int to float
+        Places of rows that lie too far off for scatter and that nothing explains, and their
+        residuals. [in]
     used : DiagnosisTable
         The rows behind the verdict.
     predicted_in, misfit_in : ndarray, shape (n_used,)
@@ -286,6 +289,7 @@ class Diagnosis(Result):
     residual_u_in: float
     expected_scatter_in: float | None
     remainder_is_noise: bool
+    far_off_in: Mapping[int, float]
     used: DiagnosisTable
     predicted_in: Array
     misfit_in: Array
@@ -681,6 +685,7 @@ def _report(
     repeatability, source = estimate_repeatability(table)
     residual = float(np.std(left))
     expected = _expected_scatter(model, table, repeatability)
+    far = case.far_off(left, expected or case.noise.scale_in)
     chances = case.posterior
     return Diagnosis(
         verdict=case.follows.verdict,
@@ -725,6 +730,7 @@ def _report(
         expected_scatter_in=expected,
         # What the gauges alone leave is noise, however it lies.
         remainder_is_noise=case.left < 0.5 or (expected is not None and residual <= expected),
+        far_off_in={place: float(left[place]) for place in far.tolist()},
         used=table,
         predicted_in=case.scene.over_in,
         misfit_in=misfit,

@@ -15,7 +15,7 @@ from math import erfc, sqrt
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, log_sum, numbered, rms
+from mlg_troubleshoot.arrays import Array, Wholes, log_sum, numbered, rms
 from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
@@ -23,7 +23,7 @@ from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, less_expected
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.conclusion import Conclusion
-from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
 from mlg_troubleshoot.misfit.fitting import fit
 from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
@@ -239,6 +239,14 @@ class Finding:
         """Probability that something else acts in addition to what is sure."""
         return self.follows.any_of(set(self.posterior.names) - set(self.follows.said))
 
+    def far_off(self, residual_in: Array, usual_in: float) -> Wholes:
+        """Rows that are surely no scatter and that nothing explains, from their residuals and the
+        scatter that the gauges alone cause. [in]
+        """
+        distance = np.minimum(self.noise.distance, np.abs(residual_in) / usual_in)
+        odds = self.problem.beliefs.slip_odds(distance)
+        return np.flatnonzero(odds >= self.problem.beliefs.odds)
+
     @property
     def ruled_out(self) -> tuple[Key, ...]:
         """Names that would explain something alone, but hardly act, likeliest first."""
@@ -298,19 +306,50 @@ class Finding:
 def explain(problem: MisfitProblem) -> Finding:
     """Say how likely each explanation of a table is, and what follows."""
     data = problem.expected
-    rows = problem.rows
-    noise = build_noise(data, rows)
+    beliefs = problem.beliefs
+    noise = build_noise(data, problem.rows)
     contexts = problem.contexts(noise.scale_in)
-    found = posterior(noise, data, problem.effects(noise), contexts, problem.beliefs)
+
+    def settled_from(noise: NoiseModel) -> tuple[MisfitPosterior, NoiseModel, float]:
+        found = posterior(noise, data, problem.effects(noise), contexts, beliefs)
+        found, noise = _with_noise_settled(problem, found, noise)
+        return found, noise, found.log_evidence + _as_slips(noise, beliefs)
+
+    found, settled, likely = settled_from(noise)
+    if np.sum(beliefs.slip_odds(noise.distance) > 0.0) > 1:
+        # Rows that one effect moves together are no scatter, however far out.
+        other = settled_from(build_noise(data, problem.rows, far=np.inf))
+        if other[2] > likely + beliefs.odds:
+            found, settled = other[:2]
+    finding = Finding(problem, _concluded(problem, found), settled)
+    return replace(finding, noise=_settled(finding))
+
+
+def _as_slips(noise: NoiseModel, beliefs: Beliefs) -> float:
+    """Logarithm of how much less likely far rows are as entry errors than as what was made of their
+    scatter.
+    """
+    far = noise.distance > FAR
+    odds = beliefs.slip_odds(noise.distance)[far]
+    out = noise.distance[far]
+    return float(np.sum(np.logaddexp(odds, 0.0) - 0.5 * (out**2 - FAR**2) + np.log(out / FAR)))
+
+
+def _with_noise_settled(
+    problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel
+) -> tuple[MisfitPosterior, NoiseModel]:
+    """Estimate the noise again beside what is found, until the same is likeliest again."""
     for _ in range(_ROUNDS - 1):
         before = found.likeliest[0]
         noise = _noise_beside(problem, found.expected_in)
-        found = posterior(noise, data, problem.effects(noise), contexts, problem.beliefs, [before])
+        effects = problem.effects(noise)
+        found = posterior(
+            noise, problem.expected, effects, found.contexts, problem.beliefs, [before]
+        )
         after = found.likeliest[0]
         if (before.context, before.members) == (after.context, after.members):
             break
-    finding = Finding(problem, _concluded(problem, found), noise)
-    return replace(finding, noise=_settled(finding))
+    return found, noise
 
 
 def _settled(finding: Finding) -> NoiseModel:

@@ -178,13 +178,15 @@ def less_expected(misfit: Array, predicted_in: Array) -> Array:
     return misfit - EXPECTED_SLOPE * predicted_in
 
 
-def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:
+def build_noise(
+    misfit: Array, rows: Rows, explained: Array | None = None, far: float = FAR
+) -> NoiseModel:
     """Estimate the noise from the misfit; effects of unknown size, and of the curve, are not
-    scatter but its doubt.
+    scatter but its doubt. Rows further out than `far` standard deviations scatter more than others.
     """
     rest = misfit if explained is None else misfit - explained
     wide = rows.along_in
-    noise = _scatter(rest, rest, rows)
+    noise = _scatter(rest, rest, rows, far)
     gears = numbered(rows.gears)
     unread = rows.unread_in if rows.unread_in.any() else np.empty((len(rest), 0))
     for _ in range(_ROUNDS if wide.size + unread.size else 0):
@@ -193,11 +195,11 @@ def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> No
         alone = left - known.share_of(unread, rest)
         if unread.size:
             alone = alone - known.share_of_groups(rows.u_shared_in, gears, rest)
-        noise = _scatter(left, alone, rows)
+        noise = _scatter(left, alone, rows, far)
     return noise.with_effects(wide) if wide.size else noise
 
 
-def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
+def _scatter(rest: Array, alone: Array, rows: Rows, far: float) -> NoiseModel:
     """Noise of the rows; `alone` is the residual without what unread joints most likely add to
     gears. [in]
     """
@@ -215,7 +217,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     gears = numbered(rows.gears)
     relative = np.hypot(relative, rows.u_filled_in / scale)
     # Rows far out in the tails of the distribution count less, but never as nothing.
-    relative = relative * np.maximum(1.0, np.abs(centred) / (scale * relative) / FAR)
+    far_out = np.maximum(1.0, np.abs(centred) / (scale * relative) / far)
     bias = [
         np.full(len(rest), BIAS_IN / scale),
         SLOPE * predicted / scale,
@@ -223,7 +225,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     ]
     loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, HABIT * rows.trends])
     noise = NoiseModel(
-        relative,
+        relative * far_out,
         numbers,
         gears,
         loadings,
@@ -233,6 +235,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
         scale,
         tail_chances=_TAIL_CHANCES,
         of_gear=rows.u_shared_in / scale if rows.u_shared_in.any() else None,
+        far_out=far_out,
     )
     standard = rest / scale
     usual = [USUAL_RATIO * levels for levels in rows.readers]

@@ -10,6 +10,8 @@ from statistics import NormalDist
 
 import numpy as np
 
+from mlg_troubleshoot.arrays import Array
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Beliefs:
@@ -66,6 +68,20 @@ class Beliefs:
     def odds(self) -> float:
         """Logarithm of the odds from which something is said. [1]"""
         return float(np.log(self.sure / (1.0 - self.sure)))
+
+    def slip_odds(self, distance: Array) -> Array:
+        """Logarithm of the odds that each row of a table is an entry error rather than scatter.
+
+        Parameters
+        ----------
+        distance : ndarray, shape (n,)
+            How far out each row lies, over the scatter of a row; 0 if it is not far out. All that
+            do may be errors, and as many as usual besides. [1]
+        """
+        wide = 1.0 + self.slip_size**2
+        share = (self.slips + np.count_nonzero(distance)) / len(distance)
+        square = np.asarray(distance) ** 2
+        return np.asarray(np.log(share) - 0.5 * (np.log(wide) - square * (1.0 - 1.0 / wide)))
 
     def seen_from(self, often: float, n: int) -> float:
         """Size of an effect over the error of its mean, from which n rows make it likelier than

@@ -60,6 +60,9 @@ class NoiseModel:
     of_tail : ndarray, shape (n, k), optional
         Further scatter that the rows of a tail have in common, column by column and independent of
         each other, each row in its own measure. [1]
+    far_out : ndarray, shape (n,), optional
+        How many times wider a row's scatter was made, because it lies so much further out than
+        `FAR` standard deviations. [1]
     """
 
     relative: Array
@@ -77,6 +80,7 @@ class NoiseModel:
     correlation: float = 0.0
     of_gear: Array | None = None
     of_tail: Array | None = None
+    far_out: Array | None = None
     _roots: dict[float, _Root] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
@@ -94,6 +98,13 @@ class NoiseModel:
     def with_tails(self, ratio: float) -> NoiseModel:
         """The same with one ratio of the scatter between tails."""
         return replace(self, tail_ratios=(ratio,), tail_chances=())
+
+    @property
+    def distance(self) -> Array:
+        """How far out the rows lie whose scatter was made wider, over what it was; 0 for others."""
+        if self.far_out is None:
+            return np.zeros(len(self.relative))
+        return np.where(self.far_out > 1.0, FAR * self.far_out, 0.0)
 
     def floored(self, square: Array) -> Array:
         """Add what no row can be better than to a residual sum of squares."""

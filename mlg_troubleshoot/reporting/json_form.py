@@ -242,6 +242,10 @@ def diagnosis_as_json(
             "looks_like_noise": d.remainder_is_noise,
             "rms_in": d.residual_u_in,
             "expected_from_gauges_in": d.expected_scatter_in,
+            "rows_far_off": [
+                {"record_id": d.used.record_id[place], "residual_in": left}
+                for place, left in d.far_off_in.items()
+            ],
         },
         warnings=warnings,
     )

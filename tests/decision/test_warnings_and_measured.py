@@ -58,6 +58,24 @@ def test_limits_in_place_of_readings_are_asked_about(judge: Judge, c3: float, as
     assert said(found.warnings, "limits were written in place of readings") is asked
 
 
+@pytest.mark.parametrize(
+    ("clearances", "asked"),
+    [
+        (every_joint(0.002), True),
+        (every_joint(0.002, j3=0.0025), False),
+        (every_joint(0.0), False),
+        (every_joint(0.0075), False),
+        (dict.fromkeys(range(1, 6), 0.002), True),
+        (dict.fromkeys(range(1, 5), 0.002), False),
+    ],
+)
+def test_one_value_in_five_joints_or_more_is_asked_about(
+    judge: Judge, clearances: dict[int, float], asked: bool
+) -> None:
+    said_so = "Every clearance is 0.0020 in, hardly a reading of each joint"
+    assert said(judge(clearances).warnings, said_so) is asked
+
+
 def test_the_limit_is_said_to_be_assumed(judge: Judge) -> None:
     assert said(judge(every_joint(0.0, j7=0.008)).warnings, "(assumed)")
 

@@ -50,7 +50,7 @@ def test_the_joints_explain_a_reading_at_their_worst_directions_though_no_random
 
 def test_a_joint_that_was_read_twice_is_known_to_be_worn_or_not(gear: Gear) -> None:
     found = causes_of(gear, {3: 0.013, 5: 0.001}, readings_in=(0.036,), measured_again=(3,))
-    assert found.worn[0, [2, 4]].tolist() == [1.0, 0.0]
+    assert found.worn[0, [2, 4]].tolist() == pytest.approx([1.0, 0.0])
     assert ((found.worn[0, [0, 6]] > 0.0) & (found.worn[0, [0, 6]] < 1.0)).all()
 
 

@@ -219,6 +219,9 @@ class RiggingOffset(RowShift):
     sentence = "The plunger rod of {target} was re-rigged"
     inspect = "Plunger rod length and rigging record of that gear"
     separates = "rigging check of that gear: plunger at Down Lock and at mid-position"
+    # A third of it to three times as much: from what a locknut leaves to half a turn of a rod end
+    # with 28 threads to the inch. [in]
+    plausible = 5e-3
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield each aircraft and each single gear, over all its rows and from each possible day
