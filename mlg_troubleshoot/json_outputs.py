@@ -575,6 +575,7 @@ class LifeOutput(TypedDict):
     next_inspection_landings: float | None
     due_date: str | None
     advice: HitRate
+    notes: list[str]
     warnings: list[str]
 
 

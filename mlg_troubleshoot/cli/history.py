@@ -230,6 +230,8 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     headings = ("date", "landings>", "record", "hash", "what")
     output.print_table(console, headings, events, ("hash", "record"))
     show_warnings(console, [life])
+    for note in life.notes:
+        console.print(note)
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
     _show_joints(console, life, values["joints"], ahead, gear)

@@ -4,28 +4,44 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
-from math import inf
+from math import hypot, inf
 
 from mlg_troubleshoot.decision.inspection import Inspection
 
 # More records than this are not listed in one sentence. [1]
 _MOST_NAMED = 6
+# An overhaul restores at least so many joints. [1]
+_SEVERAL = 3
+# Standard deviations of a difference by which a joint clearly reads tighter, or wider. [1]
+_CLEARLY = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Date (ISO 8601, empty if not known) and landings of one inspection or repair."""
+    """Date (ISO 8601, empty if not known) and landings of one inspection or repair, with what was
+    read, if it is an inspection, or the joints that were restored.
+    """
 
     day: str
     landings: float | None
+    inspection: Inspection | None = field(default=None, repr=False)
+    restored: frozenset[int] = frozenset()
 
     @classmethod
     def of(cls, inspection: Inspection) -> Moment:
         day = inspection.inspection_date
-        return cls("" if day is None else day.isoformat(), inspection.gear_landings)
+        return cls("" if day is None else day.isoformat(), inspection.gear_landings, inspection)
+
+    @property
+    def read(self) -> Mapping[int, tuple[float, float]]:
+        """Radial clearance of each joint that was read, and its standard uncertainty. [in]"""
+        if self.inspection is None:
+            return {}
+        found = self.inspection.clearance_in
+        return {joint: (found[joint], self.inspection.gauge_u_of(joint)) for joint in found}
 
 
 def in_order(moments: Sequence[Moment]) -> list[int]:
@@ -53,16 +69,76 @@ def in_order(moments: Sequence[Moment]) -> list[int]:
     return sorted(dated + undated, key=lambda place: at[place])
 
 
+def overhauls(moments: Sequence[Moment]) -> dict[int, frozenset[int]]:
+    """Places from which the landings of a gear begin anew, and the joints that were restored there
+    as readings and records tell.
+
+    At an overhaul the two landings before are above the two after, so that one mistyped number
+    begins nothing, and several joints are restored: a record says so, or they clearly read tighter,
+    and no other joint wider.
+    """
+    placed = _placed(moments)
+    landings = [moments[i].landings or 0.0 for i in placed]
+    falls = [n for n in range(1, len(placed)) if landings[n] < landings[n - 1]]
+    found = {}
+    begun = 0
+    for n, end in pairwise([*falls, len(placed)]):
+        if min(landings[max(begun, n - 2) : n]) > max(landings[n : min(end, n + 2)]):
+            restored = _restored(moments, placed[begun:n], placed[n:end])
+            if len(restored) >= _SEVERAL:
+                found[placed[n]] = restored
+                begun = n
+    return found
+
+
+def _placed(moments: Sequence[Moment]) -> list[int]:
+    """Places of what states both date and landings, by date."""
+    found = [i for i, moment in enumerate(moments) if moment.day and moment.landings is not None]
+    return sorted(found, key=lambda i: (moments[i].day, moments[i].landings))
+
+
+def _restored(
+    moments: Sequence[Moment], before: Sequence[int], after: Sequence[int]
+) -> frozenset[int]:
+    """Joints that were restored between two stretches of a life; none if another one reads
+    wider.
+    """
+    days = moments[before[-1]].day, moments[after[0]].day
+    recorded = (m.restored for m in moments if days[0] <= m.day <= days[1])
+    restored = frozenset[int]().union(*recorded)
+    last = {joint: reading for i in before for joint, reading in moments[i].read.items()}
+    first = {joint: reading for i in after[::-1] for joint, reading in moments[i].read.items()}
+    tighter = set(restored)
+    for joint in (last.keys() & first.keys()) - restored:
+        (was, was_u), (reads, u) = last[joint], first[joint]
+        clearly = _CLEARLY * hypot(was_u, u)
+        if reads > was + clearly:
+            return frozenset()
+        if reads < was - clearly:
+            tighter.add(joint)
+    return frozenset(tighter)
+
+
 def contradictions(moments: Sequence[Moment], name: Callable[[int], str]) -> dict[int, str]:
     """Say of each record that may be wrong how its date and its landings disagree with those of the
-    others.
+    others between the same overhauls.
 
     Suspect is what has to go so that the landings of the others never fall as time goes on: the
     fewest records that do. Where several choices are as few, every record of any of them is a
     suspect, and they share one sentence.
     """
-    placed = [i for i, moment in enumerate(moments) if moment.day and moment.landings is not None]
-    placed.sort(key=lambda i: (moments[i].day, moments[i].landings))
+    placed = _placed(moments)
+    begins = [0, *(placed.index(place) for place in overhauls(moments)), len(placed)]
+    found: dict[int, str] = {}
+    for start, end in pairwise(begins):
+        found |= _disagreements(moments, placed[start:end], name)
+    return found
+
+
+def _disagreements(
+    moments: Sequence[Moment], placed: Sequence[int], name: Callable[[int], str]
+) -> dict[int, str]:
+    """The contradictions of the records between two overhauls."""
     landings = [moments[i].landings or 0.0 for i in placed]
     if landings == sorted(landings):
         return {}

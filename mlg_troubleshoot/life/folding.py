@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import inf
 from typing import Any
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side, plain_tail
+from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order
+from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order, overhauls
 from mlg_troubleshoot.store import (
     Judge,
     Record,
@@ -78,6 +79,8 @@ class GearLife:
 
     warnings: the records whose dates and landings disagree, and how to correct them; with any of
     them nothing is forecast.
+    overhauls: events from which landings begin anew, by their place, with the joints that were
+    restored there.
     """
 
     key: GearKey
@@ -85,10 +88,20 @@ class GearLife:
     events: tuple[Event, ...]
     outcomes: tuple[Record, ...]
     warnings: tuple[str, ...]
+    overhauls: Mapping[int, frozenset[int]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
         return " ".join(self.key)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be known of its history: from where its landings begin anew."""
+        return tuple(
+            f"Landings begin anew on {_moment(self.events[place]).day}: taken as an overhaul that"
+            f" restored {joint_list(sorted(joints))}. Landings before it are negative here."
+            for place, joints in self.overhauls.items()
+        )
 
     @cached_property
     def inspections(self) -> tuple[KeptInspection, ...]:
@@ -239,12 +252,14 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     events: list[Event] = [*kept.values(), *repairs]
     events.sort(key=lambda event: _record_of(event).seq)
     moments = [_moment(event) for event in events]
+    order = in_order(moments)
     return GearLife(
         key,
         tuple(records),
-        tuple(events[place] for place in in_order(moments)),
+        tuple(events[place] for place in order),
         tuple(r for r in others.values() if r.kind is RecordKind.OUTCOME),
         _disagreements(key, events, moments),
+        overhauls([moments[place] for place in order]),
     )
 
 
@@ -268,7 +283,8 @@ def _record_of(event: Event) -> Record:
 def _moment(event: Event) -> Moment:
     if isinstance(event, KeptInspection):
         return event.moment
-    return Moment(event.day, event.body.get("landings"))
+    joints = frozenset(event.body.get("joints", ()))
+    return Moment(event.day, event.body.get("landings"), restored=joints)
 
 
 def _disagreements(
@@ -292,7 +308,9 @@ def _disagreements(
             remedy += ", then mlg history repair"
         else:
             remedy = f"mlg history correct {record} FILE, or {remedy}"
+        gear = " ".join(key)
         warnings.append(
-            f"{' '.join(key)}: {sentence}. No forecast until this is corrected: {remedy}"
+            f"{gear}: {sentence}. No forecast until this is corrected: {remedy}. After an overhaul"
+            f" record its joints: mlg history repair {gear} --joint N --date D"
         )
     return tuple(warnings)

@@ -198,13 +198,9 @@ def _due_date(life: GearLife, ahead: Forecast) -> str | None:
     latest = date.fromisoformat(last.record.day).toordinal()
     days = 0.0
     if not ahead.due_now:
-        placed = placed_in_time(life)
-        if not placed:
-            return None
-        (first, least), (newest, most) = placed[0], placed[-1]
-        passed = newest - first
-        flown = most - least
-        if flown <= 0.0 or passed <= 0:
+        eras = [np.array(era) for era in placed_in_time(life) if era]
+        passed, flown = np.sum([np.zeros(2), *(era[-1] - era[0] for era in eras)], axis=0).tolist()
+        if flown <= 0.0 or passed <= 0.0:
             return None
         days = ahead.next_inspection_landings * passed / flown
     if latest + days >= date.max.toordinal():

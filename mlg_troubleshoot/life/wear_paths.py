@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
+from operator import itemgetter
 
 import numpy as np
 
@@ -16,11 +17,18 @@ from mlg_troubleshoot.wear import WearPath
 @dataclass(slots=True)
 class Stretch:
     """What was read of a joint between two restorations: landings (None: not stated), clearance and
-    its uncertainty.
+    its uncertainty. Landings before the last overhaul are negative.
     """
 
     begun: float
     readings: list[tuple[float | None, float, float]]
+
+    def count_from(self, landings: float) -> None:
+        """Count landings from these on."""
+        self.begun -= landings
+        self.readings = [
+            (None if at is None else at - landings, value, u) for at, value, u in self.readings
+        ]
 
     @property
     def placed(self) -> list[tuple[float, float, float]]:
@@ -31,9 +39,13 @@ class Stretch:
 def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]:
     """Readings of each joint between its restorations, in the order of time."""
     found = {joint: [Stretch(0.0, [])] for joint in joints}
-    for event in life.events:
+    landings = 0.0
+    for place, event in enumerate(life.events):
+        if place in life.overhauls:
+            _begin_anew(found, life.overhauls[place], landings)
         if isinstance(event, KeptInspection):
             read = event.inspection
+            landings = landings if read.gear_landings is None else read.gear_landings
             for joint, clearance in read.clearance_in.items():
                 if joint in found:
                     reading = (read.gear_landings, clearance, read.gauge_u_of(joint))
@@ -44,6 +56,17 @@ def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]
                 begun = found[joint][-1].begun if at is None else at
                 found[joint].append(Stretch(begun, []))
     return found
+
+
+def _begin_anew(
+    found: Mapping[int, list[Stretch]], restored: Collection[int], landings: float
+) -> None:
+    """Count landings from an overhaul on, after which restored joints begin anew."""
+    for joint, between in found.items():
+        for stretch in between:
+            stretch.count_from(landings)
+        if joint in restored:
+            between.append(Stretch(0.0, []))
 
 
 def newest_readings(life: GearLife, joints: Sequence[int]) -> dict[int, float]:
@@ -87,13 +110,17 @@ def unit_of(key: GearKey, joint: int) -> str:
     return f"{key[0]} {key[1]} #{joint}"
 
 
-def placed_in_time(life: GearLife) -> list[tuple[int, float]]:
-    """Day and landings of the inspections that state both."""
-    return [
-        (date.fromisoformat(kept.record.day).toordinal(), kept.inspection.gear_landings)
-        for kept in life.inspections
-        if kept.record.day and kept.inspection.gear_landings is not None
-    ]
+def placed_in_time(life: GearLife) -> list[list[tuple[int, float]]]:
+    """Day and landings of the inspections that state both, those between two overhauls together."""
+    found: list[list[tuple[int, float]]] = [[]]
+    for place, event in enumerate(life.events):
+        if place in life.overhauls:
+            found.append([])
+        if isinstance(event, KeptInspection):
+            at = event.inspection.gear_landings
+            if event.record.day and at is not None:
+                found[-1].append((date.fromisoformat(event.record.day).toordinal(), at))
+    return found
 
 
 def _landings_of(record: Record, life: GearLife) -> float | None:
@@ -101,8 +128,10 @@ def _landings_of(record: Record, life: GearLife) -> float | None:
     stated = record.body.get("landings")
     if stated is not None:
         return float(stated)
-    dated = placed_in_time(life)
-    if not dated or not record.day:
+    eras = [era for era in placed_in_time(life) if era]
+    if not eras or not record.day:
         return None
-    days, landings = zip(*dated, strict=True)
-    return float(np.interp(date.fromisoformat(record.day).toordinal(), days, landings))
+    day = date.fromisoformat(record.day).toordinal()
+    own = max((era for era in eras if era[0][0] <= day), key=itemgetter(0), default=eras[0])
+    days, landings = zip(*own, strict=True)
+    return float(np.interp(day, days, landings))

@@ -100,11 +100,12 @@ def fleet_picture(places: Sequence[GearInPicture]) -> Markup:
 
 @dataclass(frozen=True, slots=True)
 class WearInTime:
-    """Clearances over landings to the end of a plot: readings between restorations up to the last
-    inspection, then the forecast.
+    """Clearances over landings from the start of a plot to its end: readings between restorations
+    up to the last inspection, then the forecast.
     """
 
     between: dict[int, list[Stretch]]
+    first: float
     last: float
     end: float
     ahead: Forecast
@@ -118,11 +119,18 @@ class WearInTime:
         between = {n: s for n, s in known.items() if any(each.placed for each in s)}
         if not between:
             return None
-        last = max(at for of in between.values() for each in of for at, *_ in each.placed)
+        read = [at for of in between.values() for each in of for at, *_ in each.placed]
+        last = max(read)
         restored = max(each.begun for of in between.values() for each in of)
         due = ahead.next_inspection_landings or 0.0
         end = max(last * 1.4, last + 2.0 * due, restored, 1.0)
-        return cls(between, last, end, ahead)
+        begun = [each.begun for of in between.values() for each in of[1:]]
+        return cls(between, min(0.0, *read, *begun), last, end, ahead)
+
+    def restored(self, number: int) -> list[float]:
+        """Landings at which a joint was restored, as far as they are known."""
+        new, *others = self.between[number]
+        return sorted({each.begun for each in others} - {new.begun})
 
     def expected(self, number: int, gear: Gear, places: int) -> tuple[Array, Array] | None:
         """Landings from the last inspection on, and the 5, 50 and 95 % quantiles at each. [in]"""
@@ -175,7 +183,6 @@ def _panel(
     lengths: Lengths,
 ) -> None:
     between = wear.between[number]
-    end = wear.end
     joint = gear.joint(number)
     shown = lengths.unit.from_inches
     limit = shown(joint.limit.value)
@@ -183,7 +190,7 @@ def _panel(
     x = _PANEL_WIDE * (place % 2)
     y = _PANEL_HIGH * (place // 2)
     clearances = Axis("", 0.0, 1.15 * max(limit, most))
-    plot = Plot(canvas, Axis("landings", 0.0, end), clearances)
+    plot = Plot(canvas, Axis("landings", wear.first, wear.end), clearances)
     plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
     canvas.text(x + 52, y + 13, f"#{number} {joint.name}, {lengths.unit}", bold=True)
     expected = wear.expected(number, gear, 25)
@@ -198,14 +205,14 @@ def _panel(
         canvas.polyline(edges, fill=PALE, colour=None, closed=True)
         plot.draw(Series("", tuple(ahead_at), tuple(middle), "2 2", ACCENT))
     plot.draw_axes(5)
-    plot.draw(Series("", (0.0, end), (limit, limit), "5 3", _RED))
+    plot.draw(Series("", (wear.first, wear.end), (limit, limit), "5 3", _RED))
+    for begun in wear.restored(number):
+        base = plot.at(begun, 0.0)
+        top_y = plot.at(begun, plot.y.high)
+        canvas.line(*base, *top_y, colour=SOFT, dash="1 3")
+        canvas.marker("triangle", *base, 4.5)
     for each in between:
         placed = [(at, shown(value)) for at, value, _u in each.placed]
-        if each.begun:
-            base = plot.at(each.begun, 0.0)
-            top_y = plot.at(each.begun, plot.y.high)
-            canvas.line(*base, *top_y, colour=SOFT, dash="1 3")
-            canvas.marker("triangle", *base, 4.5)
         usage = tuple(at for at, _ in placed)
         values = tuple(value for _, value in placed)
         plot.draw(Series("", usage, values))

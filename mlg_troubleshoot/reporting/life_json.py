@@ -108,6 +108,7 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
             for number, between in stretches(life, gear.joint_numbers).items()
         ],
         advice=_advice(Advice.of([life])),
+        notes=life.notes,
         warnings=life.warnings,
     )
 

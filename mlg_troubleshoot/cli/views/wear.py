@@ -26,7 +26,7 @@ def wear_lines(life: GearLife, ahead: Forecast, gear: Gear, width: int) -> Itera
     room = width - 4
 
     def column(landings: float) -> int:
-        return round(landings / wear.end * (room - 1))
+        return round((landings - wear.first) / (wear.end - wear.first) * (room - 1))
 
     for number, between in wear.between.items():
         limit = gear.joint(number).limit.value
@@ -34,12 +34,12 @@ def wear_lines(life: GearLife, ahead: Forecast, gear: Gear, width: int) -> Itera
         expected = wear.expected(number, gear, room)
         for at, (_low, middle, high) in () if expected is None else zip(*expected, strict=True):
             drawn[column(at)] = "×" if middle > limit else "?" if high > limit else "·"
+        for begun in wear.restored(number):
+            drawn[column(begun)] = "^"
         for stretch in between:
-            if stretch.begun:
-                drawn[column(stretch.begun)] = "^"
             for at, value, _u in stretch.placed:
                 level = _LEVELS[min(int(8.0 * value / limit), 7)]
                 drawn[column(at)] = "!" if value > limit else level
         yield f"#{number:<3}{''.join(drawn)}".rstrip()
-    yield f"{'landings 0':<{room - 4}}{wear.end:>8.0f}"
+    yield f"{f'landings {wear.first:.0f}':<{room - 4}}{wear.end:>8.0f}"
     yield LEGEND
