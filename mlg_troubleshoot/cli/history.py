@@ -383,7 +383,7 @@ def correct(
     *,
     record: RecordId,
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A table with the one corrected inspection.")
+        Path, typer.Argument(metavar="FILE", help="A table with the corrected inspection.")
     ],
     records: options.Records,
     unit: options.Unit = None,
@@ -397,9 +397,10 @@ def correct(
 
     asked = CheckOptions(gear=records.gear, unit=unit, convention=convention, sheet=sheet)
     result = check_files([file], asked)
-    notes.show_problems(result.problems)
     place = records.kept
-    added = keep.correct(place, record, result, asked)
+    wrong, result = keep.row_of(place, record, result)
+    notes.show_problems(result.problems)
+    added = keep.correct(place, wrong, result, asked)
     _say_added(place, f"correction of {record} ({added.tail_no} {added.side})", added)
 
 

@@ -579,8 +579,8 @@ class Store:
                 more = f" and {len(others) - 5} more" if len(others) > 5 else ""
                 raise StoreError(
                     f"kept already with other content: {named}{more}; nothing of this was kept",
-                    "If the new one is right: mlg history correct RECORD FILE. If it is another"
-                    " inspection, give it its own record_id or date.",
+                    "If the new one is right: mlg history correct RECORD FILE, where FILE may be"
+                    " this table. If it is another inspection, give it its own record_id or date.",
                 )
         return Added(added, total - added)
 

@@ -91,11 +91,14 @@ def inspection_from(record: Record) -> Inspection:
     return Inspection(**{"clearance_in": {}, "other_columns": other, **read})
 
 
-def same_inspection(one: Record, two: Record) -> bool:
-    """Tell whether two records say the same was found, wherever it was entered."""
+def same_inspection(one: Record, two: Record, but: str = "") -> bool:
+    """Tell whether two records say the same was found, wherever it was entered, whatever they say
+    in one of their fields.
+    """
 
     def content(record: Record) -> dict[str, Any]:
         inspection = record.body.get("inspection", {})
-        return {name: value for name, value in inspection.items() if name not in _NOT_CONTENT}
+        beside = {*_NOT_CONTENT, but}
+        return {name: value for name, value in inspection.items() if name not in beside}
 
     return content(one) == content(two)

@@ -8,7 +8,12 @@ from itertools import islice
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
-from mlg_troubleshoot.decision.inspection import Inspection, plain_tail, surely_later
+from mlg_troubleshoot.decision.inspection import (
+    Inspection,
+    RowSource,
+    plain_tail,
+    surely_later,
+)
 from mlg_troubleshoot.decision.judge_rows import AT_ONCE
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -90,9 +95,8 @@ def keep(
     records = Blocks[Record]()
     first: dict[bytes, bytes] = {}
     stood = done = 0
-    each = zip(
-        judged, written(), map(inspection_record, _under_first_ids(written(), store)), strict=True
-    )
+    made_records = map(inspection_record, _under_first_ids(written(), store))
+    each = zip(judged, written(), _under_first_days(made_records, store), strict=True)
     while block := list(islice(each, AT_ONCE)):
         known = store.known([record.identity_hash for _entry, _row, record in block])
         stood += len(known.keys() - first.keys())
@@ -152,15 +156,33 @@ def _repairs_of(row: Inspection, store: Store) -> list[Record]:
     ]
 
 
-def correct(store: Store, record_id: str, result: CheckResult, options: CheckOptions) -> Record:
-    """Append the right inspection for a wrong one; the wrong one stays readable in the chain."""
+def row_of(store: Store, record_id: str, result: CheckResult) -> tuple[Record, CheckResult]:
+    """The record that is wrong, and what a check found of the row that is to take its place: the
+    only one of a table, or that with its id and gear.
+    """
     wrong = find(store, record_id)
+    if len(result.judgements) == 1:
+        return wrong, result
+    of_wrong = wrong.record_id, wrong.tail_no, wrong.side
+    own: list[Judgement] = []
+    places: list[RowSource] = []
+    for judged in result.judgements:
+        row = judged.inspection if isinstance(judged, Assessment) else judged.row
+        if of_wrong == (row.record_id, row.tail_no, row.side):
+            own.append(judged)
+            places.append(row.source)
+    problems = [p for p in result.problems if RowSource(p.file, p.sheet, p.row) in places]
+    return wrong, replace(result, judgements=tuple(own), problems=tuple(problems))
+
+
+def correct(store: Store, wrong: Record, result: CheckResult, options: CheckOptions) -> Record:
+    """Append the right inspection for a wrong one; the wrong one stays readable in the chain."""
     judged = [j for j in result.judgements if isinstance(j, Assessment)]
     if len(judged) != 1 or len(result.judgements) != 1:
         raise UsageError(
-            f"a correction needs exactly one inspection, and the file has {len(result.judgements)}"
-            f" ({len(judged)} valid)",
-            "Give a file with the corrected row alone.",
+            f"a correction needs one valid inspection {wrong.record_id} of {wrong.tail_no}"
+            f" {wrong.side}, and the file has {len(judged)}",
+            "Give a file with the corrected row alone, or a table in which it has this record_id.",
         )
     return supersede(store, wrong, result, options)
 
@@ -276,14 +298,46 @@ def _under_first_ids(inspections: Iterable[Inspection], store: Store) -> Iterato
         yield renamed if same_inspection(kept, inspection_record(renamed)) else inspection
 
 
+def _under_first_days(records: Iterable[Record], store: Store) -> Iterator[Record]:
+    """A record is a kept one of its id, with its day corrected, if that one has none, or if it says
+    what that one says, or what that was corrected to.
+    """
+    known = set(store.gears())
+    kept: dict[GearKey, dict[str, list[list[Record]]]] = {}
+    for record in records:
+        key = record.tail_no, record.side
+        if key not in kept:
+            kept[key] = _versions_by_id(store, key) if key in known else {}
+        own = kept[key].get(record.record_id, [])
+        redated = (
+            versions[0]
+            for versions in own
+            if not versions[-1].day
+            or any(same_inspection(each, record, "inspection_date") for each in versions)
+        )
+        first = None if any(v[0].day == record.day for v in own) else next(redated, None)
+        yield (
+            record
+            if first is None
+            else replace(record, identity=(record.record_id, *key, first.day))
+        )
+
+
+def _versions_by_id(store: Store, key: GearKey) -> dict[str, list[list[Record]]]:
+    """Each kept inspection of a gear, from its first entry to what it was last corrected to."""
+    life = life_of(store, *key)
+    found: dict[str, list[list[Record]]] = {}
+    for each in life.inspections:
+        versions = life.versions(each.record)
+        found.setdefault(versions[0].record_id, []).append(versions)
+    return found
+
+
 def _agrees(store: Store, kept: Record, new: Record) -> bool:
     """The same as kept, or as what the kept one was corrected to."""
-    return same_inspection(kept, new) or any(
-        record.kind is RecordKind.CORRECTION
-        and record.body["supersedes"] == kept.digest
-        and same_inspection(record, new)
-        for record in store.of_gear(kept.tail_no, kept.side)
-    )
+    every = _versions_by_id(store, (kept.tail_no, kept.side)).get(kept.record_id, [])
+    corrected = (versions for versions in every if versions[0].digest == kept.digest)
+    return any(same_inspection(each, new) for each in next(corrected, [kept]))
 
 
 def _settled_tails(
