@@ -310,17 +310,19 @@ def explain(problem: MisfitProblem) -> Finding:
     noise = build_noise(data, problem.rows)
     contexts = problem.contexts(noise.scale_in)
 
-    def settled_from(noise: NoiseModel) -> tuple[MisfitPosterior, NoiseModel, float]:
-        found = posterior(noise, data, problem.effects(noise), contexts, beliefs)
-        found, noise = _with_noise_settled(problem, found, noise)
-        return found, noise, found.log_evidence + _as_slips(noise, beliefs)
+    def found_under(noise: NoiseModel) -> MisfitPosterior:
+        return posterior(noise, data, problem.effects(noise), contexts, beliefs)
 
-    found, settled, likely = settled_from(noise)
+    found, settled = _with_noise_settled(problem, found_under(noise), noise)
     if np.sum(beliefs.slip_odds(noise.distance) > 0.0) > 1:
         # Rows that one effect moves together are no scatter, however far out.
-        other = settled_from(build_noise(data, problem.rows, far=np.inf))
-        if other[2] > likely + beliefs.odds:
-            found, settled = other[:2]
+        near = build_noise(data, problem.rows, far=np.inf)
+        other = found_under(near)
+        if other.names_of(other.likeliest[0]) != found.names_of(found.likeliest[0]):
+            other, near = _with_noise_settled(problem, other, near)
+            lead = other.log_evidence - found.log_evidence
+            if lead + _as_slips(near, beliefs) - _as_slips(settled, beliefs) > beliefs.odds:
+                found, settled = other, near
     finding = Finding(problem, _concluded(problem, found), settled)
     return replace(finding, noise=_settled(finding))
 
