@@ -352,8 +352,8 @@ def _warnings(
     read = [f.clearance_in for f in findings if f.clearance_in is not None]
     if all(f.clearance_in == f.limit_in for f in findings):
         warnings.append(sentences.LIMITS_WRITTEN)
-    else:
-        warnings += sentences.one_value(read)
+    elif len(read) >= sentences.LEAST_ALIKE and len(set(read)) == 1 and read[0] > 0.0:
+        warnings.append(sentences.one_value(read[0]))
     down_lock = inspection.plunger_down_lock_in
     low, high = gear.down_lock_range
     if down_lock is not None and not low <= down_lock <= high:

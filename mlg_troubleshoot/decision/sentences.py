@@ -74,17 +74,13 @@ STOP_FOR_TODAY = (
 RETRACT = "Retract the gear (trial retraction). Enter the outcome with its date and time."
 
 
-def one_value(read_in: Sequence[float]) -> list[str]:
-    """Say that all joints read one clearance that is not zero, if so many do. [in]"""
-    if len(read_in) < LEAST_ALIKE or len(set(read_in)) > 1 or read_in[0] <= 0.0:
-        return []
-    return [
-        Sentence.of(
-            "Every clearance is {}, hardly a reading of each joint: if they were filled in, the"
-            " verdict says nothing of this gear; enter what was read.",
-            Length(read_in[0]),
-        )
-    ]
+def one_value(read_in: float) -> str:
+    """Say that all joints read one clearance. [in]"""
+    return Sentence.of(
+        "Every clearance is {}, hardly a reading of each joint: if they were filled in, the"
+        " verdict says nothing of this gear; enter what was read.",
+        Length(read_in),
+    )
 
 
 def percent(share: float) -> str:
