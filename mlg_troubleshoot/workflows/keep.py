@@ -302,25 +302,36 @@ def _under_first_days(records: Iterable[Record], store: Store) -> Iterator[Recor
     """A record is a kept one of its id, with its day corrected, if that one has none, or if it says
     what that one says, or what that was corrected to.
     """
-    known = set(store.gears())
-    kept: dict[GearKey, dict[str, list[list[Record]]]] = {}
-    for record in records:
-        key = record.tail_no, record.side
-        if key not in kept:
-            kept[key] = _versions_by_id(store, key) if key in known else {}
-        own = kept[key].get(record.record_id, [])
-        redated = (
-            versions[0]
-            for versions in own
-            if not versions[-1].day
-            or any(same_inspection(each, record, "inspection_date") for each in versions)
-        )
-        first = None if any(v[0].day == record.day for v in own) else next(redated, None)
-        yield (
-            record
-            if first is None
-            else replace(record, identity=(record.record_id, *key, first.day))
-        )
+    every = iter(records)
+    gears = set(store.gears())
+    ids: dict[GearKey, set[str]] = {}
+    while block := list(islice(every, AT_ONCE)):
+        known = store.known([record.identity_hash for record in block])
+        for record in block:
+            key = record.tail_no, record.side
+            if record.identity_hash in known or key not in gears:
+                yield record
+                continue
+            if key not in ids:
+                ids[key] = {kept.record_id for kept in store.of_gear(*key)}
+            first = _redated(store, record) if record.record_id in ids[key] else None
+            yield (
+                record
+                if first is None
+                else replace(record, identity=(record.record_id, *key, first.day))
+            )
+
+
+def _redated(store: Store, record: Record) -> Record | None:
+    """The first entry of the inspection that a record is with another day."""
+    own = _versions_by_id(store, (record.tail_no, record.side)).get(record.record_id, [])
+    redated = (
+        versions[0]
+        for versions in own
+        if not versions[-1].day
+        or any(same_inspection(each, record, "inspection_date") for each in versions)
+    )
+    return next(redated, None)
 
 
 def _versions_by_id(store: Store, key: GearKey) -> dict[str, list[list[Record]]]:
@@ -335,9 +346,15 @@ def _versions_by_id(store: Store, key: GearKey) -> dict[str, list[list[Record]]]
 
 def _agrees(store: Store, kept: Record, new: Record) -> bool:
     """The same as kept, or as what the kept one was corrected to."""
+    if same_inspection(kept, new):
+        return True
     every = _versions_by_id(store, (kept.tail_no, kept.side)).get(kept.record_id, [])
-    corrected = (versions for versions in every if versions[0].digest == kept.digest)
-    return any(same_inspection(each, new) for each in next(corrected, [kept]))
+    return any(
+        same_inspection(each, new)
+        for versions in every
+        if versions[0].digest == kept.digest
+        for each in versions
+    )
 
 
 def _settled_tails(
