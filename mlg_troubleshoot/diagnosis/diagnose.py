@@ -456,6 +456,7 @@ def _explained(
 ) -> _Case:
     """Say what may explain the rows, and fit the likeliest explanation of what is said."""
     table = scene.table
+    _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
     candidates = list(offered(causes, scene, columns))
     if table.doubt:
         candidates = [replace(c, stands_in=not c.cause.is_distinct()) for c in candidates]
@@ -474,7 +475,6 @@ def _explained(
         if isinstance(cause, JointFactors)
         for block in cause.blocks(scene, ensemble)
     ]
-    _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
 
     problem = MisfitProblem(
         table.measured_in - scene.over_in,

@@ -26,7 +26,7 @@ from mlg_troubleshoot.misfit.conclusion import Conclusion
 from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
 from mlg_troubleshoot.misfit.fitting import fit
-from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
+from mlg_troubleshoot.misfit.posterior import MisfitPosterior, more_than_slips, posterior
 
 # The noise is estimated again from the residual as long as that changes the likeliest explanation,
 # so often at most.
@@ -305,26 +305,36 @@ class Finding:
 
 def explain(problem: MisfitProblem) -> Finding:
     """Say how likely each explanation of a table is, and what follows."""
-    data = problem.expected
-    beliefs = problem.beliefs
-    noise = build_noise(data, problem.rows)
+    noise = build_noise(problem.expected, problem.rows)
     contexts = problem.contexts(noise.scale_in)
-
-    def found_under(noise: NoiseModel) -> MisfitPosterior:
-        return posterior(noise, data, problem.effects(noise), contexts, beliefs)
-
-    found, settled = _with_noise_settled(problem, found_under(noise), noise)
-    if np.sum(beliefs.slip_odds(noise.distance) > 0.0) > 1:
-        # Rows that one effect moves together are no scatter, however far out.
-        near = build_noise(data, problem.rows, far=np.inf)
-        other = found_under(near)
-        if other.names_of(other.likeliest[0]) != found.names_of(found.likeliest[0]):
-            other, near = _with_noise_settled(problem, other, near)
-            lead = other.log_evidence - found.log_evidence
-            if lead + _as_slips(near, beliefs) - _as_slips(settled, beliefs) > beliefs.odds:
-                found, settled = other, near
+    first = posterior(noise, problem.expected, problem.effects(noise), contexts, problem.beliefs)
+    found, settled = _with_noise_settled(problem, first, noise)
+    slips = int(np.sum(problem.beliefs.slip_odds(noise.distance) > 0.0))
+    if slips > 1:
+        found, settled = _with_far_rows(problem, found, settled, slips)
     finding = Finding(problem, _concluded(problem, found), settled)
     return replace(finding, noise=_settled(finding))
+
+
+def _with_far_rows(
+    problem: MisfitProblem, found: MisfitPosterior, settled: NoiseModel, slips: int
+) -> tuple[MisfitPosterior, NoiseModel]:
+    """What is found, or what is likelier where rows that lie far out, some of them slips, count in
+    full: those that one effect moves together are no scatter.
+    """
+    beliefs = problem.beliefs
+    near = build_noise(problem.expected, problem.rows, far=np.inf)
+    given = near, problem.expected, problem.effects(near), found.contexts, beliefs
+    likeliest = found.likeliest[0]
+    if not more_than_slips(*given, likeliest, slips):
+        return found, settled
+    other = posterior(*given)
+    if other.names_of(other.likeliest[0]) == found.names_of(likeliest):
+        return found, settled
+    other, near = _with_noise_settled(problem, other, near)
+    lead = other.log_evidence - found.log_evidence
+    lead += _as_slips(near, beliefs) - _as_slips(settled, beliefs)
+    return (other, near) if lead > beliefs.odds else (found, settled)
 
 
 def _as_slips(noise: NoiseModel, beliefs: Beliefs) -> float:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, central_slopes, central_steps
+from mlg_troubleshoot.arrays import Array, central_slopes, central_steps, frozen
 from mlg_troubleshoot.errors import MechanismError
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Mechanism
@@ -131,9 +132,13 @@ class LinkageModel:
         """Amplification index A_iP of each joint to the plunger at mid-position (Eq. 8), for small
         clearances. [1]
         """
+        return self._amplification
+
+    @cached_property
+    def _amplification(self) -> Array:
         steps = central_steps(2 * len(self.joint_numbers))
         gradient = central_slopes(self.displacement(list(steps.T)))
-        return np.hypot(gradient[0::2], gradient[1::2])
+        return frozen(np.hypot(gradient[0::2], gradient[1::2]))
 
 
 def links_from(clearance_in: Array, directions: Array) -> list[Array]:

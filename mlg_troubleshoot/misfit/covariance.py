@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.sparse import csr_array
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.misfit.columns import ColumnBlock, EffectColumns
 
-# Sums over the rows of each group of one kind, and over all rows: R with V⁻¹ = P − Rᵀ R, P the
-# inverse of what each row scatters by itself; the logarithm of V's determinant.
-_Root = tuple[tuple[csr_array, ...], Array, float]
-
 # Computing only: rows times gears up to which a table is small.
 _SMALL = 100_000
+# Sums over the rows of each group, shape (groups, n).
+_Sums = csr_array | Array
+
 # Rows further out than this many standard deviations count less, and may be entry errors.
 FAR = 3.0
 
@@ -81,7 +79,6 @@ class NoiseModel:
     of_gear: Array | None = None
     of_tail: Array | None = None
     far_out: Array | None = None
-    _roots: dict[float, _Root] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
     def white(cls, n: int) -> NoiseModel:
@@ -184,68 +181,94 @@ class NoiseModel:
             free = replace(NoiseModel.white(len(data)), loadings=held)
             own, share = free.own_part(self.own(data[:, None])[:, 0])
             return self.relative * own, share
-        groups, low, _log = self._root(self.tail_ratios[-1])
-        taken = sum(root.power(2).sum(axis=0) for root in groups) + np.sum(low**2, axis=0)
-        own = data - self.relative**2 * self._in_common(data, self.tail_ratios[-1])
+        inverse = self._inverse
+        last = inverse.at(-1)
+        low = last.root[0] @ (inverse.low.T - (last.across[0] @ inverse.tails))
+        taken = np.sum(low**2, axis=0) + sum(_squared(root).sum(axis=0) for root in inverse.fixed)
+        taken = taken + last.weight[0] @ _squared(inverse.tails)
+        own = self.relative**2 * self._times(data[:, None], last)[0, :, 0]
         return own, float(1.0 - np.mean(self.relative**2 * taken))
 
     def factors(self, tail_ratio: float) -> Array:
         """Low-rank part of the covariance, shape (n, k). [1]"""
+        kinds = [*self._groups, (self.tails, np.full(len(self.relative), tail_ratio))]
         each = [
             scatter[:, None] * (group[:, None] == np.arange(group.max() + 1))
-            for group, scatter in self._groups(tail_ratio)
+            for group, scatter in kinds
+            if scatter.any()
         ]
         return np.hstack([*each, self.loadings])
 
-    def _groups(self, tail_ratio: float) -> list[tuple[Wholes, Array]]:
-        """Group of each row and what rows of one have in common, gears first. [1]"""
-        one = np.ones(len(self.relative))
-        found = [(self.gears, self.gear_ratio * one)]
+    @property
+    def _groups(self) -> list[tuple[Wholes, Array]]:
+        """Group of each row and what rows of one have in common, whatever tails scatter alike,
+        gears first. [1]
+        """
+        found = [(self.gears, np.full(len(self.relative), self.gear_ratio))]
         if self.of_gear is not None:
             found.append((self.gears, self.of_gear))
         if self.of_tail is not None:
             found.extend((self.tails, scatter) for scatter in self.of_tail.T)
-        found.append((self.tails, tail_ratio * one))
         return [(group, scatter) for group, scatter in found if scatter.any()]
 
     def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
-        """Multiply columns by the inverse covariance (Woodbury)."""
-        product = self._own_precision_times(columns) - self._in_common(columns, tail_ratio)
-        return product, self._root(tail_ratio)[2]
+        """Multiply columns by the inverse covariance with one ratio of the scatter between tails;
+        the logarithm of the covariance's determinant.
+        """
+        level = self._inverse.at(self.tail_ratios.index(tail_ratio))
+        return self._times(columns, level)[0], float(level.log_determinant[0])
 
-    def _in_common(self, columns: Array, tail_ratio: float) -> Array:
-        """What rows have in common, taken off their own part by the inverse covariance."""
-        groups, low, _log = self._root(tail_ratio)
-        found = low.T @ (low @ columns)
-        for root in groups:
-            found += root.T @ (root @ columns)
-        return found
+    def precisions_times(self, columns: Array) -> tuple[Array, Array]:
+        """The same with each ratio, shapes (levels, n, k) and (levels,)."""
+        levels = self._inverse.levels
+        return self._times(columns, levels), levels.log_determinant
+
+    def _times(self, columns: Array, levels: _Levels) -> Array:
+        """Multiply columns by the inverse covariance of some levels, (levels, n, k)."""
+        inverse = self._inverse
+        product = self._beside_tails(columns, inverse.fixed)
+        of_tails = inverse.tails @ columns
+        bent = levels.root @ (inverse.low.T @ columns - levels.across @ of_tails)
+        sizes = levels.root.swapaxes(1, 2) @ bent
+        in_tails = levels.weight[:, :, None] * (of_tails - inverse.low_of_tails @ sizes)
+        return np.array(
+            [
+                product - inverse.low @ own - inverse.tails.T @ alike
+                for own, alike in zip(sizes, in_tails, strict=True)
+            ]
+        )
+
+    def _beside_tails(self, columns: Array, fixed: Sequence[_Sums]) -> Array:
+        """Multiply columns by the inverse covariance of what rows scatter by themselves, and in
+        common with a group.
+        """
+        product = self._own_precision_times(columns)
+        for root in fixed:
+            product -= root.T @ (root @ columns)
+        return product
 
     def square(self, data: Array, tail_ratio: float) -> Array:
         """Squared length of data sets under the inverse covariance."""
-        groups, low, _log = self._root(tail_ratio)
-        own = self.own(data)
-        parts = (low @ data, *(root @ data for root in groups))
-        common = np.sum([np.einsum("ij,ij->j", part, part) for part in parts], axis=0)
-        return np.asarray(np.einsum("ij,ij->j", own, own) - common)
+        each: Array = self._squares(data)[self.tail_ratios.index(tail_ratio)]
+        return each
 
     def squares(self, columns: EffectColumns) -> Array:
         """The same of many columns, for each ratio of the scatter between tails, (levels, p)."""
-        roots = [self._root(ratio) for ratio in self.tail_ratios]
-        fixed = 0 if self._small or not self._nested else len(self._groups(0.0))
+        return columns.sums(self._squares)
 
-        def of_block(block: ColumnBlock) -> Array:
-            if self.correlation or isinstance(block, np.ndarray):
-                written = block if isinstance(block, np.ndarray) else block.toarray()
-                own = np.sum(self.own(written) ** 2, axis=0)
-            else:
-                own = np.asarray(self.relative**-2.0 @ (block * block))
-            for root in roots[0][0][:fixed]:
-                own = own - _all_squares((root,), block)
-            further = [(*groups[fixed:], low) for groups, low, _log in roots]
-            return np.array([own - _all_squares(parts, block) for parts in further])
-
-        return columns.sums(of_block)
+    def _squares(self, block: ColumnBlock) -> Array:
+        if self.correlation or isinstance(block, np.ndarray):
+            written = block if isinstance(block, np.ndarray) else block.toarray()
+            own = np.sum(self.own(written) ** 2, axis=0)
+        else:
+            own = np.asarray(self.relative**-2.0 @ (block * block))
+        inverse = self._inverse
+        levels = inverse.levels
+        for root in inverse.fixed:
+            own = own - _squared(root @ block).sum(axis=0)
+        of_tails = _written_out(inverse.tails @ block)
+        bent = levels.root @ (inverse.low.T @ block - levels.across @ of_tails)
+        return np.asarray(own - levels.weight @ of_tails**2 - np.sum(bent**2, axis=1))
 
     @cached_property
     def _nested(self) -> bool:
@@ -263,44 +286,118 @@ class NoiseModel:
         """True if sums over groups are soonest had with all rows written out."""
         return bool(len(self.relative) * (self.gears.max() + 1) <= _SMALL)
 
-    def _root(self, tail_ratio: float) -> _Root:
-        if tail_ratio in self._roots:
-            return self._roots[tail_ratio]
-        log_determinant = 2.0 * float(np.sum(np.log(self.relative)))
-        log_determinant += float(np.sum(np.log1p(-(self._steps[2] ** 2))))
-        groups: list[csr_array] = []
-        low = self.loadings if self._nested else self.factors(tail_ratio)
-
-        def beside_groups(columns: Array) -> Array:
-            product = self._own_precision_times(columns)
-            for root in groups:
-                product -= root.T @ (root @ columns)
-            return product
-
-        for group, scatter in self._groups(tail_ratio) if self._nested else ():
-            # Of gears within tails no two groups of one kind share a row: one column holds all.
-            weighted = beside_groups(scatter[:, None])[:, 0]
-            inner = 1.0 + np.bincount(group, scatter * weighted)
-            log_determinant += float(np.sum(np.log(inner)))
-            begins = np.r_[0, np.cumsum(np.bincount(group))]
-            rows = np.argsort(group, kind="stable")
-            values = (weighted / np.sqrt(inner)[group])[rows]
-            groups.append(csr_array((values, rows, begins), (len(inner), len(group))))
-        weighted = beside_groups(low)
-        lower = np.linalg.cholesky(np.eye(low.shape[1]) + low.T @ weighted)
-        log_determinant += 2.0 * float(np.sum(np.log(np.diag(lower))))
-        root = np.asarray(solve_triangular(lower, weighted.T, lower=True))
+    @cached_property
+    def _inverse(self) -> _Inverse:
+        ratios = np.array(self.tail_ratios)
+        alike = any(self.tail_ratios)
+        log = 2.0 * float(np.sum(np.log(self.relative)))
+        log += float(np.sum(np.log1p(-(self._steps[2] ** 2))))
+        fixed: list[_Sums] = []
+        tails: _Sums = np.empty((0, len(self.relative)))
+        low = self.loadings
+        scale = np.ones((len(ratios), low.shape[1]))
+        if self._nested:
+            for group, scatter in self._groups:
+                # Of gears within tails no two groups of one kind share a row: one column holds all.
+                weighted = self._beside_tails(scatter[:, None], fixed)[:, 0]
+                inner = 1.0 + np.bincount(group, scatter * weighted)
+                log += float(np.sum(np.log(inner)))
+                fixed.append(self._sums(group, weighted / np.sqrt(inner)[group]))
+            if alike:
+                one = np.ones((len(self.relative), 1))
+                tails = self._sums(self.tails, self._beside_tails(one, fixed)[:, 0])
+        else:
+            low = self.factors(float(alike))
+            scale = np.ones((len(ratios), low.shape[1]))
+            if alike:
+                end = low.shape[1] - self.loadings.shape[1]
+                scale[:, end - self.tails.max() - 1 : end] = ratios[:, None]
         if self._small:
-            root = np.vstack([root, *(own.toarray() for own in groups)])
-            groups = []
-        self._roots[tail_ratio] = tuple(groups), root, log_determinant
-        return self._roots[tail_ratio]
+            fixed = [np.vstack([_written_out(root) for root in fixed])] if fixed else []
+            tails = _written_out(tails)
+        total = np.asarray(tails.sum(axis=1))
+        inner = 1.0 + ratios[:, None] ** 2 * total
+        weight = ratios[:, None] ** 2 / inner
+        beside = self._beside_tails(low, fixed)
+        low_of_tails = np.asarray(tails @ low)
+        across = low_of_tails.T * weight[:, None, :]
+        pairs = low.T @ beside - across @ low_of_tails
+        lower = np.linalg.cholesky(
+            np.eye(low.shape[1]) + scale[:, :, None] * pairs * scale[:, None, :]
+        )
+        determinant = np.log(inner).sum(axis=1)
+        determinant += 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+        root = np.linalg.inv(lower) * scale[:, None, :]
+        levels = _Levels(weight, across, root, log + determinant)
+        return _Inverse(tuple(fixed), tails, beside, low_of_tails, levels)
+
+    def _sums(self, group: Wholes, values: Array) -> csr_array:
+        """Sums over the rows of each group, each row so many times."""
+        begins = np.r_[0, np.cumsum(np.bincount(group))]
+        rows = np.argsort(group, kind="stable")
+        return csr_array((values[rows], rows, begins), (len(begins) - 1, len(group)))
 
 
-def _all_squares(roots: Sequence[Any], block: ColumnBlock) -> Array:
-    """Sum of squares of all that roots make of each column."""
-    found = np.zeros(block.shape[1])
-    for root in roots:
-        product = root @ block
-        found += (product * product).sum(axis=0)
-    return found
+@dataclass(frozen=True)
+class _Levels:
+    """What the inverse covariances of some ratios of the scatter between tails do not share.
+
+    Attributes
+    ----------
+    weight : ndarray, shape (levels, tails)
+        What is taken off for each tail, times its sums.
+    across : ndarray, shape (levels, k, tails)
+        That of the loadings.
+    root : ndarray, shape (levels, k, k)
+        Root of the covariance of the sizes of the loadings.
+    log_determinant : ndarray, shape (levels,)
+        Logarithm of the covariance's determinant.
+    """
+
+    weight: Array
+    across: Array
+    root: Array
+    log_determinant: Array
+
+
+@dataclass(frozen=True)
+class _Inverse:
+    """Inverse covariances of all ratios of the scatter between tails (Woodbury).
+
+    With P the inverse of what rows scatter beside tails and loadings L, T the sums of P over each
+    tail, f its weight and S S' the covariance of the loadings' sizes:
+    V⁻¹ = P − T'f T − (P L − T'f T L) S S' (P L − T'f T L)'.
+
+    Attributes
+    ----------
+    fixed : tuple of _Sums
+        Roots of what P takes off for groups.
+    tails : _Sums
+        T.
+    low : ndarray, shape (n, k)
+        P L.
+    low_of_tails : ndarray, shape (tails, k)
+        T L.
+    levels : _Levels
+        What depends on the ratio.
+    """
+
+    fixed: tuple[_Sums, ...]
+    tails: _Sums
+    low: Array
+    low_of_tails: Array
+    levels: _Levels
+
+    def at(self, level: int) -> _Levels:
+        """One of the levels."""
+        each = (self.levels.weight, self.levels.across, self.levels.root)
+        one = [values[[level]] for values in (*each, self.levels.log_determinant)]
+        return _Levels(*one)
+
+
+def _squared(values: Any) -> Any:
+    return values * values
+
+
+def _written_out(values: Any) -> Array:
+    return values if isinstance(values, np.ndarray) else np.asarray(values.toarray())

@@ -56,8 +56,9 @@ def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
     n = len(data) - noise.absorbed
     k = columns.shape[1]
     best: Fit | None = None
-    for ratio, chance in noise.tail_levels:
-        product, log_determinant = noise.precision_times(np.column_stack([columns, data]), ratio)
+    every, determinants = noise.precisions_times(np.column_stack([columns, data]))
+    levels = zip(noise.tail_levels, every, determinants.tolist(), strict=True)
+    for (ratio, chance), product, log_determinant in levels:
         inner = columns.T @ product[:, :k]
         inverse = np.linalg.pinv(inner)
         values = inverse @ (columns.T @ product[:, k])

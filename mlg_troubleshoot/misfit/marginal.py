@@ -52,35 +52,33 @@ class Products:
         self.spread = np.maximum(factor * effects.size, effects.least) / noise.scale_in
         self.every_spread = np.repeat(self.spread, len(noise.tail_levels), axis=0)
         self.signed = np.flatnonzero(effects.sign)
-        weighted, log = self._weighted(data[:, None])
+        weighted, log = noise.precisions_times(data[:, None])
         self._weighted_data = weighted[:, :, 0]
         self.rest = self._weighted_data @ data
-        self.log = np.array(log) - 2.0 * np.array([chance for _r, chance in noise.tail_levels])
+        self.log = log - 2.0 * np.array([chance for _r, chance in noise.tail_levels])
         self.square = noise.squares(self.columns)
         self.along = self.columns.onto(self._weighted_data)
         self._cross: dict[int, Array] = {}
         self._onto: dict[int, Array] = {}
 
-    def _weighted(self, columns: Array) -> tuple[Array, list[float]]:
-        """Columns times the inverse covariance of each level, (levels, n, k)."""
-        found = [self.noise.precision_times(columns, ratio) for ratio, _c in self.noise.tail_levels]
-        return np.array([product for product, _log in found]), [log for _product, log in found]
-
     def cross(self, member: int) -> Array:
         """Products of all effects with one of them, shape (levels, p)."""
         if member not in self._cross:
-            self._cross[member] = self._held(self._weighted(self.columns.take([member]))[0])[:, 0]
+            weighted, _log = self.noise.precisions_times(self.columns.take([member]))
+            self._cross[member] = self._held(weighted)[:, 0]
         return self._cross[member]
 
     def _held(self, weighted: Array) -> Array:
         """Products of all effects with weighted columns, (levels, n, k): (levels, k, p)."""
-        return np.array([self.columns.onto(level.T) for level in weighted])
+        levels, n, k = weighted.shape
+        rows = weighted.swapaxes(1, 2).reshape(levels * k, n)
+        return self.columns.onto(rows).reshape(levels, k, self.columns.p)
 
     def onto(self, columns: Array) -> tuple[Array, Array, Array]:
         """Products of other columns with the effects, (levels, k, p), with the data, (levels, k),
         and with each other; those that contexts share are multiplied once.
         """
-        weighted = self._weighted(columns)[0]
+        weighted, _log = self.noise.precisions_times(columns)
         keys = [hash(column.tobytes()) for column in columns.T]
         new = [k for k, key in enumerate(keys) if key not in self._onto]
         products = self._held(weighted[:, :, new])

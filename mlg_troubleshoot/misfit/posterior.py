@@ -87,9 +87,35 @@ def posterior(
     """Search the likeliest sets of effects in all contexts, and sum the probability of all near
     them.
     """
-    search = _Search(noise, data, effects, contexts, beliefs, most)
+    # What a search works out of the noise goes with it.
+    search = _Search(replace(noise), data, effects, contexts, beliefs, most)
     search.run(start)
     return search.summed()
+
+
+def more_than_slips(
+    noise: NoiseModel,
+    data: Array,
+    effects: Effects,
+    contexts: Sequence[Context],
+    beliefs: Beliefs,
+    start: Explanation,
+    most: int,
+) -> bool:
+    """Tell whether an effect that has a name likely acts beside an explanation, once slips are
+    taken one by one, `most` of them, each as long as it is the likeliest further effect.
+    """
+    search = _Search(noise, data, effects, contexts, beliefs, len(start.members) + most)
+    members = frozenset(start.members)
+    while True:
+        search.extend(start.context, members)
+        at = search.extended[start.context, members]
+        (nearest, *_) = at.leading
+        if at.further[nearest] <= at.own.log_posterior:
+            return False
+        if effects.names[nearest] is not None:
+            return True
+        members |= {nearest}
 
 
 @dataclass
@@ -114,23 +140,28 @@ class _Search:
     _alone: dict[tuple[int, frozenset[int]], Explanation] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        given = self.effects, self.data, self.beliefs
-        products = Products(self.noise, *given)
-        self.marginals = [
-            Marginal(
-                products if each.of_tails_in is None else Products(each.behind(self.noise), *given),
-                each,
-            )
-            for each in self.contexts
-        ]
+        self.products = self._under(self.noise)
         self.once, self.number = self.effects.numbered
+        self._marginals: dict[int, Marginal] = {}
+
+    def _under(self, noise: NoiseModel) -> Products:
+        return Products(noise, self.effects, self.data, self.beliefs)
+
+    def marginal(self, number: int) -> Marginal:
+        """Likelihoods in one context, worked out when they are first asked for."""
+        if number not in self._marginals:
+            of = self.contexts[number]
+            wanders = of.of_tails_in is not None
+            products = self._under(of.behind(self.noise)) if wanders else self.products
+            self._marginals[number] = Marginal(products, of)
+        return self._marginals[number]
 
     def alone(self, context: int, members: frozenset[int]) -> Explanation:
         """One set on its own, exactly."""
         key = context, members
         if key not in self._alone:
             places = tuple(sorted(members))
-            self._alone[key] = self.marginals[context].explanation(context, places)
+            self._alone[key] = self.marginal(context).explanation(context, places)
         return self._alone[key]
 
     def extend(self, context: int, members: frozenset[int]) -> None:
@@ -139,7 +170,7 @@ class _Search:
         if key in self.extended:
             return
         places = tuple(sorted(members))
-        own, further, values = self.marginals[context].extended(context, places)
+        own, further, values = self.marginal(context).extended(context, places)
         own = self._alone.setdefault(key, own)
         taken = {int(self.number[k]) for k in members} - {0}
         further[np.isin(self.number, list(taken))] = -np.inf

@@ -5,13 +5,13 @@ Which groups have it and since when is not known: it is summed over all that may
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mlg_troubleshoot.arrays import Array, Wholes, log_sum
+from mlg_troubleshoot.arrays import Array, Wholes, log_sum, numbered
 from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 
@@ -38,10 +38,11 @@ class CommonStep:
     rarity: float
 
 
-def common_step(
-    groups: NDArray[np.str_], times: Array, data: Array, noise: NoiseModel, direction: float
-) -> CommonStep | None:
-    """Find the groups that have a step of one size, up or down; None if no step fits.
+def common_steps(
+    groups: NDArray[np.str_], times: Array, data: Array, noise: NoiseModel
+) -> tuple[CommonStep | None, CommonStep | None]:
+    """Find the groups that have a step of one size, up, and those that have one down; None where no
+    such step fits.
 
     Each has it or not with equal chance, from each of its times on with equal chance, its first one
     among them. Groups are independent but for the loadings of the noise and the size.
@@ -56,48 +57,49 @@ def common_step(
         Misfit. [unit of the data]
     noise : NoiseModel
         What rows scatter where nothing is wrong.
-    direction : float
-        +1 for steps up, −1 for steps down.
     """
-    offered = {group: np.unique(times[groups == group]) for group in np.unique(groups).tolist()}
-    variants = [(group, at) for group, own in offered.items() for at in own.tolist()]
+    rows_of = {group: groups == group for group in np.unique(groups).tolist()}
+    variants = [
+        (group, at) for group, rows in rows_of.items() for at in np.unique(times[rows]).tolist()
+    ]
     columns = EffectColumns.made(
-        len(data), ((groups == group) & (times >= at) for group, at in variants)
+        len(data), (rows_of[group] & (times >= at) for group, at in variants)
     )
-    group_of = np.repeat(np.arange(len(offered)), [len(own) for own in offered.values()])
+    group_of = numbered(np.array([group for group, _at in variants]))
     of_groups = replace(noise, loadings=noise.loadings[:, :0])
     squares = of_groups.squares(columns)
     known = np.column_stack([noise.loadings, data])
-    fitted: list[_Mixture] = []
-    for (ratio, log_chance), square in zip(of_groups.tail_levels, squares, strict=True):
-        product, log_determinant = of_groups.precision_times(known, ratio)
+    mixtures: list[_Mixture] = []
+    every = zip(of_groups.tail_levels, *of_groups.precisions_times(known), squares, strict=True)
+    for (_ratio, log_chance), product, log_determinant, square in every:
         inner = known.T @ product
         inner[-1, -1] = noise.floored(inner[-1, -1])
-        mixture = _Mixture(
-            inner,
-            columns.onto(product.T),
-            square,
-            group_of,
-            len(data),
-            log_chance - 0.5 * log_determinant,
-        )
-        if mixture.fit(direction):
-            fitted.append(mixture)
+        log = log_chance - 0.5 * log_determinant
+        onto = columns.onto(product.T)
+        mixtures.append(_Mixture(inner, onto, square, group_of, len(data), log))
+    return _likeliest(mixtures, variants, 1.0), _likeliest(mixtures, variants, -1.0)
+
+
+def _likeliest(
+    mixtures: Sequence[_Mixture], variants: Sequence[tuple[str, float]], direction: float
+) -> CommonStep | None:
+    """The groups that likely have a step up, or down if the direction is −1; None if none fits."""
+    fitted = [mixture for mixture in mixtures if mixture.fit(direction)]
     if not fitted:
         return None
-    chances = max(fitted, key=lambda mixture: mixture.log_likelihood).chances
+    best = max(fitted, key=lambda mixture: mixture.log_likelihood)
     certain = np.zeros(len(variants))
     since = {}
     seen = {}
-    for own in np.split(np.arange(len(variants)), _begins(group_of)[1:]):
-        each = chances[own]
+    for own in np.split(np.arange(len(variants)), best.begins[1:]):
+        each = best.chances[own]
         if each.sum() <= 0.5:
             continue
-        best = own[np.argmax(each)]
-        certain[best] = 1.0
-        name, since_then = variants[best]
+        surest = own[np.argmax(each)]
+        certain[surest] = 1.0
+        name, since_then = variants[surest]
         since[name] = since_then
-        if best > own[0]:
+        if surest > own[0]:
             seen[name] = float(each[1:].sum())
     together = log_sum(np.array([mixture.log_likelihood for mixture in fitted]))
     likeliest = log_sum(np.array([mixture.log_likelihood_of(certain) for mixture in fitted]))
@@ -129,6 +131,8 @@ class _Mixture:
         self._onto = onto
         self._square = square
         self._group_of = group_of
+        # Place of the first variant of each group.
+        self.begins = np.flatnonzero(np.diff(group_of, prepend=-1))
         self._prior = np.log(0.5) - np.log(np.bincount(group_of)[group_of])
         self._n = n
         self._log = log - 0.5 * float(np.linalg.slogdet(self._wide)[1])
@@ -143,7 +147,7 @@ class _Mixture:
         for _turn in range(_TURNS):
             left = self._onto[-1] - shared @ self._onto[:-1]
             each = self._prior + (step * left - 0.5 * step**2 * self._square) / scatter**2
-            stepped = np.logaddexp.reduceat(each, _begins(self._group_of))
+            stepped = np.logaddexp.reduceat(each, self.begins)
             total = np.logaddexp(np.log(0.5), stepped)
             bare = self._rest - 2.0 * shared @ self._along + shared @ self._wide @ shared
             self.log_likelihood = float(self._log + total.sum() + self._density(bare, scatter))
@@ -171,8 +175,3 @@ class _Mixture:
         step = (across[-1] - across[:-1] @ pull[:, 1]) / square if square > 0.0 else 0.0
         shared = pull[:, 1] - step * pull[:, 0]
         return shared, float(step), float(self._rest - self._along @ shared - across[-1] * step)
-
-
-def _begins(group_of: Wholes) -> Wholes:
-    """Place of the first variant of each group."""
-    return np.flatnonzero(np.diff(group_of, prepend=-1))

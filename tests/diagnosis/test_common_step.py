@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from mlg_troubleshoot.arrays import log_sum
 from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.steps import CommonStep, common_step
+from mlg_troubleshoot.misfit.steps import CommonStep, common_steps
 
 Array = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
@@ -74,8 +74,8 @@ def best(terms: list[tuple[float, Array]], noise: NoiseModel) -> float:
     return -float(minimize(lacking, [4.0, -0.3], method="Nelder-Mead").fun)
 
 
-def found_in(data: Array, noise: NoiseModel = NOISE, direction: float = 1.0) -> CommonStep:
-    found = common_step(GROUPS, TIMES, data, noise, direction)
+def found_in(data: Array, noise: NoiseModel = NOISE, *, down: bool = False) -> CommonStep:
+    found = common_steps(GROUPS, TIMES, data, noise)[down]
     assert found is not None
     return found
 
@@ -109,13 +109,13 @@ def test_steps_without_any_scatter_are_found() -> None:
 
 
 def test_data_that_are_all_zero_have_no_step() -> None:
-    assert common_step(GROUPS, TIMES, np.zeros(N), replace(NOISE, floor_in=1e-3), 1.0) is None
+    assert common_steps(GROUPS, TIMES, np.zeros(N), replace(NOISE, floor_in=1e-3)) == (None, None)
 
 
 def test_steps_down_are_steps_up_of_the_opposite() -> None:
-    down = found_in(-DATA, direction=-1.0)
+    down = found_in(-DATA, down=True)
     assert (down.since, down.rarity) == (TRUE, pytest.approx(found_in(DATA).rarity))
 
 
 def test_no_step_up_fits_where_all_steps_are_down() -> None:
-    assert common_step(GROUPS, TIMES, -np.abs(DATA), NOISE, 1.0) is None
+    assert common_steps(GROUPS, TIMES, -np.abs(DATA), NOISE)[0] is None

@@ -23,7 +23,7 @@ from mlg_troubleshoot.diagnosis.causes.reading import (
     days_since,
 )
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.steps import common_step
+from mlg_troubleshoot.misfit.steps import common_steps
 from mlg_troubleshoot.units import DAYS_PER_YEAR
 
 # A gauge is calibrated once a year; in which month is not known.
@@ -135,10 +135,8 @@ class Modification(RowShift):
         if scene.noise is None or not known.any():
             return
         noise = scene.noise.take(known)
-        for direction in (1.0, -1.0):
-            found = common_step(
-                table.tails[known], day[known], scene.expected_in[known], noise, direction
-            )
+        steps = common_steps(table.tails[known], day[known], scene.expected_in[known], noise)
+        for found in steps:
             if found is None:
                 continue
             if len(found.since) >= _LEAST_AIRCRAFT and len(found.seen) >= _LEAST_NAMED:
