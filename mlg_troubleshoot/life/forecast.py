@@ -73,13 +73,18 @@ class Forecast:
     departures: Mapping[int, float] = field(default_factory=dict)
 
 
-def _quantiles(samples: Array) -> Quantiles:
-    """The 5, 50 and 95 % quantiles; null beyond the horizon."""
-    ends = Samples(samples).quantile([0.05, 0.5, 0.95])
-    return {
-        name: float(end) if np.isfinite(end) else None
-        for name, end in zip(("p05", "p50", "p95"), ends, strict=True)
-    }
+def _quantiles(samples: Array) -> list[Quantiles]:
+    """The 5, 50 and 95 % quantiles of samples on the last axis, question by question; null beyond
+    the horizon.
+    """
+    ends = Samples(samples).quantile([0.05, 0.5, 0.95]).reshape(-1, 3)
+    return [
+        {
+            name: end if np.isfinite(end) else None
+            for name, end in zip(("p05", "p50", "p95"), each, strict=True)
+        }
+        for each in ends.tolist()
+    ]
 
 
 def landings_of_bands(gear: Gear) -> Array:
@@ -182,7 +187,7 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
         reasons.append(f"{joint_list(list(over))} over the limit when last read")
     if not reasons:
         return None
-    nothing = _quantiles(np.zeros(1))
+    (nothing,) = _quantiles(np.zeros(1))
     worst = max(over, key=lambda n: over[n] / gear.joint(n).limit.value, default=None)
     why = ", and ".join(reasons)
     return Forecast(dict.fromkeys(over, nothing), {}, nothing, worst, nothing, 0.0, why)
@@ -238,26 +243,25 @@ def _forecast_part(
     asked = wear[:, :, _ASKED]
     displacement = _worst_case_of(wear, asked, gear)
     bands = np.quantile(asked, [0.05, 0.5, 0.95], axis=3)
+    margins = [life.inspections[-1].inspection.margin_in for life in going_on]
+    to_limit = first_passage(ahead, wear, gear.limits_in)
+    to_any = to_limit.min(axis=1)
+    to_margin = first_passage(
+        ahead, displacement, [gear.margin.value if one is None else one for one in margins]
+    )
+    due = Samples(np.minimum(to_any, to_margin)).quantile(gear.accepted_chance.value)
+    of_joints, of_any, of_margin = map(_quantiles, (to_limit, to_any, to_margin))
+    first = to_limit.argmin(axis=1)
     for g, life in enumerate(going_on):
-        margin = life.inspections[-1].inspection.margin_in
-        to_limit = np.stack(
-            [first_passage(ahead, wear[g, j], limit) for j, limit in enumerate(gear.limits_in)]
-        )
-        to_any = to_limit.min(axis=0)
-        to_margin = first_passage(
-            ahead, displacement[g], gear.margin.value if margin is None else margin
-        )
-        to_either = Samples(np.minimum(to_any, to_margin))
-        due = float(to_either.quantile(gear.accepted_chance.value))
         known = [(j, number) for j, number in enumerate(numbers) if read[g, j]]
-        first = to_limit.argmin(axis=0)[np.isfinite(to_any)]
+        passed = first[g, np.isfinite(to_any[g])]
         found[life.key] = Forecast(
-            {number: _quantiles(to_limit[j]) for j, number in known},
+            {number: of_joints[g * len(numbers) + j] for j, number in known},
             {number: bands[:, g, j] for j, number in known},
-            _quantiles(to_any),
-            numbers[int(np.bincount(first).argmax())] if len(first) else None,
-            _quantiles(to_margin),
-            due if np.isfinite(due) else None,
+            of_any[g],
+            numbers[int(np.bincount(passed).argmax())] if len(passed) else None,
+            of_margin[g],
+            float(due[g]) if np.isfinite(due[g]) else None,
             departures=found[life.key].departures,
         )
     return found

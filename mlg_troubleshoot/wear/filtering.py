@@ -77,6 +77,8 @@ def clock(usage: Array, power: Array) -> Array:
     bent = power.ravel() != 1.0
     if not bent.any():
         return usage
+    if bent.all():
+        return np.asarray(np.maximum(usage, 0.0) ** power)
     time = np.broadcast_to(usage, np.broadcast_shapes(usage.shape, power.shape)).copy()
     time[bent] = np.maximum(usage, 0.0) ** power[bent]
     return time
@@ -88,6 +90,8 @@ class _Covariances:
     def __init__(self, draws: Draws, units: int) -> None:
         self._draws = draws
         self._wanders = bool(draws.wander_sd.any())
+        self._increment_var = draws.increment_sd**2
+        self._jumps = bool(draws.increment_sd.any())
         self._own = (1.0 - draws.kept) * draws.drift_sd**2
         kept = draws.kept * draws.drift_sd**2
         shape = (len(draws.start), units)
@@ -104,19 +108,29 @@ class _Covariances:
         self.bb = np.where(restored, self._uu + self._own, self.bb)
         self._bu = np.where(restored, self._uu, self._bu)
 
-    def run(self, d: Array, drift: Array | None) -> None:
-        """Let the clock run by d; a drift is that of gamma increments."""
-        s2 = self._draws.increment_sd**2 * d
-        if drift is not None:
-            s2 = s2 * (drift * drift + self.bb)
-        self.xx = self.xx + d * (2.0 * self.xb + d * self.bb) + s2
-        self.xb = self.xb + d * self.bb
+    def run(self, d: Array, drift: Array | None, *, own: bool) -> None:
+        """Let the clock run by d; a drift is that of gamma increments, the own drift may be asked
+        for.
+        """
+        by_drift = d * self.bb
+        grown = 2.0 * self.xb
+        grown += by_drift
+        grown *= d
+        grown += self.xx
+        if self._jumps:
+            s2 = self._increment_var * d
+            if drift is not None:
+                s2 *= drift * drift + self.bb
+            grown += s2
+        self.xb = self.xb + by_drift
         if self._wanders:
             w2 = self._draws.wander_sd**2 * d
-            self.xx = self.xx + w2 * d * d / 3.0
-            self.xb = self.xb + w2 * d / 2.0
+            grown += w2 * d * d / 3.0
+            self.xb += w2 * d / 2.0
             self.bb = self.bb + w2
-        self._xu = self._xu + d * self._bu
+        self.xx = grown
+        if own:
+            self._xu = self._xu + d * self._bu
 
     def read(self, g: Array, *, own: bool) -> tuple[Array, Array, Array | None]:
         """Take in a reading of weight g; return the gains of x, b and, if the own drift will be
@@ -145,7 +159,7 @@ def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Arra
     is_gamma = bool(draws.gamma.any())
     # Covariances depend on what was read with gamma increments only: otherwise once for all units
     # that were read at the same usages, as the joints of one gear are.
-    first, owner = (None, None) if is_gamma else _alike(steps)
+    first, owner = (None, None) if is_gamma else steps.alike
 
     def alike(of_units: Any) -> Any:
         return of_units if first is None else of_units[..., first]
@@ -154,6 +168,7 @@ def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Arra
         return of_alike if owner is None else of_alike.take(owner, axis=-1)
 
     seens, usages, known_r2 = map(alike, (steps.seen, steps.usage, steps.known_r2))
+    estimated = np.isnan(known_r2)
     shape = (len(draws.start), steps.seen.shape[1])
     x = promised = np.broadcast_to(draws.start, shape)
     b = u = promised_drift = np.broadcast_to(draws.drift, shape)
@@ -174,14 +189,22 @@ def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Arra
         d = now - before
         before = now
         promised_drift = b
-        covariances.run(d, b if is_gamma else None)
-        x = promised = x + b * each(d)
-        reading = np.where(np.isnan(known_r2[i]), draws.reading_sd**2, known_r2[i])
+        covariances.run(d, b if is_gamma else None, own=i < last)
+        moved = b * each(d)
+        moved += x
+        x = promised = moved
+        reading = known_r2[i]
+        if estimated[i].any():
+            reading = np.where(estimated[i], draws.reading_sd**2, reading)
         s = covariances.xx + reading + _LEAST_VARIANCE
         off = value - x
         if likelihood:
-            misfit = off * off / each(s) + each(np.log(s)) + _LOG_2PI
-            total = total - 0.5 * steps.seen[i] * misfit
+            misfit = off * off
+            misfit /= each(s)
+            misfit += each(np.log(s))
+            misfit += _LOG_2PI
+            misfit *= 0.5 * steps.seen[i]
+            total -= misfit
         to_x, to_b, to_u = covariances.read(seens[i] / s, own=i < last)
         x = x + each(to_x) * off
         b = b + each(to_b) * off
@@ -189,11 +212,3 @@ def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Arra
             u = u + each(to_u) * off
     xx, xb, bb, s = map(each, (covariances.xx, covariances.xb, covariances.bb, s))
     return total, FilterState(x, b, xx, xb, bb, promised, s, promised_drift)
-
-
-def _alike(steps: Steps) -> tuple[Places, Places]:
-    """The first of the units that were read alike, and which of these stands for each unit."""
-    known = np.nan_to_num(steps.known_r2, nan=-1.0)
-    when = np.concatenate([steps.begins, steps.seen, steps.usage, known])
-    _when, first, owner = np.unique(when, axis=1, return_index=True, return_inverse=True)
-    return first, owner.ravel()

@@ -216,11 +216,7 @@ class WearModel(Result):
         wear = self.forecast(units, last + ahead, reading=False).samples
         # Wear that falls passes its limit from above.
         up = np.sign(self.scale.value)
-        passed = [
-            first_passage(ahead, up * value, up * limit)
-            for value, limit in zip(wear, limits, strict=True)
-        ]
-        samples = last + np.stack(passed)
+        samples = last + first_passage(ahead, up * wear, up * limits)
         return Samples(samples[0] if isinstance(unit, str) else samples)
 
     def _chunks(self, units: int, together: int) -> Iterator[Places]:
@@ -348,55 +344,59 @@ class _Ends:
         bend = clock(np.maximum(last, 1.0)[None, :, None], power)
         x = self.level
         b = self.drift
-        before = np.zeros_like(x)
+        before = np.zeros((1, 1, 1))
         for j in range(usage.shape[1]):
             at = clock(usage[None, :, j, None], power)
             beyond = np.maximum(at - bend, 0.0)
-            now = np.minimum(at, bend) - start + self.pace * beyond
+            now = np.minimum(at, bend) - start
+            if beyond.any():
+                now = now + self.pace * beyond
             d = now - before
             before = now
             if self.draws.gamma.any():
-                shape = np.maximum(d, 0.0) / s**2
+                shape = np.broadcast_to(np.maximum(d, 0.0) / s**2, x.shape)
                 increment = b * s**2 * rng.gamma(shape)
                 x = x + np.where(d > 0.0, increment, b * d)
             else:
                 span = np.abs(d)
+                turn = v * np.sqrt(span)
                 one, two = rng.normal(2, x.shape)
-                sway = np.sqrt(v * v * span**3 / 12.0 + s * s * span)
-                x = x + b * d + v * span**1.5 * one / 2.0 + sway * two
-                b = b + v * np.sqrt(span) * one
+                sway = np.sqrt((turn * turn * span / 12.0 + s * s) * span)
+                x = x + b * d + 0.5 * turn * span * one + sway * two
+                b = b + turn * one
             yield x + sd * rng.normal(1, x.shape)[0] if reading else x
 
 
-def first_passage(at: Array, paths: Array, limit: float) -> Array:
+def first_passage(at: Array, paths: Array, limit: ArrayLike) -> Array:
     """Find where each simulated path first passes a limit; between two usages it is interpolated.
 
     Parameters
     ----------
     at : ndarray, shape (m,)
         Ascending usages. [usage]
-    paths : ndarray, shape (m, n_samples)
+    paths : ndarray, shape (..., m, n_samples)
         The wear of each path at these usages. [value]
-    limit : float
+    limit : array_like, shape (...)
         The limit. [value]
 
     Returns
     -------
-    ndarray, shape (n_samples,)
+    ndarray, shape (..., n_samples)
         Usage of each first passage, infinite beyond the last usage. [usage]
     """
-    over = paths > limit
-    k = np.argmax(over, axis=0)
+    limits = np.asarray(limit, float)[..., None]
+    over = paths > limits[..., None]
+    k = np.argmax(over, axis=-2)
     before = np.maximum(k - 1, 0)
-    sample = np.arange(paths.shape[1])
-    high = paths[k, sample]
-    low = paths[before, sample]
+    high, low = (
+        np.take_along_axis(paths, place[..., None, :], axis=-2)[..., 0, :] for place in (k, before)
+    )
     with np.errstate(invalid="ignore"):
         rise = np.where(high > low, high - low, 1.0)
-        share = np.where(np.isfinite(high), (limit - low) / rise, 1.0)
+        share = np.where(np.isfinite(high), (limits - low) / rise, 1.0)
     passed = at[before] + share * (at[k] - at[before])
     passed = np.where(k == 0, 0.0, passed)
-    return np.where(over.any(axis=0), passed, np.inf)
+    return np.where(over.any(axis=-2), passed, np.inf)
 
 
 def fit_wear(

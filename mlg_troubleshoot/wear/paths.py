@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlg_troubleshoot.arrays import Array, Mask, frozen
+from mlg_troubleshoot.arrays import Array, Mask, Places, frozen
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.results import Result
 
@@ -91,7 +92,7 @@ class Scale:
     resolution: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Steps:
     """Readings of many units side by side, arrays of shape (steps, units): in each step a unit is
     read once at most.
@@ -105,6 +106,14 @@ class Steps:
     usage: Array
     value: Array
     known_r2: Array
+
+    @cached_property
+    def alike(self) -> tuple[Places, Places]:
+        """The first of the units that were read alike, and which of these stands for each unit."""
+        known = np.nan_to_num(self.known_r2, nan=-1.0)
+        when = np.concatenate([self.begins, self.seen, self.usage, known])
+        _when, first, owner = np.unique(when, axis=1, return_index=True, return_inverse=True)
+        return first, owner.ravel()
 
 
 def grid_step(values: Array) -> float:
