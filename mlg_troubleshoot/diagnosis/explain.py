@@ -319,8 +319,8 @@ def explain(problem: MisfitProblem) -> Finding:
 def _with_far_rows(
     problem: MisfitProblem, found: MisfitPosterior, settled: NoiseModel, slips: int
 ) -> tuple[MisfitPosterior, NoiseModel]:
-    """What is found, or what is likelier where rows that lie far out, some of them slips, count in
-    full: those that one effect moves together are no scatter.
+    """What is found, or what is likelier where rows far out, at most so many of them slips, count
+    in full, because one effect moves them together.
     """
     beliefs = problem.beliefs
     near = build_noise(problem.expected, problem.rows, far=np.inf)

@@ -100,12 +100,12 @@ def more_than_slips(
     contexts: Sequence[Context],
     beliefs: Beliefs,
     start: Explanation,
-    most: int,
+    slips: int,
 ) -> bool:
-    """Tell whether an effect that has a name likely acts beside an explanation, once slips are
-    taken one by one, `most` of them, each as long as it is the likeliest further effect.
+    """Tell whether an effect that has a name likely acts beside an explanation and its slips, which
+    are added to it as long as one is the likeliest further effect, at most so many.
     """
-    search = _Search(noise, data, effects, contexts, beliefs, len(start.members) + most)
+    search = _Search(noise, data, effects, contexts, beliefs, len(start.members) + slips + 1)
     members = frozenset(start.members)
     while True:
         search.extend(start.context, members)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +15,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from mlg_troubleshoot.cli.app import app
-from mlg_troubleshoot.diagnosis import DiagnosisTable, diagnose
+from mlg_troubleshoot.diagnosis import Cause, DiagnosisTable, diagnose
+from mlg_troubleshoot.diagnosis.causes.base import Candidate
+from mlg_troubleshoot.diagnosis.causes.reading import GaugeBias
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -150,6 +152,17 @@ def test_what_is_wrong_with_the_table_is_not_a_cause(
     with pytest.raises(InconclusiveDataError) as refused:
         diagnose(gear.model, spoil(plain), gear.discrepancies)
     assert remedy in refused.value.remedy
+
+
+def test_a_table_that_is_wrong_is_refused_before_causes_are_sought(
+    gear: Gear, plain: DiagnosisTable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def sought(_self: Cause, _scene: object) -> Iterator[Candidate]:
+        raise AssertionError
+
+    monkeypatch.setattr(GaugeBias, "candidates", sought)
+    with pytest.raises(InconclusiveDataError):
+        diagnose(gear.model, plunger_in_millimetres(plain), gear.discrepancies)
 
 
 def test_a_column_with_one_value_known_is_not_a_reason_to_fail(

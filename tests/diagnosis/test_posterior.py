@@ -24,9 +24,9 @@ from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.conclusion import Conclusion
 from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Key
+from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
 from mlg_troubleshoot.misfit.marginal import Marginal, Products
-from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
+from mlg_troubleshoot.misfit.posterior import MisfitPosterior, more_than_slips, posterior
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions
 
 PAGE = Path(__file__).parents[2] / "docs/explanation/diagnosis.md"
@@ -298,6 +298,21 @@ def test_an_entry_error_is_nothing_that_is_wrong() -> None:
     found = posterior(NOISE, data, replace(slip, size=np.full(P, 9.0)), CONTEXTS, BELIEFS)
     assert found.likeliest[0].members == (5,)
     assert found.nothing > 0.5
+
+
+@pytest.mark.parametrize(("step", "more"), [(0.0, False), (4.0, True)])
+def test_only_an_effect_that_has_a_name_is_more_than_slips(step: float, more: bool) -> None:
+    rng, n = np.random.default_rng(12), 40
+    late = np.arange(n) >= 30
+    data = rng.standard_normal(n) + step * late
+    data[[3, 8, 35]] += (25.0, -30.0, 28.0)
+    names: list[Key | None] = [("step", None), *([None] * n)]
+    columns = np.column_stack([late.astype(float), np.eye(n)])
+    every = Effects.free(columns, names, -4.0, 20.0)
+    contexts = (Context.none(n),)
+    given = NoiseModel.white(n), data, every, contexts, BELIEFS
+    nothing = Explanation(0, (), 0.0, np.empty(0))
+    assert more_than_slips(*given, nothing, 3) is more
 
 
 def test_what_is_rarer_beforehand_is_rarer_afterwards_by_as_much() -> None:
