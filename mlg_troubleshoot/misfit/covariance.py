@@ -13,11 +13,11 @@ from scipy.sparse import csr_array
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.misfit.columns import ColumnBlock, EffectColumns
 
-# Computing only: rows times gears up to which a table is small.
-_SMALL = 100_000
 # Sums over the rows of each group, shape (groups, n).
 _Sums = csr_array | Array
 
+# Computing only: rows times gears up to which a table is small.
+_SMALL = 100_000
 # Rows further out than this many standard deviations count less, and may be entry errors.
 FAR = 3.0
 
@@ -218,7 +218,7 @@ class NoiseModel:
         level = self._inverse.at(self.tail_ratios.index(tail_ratio))
         return self._times(columns, level)[0], float(level.log_determinant[0])
 
-    def precisions_times(self, columns: Array) -> tuple[Array, Array]:
+    def each_precision_times(self, columns: Array) -> tuple[Array, Array]:
         """The same with each ratio, shapes (levels, n, k) and (levels,)."""
         levels = self._inverse.levels
         return self._times(columns, levels), levels.log_determinant
@@ -294,7 +294,8 @@ class NoiseModel:
         log += float(np.sum(np.log1p(-(self._steps[2] ** 2))))
         fixed: list[_Sums] = []
         tails: _Sums = np.empty((0, len(self.relative)))
-        low = self.loadings
+        low = self.loadings if self._nested else self.factors(float(alike))
+        # How much larger the loadings are in each level.
         scale = np.ones((len(ratios), low.shape[1]))
         if self._nested:
             for group, scatter in self._groups:
@@ -302,16 +303,13 @@ class NoiseModel:
                 weighted = self._beside_tails(scatter[:, None], fixed)[:, 0]
                 inner = 1.0 + np.bincount(group, scatter * weighted)
                 log += float(np.sum(np.log(inner)))
-                fixed.append(self._sums(group, weighted / np.sqrt(inner)[group]))
+                fixed.append(_sums(group, weighted / np.sqrt(inner)[group]))
             if alike:
                 one = np.ones((len(self.relative), 1))
-                tails = self._sums(self.tails, self._beside_tails(one, fixed)[:, 0])
-        else:
-            low = self.factors(float(alike))
-            scale = np.ones((len(ratios), low.shape[1]))
-            if alike:
-                end = low.shape[1] - self.loadings.shape[1]
-                scale[:, end - self.tails.max() - 1 : end] = ratios[:, None]
+                tails = _sums(self.tails, self._beside_tails(one, fixed)[:, 0])
+        elif alike:
+            end = low.shape[1] - self.loadings.shape[1]
+            scale[:, end - self.tails.max() - 1 : end] = ratios[:, None]
         if self._small:
             fixed = [np.vstack([_written_out(root) for root in fixed])] if fixed else []
             tails = _written_out(tails)
@@ -330,12 +328,6 @@ class NoiseModel:
         root = np.linalg.inv(lower) * scale[:, None, :]
         levels = _Levels(weight, across, root, log + determinant)
         return _Inverse(tuple(fixed), tails, beside, low_of_tails, levels)
-
-    def _sums(self, group: Wholes, values: Array) -> csr_array:
-        """Sums over the rows of each group, each row so many times."""
-        begins = np.r_[0, np.cumsum(np.bincount(group))]
-        rows = np.argsort(group, kind="stable")
-        return csr_array((values[rows], rows, begins), (len(begins) - 1, len(group)))
 
 
 @dataclass(frozen=True)
@@ -393,6 +385,13 @@ class _Inverse:
         each = (self.levels.weight, self.levels.across, self.levels.root)
         one = [values[[level]] for values in (*each, self.levels.log_determinant)]
         return _Levels(*one)
+
+
+def _sums(group: Wholes, values: Array) -> csr_array:
+    """Sums over the rows of each group, each row so many times."""
+    begins = np.r_[0, np.cumsum(np.bincount(group))]
+    rows = np.argsort(group, kind="stable")
+    return csr_array((values[rows], rows, begins), (len(begins) - 1, len(group)))
 
 
 def _squared(values: Any) -> Any:

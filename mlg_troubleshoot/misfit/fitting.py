@@ -56,7 +56,7 @@ def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
     n = len(data) - noise.absorbed
     k = columns.shape[1]
     best: Fit | None = None
-    every, determinants = noise.precisions_times(np.column_stack([columns, data]))
+    every, determinants = noise.each_precision_times(np.column_stack([columns, data]))
     levels = zip(noise.tail_levels, every, determinants.tolist(), strict=True)
     for (ratio, chance), product, log_determinant in levels:
         inner = columns.T @ product[:, :k]

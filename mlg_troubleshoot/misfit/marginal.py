@@ -52,7 +52,7 @@ class Products:
         self.spread = np.maximum(factor * effects.size, effects.least) / noise.scale_in
         self.every_spread = np.repeat(self.spread, len(noise.tail_levels), axis=0)
         self.signed = np.flatnonzero(effects.sign)
-        weighted, log = noise.precisions_times(data[:, None])
+        weighted, log = noise.each_precision_times(data[:, None])
         self._weighted_data = weighted[:, :, 0]
         self.rest = self._weighted_data @ data
         self.log = log - 2.0 * np.array([chance for _r, chance in noise.tail_levels])
@@ -64,7 +64,7 @@ class Products:
     def cross(self, member: int) -> Array:
         """Products of all effects with one of them, shape (levels, p)."""
         if member not in self._cross:
-            weighted, _log = self.noise.precisions_times(self.columns.take([member]))
+            weighted, _log = self.noise.each_precision_times(self.columns.take([member]))
             self._cross[member] = self._held(weighted)[:, 0]
         return self._cross[member]
 
@@ -78,7 +78,7 @@ class Products:
         """Products of other columns with the effects, (levels, k, p), with the data, (levels, k),
         and with each other; those that contexts share are multiplied once.
         """
-        weighted, _log = self.noise.precisions_times(columns)
+        weighted, _log = self.noise.each_precision_times(columns)
         keys = [hash(column.tobytes()) for column in columns.T]
         new = [k for k, key in enumerate(keys) if key not in self._onto]
         products = self._held(weighted[:, :, new])

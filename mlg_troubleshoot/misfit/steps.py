@@ -70,7 +70,7 @@ def common_steps(
     squares = of_groups.squares(columns)
     known = np.column_stack([noise.loadings, data])
     mixtures: list[_Mixture] = []
-    every = zip(of_groups.tail_levels, *of_groups.precisions_times(known), squares, strict=True)
+    every = zip(of_groups.tail_levels, *of_groups.each_precision_times(known), squares, strict=True)
     for (_ratio, log_chance), product, log_determinant, square in every:
         inner = known.T @ product
         inner[-1, -1] = noise.floored(inner[-1, -1])
