@@ -216,7 +216,8 @@ class WearModel(Result):
         wear = self.forecast(units, last + ahead, reading=False).samples
         # Wear that falls passes its limit from above.
         up = np.sign(self.scale.value)
-        samples = last + first_passage(ahead, up * wear, up * limits)
+        wear *= up
+        samples = last + first_passage(ahead, wear, up * limits)
         return Samples(samples[0] if isinstance(unit, str) else samples)
 
     def _chunks(self, units: int, together: int) -> Iterator[Places]:
