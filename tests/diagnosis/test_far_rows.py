@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mlg_troubleshoot.diagnosis import Diagnosis, diagnose
+from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.misfit.beliefs import Beliefs
@@ -55,6 +58,12 @@ def test_as_many_rows_of_other_gears_are_no_cause(gear: Gear) -> None:
 def test_a_row_far_off_that_nothing_explains_is_named(one: Diagnosis) -> None:
     ((place, left),) = one.far_off_in.items()
     assert (one.used.record_id[place], left) == ("R71", pytest.approx(FAR_IN, abs=0.004))
+
+
+def test_a_row_that_stays_far_off_as_it_was_repaired_says_so(one: Diagnosis) -> None:
+    (place,) = one.far_off_in
+    fault = DataFault.at(one.used, place, "plunger_displacement_in", "mm_as_in", "1.4", "0.0551")
+    assert "thou as repaired)" in seven_lines(replace(one, faults=(fault,)))[5].text
 
 
 @pytest.mark.parametrize("line", [6, 7])
