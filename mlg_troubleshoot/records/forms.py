@@ -39,7 +39,8 @@ _DECLARATIONS = (UNIT, CONVENTION)
 class Form:
     """A form as found.
 
-    lines: row, label and value. gears: the columns that hold the values of a gear, if several do.
+    lines: row, label and value. gears: the columns that hold the values of a gear, if several do or
+    another one than that of the values.
     """
 
     lines: Sequence[tuple[int, str, Cell]]
@@ -48,6 +49,8 @@ class Form:
     gears: Sequence[int] = ()
 
     def is_untouched(self, options: ReadOptions) -> bool:
+        if self.gears:
+            return False
         filled = [label for _, label, value in self.lines if value is not None]
         fields = (recognise(label, options.joints).field for label in filled)
         return all(field is not None and field.column in _DECLARATIONS for field in fields)
@@ -91,7 +94,8 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
             if i > column and value is not None and (named.column is not SIDE or is_side):
                 held.setdefault(i, set()).add(named.column)
     gears = [i for i in sorted(held) if {SIDE, CLEARANCE} <= held[i]]
-    return Form(lines, column, value_column, gears if len(gears) > 1 else ())
+    beside = CLEARANCE not in held.get(value_column, ())
+    return Form(lines, column, value_column, gears if len(gears) > 1 or beside else ())
 
 
 def _field(cell: Cell, options: ReadOptions) -> Field | None:
@@ -108,6 +112,16 @@ def read_form(
     form: Form, options: ReadOptions, *, file: str | None, sheet: str | None
 ) -> Collected:
     out = Collected()
+    if len(form.gears) == 1:
+        (beside,) = map(column_letters, form.gears)
+        meant = column_letters(form.value_column)
+        raise FileRefusedError(
+            "form_beside",
+            f"its values stand in column {beside}",
+            f"them in column {meant}, next to their labels",
+            f"Move what was entered to column {meant}.",
+            sheet=sheet,
+        )
     if form.gears:
         raise FileRefusedError(
             "form_several",

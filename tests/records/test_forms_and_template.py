@@ -217,6 +217,16 @@ def test_a_form_with_two_gears_side_by_side_is_refused(read, xlsx):
     assert [problem.code for problem in result.problems] == ["form_several"]
 
 
+def test_a_form_filled_in_over_its_hints_says_where_the_values_belong(read, template):
+    book = openpyxl.load_workbook(template)
+    for row, value in ((4, "X1"), (5, "N1"), (6, "LH"), (7, "RADIAL"), (8, "in"), (11, 0.003)):
+        book["Form"].cell(row, 3, value)
+    buffer = io.BytesIO()
+    book.save(buffer)
+    (problem,) = read(buffer.getvalue(), "f.xlsx").problems
+    assert (problem.code, problem.remedy) == ("form_beside", "Move what was entered to column B.")
+
+
 def test_the_template_has_lists_of_choices_and_explains_each_column(template):
     sheet = openpyxl.load_workbook(template)["Inspections"]
     choices = {
