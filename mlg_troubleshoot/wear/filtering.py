@@ -90,7 +90,6 @@ class _Covariances:
     def __init__(self, draws: Draws, units: int) -> None:
         self._draws = draws
         self._wanders = bool(draws.wander_sd.any())
-        self._increment_var = draws.increment_sd**2
         self._jumps = bool(draws.increment_sd.any())
         self._own = (1.0 - draws.kept) * draws.drift_sd**2
         kept = draws.kept * draws.drift_sd**2
@@ -113,22 +112,16 @@ class _Covariances:
         for.
         """
         by_drift = d * self.bb
-        grown = 2.0 * self.xb
-        grown += by_drift
-        grown *= d
-        grown += self.xx
+        self.xx = self.xx + d * (2.0 * self.xb + by_drift)
         if self._jumps:
-            s2 = self._increment_var * d
-            if drift is not None:
-                s2 *= drift * drift + self.bb
-            grown += s2
+            s2 = self._draws.increment_sd**2 * d
+            self.xx += s2 if drift is None else s2 * (drift * drift + self.bb)
         self.xb = self.xb + by_drift
         if self._wanders:
             w2 = self._draws.wander_sd**2 * d
-            grown += w2 * d * d / 3.0
+            self.xx += w2 * d * d / 3.0
             self.xb += w2 * d / 2.0
             self.bb = self.bb + w2
-        self.xx = grown
         if own:
             self._xu = self._xu + d * self._bu
 
@@ -190,21 +183,15 @@ def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Arra
         before = now
         promised_drift = b
         covariances.run(d, b if is_gamma else None, own=i < last)
-        moved = b * each(d)
-        moved += x
-        x = promised = moved
+        x = promised = x + b * each(d)
         reading = known_r2[i]
         if estimated[i].any():
             reading = np.where(estimated[i], draws.reading_sd**2, reading)
         s = covariances.xx + reading + _LEAST_VARIANCE
         off = value - x
         if likelihood:
-            misfit = off * off
-            misfit /= each(s)
-            misfit += each(np.log(s))
-            misfit += _LOG_2PI
-            misfit *= 0.5 * steps.seen[i]
-            total -= misfit
+            misfit = off * off / each(s) + each(np.log(s)) + _LOG_2PI
+            total -= 0.5 * steps.seen[i] * misfit
         to_x, to_b, to_u = covariances.read(seens[i] / s, own=i < last)
         x = x + each(to_x) * off
         b = b + each(to_b) * off
