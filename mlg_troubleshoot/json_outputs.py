@@ -696,27 +696,6 @@ class SurveyOutput(TypedDict):
     inspections: NotRequired[list[SurveyedInspection]]
 
 
-class SeparableCause(TypedDict):
-    """What the planned columns could say about one cause; a size that is never reached is null."""
-
-    cause: str
-    target: str | None
-    found_from_in: float | None
-    missing_column: str | None
-    nearest: str | None
-    told_apart_from_in: float | None
-    further_column: str | None
-    separating_reading: str
-
-
-class SeparableOutput(TypedDict):
-    """Output of mlg gear separable --json."""
-
-    schema_version: Version
-    columns: list[str] | None
-    causes: list[SeparableCause]
-
-
 class LoosePart(TypedDict):
     """A number of the linkage and which part of its range stays free."""
 

@@ -54,8 +54,8 @@ def test_an_unknown_schema_is_refused() -> None:
         schemas.schema("template")
 
 
-def test_the_contract_names_eleven_outputs_and_the_verification() -> None:
-    named = "check diagnose study fleet history life gear survey separable reconstruct doctor"
+def test_the_contract_names_ten_outputs_and_the_verification() -> None:
+    named = "check diagnose study fleet history life gear survey reconstruct doctor"
     assert set(schemas.NAMES) == {*named.split(), "verify"}
 
 
@@ -230,7 +230,6 @@ def test_every_output_states_the_version_of_its_schema(name: str) -> None:
         ("gear", ("gear", "--gear", FOUR_BAR)),
         ("verify", ("gear", "verify")),
         ("doctor", ("doctor",)),
-        ("separable", ("gear", "separable", "--columns", "tail_no,side,clearance_3_in")),
         ("reconstruct", ("gear", "reconstruct", "--start", "A", "--minutes", "0.01")),
         pytest.param("study", ("study", "--bound"), marks=pytest.mark.slow),
     ],

@@ -1,11 +1,9 @@
-"""``mlg gear``: which model is in use, whether it still gives the printed numbers, and which causes
-planned columns could distinguish with it.
-"""
+"""``mlg gear``: which model is in use, and whether it still gives the printed numbers."""
 
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -15,11 +13,6 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.targets import Computed
-
-SEPARABLE = (
-    "Example: [b]mlg gear separable --columns"
-    " tail_no,side,gear_landings,clearance_3_in,clearance_5_in[/b]"
-)
 
 
 def show(
@@ -67,34 +60,6 @@ def verify(
     raise typer.Exit(ExitCode.ATTENTION if failed else ExitCode.FINE)
 
 
-def separable(
-    context: typer.Context,
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A,B,…",
-            help="Columns that will be recorded, as in a table; all if not given.",
-        ),
-    ] = None,
-    as_json: options.Json = False,
-    _version: options.Version = False,
-) -> None:
-    """Show which causes the planned columns could distinguish, and at what size of effect."""
-    from mlg_troubleshoot.workflows.separable import separable as planned
-
-    names = (
-        None if columns is None else [name.strip() for name in columns.split(",") if name.strip()]
-    )
-    causes = planned(context.obj, names)
-    if as_json:
-        from mlg_troubleshoot.json_outputs import SeparableOutput
-        from mlg_troubleshoot.reporting.json_form import written
-
-        output.write_json(written(SeparableOutput, columns=names, causes=causes))
-        return
-    output.show_page("separable", output.console(), causes=causes)
-
-
 def _number(n: Computed) -> dict[str, object]:
     from mlg_troubleshoot.json_outputs import VerifiedNumber
     from mlg_troubleshoot.reporting.json_form import written
@@ -116,5 +81,4 @@ app.command(epilog="Example: [b]mlg gear verify[/b]")(verify)
 app.command(epilog=new_gear.EPILOG)(new_gear.new)
 app.command(epilog="Example: [b]mlg gear draw gear.svg[/b]")(new_gear.draw)
 app.command(epilog=reconstruct.EPILOG)(reconstruct.reconstruct)
-app.command(epilog=SEPARABLE)(separable)
 app.command(epilog=survey.EPILOG)(survey.survey)

@@ -90,8 +90,6 @@ class Column:
         A word such as ``n/a`` says that nothing was measured.
     covariate : int
         Place among the covariates of a diagnosis, from 1; 0 for any other column.
-    effort : int
-        Place in the order of what it takes to record it in addition to clearances, from 1.
     words : str
         What the column is about, in a sentence.
     sign_off : int
@@ -124,7 +122,6 @@ class Column:
     carried: bool = False
     blank_by_word: bool = True
     covariate: int = 0
-    effort: int = 0
     words: str = ""
     sign_off: int = 0
     prompt: str = ""
@@ -234,7 +231,6 @@ TAIL_NO = Column(
     bears_verdict=True,
     blank_by_word=False,
     covariate=1,
-    effort=2,
 )
 SIDE = Column(
     name="side",
@@ -249,7 +245,6 @@ SIDE = Column(
     bears_verdict=True,
     blank_by_word=False,
     covariate=2,
-    effort=1,
 )
 CONVENTION = Column(
     name="clearance_convention",
@@ -307,7 +302,6 @@ DATE = Column(
     prompt="Date of the inspection",
     prompt_word="date",
     covariate=9,
-    effort=3,
 )
 OUTCOME = Column(
     name="outcome",
@@ -337,7 +331,6 @@ LANDINGS = Column(
     prompt="Landings since overhaul",
     prompt_word="landings",
     covariate=8,
-    effort=9,
 )
 GAUGE_U = Column(
     name="gauge_u",
@@ -376,7 +369,6 @@ ACTUATOR_EXTENSION = Column(
     high=5,
     in_template=False,
     covariate=10,
-    effort=10,
 )
 PLUNGER_POSITION = Column(
     name="plunger_position",
@@ -427,7 +419,6 @@ TEMPERATURE = Column(
     spellings="temp c",
     words="temperature",
     covariate=6,
-    effort=7,
 )
 PRESSURE = Column(
     name="hydraulic_pressure_psi",
@@ -439,7 +430,6 @@ PRESSURE = Column(
     spellings="pressure psi",
     words="hydraulic pressure",
     covariate=7,
-    effort=8,
 )
 APPROACH = Column(
     name="approach",
@@ -452,7 +442,6 @@ APPROACH = Column(
     },
     spellings="approach direction",
     covariate=5,
-    effort=6,
 )
 GAUGE_ID = Column(
     name="gauge_id",
@@ -466,7 +455,6 @@ GAUGE_ID = Column(
     prompt_word="gauge",
     blank_by_word=False,
     covariate=3,
-    effort=5,
 )
 TECHNICIAN_ID = Column(
     name="technician_id",
@@ -483,7 +471,6 @@ TECHNICIAN_ID = Column(
     prompt_word="name",
     blank_by_word=False,
     covariate=4,
-    effort=4,
 )
 WORK_ORDER = Column(
     name="work_order",
@@ -512,7 +499,6 @@ AXIAL_FLOAT = Column(
     joint_fills="axial_float_in",
     needs_joint=True,
     words="end float",
-    effort=11,
 )
 
 # What was repaired, and what the day allows.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -144,8 +144,3 @@ def effects_of(scene: Scene, candidates: Iterable[Candidate]) -> Iterator[Array]
     for candidate in candidates:
         trial = candidate.cause.trial
         yield effect(scene, candidate.cause.adjust(scene, candidate, trial)) / trial
-
-
-def effect_columns(scene: Scene, candidates: Sequence[Candidate]) -> Array:
-    """The same written out, shape (n, n_candidates)."""
-    return np.column_stack([np.empty((len(scene.table), 0)), *effects_of(scene, candidates)])

@@ -9,7 +9,6 @@ __all__ = [
     "columns",
     "conclusion",
     "covariance",
-    "design",
     "dynamic",
     "explanation",
     "fitting",

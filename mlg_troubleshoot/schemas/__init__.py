@@ -19,7 +19,6 @@ NAMES = (
     "gear",
     "verify",
     "survey",
-    "separable",
     "reconstruct",
     "doctor",
 )
@@ -33,7 +32,7 @@ def schema(name: str) -> dict[str, Any]:
     ----------
     name : str
         ``check``, ``diagnose``, ``study``, ``fleet``, ``history``, ``life``, ``gear``, ``verify``,
-        ``survey``, ``separable``, ``reconstruct`` or ``doctor``; of files ``gear-file``,
+        ``survey``, ``reconstruct`` or ``doctor``; of files ``gear-file``,
         ``ensemble``, ``targets``, ``indices``, ``extension``, ``settings`` or ``beliefs``.
 
     Returns

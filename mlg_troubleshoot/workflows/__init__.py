@@ -11,7 +11,6 @@ __all__ = [
     "kept",
     "new_gear",
     "reconstruct",
-    "separable",
     "study",
     "survey",
 ]

@@ -34,7 +34,6 @@ COMMANDS = {
     "study": (("study", "--design", "lhs", "--n1", "2", "--n2", "20", "--iterations", "2"), 0),
     "history": (("history", "--store", str(STORE)), 0),
     "fleet": (("fleet", "--no-forecast", "--store", str(STORE)), 0),
-    "separable": (("gear", "separable"), 0),
     "survey template": (("gear", "survey", "template", "neu–2.csv"), 0),
     "survey": (("gear", "--gear", str(FOUR_BAR), "survey", str(SURVEY), "--show", "mm"), 1),
     "diagnose": (("diagnose", str(DATA / "measured_pressure.csv")), 1),

@@ -12,7 +12,7 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Cause, Scene, diagnose
 from mlg_troubleshoot.diagnosis.causes import JointContact, OutOfPlaneTilt, RiggingOffset
-from mlg_troubleshoot.diagnosis.scene import effect_columns
+from mlg_troubleshoot.diagnosis.scene import effects_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -95,7 +95,7 @@ def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(
 ) -> None:
     cause = BY_NAME[name]
     candidate = first(cause, scene)
-    column = effect_columns(scene, [candidate])[:, 0]
+    (column,) = effects_of(scene, [candidate])
     step = 1e-3 * cause.trial
     moved = adjusted_worst_case(gear.model, cause.adjust(scene, candidate, step)).over_in
     slope = (moved - scene.over_in) / step

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import multivariate_normal, norm
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
 from mlg_troubleshoot.diagnosis.bank import Bank
@@ -361,6 +361,13 @@ def test_what_moves_with_a_column_is_as_likely_beforehand_whatever_the_number_of
 
 def test_what_a_probability_is_said_from_is_odds_of_nine_to_one() -> None:
     assert np.exp(Beliefs().odds) == pytest.approx(9.0)
+
+
+def test_at_the_stated_distance_the_wrong_cause_is_ruled_out_with_80_percent_power() -> None:
+    # The difference of the log likelihoods has a mean of half the squared distance, and the
+    # distance as its standard deviation.
+    apart = Beliefs().apart_from()
+    assert norm.sf(Beliefs().odds, apart**2 / 2.0, apart) == pytest.approx(0.8, abs=0.001)
 
 
 @pytest.mark.parametrize("name", [field.name for field in fields(Beliefs)])

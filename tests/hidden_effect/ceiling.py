@@ -32,7 +32,7 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis import diagnose
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
-from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
+from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from tests.hidden_effect import calibration, simulator, study
 from tests.hidden_effect.as_table import as_table
@@ -56,7 +56,7 @@ def chance(task: Task) -> tuple[str, str, float, float]:
     rivals = [
         c for kind in CATALOGUE for c in kind.candidates(scene) if not _same(c.key, (cause, target))
     ]
-    own = whitened(fleet, usable, effect_columns(scene, rivals))
+    own = whitened(fleet, usable, np.column_stack(list(effects_of(scene, rivals))))
     columns = own[:, 1:]
     truth = own[:, 0]
     along = truth @ columns
@@ -123,7 +123,7 @@ def oracle(task: Task) -> dict[str, float | str]:
         if isinstance(kind, JointFactors)
         for b in kind.blocks(scene, gear.ensemble_models[1:])
     ]
-    effects = effect_columns(scene, rivals)
+    effects = np.column_stack(list(effects_of(scene, rivals)))
     own = whitened(fleet, usable, np.hstack([effects, *(b.effects_in for b in blocks)]))
     truth, columns, wide = own[:, :1], own[:, 1 : 1 + len(rivals)], own[:, 1 + len(rivals) :]
     noise = np.random.default_rng(task["seed"]).standard_normal((len(truth), 200))

@@ -40,7 +40,7 @@ from scipy.special import logsumexp
 
 from mlg_troubleshoot import load_gear
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Scene
-from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
+from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of
 from tests.hidden_effect import simulator
 from tests.hidden_effect.as_table import as_table
 from tests.hidden_effect.ceiling import _same
@@ -142,7 +142,7 @@ def beside_linkage(task: Task) -> Record:
         if kind.name in simulator.CATALOGUE
         for c in kind.candidates(seen.scene)
     ]
-    columns = effect_columns(seen.scene, candidates)
+    columns = np.column_stack(list(effects_of(seen.scene, candidates)))
     size = np.sqrt(np.mean(columns**2, axis=0))
     acts = size > 1e-9 * size.max()
     strength = (

@@ -27,7 +27,6 @@ ENTRY = """
         spellings="humidity percent",
         words="humidity",
         covariate=11,
-        effort=12,
     ),
 """
 JOURNEY = """
@@ -43,7 +42,6 @@ from mlg_troubleshoot.records.template import write_template
 from mlg_troubleshoot.reporting.diagnosis_lines import column_words
 from mlg_troubleshoot.store.inspections import inspection_from, inspection_record
 from mlg_troubleshoot.workflows.kept import KeptGate
-from mlg_troubleshoot.workflows.separable import FURTHER
 from tests.docs_examples import columns_table
 
 NAME = "air_humidity_percent"
@@ -75,7 +73,6 @@ found = {
     "gate of a damaged record": KeptGate(gear)(record, damaged),
     "from Python": judge_again(row, options).value(NAME),
     "diagnosis": table_from_inspections([row], gear).quantities[NAME].tolist(),
-    "plan": FURTHER[NAME].name,
     "words": column_words(NAME),
     "docs": [line for line in columns_table().splitlines() if NAME in line],
 }
@@ -144,10 +141,6 @@ def test_a_new_column_is_judged_from_python(journey):
 
 def test_a_new_column_is_offered_to_the_diagnosis(journey):
     assert journey["diagnosis"] == [41.0]
-
-
-def test_a_new_column_is_offered_when_measurements_are_planned(journey):
-    assert journey["plan"] == "air_humidity_percent"
 
 
 def test_a_new_column_is_named_in_sentences(journey):
