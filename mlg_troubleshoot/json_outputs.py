@@ -410,18 +410,6 @@ class StudiedStatement(TypedDict):
     paragraph: str
 
 
-class StudiedBound(TypedDict):
-    """The worst displacement of one sense: by the paper's rule, by search, and proved."""
-
-    sense: Literal["over-travel", "under-travel"]
-    sequential_in: float
-    searched_in: float
-    found_in: float
-    bound_in: float | None
-    stroke_in: float
-    directions_rad: list[float]
-
-
 class GivenJoint(TypedDict):
     """First-order index of one joint from measured inspections."""
 
@@ -467,7 +455,6 @@ class StudyOutput(TypedDict):
     ensemble: NotRequired[list[str]]
     amplification: NotRequired[StudiedAmplification]
     statements: NotRequired[list[StudiedStatement]]
-    bounds: NotRequired[list[StudiedBound]]
     given_data: NotRequired[GivenData]
 
 

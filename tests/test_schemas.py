@@ -231,7 +231,7 @@ def test_every_output_states_the_version_of_its_schema(name: str) -> None:
         ("verify", ("gear", "verify")),
         ("doctor", ("doctor",)),
         ("reconstruct", ("gear", "reconstruct", "--start", "A", "--minutes", "0.01")),
-        pytest.param("study", ("study", "--bound"), marks=pytest.mark.slow),
+        pytest.param("study", ("study", "--statements"), marks=pytest.mark.slow),
     ],
 )
 def test_what_is_said_of_the_gear_fits_its_schema(name: str, arguments: tuple[object, ...]) -> None:

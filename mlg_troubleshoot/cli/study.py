@@ -26,7 +26,7 @@ class StudyFlags(options.OutputOptions):
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write a printable report with figures, statements and bound.",
+            help="Write a printable report with figures and statements.",
         ),
     ] = None
     gear: options.Gear = DEFAULT_GEAR
@@ -75,13 +75,6 @@ class StudyFlags(options.OutputOptions):
         bool,
         typer.Option(
             "--statements", help="Which statements of section 4.3 hold, with the numbers."
-        ),
-    ] = False
-    bound: Annotated[
-        bool,
-        typer.Option(
-            "--bound",
-            help="Worst displacement at the limits: sequential rule, global search, proved bound.",
         ),
     ] = False
     most: Annotated[int, typer.Option(min=1, help="Maximum number of evaluations.")] = 1 << 24

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, replace
@@ -74,13 +73,11 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
             gear,
             options,
             statements=flags.statements or (wants_report and targets_file(gear).exists()),
-            bound=flags.bound or wants_report,
             designs=wants_report,
             progress=progress,
         )
     said = findings.statements if flags.statements else ()
-    searched = findings.searches if flags.bound else ()
-    shown = replace(findings, statements=said, searches=searched)
+    shown = replace(findings, statements=said)
     if flags.as_json:
         from mlg_troubleshoot.reporting.model_json import study_as_json
 
@@ -97,7 +94,6 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
             rows=rows,
             bars=["█" * round(length) for length in lengths],
             given=given,
-            infinity=math.inf,
         )
     if flags.csv is not None:
         task.write_study_csv(findings, flags.csv)

@@ -3,7 +3,6 @@ aircraft.
 """
 
 __all__ = [
-    "intervals",
     "kernel",
     "mechanism",
     "program",

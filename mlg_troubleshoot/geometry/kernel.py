@@ -15,18 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import frozen
-from mlg_troubleshoot.geometry.intervals import narrowed_by_links
 from mlg_troubleshoot.geometry.mechanism import Mechanism
 from mlg_troubleshoot.geometry.program import Program, write_program
 
 Array = NDArray[Any]
-_NUMPY = {
-    "sqrt": np.sqrt,
-    "cos": np.cos,
-    "sin": np.sin,
-    "arctan2": np.arctan2,
-    "narrowed_by_links": narrowed_by_links,
-}
+_NUMPY = {"sqrt": np.sqrt, "cos": np.cos, "sin": np.sin, "arctan2": np.arctan2}
 CHUNK = 4096
 
 
@@ -80,12 +73,6 @@ class Kernel:
             numbers = self.parameters.tolist() if parameters is None else parameters
             return np.asarray(self._output(position, links, numbers)[0])
 
-    def enclose(self, position: Any, links: Sequence[Any]) -> Any:
-        """Run the formulas on ranges; every joint on two links is narrowed by what the links
-        allow.
-        """
-        return _enclosing(self._program)(position, links, self.parameters.tolist())[0]
-
     def positions(
         self,
         position: Array | float,
@@ -135,27 +122,6 @@ class Kernel:
 
 def _function(program: Program, results: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
     return _build(program.source(results), program.inputs, results)
-
-
-def _enclosing(program: Program) -> Callable[..., tuple[Any, ...]]:
-    """Formulas with a line after every joint on two links that narrows it."""
-    hooks = {
-        closure.joint[1]: (
-            f"    {', '.join(closure.joint)} = narrowed_by_links("
-            + ", ".join(
-                f"({', '.join(pair)})" for pair in (closure.joint, closure.start, closure.end)
-            )
-            + f", {closure.square}, {closure.area})"
-        )
-        for closure in program.closures
-    }
-    lines = []
-    for line in program.source((program.output,), release=False).splitlines():
-        lines.append(line)
-        name = line.split("=", 1)[0].strip()
-        if name in hooks:
-            lines.append(hooks[name])
-    return _build("\n".join(lines), program.inputs, (program.output,))
 
 
 @lru_cache(maxsize=64)

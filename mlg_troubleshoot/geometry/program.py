@@ -31,22 +31,6 @@ from mlg_troubleshoot.geometry.mechanism import (
 
 
 @dataclass(frozen=True, slots=True)
-class Closure:
-    """A joint on two links: what its formulas solve, for whoever can use it directly.
-
-    joint, start, end: names of the coordinates of the joint and of the links' other ends.
-    square: square of the first link's length in the plane; the second link's is constant.
-    area: cross product of the two links, from their ends to the joint.
-    """
-
-    joint: tuple[str, str]
-    start: tuple[str, str]
-    end: tuple[str, str]
-    square: str
-    area: str
-
-
-@dataclass(frozen=True, slots=True)
 class Program:
     """Formulas that locate every joint of a mechanism, in order, and its numbers by name.
 
@@ -70,7 +54,6 @@ class Program:
     joints: dict[str, tuple[str, str]]
     output: str
     virtual_links: int
-    closures: tuple[Closure, ...] = ()
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -110,7 +93,6 @@ class _Writer:
         self.parameters: dict[str, Any] = {}
         self.lines: list[tuple[str, str]] = []
         self.joints: dict[str, tuple[str, str]] = {}
-        self.closures: list[Closure] = []
         self.positions: dict[str, str] = {}
         # Where a link that clearances displace starts, by its joint and the one it comes from.
         self.starts: dict[tuple[str, str], tuple[str, str]] = {}
@@ -208,14 +190,7 @@ def write_program(mechanism: Mechanism) -> Program:
             case Guided():
                 _guided(w, step)
     output = _output(w)
-    return Program(
-        w.parameters,
-        tuple(w.lines),
-        w.joints,
-        output,
-        len(mechanism.virtual_links),
-        tuple(w.closures),
-    )
+    return Program(w.parameters, tuple(w.lines), w.joints, output, len(mechanism.virtual_links))
 
 
 def _travel(w: _Writer) -> str:
@@ -267,12 +242,10 @@ def _dyad(w: _Writer, step: Dyad) -> None:
         factors = w.let(f"4.0 * {second} * {second} * {square} - {excess} * {excess}")
     area = w.let(f"0.5 * {sign} * sqrt({factors})")
     across = w.let(f"{area} * {inverse}")
-    place = (
+    w.joints[step.joint] = (
         w.let(f"{ax} + {along} * {dx} - {across} * {dy}"),
         w.let(f"{ay} + {along} * {dy} + {across} * {dx}"),
     )
-    w.joints[step.joint] = place
-    w.closures.append(Closure(place, start, (bx, by), square, area))
 
 
 def _arm(pivot: Point, end: Point) -> Any:

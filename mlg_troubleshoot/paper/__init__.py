@@ -1,6 +1,4 @@
-"""What the paper prints, reproduced: its designs, statements and numbers, the reconstruction, the
-proved bound.
-"""
+"""What the paper prints, reproduced: its designs, statements and numbers, the reconstruction."""
 
 __all__ = [
     "reconstruct",
@@ -8,5 +6,4 @@ __all__ = [
     "study",
     "targets",
     "verification",
-    "worst_search",
 ]

@@ -43,7 +43,6 @@ from mlg_troubleshoot.results import Result
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.replicated import PaperDesign, ReplicatedIndices
     from mlg_troubleshoot.paper.statements import Statement
-    from mlg_troubleshoot.paper.worst_search import WorstSearch
 
 Progress = Callable[[str, int, int | None], None]
 Stages = Callable[[str], Callable[[int, int | None], None]]
@@ -164,8 +163,6 @@ class StudyFindings(Result):
         The paper's designs; empty if they were not run.
     statements : tuple of Statement
         What became of the source's statements; empty if they were not checked.
-    searches : tuple of WorstSearch
-        Worst displacement of each sense; empty if it was not looked for.
     """
 
     gear: Gear
@@ -173,7 +170,6 @@ class StudyFindings(Result):
     result: StudyResult
     designs: tuple[ReplicatedIndices, ...] = ()
     statements: tuple[Statement, ...] = ()
-    searches: tuple[WorstSearch, ...] = ()
 
 
 @dataclass(slots=True)

@@ -11,7 +11,6 @@ from mlg_troubleshoot.json_outputs import (
     MetTarget,
     ReconstructOutput,
     StudiedAmplification,
-    StudiedBound,
     StudiedStatement,
     SurveyedInspection,
     SurveyOutput,
@@ -45,17 +44,6 @@ def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None)
         "ensemble": [linkage.name for linkage in findings.gear.ensemble],
         "amplification": written(StudiedAmplification, growth, exact_plunger=growth.exact),
         "statements": [written(StudiedStatement, statement) for statement in findings.statements],
-        "bounds": [
-            written(
-                StudiedBound,
-                found.proved,
-                sense="over-travel" if found.sense > 0 else "under-travel",
-                sequential_in=found.sequential_in,
-                searched_in=found.searched_in,
-                directions_rad=found.proved.directions,
-            )
-            for found in findings.searches
-        ],
     }
     if given is not None:
         found = given.indices

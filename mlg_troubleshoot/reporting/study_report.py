@@ -1,5 +1,5 @@
-"""The report of a sensitivity study: indices, the counterparts of Figs. 12 and 13, each statement,
-the bound.
+"""The report of a sensitivity study: indices, the counterparts of Figs. 12 and 13, each
+statement.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A study and what goes with it: statements, proofs, indices of measured inspections, table,
+"""A study and what goes with it: statements, indices of measured inspections, table,
 report.
 
 What computes is imported where it is needed: a check must not wait for scipy.
@@ -26,7 +26,6 @@ from mlg_troubleshoot.parallel import StageProgress
 if TYPE_CHECKING:
     from mlg_troubleshoot.indices.given_data import GivenDataResult
     from mlg_troubleshoot.paper.study import StudyFindings, StudyOptions
-    from mlg_troubleshoot.paper.worst_search import WorstSearch
     from mlg_troubleshoot.reporting.publish import WrittenReport
 
 from mlg_troubleshoot.units import LengthUnit
@@ -37,7 +36,6 @@ def run_study(
     options: StudyOptions | None = None,
     *,
     statements: bool = False,
-    bound: bool = False,
     designs: bool = False,
     progress: StageProgress | None = None,
 ) -> StudyFindings:
@@ -52,8 +50,6 @@ def run_study(
         Design, accuracy, seed, distribution and directions; else the standard study.
     statements : bool
         Check the statements of the gear's source.
-    bound : bool
-        Prove the worst displacement with every clearance at its limit.
     designs : bool
         Compare the designs of the paper.
     progress : callable, optional
@@ -90,22 +86,7 @@ def run_study(
             known, progress=lambda done, total: report("statements", done, total)
         )
         findings = replace(findings, statements=found)
-    if bound:
-        findings = replace(findings, searches=_searches(known, wanted, report))
     return findings
-
-
-def _searches(gear: Gear, options: StudyOptions, report: StageProgress) -> tuple[WorstSearch, ...]:
-    from mlg_troubleshoot.paper.worst_search import search_worst
-
-    found = []
-    for k, sense in enumerate((1.0, -1.0)):
-        stream = np.random.SeedSequence(options.seed, spawn_key=(1000 + k,))
-        rng = np.random.default_rng(stream)
-        limits = gear.limits_in if options.limits_in is None else options.limits_in
-        found.append(search_worst(gear.model, limits, sense, rng, options.seed))
-        report("proof", k + 1, 2)
-    return tuple(found)
 
 
 def refuse_other_tables(options: StudyOptions) -> None:

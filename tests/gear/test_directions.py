@@ -7,10 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import chance_beyond, random_directions, worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
 FAILURE = np.array([[0, 0, 0.013, 0, 0.007, 0, 0, 0, 0, 0]])
@@ -47,6 +50,51 @@ def test_the_sequential_rule_is_within_four_in_ten_thousand_of_the_global_optimu
     worst = worst_case(gear.model, clearance)
     found = (sense * (worst.over_in if sense > 0 else worst.under_in))[0]
     assert found == pytest.approx(best_over_all_directions(gear.model, clearance, sense), rel=4e-4)
+
+
+def best_by_differential_evolution(
+    model: LinkageModel, clearance: np.ndarray, sense: float
+) -> float:
+    """The largest displacement over all directions and the whole stroke, by scipy."""
+
+    def lost(points: np.ndarray) -> np.ndarray:
+        directions = points[:-1].T
+        links = links_from(np.broadcast_to(clearance, directions.shape), directions)
+        moved = sense * model.displacement(links, None, points[-1])
+        return np.where(np.isfinite(moved), -moved, 1e3)
+
+    found = differential_evolution(
+        lost,
+        [[-np.pi, np.pi]] * len(clearance) + [sorted(model.stroke)],
+        popsize=12,
+        maxiter=300,
+        tol=1e-10,
+        atol=1e-12,
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+        rng=np.random.default_rng(0),
+    )
+    return -float(found.fun)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("name", "members", "short_by"),
+    [
+        *((name, slice(1), 4e-4) for name in shipped_gears()),
+        pytest.param(DEFAULT_GEAR, slice(1, None), 3e-3, marks=pytest.mark.slow),
+    ],
+)
+def test_a_global_search_of_directions_and_stroke_finds_hardly_more_than_the_rule(
+    name: str, members: slice, short_by: float, sense: float
+) -> None:
+    known = load_gear(name)
+    for model in known.ensemble_models[members]:
+        worst = worst_case(model, known.limits_in)
+        found = (sense * (worst.over_in if sense > 0 else worst.under_in))[0]
+        best = best_by_differential_evolution(model, known.limits_in, sense)
+        assert 0.0 <= best - found <= short_by * best
 
 
 @given(clearance=clearances)
