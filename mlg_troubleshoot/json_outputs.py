@@ -715,20 +715,3 @@ class ReconstructOutput(TypedDict):
     loosest: list[LoosePart]
     targets: list[MetTarget]
     member_toml: str
-
-
-class CheckedAbility(TypedDict):
-    """One thing that an installation can do, or cannot."""
-
-    ability: str
-    detail: str
-    works: bool
-    needed: bool
-    remedy: str
-
-
-class DoctorOutput(TypedDict):
-    """Output of mlg doctor --json."""
-
-    schema_version: Version
-    abilities: list[CheckedAbility]

@@ -16,10 +16,11 @@ from typer.core import TyperGroup
 
 from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.boundary import Boundary
+from mlg_troubleshoot.cli.gone import refuse_gone
 from mlg_troubleshoot.errors import ExitCode
 
 # In the order of the help; each stands in the module of its name, as `app`.
-_COMMANDS = ("check", "diagnose", "template", "fleet", "doctor", "study", "history", "gear")
+_COMMANDS = ("check", "diagnose", "template", "fleet", "study", "history", "gear")
 _ASK_FOR_HELP = frozenset(("--help", "-h"))
 
 
@@ -52,6 +53,7 @@ class CommandGroup(TyperGroup):
             _load_help_pages()
             _unwrap_help(self)
         with Boundary():
+            refuse_gone(given)
             code = super().main(given or ["--help"], *more, **{**named, "standalone_mode": False})
             raise SystemExit(code if given else ExitCode.USAGE)
 

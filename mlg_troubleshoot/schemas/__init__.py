@@ -20,7 +20,6 @@ NAMES = (
     "verify",
     "survey",
     "reconstruct",
-    "doctor",
 )
 FILES = ("gear-file", "ensemble", "targets", "indices", "extension", "settings", "beliefs")
 
@@ -32,7 +31,7 @@ def schema(name: str) -> dict[str, Any]:
     ----------
     name : str
         ``check``, ``diagnose``, ``study``, ``fleet``, ``history``, ``life``, ``gear``, ``verify``,
-        ``survey``, ``reconstruct`` or ``doctor``; of files ``gear-file``,
+        ``survey`` or ``reconstruct``; of files ``gear-file``,
         ``ensemble``, ``targets``, ``indices``, ``extension``, ``settings`` or ``beliefs``.
 
     Returns

@@ -4,7 +4,6 @@ __all__ = [
     "beliefs_file",
     "check",
     "diagnose",
-    "doctor",
     "history",
     "index_tables",
     "keep",

@@ -29,7 +29,6 @@ COMMANDS = {
     "refused": (("check", "Größe.csv"), 3),
     "gear": (("gear",), 0),
     "verify": (("gear", "verify"), 0),
-    "doctor": (("doctor",), 0),
     "template": (("template", "neu–1.xlsx"), 0),
     "study": (("study", "--design", "lhs", "--n1", "2", "--n2", "20", "--iterations", "2"), 0),
     "history": (("history", "--store", str(STORE)), 0),
@@ -134,7 +133,7 @@ def test_json_holds_every_character_on_a_stream_that_cannot(
     assert json.loads(plain.buffer.getvalue()) == {"tail": "Größe–1\udcff"}
 
 
-@pytest.mark.parametrize("command", ["check", "diagnose", "study", "gear", "doctor", "template"])
+@pytest.mark.parametrize("command", ["check", "diagnose", "study", "gear", "template"])
 def test_every_command_shows_the_version(command: str) -> None:
     found = mlg(command, "--version")
     assert (found.code, found.out.split()[0]) == (0, "mlg")

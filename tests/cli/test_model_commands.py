@@ -1,4 +1,4 @@
-"""``mlg gear``, ``mlg gear verify``, ``mlg doctor``, ``mlg --version``, help."""
+"""``mlg gear``, ``mlg gear verify``, ``mlg --version``, help."""
 
 from __future__ import annotations
 
@@ -59,26 +59,13 @@ def test_a_number_that_is_not_reproduced_is_shown_as_such(verified: Run) -> None
     assert "not reproduced" in {n["status"] for n in verified.json["numbers"]}
 
 
-def test_the_doctor_finds_everything_that_is_needed() -> None:
-    found = mlg("doctor")
-    assert found.code == 0
-    assert "MISSING" not in found.out
-    assert "PDF report: written, fonts embedded" in found.out
-
-
-def test_the_doctor_says_the_same_in_json() -> None:
-    abilities = {a["ability"]: a for a in mlg("doctor", "--json").json["abilities"]}
-    assert abilities["PDF report"]["works"]
-    assert not abilities["fast kernel"]["needed"]
-
-
 def test_the_version_is_that_of_the_package() -> None:
     from importlib.metadata import version
 
     assert mlg("--version").out == f"mlg {version('mlg-troubleshoot')}\n"
 
 
-@pytest.mark.parametrize("command", ["check", "diagnose", "template", "gear", "doctor"])
+@pytest.mark.parametrize("command", ["check", "diagnose", "template", "gear"])
 def test_every_command_shows_an_example(command: str) -> None:
     assert f"mlg {command}" in mlg(command, "--help").out
 

@@ -216,14 +216,6 @@ def test_an_edited_gear_is_checked_at_once_and_its_renewed_table_is_named(gear: 
     assert "computed again" not in mlg("check", *hand, "--gear", gear).err
 
 
-def test_the_doctor_renews_the_table_of_an_edited_gear(gear: Path) -> None:
-    load_gear(gear).indices_file.unlink()
-    found = mlg("doctor", "--gear", gear)
-    assert found.code == 0
-    assert "is missing. It was computed again" in " ".join(found.out.split())
-    assert "mlg study" not in found.out + found.err
-
-
 def test_from_python_the_table_of_an_edited_gear_is_renewed(gear: Path) -> None:
     loaded = load_gear(gear)
     loaded.indices_file.unlink()

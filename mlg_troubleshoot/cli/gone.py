@@ -1,0 +1,31 @@
+"""Commands and options that 0.2.0 had and this version has not, and what to use instead."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise, takewhile
+
+from mlg_troubleshoot.errors import UsageError
+
+# A command as it is typed after `mlg`, an option after the command that had it or, if several had
+# it, alone. What follows completes "… is gone since 0.2.0: ".
+GONE = {
+    "doctor": "mlg gear verify tries the model, and a report that cannot be written says why",
+    "gear separable": "a diagnosis says what would split its set of causes (mlg diagnose)",
+}
+
+
+def refuse_gone(given: Sequence[str]) -> None:
+    """Refuse a command line with a command or an option that is gone."""
+    words = [
+        word
+        for before, word in pairwise(("", *given))
+        if not word.startswith("-") and before != "--gear"
+    ]
+    flags = [word.partition("=")[0] for word in takewhile("--".__ne__, given)]
+    flags = [flag for flag in flags if flag.startswith("--")]
+    command = "".join(words[:1])
+    own = [f"{command} {flag}" for flag in flags]
+    for name in (command, " ".join(words[:2]), *own, *flags):
+        if name in GONE:
+            raise UsageError(f"mlg {name} is gone since 0.2.0: {GONE[name]}.")
