@@ -14,7 +14,6 @@ from mlg_troubleshoot.diagnosis.extension import (
     write_extension,
 )
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
-from mlg_troubleshoot.misfit.dynamic import fmu_simulation, ode_simulation
 from mlg_troubleshoot.misfit.simulation import diagnose_simulation
 from mlg_troubleshoot.misfit.simulation_result import (
     HeldOutGain,
@@ -49,11 +48,9 @@ __all__ = [
     "doubt_of",
     "extension",
     "faults",
-    "fmu_simulation",
     "load_causes",
     "load_extension",
     "noise",
-    "ode_simulation",
     "scene",
     "table",
     "table_from_inspections",

@@ -9,7 +9,6 @@ __all__ = [
     "columns",
     "conclusion",
     "covariance",
-    "dynamic",
     "explanation",
     "fitting",
     "posterior",

@@ -171,3 +171,20 @@ def test_a_reading_is_far_by_what_is_usual_of_its_output() -> None:
     rest[[0, 10]] = 1.2 * FAR
     far = Study._far(SimpleNamespace(outputs=outputs), rest, relative)
     assert np.flatnonzero(far).tolist() == [0]
+
+
+@pytest.mark.parametrize(("grows", "ratio"), [(True, (5.0, 30.0)), (False, (0.99, 1.01))])
+def test_scatter_grows_with_the_prediction_where_the_residuals_say_so(
+    grows: bool, ratio: tuple[float, float]
+) -> None:
+    steps, row = np.linspace(0.1, 10.0, 120), np.arange(120)
+    noise = np.random.default_rng(9).uniform(-1.0, 1.0, 120) * (steps if grows else 1.0)
+    scale = Readings(row, [row], None, None, predicted=steps).scale_of(noise, 1.0)
+    assert ratio[0] < scale[-1] / scale[0] < ratio[1]
+
+
+def test_a_bend_is_not_taken_for_scatter_that_grows() -> None:
+    steps, row = np.linspace(0.1, 10.0, 120), np.arange(120)
+    noise = 0.1 * np.random.default_rng(9).uniform(-1.0, 1.0, 120) + 0.05 * steps**2
+    scale = Readings(row, [row], None, None, predicted=steps).scale_of(noise, 1.0)
+    assert np.median(scale[-9:]) < 2.0 * np.median(scale[:9])
