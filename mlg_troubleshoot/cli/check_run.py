@@ -277,8 +277,7 @@ class Run:
         *,
         detail: bool,
     ) -> None:
-        if not self._wanted.quiet:
-            notes.show_notes(result.notes)
+        notes.show_notes(result.unread if self._wanted.quiet else result.notes)
         notes.show_problems(result.problems)
         screen = output.console(unit=unit)
         screen.asks = self._asks

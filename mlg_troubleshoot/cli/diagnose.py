@@ -101,8 +101,7 @@ def diagnose(
         warnings = (*filter(None, [asked.remembered]), *result.notes)
         output.write_json(diagnosis_as_json(result.diagnosis, result.extension, warnings))
     else:
-        if not shown.quiet:
-            show_notes(result.notes)
+        show_notes(result.unread if shown.quiet else result.notes)
         show_problems(result.problems)
         _show(result.diagnosis, settings.show)
     if write_extension is not None and result.extension is None:

@@ -85,6 +85,8 @@ class TableResult(Result):
         What is wrong with the input.
     notes : tuple of str
         Notes on the input as a whole.
+    unread : tuple of str
+        Those of the notes that say what of the input was not read.
     inputs_sha256 : mapping of str to str
         Hash of each input file by name.
     """
@@ -92,6 +94,7 @@ class TableResult(Result):
     gear: Gear
     problems: tuple[Problem, ...] = ()
     notes: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
     inputs_sha256: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -252,6 +255,8 @@ class FileRead:
 class ReadResult:
     """Everything that came out of one or more files, in their order: no row is lost, each problem
     stands once.
+
+    unread: those of the notes that say what was not read.
     """
 
     rows: tuple[Inspection | InvalidRow, ...]
@@ -259,6 +264,7 @@ class ReadResult:
     notes: tuple[str, ...] = ()
     layouts: tuple[SheetLayout, ...] = ()
     files: tuple[FileRead, ...] = ()
+    unread: tuple[str, ...] = ()
 
     @property
     def inputs_sha256(self) -> dict[str, str]:

@@ -166,6 +166,7 @@ def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -
         found.layouts.clear()
         found.problems[:] = [replace(refusal.problem, file=label)]
     found.notes[:] = [f"{label}: {note}" for note in found.notes]
+    found.unread[:] = [f"{label}: {note}" for note in found.unread]
     return FileRead(label, kind, digest, len(found.rows)), found
 
 
@@ -311,10 +312,11 @@ def _read_book(
             )
         else:
             raise _no_header(candidate)
-        several = len(chosen) > 1
+        place = f"sheet {sheet.name!r}: " if len(chosen) > 1 else ""
         found.rows += part.rows
         found.problems += part.problems
-        found.notes += [f"sheet {sheet.name!r}: {note}" if several else note for note in part.notes]
+        found.notes += [place + note for note in part.notes]
+        found.unread += [place + note for note in part.unread]
         found.layouts += part.layouts
         found.invalid_content |= part.invalid_content
     if not found.rows and not found.problems:
@@ -483,6 +485,7 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         ),
         layouts,
         tuple(file for file, _ in results),
+        tuple(note for _, found in results for note in found.unread),
     )
 
 

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from pathlib import PurePath
 
-from mlg_troubleshoot.decision.columns import CLEARANCE, IDENTITY, RECORD_ID, SIDE, TAIL_NO
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
+from mlg_troubleshoot.decision.columns import (
+    CLEARANCE,
+    IDENTITY,
+    JOINT,
+    OUTCOME,
+    PLUNGER_DISPLACEMENT,
+    RECORD_ID,
+    SIDE,
+    TAIL_NO,
+)
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, RowSource, Side
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.records.cells import Cells, Filled, column_letters, quote
+from mlg_troubleshoot.gear.gear import ROUNDING_IN
+from mlg_troubleshoot.records.cells import Cells, Filled, column_letters, quote, show
 from mlg_troubleshoot.records.headers import UNKNOWN, recognise, tidy
 from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header, header_score
 from mlg_troubleshoot.records.longform import LongReader
@@ -31,12 +42,13 @@ class Collected:
     """What the sheets of one file gave.
 
     invalid_content: a hash of the cells of each row that cannot be judged, to recognize a repeated
-    row.
+    row. unread: those of the notes that say what was not read.
     """
 
     rows: list[Inspection | InvalidRow] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    unread: list[str] = field(default_factory=list)
     layouts: list[SheetLayout] = field(default_factory=list)
     invalid_content: dict[RowSource, int] = field(default_factory=dict)
 
@@ -140,11 +152,17 @@ def _sides(
     return options, options.side, "" if options.side is None else f"every row is {options.side}"
 
 
+_STATISTICS = (
+    r"(?:grand|sub)?\W?totals?|sums?|averages?|avg|mean|median|max(?:imum)?|min(?:imum)?|std|count"
+    r"|limits?|ucl|lcl|nominal|target|mittelwert|moyenne|[øσ]"
+)
+# The name of a statistic, also behind that of what it is of.
+_STATISTIC = re.compile(rf"(?:.*\s)?(?:{_STATISTICS})[\s:.]*", re.IGNORECASE)
 # First words of rows that people write below or between inspections.
 _NO_INSPECTION = re.compile(
-    r"""(?:(?:grand|sub)?\W?totals?|sums?|averages?|avg|mean|median|max(?:imum)?|min(?:imum)?|std|count|limits?
-      |sign(?:ed|ature)?s?|checked|approved|inspect(?:ed|or)|prepared|certified|verified|stamp|date|name
-      |end|notes?|remarks?|legend|key|page|nil|no\ further)(?![^\s:.,'\u2019_/(\-])""",
+    rf"""(?:{_STATISTICS}|sign(?:ed|ature)?s?|checked|approved|inspect(?:ed|or)|prepared|certified
+      |verified|stamp|date|name|end|notes?|remarks?|legend|key|page|nil
+      |no\ further)(?![^\s:.,'\u2019_/(\-])""",
     re.VERBOSE | re.IGNORECASE,
 )
 _RULE = re.compile(r"[-=_*.\s]{3,}")
@@ -162,6 +180,8 @@ class _Table:
         delimiter: str | None,
         out: Collected,
     ) -> None:
+        self._columns = columns.placed
+        self._table = table
         self._reader = RowReader(columns.placed, table)
         self._long = LongReader(columns.placed, table) if columns.is_long else None
         self._faulty = sheet.facts.faulty
@@ -182,13 +202,23 @@ class _Table:
         self._merged: Sequence[MergedRange] | None = None
         self._filled_in = 0
         self._repeated = 0
-        self._aside: list[str] = []
+        self._aside: list[tuple[int, str, Cells]] = []
         self._dates = ""
         self._options = table.options
         self._second: FileRefusedError | None = None
         self._telling = [
             [p.index for p in columns.placed if p.field is not None and p.field.column is column]
             for column in (TAIL_NO, SIDE, CLEARANCE)
+        ]
+        self._named = {
+            p.index: p.field.column
+            for p in columns.placed
+            if p.field is not None and p.field.column in (RECORD_ID, TAIL_NO, JOINT)
+        }
+        self._evidence = [
+            p.index
+            for p in columns.placed
+            if p.field is not None and p.field.column in (CLEARANCE, PLUNGER_DISPLACEMENT, OUTCOME)
         ]
 
     def take(self, number: int, cells: Cells) -> None:
@@ -261,26 +291,84 @@ class _Table:
         )
 
     def _stands_aside(self, number: int, cells: Cells) -> bool:
-        """Tell a row of totals, signatures and the like: it says so first, and lacks what makes an
-        inspection.
+        """Tell a row of totals, signatures and the like: a name of it says so, and it lacks what
+        makes an inspection. Without a reading its first cell may also say so.
         """
         place = next((i for i, cell in enumerate(cells) if cell is not None), None)
-        first = None if place is None else cells[place]
-        if not isinstance(first, str):
+        if place is None:
             return False
-        ruled = all(
-            cell is None or (isinstance(cell, str) and _RULE.fullmatch(cell)) for cell in cells
-        )
-        if not ruled and _NO_INSPECTION.match(first.strip()) is None:
-            return False
-        filled = [
-            any(i != place and i < len(cells) and cells[i] is not None for i in kind)
-            for kind in self._telling
-        ]
-        if sum(filled) > 1 and not ruled:
-            return False
-        self._aside.append(f"row {number} {quote(first, 40)!r}")
-        return True
+        if all(c is None or (isinstance(c, str) and _RULE.fullmatch(c)) for c in cells):
+            self._aside.append((number, show(cells[place]), ()))
+            return True
+        is_read = any(i < len(cells) and cells[i] is not None for i in self._evidence)
+        named = self._named if is_read else {place: RECORD_ID}
+        for index, column in named.items():
+            cell = cells[index] if index < len(cells) else None
+            if not isinstance(cell, str):
+                continue
+            # A gear whose side stands elsewhere may have any tail.
+            is_whole = column is TAIL_NO and self._table.side is not None
+            says = _STATISTIC.fullmatch if is_whole else _NO_INSPECTION.match
+            others = [
+                any(i != index and i < len(cells) and cells[i] is not None for i in kind)
+                for kind in self._telling
+            ]
+            if says(cell.strip()) is not None and sum(others) < 2:
+                self._aside.append((number, cell, cells))
+                return True
+        return False
+
+    def _judge_aside(self) -> None:
+        """Refuse a row that was set aside and holds a reading over its limit, a plunger beyond the
+        margin or a failure that no other row has.
+        """
+        if not self._aside:
+            return
+        reader = RowReader(self._columns, replace(self._table, report=lambda _problem: None))
+        others = self._alarms(self._out.rows)
+        for number, name, cells in self._aside:
+            found = self._alarms([reader.read(number, cells)])
+            alarms = [what for what, value in found.items() if value > others.get(what, 0.0)]
+            if alarms:
+                what = f"{quote(name, 40)!r}, set aside although it holds {', '.join(alarms)}"
+                why = FileRefusedError(
+                    "row_aside",
+                    what,
+                    "an inspection, or a statistic that the other rows bear out",
+                    "If it is an inspection, enter its tail number and side; else delete the row.",
+                )
+                self._out.rows.append(self._reader.faulty(number, cells, why))
+
+    def _alarms(self, rows: Sequence[Inspection | InvalidRow]) -> dict[str, float]:
+        """What rows hold beyond a limit or what no reading can be, each with its largest value.
+        [in]
+        """
+        options = self._options
+        lowest = min(options.limit_in.values(), default=math.inf)
+        of_readings = {self._texts[index] for index in self._evidence}
+        worst: dict[str, float] = {}
+        for row in rows:
+            found = {}
+            known = row
+            if isinstance(row, InvalidRow):
+                found = {
+                    f"an unclear {header}": 1.0 for header in row.correct if header in of_readings
+                }
+                known = row.understood or row
+            if isinstance(known, Inspection):
+                # Without its convention a reading was taken as the smallest radial value.
+                factor = 1.0 if known.convention else ClearanceConvention.TOTAL_PLAY.per_radial
+                for joint, value in known.clearance_in.items():
+                    if factor * value > options.limit_in.get(joint, lowest) + ROUNDING_IN:
+                        found[f"clearance of joint {joint or 'any'} over its limit"] = value
+                far = max(map(abs, known.readings_in), default=0.0)
+                if far > options.margin_in + ROUNDING_IN:
+                    found["a plunger reading beyond the margin"] = far
+                if known.outcome is Outcome.FAILED:
+                    found["FAILED"] = 1.0
+            for what, value in found.items():
+                worst[what] = max(value, worst.get(what, 0.0))
+        return worst
 
     def finish(self) -> None:
         """Read what could be read only with all rows at hand."""
@@ -291,6 +379,7 @@ class _Table:
             )
             reader = self._long.reader
         self._dates = reader.settle_dates(self._out.rows)
+        self._judge_aside()
 
     def notes(self) -> list[str]:
         notes = []
@@ -315,8 +404,11 @@ class _Table:
                 if len(self._aside) > 1
                 else "1 row is not an inspection"
             )
-            shown = ", ".join(self._aside[:5]) + (", …" if len(self._aside) > 5 else "")
-            notes.append(f"{count}, set aside: {shown}")
+            named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
+            shown = ", ".join(named[:5]) + (f" and {len(named) - 5} more" if len(named) > 5 else "")
+            said = f"{count}, set aside: {shown} (a statistic, a signature or a rule by its name)"
+            notes.append(said)
+            self._out.unread.append(said)
         if self._dates:
             notes.append(self._dates)
         words = self._reader.not_measured

@@ -178,6 +178,7 @@ def check_files(
             judgements=(),
             problems=read.problems,
             notes=read.notes,
+            unread=read.unread,
             inputs_sha256=read.inputs_sha256,
             read=read,
             seed=options.seed,

@@ -177,6 +177,7 @@ def diagnose_files(
         extension=extension,
         problems=read.problems,
         notes=notes,
+        unread=read.unread,
         inputs_sha256=read.inputs_sha256,
     )
 
