@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -10,6 +11,7 @@ from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,
     IDENTITY,
+    PLUNGER_DISPLACEMENT,
     RECORD_ID,
     SIDE,
     UNIT,
@@ -33,6 +35,7 @@ from mlg_troubleshoot.records.tables import Collected
 FORM_TITLE = "MLG inspection form"
 # What an untouched copy of the form may hold: it says how to read, not what was found.
 _DECLARATIONS = (UNIT, CONVENTION)
+_NUMBER = re.compile(r"[^\w]*\d")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,13 +43,14 @@ class Form:
     """A form as found.
 
     lines: row, label and value. gears: the columns that hold the values of a gear, if several do or
-    another one than that of the values.
+    another one than that of the values. numbers: the columns that hold numbers next to joints.
     """
 
     lines: Sequence[tuple[int, str, Cell]]
     label_column: int
     value_column: int
     gears: Sequence[int] = ()
+    numbers: Sequence[int] = ()
 
     def is_untouched(self, options: ReadOptions) -> bool:
         if self.gears:
@@ -85,21 +89,30 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         if _is_line(label, options)
     ]
     held: dict[int, set[Column]] = {}
+    numbers: set[int] = set()
     for _, label, cells in labelled:
         named = _field(label, options)
         if named is None:
             continue
+        if named.column in (CLEARANCE, PLUNGER_DISPLACEMENT):
+            numbers |= {i for i, value in enumerate(cells) if i > column and _is_number(value)}
         for i, value in enumerate(cells):
             is_side = isinstance(value, str) and Side.spelt(value)
             if i > column and value is not None and (named.column is not SIDE or is_side):
                 held.setdefault(i, set()).add(named.column)
     gears = [i for i in sorted(held) if {SIDE, CLEARANCE} <= held[i]]
     beside = CLEARANCE not in held.get(value_column, ())
-    return Form(lines, column, value_column, gears if len(gears) > 1 or beside else ())
+    gears = gears if len(gears) > 1 or beside else []
+    return Form(lines, column, value_column, gears, sorted(numbers))
 
 
 def _field(cell: Cell, options: ReadOptions) -> Field | None:
     return recognise(cell, options.joints).field if isinstance(cell, str) else None
+
+
+def _is_number(cell: Cell) -> bool:
+    """Whether a cell may be a reading: a number, or a text that begins with one."""
+    return cell is not None and (not isinstance(cell, str) or _NUMBER.match(cell) is not None)
 
 
 def _is_line(label: str, options: ReadOptions) -> bool:
@@ -129,6 +142,15 @@ def read_form(
             "one gear on a form, or a table with one gear in each row",
             "Swap rows and columns (copy, then paste special: transpose), or give each gear a"
             " sheet of its own.",
+            sheet=sheet,
+        )
+    if len(form.numbers) > 1:
+        raise FileRefusedError(
+            "form_columns",
+            f"it holds numbers next to its joints in columns"
+            f" {', '.join(map(column_letters, form.numbers))}",
+            "the readings of one gear on one day, in one column",
+            "Delete the columns that are not the readings, or give each its own sheet.",
             sheet=sheet,
         )
     labels = [CellPlace.at(row, form.label_column, label) for row, label, _ in form.lines]
