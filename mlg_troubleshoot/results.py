@@ -38,14 +38,14 @@ class Result:
         values: dict[str, Any] = notebook().to_dict(self)
         return values
 
-    def plot(self, name: str = "", **how: Any) -> Picture:
-        """Draw the first of its pictures, or the one of that name."""
-        picture: Picture = notebook().plot(self, name, **how)
+    def plot(self, **options: Any) -> Picture:
+        """Draw its picture, where it has one."""
+        picture: Picture = notebook().plot(self, **options)
         return picture
 
     def _repr_html_(self) -> str:
-        page: str = notebook().page(self)
-        return page
+        text: str = notebook().html(self)
+        return text
 
     def __hash__(self) -> int:
         raise TypeError(f"unhashable type: {type(self).__name__!r}")

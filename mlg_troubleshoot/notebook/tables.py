@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from textwrap import shorten
 from typing import Any
 
 import pandas as pd
+from markupsafe import escape
 
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.diagnosis import Diagnosis
@@ -38,6 +40,11 @@ from mlg_troubleshoot.workflows.history import Lives
 _MAIN = ("inspections", "gears", "causes", "joints", "also_possible")
 # What says whose a row of a list within a row is.
 _WHOSE = ("record_id", "tail_no", "side")
+# What a notebook shows of a result.
+_SHOWN_ROWS = 4
+_SHOWN_COLUMNS = 6
+_SHOWN_CHARACTERS = 24
+_SHOWN_WORDS = 400
 
 
 def _catalogue_as_json(catalogue: Catalogue) -> dict[str, Any]:
@@ -104,23 +111,43 @@ def _place(point: Point) -> dict[str, Any]:
 def to_frame(result: Any, of: str = "") -> pd.DataFrame:
     values = {**to_dict(result), **_more_tables(result)}
     lists = {name: rows for name, rows in values.items() if isinstance(rows, list)}
-    name = of or next((name for name in _MAIN if lists.get(name)), "")
+    known = [name for name in _MAIN if name in lists]
+    name = of or next((name for name in known if lists[name]), "".join(known[:1]))
     if name in lists:
         frame = _frame(lists[name])
     else:
-        rows = next((lists[each] for each in _MAIN if lists.get(each)), [])
+        rows = next((lists[each] for each in known if lists[each]), [])
         within = [
             {**{key: row[key] for key in _WHOSE if key in row}, **each}
             for row in rows
             for each in row.get(name) or ()
         ]
         if name and not any(name in row for row in rows):
-            known = ", ".join(_tables(lists, rows))
-            raise UsageError(f"no table {name!r}", f"Give one of {known}.")
+            raise UsageError(
+                f"no table {name!r}", f"Give one of {', '.join(_tables(lists, rows))}."
+            )
         frame = _frame(within) if name else pd.DataFrame(_columns(lists))
     if isinstance(result, CheckResult) and name == "inspections":
         frame.index = _index(result)
     return frame
+
+
+def html(result: Any) -> str:
+    """What a result says by itself and the beginning of its table, within two kilobytes: a notebook
+    keeps whatever it shows.
+    """
+    words = (
+        f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in to_dict(result).items()
+        if isinstance(value, str | float)
+    )
+    frame = to_frame(result)
+    with pd.option_context("display.max_colwidth", _SHOWN_CHARACTERS):
+        table = frame.iloc[:_SHOWN_ROWS, :_SHOWN_COLUMNS].to_html(border=0)
+    return (
+        f"<p><b>{type(result).__name__}</b>: {escape(shorten(', '.join(words), _SHOWN_WORDS))}</p>"
+        f"{table}<p>to_frame(): {frame.shape[0]} rows, {frame.shape[1]} columns</p>"
+    )
 
 
 def _tables(lists: dict[str, Any], rows: list[Any]) -> list[str]:

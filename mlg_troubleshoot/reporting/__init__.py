@@ -9,7 +9,6 @@ __all__ = [
     "fleet_report",
     "formats",
     "html",
-    "inspection_figures",
     "inspection_report",
     "json_form",
     "life_json",
