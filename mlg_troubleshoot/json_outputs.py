@@ -16,6 +16,7 @@ from mlg_troubleshoot.decision.assessment import (
     Posterior,
     RepairSet,
     Rigging,
+    RigidBound,
     Verdict,
 )
 from mlg_troubleshoot.decision.inspection import Side
@@ -74,7 +75,9 @@ class CheckedInspection(TypedDict):
     predicted_displacement_in: worst case, the larger of the two senses in magnitude; null where the
     linkage does not close. over_travel_in, under_travel_in: signed worst case of each sense.
     predicted_upper_in: with unmeasured joints at their limit. bound_in: over all directions,
-    whatever an extension predicts. remaining_in: margin_in − predicted_displacement_in.
+    whatever an extension predicts. remaining_in: margin_in less the displacement that decides.
+    rigid: the plain model's bound, which an extension does not relax: the verdict is that of the
+    worse of both; null without an extension.
     standard_uncertainty_in: of the prediction against the margin. probability_within_margin: that
     the worst-case bound is within the margin. probability_exceed_random_directions: chance of
     exceeding the margin with uniformly random directions. geometry_spread_in: least and largest
@@ -99,6 +102,7 @@ class CheckedInspection(TypedDict):
     under_travel_in: float | None
     predicted_upper_in: float | None
     bound_in: Size | None
+    rigid: RigidBound | None
     margin_in: Positive | None
     remaining_in: float | None
     standard_uncertainty_in: Size | None

@@ -257,6 +257,28 @@ class Posterior:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class RigidBound:
+    """What the plain model says of a gear that was predicted with an extension.
+
+    Parameters
+    ----------
+    displacement_in : float or None
+        Worst case over all directions; None where the linkage does not close. [in]
+    probability_within_margin : float or None
+        Probability that it is within the margin. [1]
+    verdict : Verdict
+        The verdict of the plain model.
+    decides : bool
+        True if the verdict of the gear rests on it: the extension's own is not worse.
+    """
+
+    displacement_in: float | None
+    probability_within_margin: float | None
+    verdict: Verdict
+    decides: bool
+
+
 class _Planned:
     """What has a plan: its first step is the one next action."""
 
@@ -294,7 +316,7 @@ class Assessment(_Planned, Result):
     margin_in : float
         Allowed displacement. [in]
     remaining_in : float or None
-        Margin less prediction. [in]
+        Margin less the displacement that decides. [in]
     standard_uncertainty_in : float or None
         Of the prediction against the margin; None where a linkage of the ensemble does not close.
         [in]
@@ -340,6 +362,8 @@ class Assessment(_Planned, Result):
     posterior : Posterior or None
         Which joints explain the measured displacement; None if none was measured or it was not
         asked for.
+    rigid : RigidBound or None
+        The plain model's bound, which an extension does not relax; None without an extension.
     """
 
     inspection: Inspection
@@ -371,6 +395,7 @@ class Assessment(_Planned, Result):
     rigging: Rigging | None = None
     confidence: Confidence | None = None
     posterior: Posterior | None = None
+    rigid: RigidBound | None = None
 
     @property
     def row(self) -> Inspection:
@@ -390,6 +415,28 @@ class Assessment(_Planned, Result):
         also given.
         """
         return self.predicted_displacement_in != self.bound_in
+
+    @property
+    def decided_by_bound(self) -> bool:
+        """True where the verdict rests on a worst case over all directions."""
+        return not self.as_loaded if self.rigid is None else self.rigid.decides
+
+    @property
+    def deciding_in(self) -> float | None:
+        """Displacement that decides: of the plain model, where an extension predicts less. [in]"""
+        if self.rigid is not None and self.rigid.decides:
+            return self.rigid.displacement_in
+        return self.predicted_displacement_in
+
+    @property
+    def rigid_displacement_in(self) -> float | None:
+        """The plain model's bound; None without an extension. [in]"""
+        return None if self.rigid is None else self.rigid.displacement_in
+
+    @property
+    def rigid_verdict(self) -> str | None:
+        """The plain model's verdict; None without an extension."""
+        return None if self.rigid is None else str(self.rigid.verdict)
 
     @property
     def chance_wrong(self) -> float | None:

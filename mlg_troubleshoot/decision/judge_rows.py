@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Any
@@ -18,6 +19,7 @@ from mlg_troubleshoot.decision.assessment import (
     Judgement,
     Rejected,
     RepairSet,
+    RigidBound,
     UncertaintyBudget,
     Verdict,
 )
@@ -80,8 +82,12 @@ def _judge_part(
     valid = [row for row in part if isinstance(row, Inspection)]
     # Products of this size take twice as long where they wait for other threads.
     with threadpool_limits(1, "blas"):
-        cases = Cases.of(gear, valid, extension, fleet)
-        assessed = iter(_assess_valid(cases, table, drawn) if valid else ())
+        cases = Cases.of(gear, valid, fleet=fleet)
+        found = _assess_valid(cases, table, drawn) if valid else []
+        if extension is not None and valid:
+            extended = _assess_valid(replace(cases, extension=extension), table, drawn)
+            found = [_never_relaxed(*both) for both in zip(found, extended, strict=True)]
+        assessed = iter(found)
     return tuple(
         (
             next(assessed)
@@ -89,6 +95,51 @@ def _judge_part(
             else Rejected(row, correct(row), row.warnings)
         )
         for row in part
+    )
+
+
+# From the best to the worst.
+_ORDER = (
+    Verdict.WITHIN_MARGIN,
+    Verdict.INCONCLUSIVE,
+    Verdict.INCOMPLETE,
+    Verdict.OUTSIDE_MARGIN,
+)
+# What an extension predicts stands beside a verdict of the plain model.
+_PREDICTED = (
+    "predicted_displacement_in",
+    "over_travel_in",
+    "under_travel_in",
+    "predicted_upper_in",
+    "bound_in",
+    "standard_uncertainty_in",
+    "geometry_spread_in",
+    "budget",
+)
+
+
+def _never_relaxed(plain: Assessment, extended: Assessment) -> Assessment:
+    """The worse of what the plain model and an extension say of one gear: an extension relaxes no
+    verdict.
+    """
+
+    def badness(found: Assessment) -> tuple[int, float]:
+        return _ORDER.index(found.verdict), -(found.probability_within_margin or 0.0)
+
+    decides = badness(plain) >= badness(extended)
+    bound = RigidBound(
+        plain.predicted_displacement_in, plain.probability_within_margin, plain.verdict, decides
+    )
+    if not decides:
+        return replace(extended, rigid=bound)
+    beside = sentences.beside(extended.predicted_displacement_in, extended.verdict)
+    own = [said for said in extended.warnings if said.startswith(_OF_EXTENSION)]
+    return replace(
+        plain,
+        **{name: getattr(extended, name) for name in _PREDICTED},
+        headline=Sentence.joined([plain.headline, beside]),
+        warnings=(*plain.warnings, *own),
+        rigid=bound,
     )
 
 
@@ -319,6 +370,9 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
     return sentences.inconclusive(margin, said, float(judged.p_within[i]))
 
 
+_OF_EXTENSION = "The extension of the model"
+
+
 def _warnings(
     inspection: Inspection,
     gear: Gear,
@@ -334,7 +388,7 @@ def _warnings(
     lacking = () if extension is None else extension.lacks(inspection)
     if lacking:
         warnings.append(
-            f"The extension of the model needs {', '.join(lacking)}, which this inspection lacks:"
+            f"{_OF_EXTENSION} needs {', '.join(lacking)}, which this inspection lacks:"
             " predicted without it."
         )
     warnings += [

@@ -152,7 +152,7 @@ class Listed:
             a is not None and a.inspection.outcome is Outcome.FAILED,
             a is not None and a.inspection.is_repaired,
             () if a is None else tuple(f.joint for f in a.joints if f.over_limit),
-            a.predicted_displacement_in if a is not None and a.inspection.clearance_in else None,
+            a.deciding_in if a is not None and a.inspection.clearance_in else None,
             None if a is None else a.margin_in,
             None if a is None else a.probability_exceed_random_directions,
         )
@@ -204,11 +204,7 @@ def _severity(judgement: Judgement) -> tuple[int, int, float]:
     if not isinstance(judgement, Assessment):
         return 1, rank, 0.0
     measured = judgement.basis is Basis.MEASURED
-    size = (
-        judgement.inspection.measured_displacement_in
-        if measured
-        else judgement.predicted_displacement_in
-    )
+    size = judgement.inspection.measured_displacement_in if measured else judgement.deciding_in
     return (
         0 if measured else 1,
         rank,

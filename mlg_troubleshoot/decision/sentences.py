@@ -14,6 +14,7 @@ from mlg_troubleshoot.decision.assessment import (
     RepairKind,
     RepairSet,
     Rigging,
+    Verdict,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, surely_later
 from mlg_troubleshoot.decision.plan import STOP, End, Step
@@ -234,6 +235,17 @@ class Predicted:
         return Sentence.of("worst case {}{}, {}", displacement, alone, chance)
 
 
+def beside(displacement_in: float | None, verdict: Verdict) -> Sentence:
+    """What an extension predicts, after the headline of a verdict that it does not relax."""
+    if displacement_in is None:
+        return Sentence("With the extension the linkage does not close.")
+    return Sentence.of(
+        "With the extension: {}, {}; it relaxes no verdict.",
+        Length(displacement_in),
+        verdict.words.lower(),
+    )
+
+
 def outside(margin_in: float, said: Predicted) -> Sentence:
     """Headline of OUTSIDE_MARGIN, predicted."""
     can = "push" if said.loaded else "could push"
@@ -421,7 +433,7 @@ def chance_wrong_sentence(a: Assessment) -> str | None:
     """The chance that a verdict by the prediction is wrong; None where no prediction decides."""
     if a.chance_wrong is None:
         return None
-    what = "displacement as loaded" if a.as_loaded else "worst case"
+    what = "worst case" if a.decided_by_bound else "displacement as loaded"
     unread = (
         "; joints that were not measured count as 0"
         if any(f.clearance_in is None for f in a.joints)

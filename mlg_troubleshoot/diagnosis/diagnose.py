@@ -114,10 +114,13 @@ class NamedCause(Term):
 
     @property
     def predicts(self) -> bool:
-        """True if the model can be extended by it: it is about the gear, and some joint's share of
-        it is known.
+        """True if the model can be extended by it: it is about the gear, some joint's share of it
+        is known, and its size is plausible.
         """
-        return self.candidate.cause.extends and bool(self.candidate.setting.get("factors", True))
+        cause = self.candidate.cause
+        factors = self.candidate.setting.get("factors", True)
+        plausible = cause.is_plausible(self.candidate, self.value, ())
+        return cause.extends and bool(factors) and plausible
 
     @property
     def parameters(self) -> dict[str, float | str]:

@@ -4,10 +4,13 @@ use.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -78,6 +81,8 @@ class ExtensionFile(Table):
     terms: Annotated[tuple[TermTable, ...], Meta(min_length=1, description="at least one term")]
     gear: str = ""
     unread_joints: tuple[Whole, ...] = ()
+    program: str = ""
+    sha256: str = ""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -122,6 +127,8 @@ class ModelExtension(Result):
         Rows that they were fitted to.
     unread : tuple of int
         Joints of which these rows had no clearance.
+    foreign : tuple of str
+        Files that hold it and are not as a diagnosis wrote them.
     """
 
     gear: Gear
@@ -130,6 +137,7 @@ class ModelExtension(Result):
     data_sha256: tuple[str, ...]
     rows: int
     unread: tuple[int, ...] = ()
+    foreign: tuple[str, ...] = ()
 
     def adjust(self, inspections: Sequence[Inspection], clearance_in: Array) -> Adjustment:
         """Return what all terms change for n inspections.
@@ -150,7 +158,8 @@ class ModelExtension(Result):
             if listed
             else ""
         )
-        return f"{terms}; fitted to {self.rows} measured rows{unread}"
+        foreign = f"; no diagnosis wrote {', '.join(self.foreign)}" if self.foreign else ""
+        return f"{terms}; fitted to {self.rows} measured rows{unread}{foreign}"
 
     def lacks(self, inspection: Inspection) -> tuple[str, ...]:
         """Return the columns that the terms need and an inspection lacks: a term does nothing where
@@ -232,9 +241,16 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
         "rows": extension.rows,
         "residual_u_in": extension.residual_u_in,
         "unread_joints": extension.unread,
-        "terms": terms,
+        "program": f"mlg_troubleshoot {version('mlg-troubleshoot')}",
     }
-    write_text(file, _HEADING + tomli_w.dumps(whole))
+    whole["sha256"] = _digest({**whole, "terms": terms})
+    write_text(file, _HEADING + tomli_w.dumps({**whole, "terms": terms}))
+
+
+def _digest(values: Mapping[str, Any]) -> str:
+    """SHA-256 of all that a diagnosis wrote into an extension."""
+    content = {key: value for key, value in values.items() if key != "sha256"}
+    return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ()) -> ModelExtension:
@@ -264,6 +280,7 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
     rows = 0
     residual = float("nan")
     unread = set[int]()
+    foreign: list[str] = []
     known = {cause.name: cause for cause in with_own(own)}
     for file in files:
         read = read_toml(file, ExtensionFile, "Give a file that mlg diagnose wrote.")
@@ -277,9 +294,11 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
         rows = found.rows
         residual = found.residual_u_in
         unread |= set(found.unread_joints)
+        foreign += [str(file)] * (found.sha256 != _digest(read.values))
         hashes += found.data_sha256
         terms += [_term(read, index, known, gear) for index in range(len(found.terms))]
-    return ModelExtension(gear, tuple(terms), residual, tuple(hashes), rows, tuple(sorted(unread)))
+    joints = tuple(sorted(unread))
+    return ModelExtension(gear, tuple(terms), residual, tuple(hashes), rows, joints, tuple(foreign))
 
 
 def _tried_out(term: Term, gear: Gear) -> float:
@@ -313,9 +332,15 @@ def _term(
             (*place, "cause"),
             "the name of a cause; give the file of your own causes with --causes",
         )
-    candidate = Candidate(known[read.cause], read.target, read.setting)
+    cause = known[read.cause]
+    if not cause.extends:
+        raise file.fail(
+            (*place, "cause"), "a cause of the model; this one is about what was written"
+        )
+    candidate = Candidate(cause, read.target, read.setting)
     term = Term(candidate, read.value, read.interval_95)
     try:
+        plausible = cause.is_plausible(candidate, read.value, gear.joint_numbers)
         moved = _tried_out(term, gear)
     except (KeyError, TypeError, ValueError, TroubleshootError) as error:
         needed = f"what {read.cause} needs of this gear ({error})"
@@ -325,4 +350,8 @@ def _term(
             (*place, "value"),
             f"a number that leaves the plunger within {MOST_IN:g} in of its place",
         )
+    if not plausible:
+        low, high = cause.plausible_values
+        expected = f"{low:g} to {high:g}, which is what is plausible of {cause.name}"
+        raise file.fail((*place, "value"), expected)
     return term

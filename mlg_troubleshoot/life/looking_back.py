@@ -103,7 +103,7 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[PastInsp
         day = found.inspection_date.isoformat() if found.inspection_date else ""
         at = (day or "9999", life.records[-1].seq + 1)
         rows = [r for r in rows if r[0].record_id != found.record_id and r[1] < at]
-        rows += [(found, at, now.predicted_displacement_in, now.verdict.value)] if rows else []
+        rows += [(found, at, now.deciding_in, now.verdict.value)] if rows else []
     steps: list[PastInspection] = []
     before: tuple[str, int] | None = None
     for inspection, at, worst_in, verdict in rows:

@@ -17,6 +17,8 @@ from mlg_troubleshoot.reporting import figures
 from mlg_troubleshoot.reporting.figures import INK, PALE, SOFT, Bar, Canvas
 from mlg_troubleshoot.reporting.formats import Lengths
 
+_PLAIN = "plain model (bound)"
+
 
 def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
     """Draw the worst cases of both senses against the margin, with the uncertainty and what was
@@ -34,17 +36,20 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
     measured = a.inspection.measured_displacement_in
     low, high = (sense * value for value in a.geometry_spread_in or (0.0, 0.0))
     upper = sense * (a.predicted_upper_in or 0.0)
-    what = "As loaded" if a.as_loaded else "Worst case"
-    what = f"{what} ({'expected' if a.as_loaded else 'bound'})"
+    bound = sense * (a.rigid_displacement_in or 0.0)
+    what = "As loaded (expected)" if a.as_loaded else "Worst case (bound)"
+    what = "With the extension" if bound else what
     shown = partial(lengths.bare, signed=True)
     lanes = {what: f"{shown(under)} / {shown(over)}"}
     if measured is not None:
         lanes = {"Measured on the gear": shown(measured), **lanes}
+    if bound:
+        lanes[_PLAIN] = shown(bound)
     if abs(upper) > worst + 5e-5:
         lanes["unmeasured at limit"] = shown(upper)
     if a.geometry_spread_in:
         lanes["other geometries"] = " … ".join(dict.fromkeys((shown(low), shown(high))))
-    farthest = max(margin, worst + u2, *map(abs, (measured or 0.0, upper, high)))
+    farthest = max(margin, worst + u2, *map(abs, (measured or 0.0, upper, high, bound)))
     plot = _gauge(lanes, margin, 1.06 * farthest, lengths)
     canvas = plot.canvas
     rows = {name: place + 0.5 for place, name in enumerate(lanes)}
@@ -61,6 +66,9 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
     canvas.rectangle(x, y - 6, at(sense * worst + u2, what)[0] - x, 12, colour=INK)
     for end in (under, over):
         canvas.marker("diamond", *at(end, what), 5.5)
+    if bound:
+        canvas.line(*at(0.0, _PLAIN), *at(bound, _PLAIN), width=4)
+        canvas.marker("diamond", *at(bound, _PLAIN), 5.5)
     if "unmeasured at limit" in lanes:
         ends = at(0.0, "unmeasured at limit"), at(upper, "unmeasured at limit")
         canvas.line(*ends[0], *ends[1], width=1.5, dash="5 3")

@@ -236,7 +236,7 @@ def batch_document(
 
 def _place_of(a: Assessment) -> GearInPicture:
     inspection = a.inspection
-    worst_in = a.predicted_displacement_in
+    worst_in = a.deciding_in
     name = f"{inspection.tail_no} {inspection.side}"
     return GearInPicture(
         name, a.verdict.value, None if worst_in is None else worst_in / a.margin_in

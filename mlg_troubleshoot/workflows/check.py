@@ -426,6 +426,9 @@ def _judge(
         from mlg_troubleshoot.life.looking_back import expected_of
 
         fleet = expected_of(store, found.gear)
+    if options.extension is not None:
+        said = f"Extension: {options.extension.describe()}. It relaxes no verdict."
+        found = replace(found, notes=(*found.notes, said))
     if fleet is not None:
         found = replace(found, notes=(*found.notes, fleet.text))
     held: list[Judgement] = []
@@ -584,10 +587,20 @@ _NUMBERS = (
         "remaining_in",
     ),
     *("probability_within_margin", "probability_exceed_random_directions"),
+    "rigid_displacement_in",
 )
 _VERDICT_HEADER = (
     *("record_id", "tail_no", "side"),
-    *("verdict", "basis", *_NUMBERS, "joints_over_limit", "next_action", "in_brief", "end"),
+    *(
+        "verdict",
+        "basis",
+        *_NUMBERS,
+        "rigid_verdict",
+        "joints_over_limit",
+        "next_action",
+        "in_brief",
+        "end",
+    ),
     *("file", "sheet", "row"),
 )
 VERDICT_HEADER = csv_lines([_VERDICT_HEADER])
@@ -603,6 +616,7 @@ def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:
             name: getattr(a, "margin_in" if name == "margin_used_in" else name, None)
             for name in _NUMBERS
         },
+        "rigid_verdict": None if a is None else a.rigid_verdict,
         "joints_over_limit": (
             None if a is None else ", ".join(f"#{f.joint}" for f in a.joints if f.over_limit)
         ),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tests.cli.conftest import FAILURE, Run, mlg
+from mlg_troubleshoot import load_gear
+from tests.cli.conftest import DATA, FAILURE, Run, mlg
 from tests.hidden_effect.simulator.generate import draw_fleet, write_csv
 
 
@@ -91,6 +94,106 @@ def test_the_extension_brings_the_uncertainty_of_the_model(plain: Run, extended:
         for run in (plain, extended)
     )
     assert sum(after) != pytest.approx(sum(before), rel=0.05)
+
+
+def test_an_extension_relaxes_no_verdict(plain: Run, extended: Run) -> None:
+    before, after = ([i["verdict"] for i in run.json["inspections"]] for run in (plain, extended))
+    relaxed = [
+        (one, two)
+        for one, two in zip(before, after, strict=True)
+        if two == "WITHIN_MARGIN" and one != two
+    ]
+    assert "OUTSIDE_MARGIN" in before
+    assert not relaxed
+
+
+def test_the_plain_model_stands_beside_what_an_extension_predicts(
+    plain: Run, extended: Run
+) -> None:
+    for one, two in zip(plain.json["inspections"], extended.json["inspections"], strict=True):
+        assert one["rigid"] is None
+        assert two["rigid"]["verdict"] == one["verdict"]
+        assert two["rigid"]["displacement_in"] == one["predicted_displacement_in"]
+
+
+@pytest.fixture(scope="module")
+def loads(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The extension that is learned from readings far below the bound."""
+    file = tmp_path_factory.mktemp("loads") / "e.toml"
+    found = mlg("diagnose", DATA / "measured_far_below.csv", "--write-extension", file, "--quiet")
+    assert found.code == 1
+    return file
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eighty gears that the plain model calls outside."""
+    rng = np.random.default_rng(58)
+    file = tmp_path_factory.mktemp("drawn") / "gears.csv"
+    header = ["record_id", "tail_no", "side", "clearance_convention"]
+    joints = [f"clearance_{joint}_in" for joint in range(1, 11)]
+    lines = [[f"R{k}", f"N{k}", "LH", "RADIAL", *rng.uniform(0.004, 0.0074, 10)] for k in range(80)]
+    with file.open("w", encoding="utf-8", newline="") as opened:
+        csv.writer(opened).writerows([[*header, *joints], *lines])
+    found = mlg("check", file, "--json")
+    assert {i["verdict"] for i in found.json["inspections"]} == {"OUTSIDE_MARGIN"}
+    return file
+
+
+def test_no_gear_that_is_outside_leaves_as_within_by_a_learned_extension(
+    loads: Path, drawn: Path
+) -> None:
+    found = mlg("check", drawn, "--extension", loads, "--json")
+    assert found.code == 1
+    assert {i["verdict"] for i in found.json["inspections"]} == {"OUTSIDE_MARGIN"}
+    assert {i["rigid"]["decides"] for i in found.json["inspections"]} == {True}
+
+
+def test_a_table_of_verdicts_has_both(loads: Path, drawn: Path) -> None:
+    out = drawn.with_name("verdicts.csv")
+    mlg("check", drawn, "--extension", loads, "--csv", out, "--quiet")
+    with out.open(encoding="utf-8", newline="") as opened:
+        first = next(csv.DictReader(opened))
+    assert (first["verdict"], first["rigid_verdict"]) == ("OUTSIDE_MARGIN", "OUTSIDE_MARGIN")
+    assert float(first["predicted_displacement_in"]) < 0.03 < float(first["rigid_displacement_in"])
+
+
+def test_a_screen_says_that_an_extension_was_used(loads: Path, drawn: Path) -> None:
+    assert "Extension: " in mlg("check", drawn, "--extension", loads).err
+
+
+def rate(tmp_path: Path, value: float) -> Path:
+    """A rate that somebody wrote by hand."""
+    file = tmp_path / "rate.toml"
+    lines = [
+        "schema = 1",
+        f'geometry_sha256 = "{load_gear().geometry_sha256}"',
+        'data_sha256 = ["0"]',
+        "rows = 1",
+        "residual_u_in = 0.001",
+        "[[terms]]",
+        'cause = "calibration_rate"',
+        f"value = {value}",
+        "interval_95 = [-1e6, 1e6]",
+    ]
+    file.write_text("\n".join(lines), encoding="utf-8")
+    return file
+
+
+def test_a_rate_that_leaves_nothing_of_a_prediction_is_refused(tmp_path: Path) -> None:
+    found = mlg("check", FAILURE, "--extension", rate(tmp_path, -0.99))
+    assert (found.code, found.out) == (2, "")
+    assert "terms[1].value: expected -0.18 to 0.18" in found.err
+
+
+def test_a_file_that_no_diagnosis_wrote_relaxes_nothing_and_says_so(
+    drawn: Path, tmp_path: Path
+) -> None:
+    file = rate(tmp_path, -0.18)
+    found = mlg("check", drawn, "--extension", file, "--json")
+    assert found.code == 1
+    assert {i["verdict"] for i in found.json["inspections"]} == {"OUTSIDE_MARGIN"}
+    assert any(f"no diagnosis wrote {file}" in said for said in found.json["warnings"])
 
 
 def test_an_extension_of_another_geometry_is_refused(extension: Path, diagnosed: Run) -> None:

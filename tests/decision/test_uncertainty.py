@@ -8,7 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.assessment import Assessment, UncertaintyBudget, Verdict
+from mlg_troubleshoot.decision.assessment import (
+    Assessment,
+    RigidBound,
+    UncertaintyBudget,
+    Verdict,
+)
 from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import assess
@@ -268,14 +273,37 @@ def test_where_under_travel_governs_the_part_of_the_readings_is_of_that_sense(ge
     )
 
 
-def test_a_gear_within_its_margin_as_loaded_says_what_other_loads_could_do(
-    loaded: Assessment,
+def test_an_extension_relaxes_no_verdict(judge: Judge, loaded: Assessment) -> None:
+    plain = judge(WORN)
+    assert plain.verdict is Verdict.INCONCLUSIVE
+    assert (loaded.verdict, loaded.plan) == (plain.verdict, plain.plan)
+    assert loaded.probability_within_margin == plain.probability_within_margin
+
+
+def test_what_an_extension_predicts_stands_after_the_verdict_that_it_does_not_relax(
+    judge: Judge, loaded: Assessment
 ) -> None:
-    assert loaded.verdict is Verdict.WITHIN_MARGIN
-    assert loaded.headline.startswith(
-        f"Within its margin of 0.0300 in as loaded ({loaded.predicted_displacement_in:.4f} in)."
-        f" Other loads than this fleet's could push it to {loaded.bound_in:.4f} in."
+    said = f" With the extension: {loaded.predicted_displacement_in:.4f} in, within margin; it"
+    assert loaded.headline == judge(WORN).headline + said + " relaxes no verdict."
+
+
+def test_an_extension_that_predicts_more_decides(judge: Judge) -> None:
+    found = judge(WORN, extension=Shifted(0.04), gauge_id="G-1")
+    assert found.verdict is Verdict.OUTSIDE_MARGIN
+    assert found.rigid == RigidBound(
+        judge(WORN).predicted_displacement_in,
+        judge(WORN).probability_within_margin,
+        Verdict.INCONCLUSIVE,
+        decides=False,
     )
+
+
+def test_what_decides_is_the_larger_of_bound_and_extension(
+    judge: Judge, loaded: Assessment
+) -> None:
+    assert loaded.deciding_in == judge(WORN).predicted_displacement_in
+    more = judge(WORN, extension=Shifted(0.04), gauge_id="G-1")
+    assert more.deciding_in == more.predicted_displacement_in
 
 
 @pytest.mark.slow

@@ -243,6 +243,65 @@ def test_a_cause_that_is_not_known_asks_for_the_file_of_causes(gear: Gear, tmp_p
     assert "--causes" in str(refused.value)
 
 
+@pytest.mark.parametrize("value", [-0.99, -1.0, -5.0, 0.19])
+def test_a_rate_that_its_page_does_not_call_plausible_is_refused(
+    value: float, gear: Gear, tmp_path: Path
+) -> None:
+    write_extension(extension(gear, term("calibration_rate", value)), tmp_path / "e.toml")
+    with pytest.raises(
+        GearFileError, match=r"expected -0\.18 to 0\.18, which is what is plausible"
+    ):
+        load_extension([tmp_path / "e.toml"], gear)
+
+
+def test_an_offset_of_more_than_half_a_turn_of_the_dial_is_refused(
+    gear: Gear, tmp_path: Path
+) -> None:
+    write_extension(extension(gear, term("gauge_bias", 0.051, value="G-1")), tmp_path / "e.toml")
+    with pytest.raises(GearFileError, match=r"expected -0\.05 to 0\.05"):
+        load_extension([tmp_path / "e.toml"], gear)
+
+
+def test_a_joint_that_counts_more_than_its_clearance_under_load_is_refused(
+    gear: Gear, tmp_path: Path
+) -> None:
+    loads = term("load_directions", 1.0, factors={"3": 1.2})
+    write_extension(extension(gear, loads), tmp_path / "e.toml")
+    with pytest.raises(GearFileError, match="expected -1 to 1"):
+        load_extension([tmp_path / "e.toml"], gear)
+
+
+def test_a_slip_of_convention_is_no_extension(gear: Gear, tmp_path: Path) -> None:
+    slip = term("convention_slip", 1.0, column="gauge_id", value="G-1", written_factor=2.0)
+    write_extension(extension(gear, slip), tmp_path / "e.toml")
+    with pytest.raises(GearFileError, match="about what was written"):
+        load_extension([tmp_path / "e.toml"], gear)
+
+
+def test_a_file_as_a_diagnosis_wrote_it_names_its_program(gear: Gear, tmp_path: Path) -> None:
+    write_extension(extension(gear, RATE), tmp_path / "e.toml")
+    raw = tomllib.loads((tmp_path / "e.toml").read_text(encoding="utf-8"))
+    assert raw["program"].startswith("mlg_troubleshoot ")
+    assert not load_extension([tmp_path / "e.toml"], gear).foreign
+
+
+@pytest.mark.parametrize(
+    "changed", ["value = 0.05", "rows = 200", "program = ", "residual_u_in = "]
+)
+def test_a_file_that_no_diagnosis_wrote_so_says_it(
+    changed: str, gear: Gear, tmp_path: Path
+) -> None:
+    file = tmp_path / "e.toml"
+    write_extension(extension(gear, RATE), file)
+    lines = file.read_text(encoding="utf-8").splitlines()
+    other = {"value = 0.05": "value = 0.051", "rows = 200": "rows = 201", "program = ": ""}
+    lines = [
+        other.get(changed, "residual_u_in = 0.002") if x.startswith(changed) else x for x in lines
+    ]
+    file.write_text("\n".join(lines), encoding="utf-8")
+    assert load_extension([file], gear).describe().endswith(f"; no diagnosis wrote {file}")
+
+
 def test_an_extension_that_cannot_be_written_says_so(gear: Gear, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(OutputError, match="cannot be written"):

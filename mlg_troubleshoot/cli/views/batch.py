@@ -100,7 +100,7 @@ def show_before_and_after(before: Assessment, after: Assessment, screen: DataCon
 
     both = before, after
     lengths: dict[str, list[float | None]] = {
-        "worst case": [a.predicted_displacement_in for a in both],
+        "worst case": [a.deciding_in for a in both],
         "margin": [a.margin_in for a in both],
         "measured": [a.inspection.measured_displacement_in for a in both],
     }

@@ -96,7 +96,7 @@ def _numbers(a: Assessment) -> Iterator[str]:
         yield Sentence.of(
             "Probability that {} is within the margin: {}{}. The ensemble of reconstructed linkages"
             " gives {} to {}.",
-            "the plunger" if a.as_loaded else "the worst case",
+            "the worst case" if a.decided_by_bound else "the plunger",
             percent(a.probability_within_margin),
             confidence_words(a.confidence),
             Length(low, named=False),

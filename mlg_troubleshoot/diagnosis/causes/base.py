@@ -16,6 +16,7 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 
 
@@ -187,6 +188,19 @@ class Cause(ABC):
         alone; none unless something else in the table moves as the missing column would.
         """
         yield from ()
+
+    @property
+    def plausible_values(self) -> tuple[float, float]:
+        """Ends of what an extension may have, of one sign where physics allows one only: three
+        standard deviations of the largest size that a diagnosis tries. [unit of `parameter`]
+        """
+        most = np.inf if self.plausible is None else 3.0 * max(Beliefs().sizes) * self.plausible
+        return (0.0 if self.sign > 0 else -most), (0.0 if self.sign < 0 else most)
+
+    def is_plausible(self, candidate: Candidate, value: float, joints: Sequence[int]) -> bool:
+        """Tell whether an extension may have a value of the parameter. [unit of `parameter`]"""
+        low, high = self.plausible_values
+        return low <= value <= high
 
     @abstractmethod
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:

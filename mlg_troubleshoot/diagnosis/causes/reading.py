@@ -22,6 +22,9 @@ from mlg_troubleshoot.diagnosis.causes.base import (
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
 _LEAST_ROWS = 3
+# Half a turn of a dial with 0.1 in per turn: further off a reading is a turn that was miscounted.
+# [in]
+_DIAL_IN = 0.1 / 2
 
 
 def change_date(scene: Scene, day: float) -> str | None:
@@ -68,6 +71,11 @@ class RowShift(Cause):
 
     parameter = "offset_in"
     trial = 0.001
+
+    @property
+    def plausible_values(self) -> tuple[float, float]:
+        """Ends of an offset. [in]"""
+        return -_DIAL_IN, _DIAL_IN
 
     def rows(self, candidate: Candidate) -> Mapping[str, str]:
         """What a row that is shifted has in each of some columns."""

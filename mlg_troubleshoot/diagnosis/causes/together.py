@@ -168,6 +168,17 @@ class JointFactors(Cause):
         share = 1.0 / max(len(found), 1)
         return [Block(self, joints, columns, k[np.ix_(used, used)], share) for k in found]
 
+    @property
+    def plausible_values(self) -> tuple[float, float]:
+        """Ends of the factor of a joint. [1]"""
+        return self.bounds
+
+    def is_plausible(self, candidate: Candidate, value: float, joints: Sequence[int]) -> bool:
+        """Tell whether an extension may have these factors."""
+        low, high = self.bounds
+        factors = self.factors(joints, candidate, value)
+        return bool(np.all((low <= factors) & (factors <= high)))
+
     def factors(self, joints: Sequence[int], candidate: Candidate, value: float) -> Array:
         """Factor of each joint, shape (n_joints,). [1]"""
         fitted = candidate.setting["factors"]
