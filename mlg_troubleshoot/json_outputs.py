@@ -11,8 +11,6 @@ from typing import Annotated, Any, Literal, NotRequired, TypedDict
 from msgspec import Meta
 
 from mlg_troubleshoot.decision.assessment import (
-    Confidence,
-    MeasuringAdvice,
     Posterior,
     RepairSet,
     Rigging,
@@ -87,7 +85,7 @@ class CheckedInspection(TypedDict):
     only that binds. in_brief: the same in words that stand alone, as on screen, in CSV and on
     paper. open_question: what the day does not allow to settle, and at the end of the plan which
     joints nobody read, with the chance that one is over its limit. repair_sets: null where the
-    linkage does not close. measuring, confidence: null in a batch. posterior: null in a batch
+    linkage does not close. posterior: null in a batch
     or where nothing was measured.
     """
 
@@ -121,8 +119,6 @@ class CheckedInspection(TypedDict):
     open_question: str | None
     repair_sets: list[RepairSet] | None
     rigging: Rigging | None
-    measuring: MeasuringAdvice | None
-    confidence: Confidence | None
     posterior: Posterior | None
     warnings: list[str]
 
@@ -130,11 +126,10 @@ class CheckedInspection(TypedDict):
 class CheckOutput(TypedDict):
     """Output of mlg check --json: every data row of the input appears exactly once.
 
-    seed: of the Monte Carlo draws. problems: errors only. warnings: notes on the input as a whole.
+    problems: errors only. warnings: notes on the input as a whole.
     """
 
     schema_version: Version
-    seed: Count
     gear: GearIdentity
     inspections: list[CheckedInspection]
     problems: list[Problem]

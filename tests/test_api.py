@@ -178,8 +178,10 @@ def test_check_says_what_the_command_says() -> None:
     assert [joint.joint for joint in found.ranked][:2] == [3, 5]
 
 
-def test_check_without_advice_draws_nothing() -> None:
-    assert mlg.check(inspection(FAILURE), advice=False).confidence is None
+def test_check_without_advice_looks_for_no_worn_joints() -> None:
+    read = inspection(FAILURE)
+    assert mlg.check(read).rigging is not None
+    assert mlg.check(read, advice=False).rigging is None
 
 
 def test_check_with_repairs_finds_the_set() -> None:

@@ -18,6 +18,7 @@ from mlg_troubleshoot.decision.columns import (
     TAIL_NO,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -163,13 +164,11 @@ def advice_for(
     """Say after each critical joint which reading is most useful next, or that one may stop."""
 
     def advise(measured: Mapping[int, float], left: Sequence[int]) -> tuple[str, int | None] | None:
-        advice = task.next_joint(gear, measured)
-        if advice is None:
-            return None
-        if advice.stop and left:
-            return f"{advice.text} Type done.", None
-        useful = (worth.joint for worth in advice.worth if worth.joint in left)
-        joint = next(useful, None)
+        step = task.next_step(gear, measured)
+        if step.action not in (Action.MEASURE, Action.MEASURE_AGAIN):
+            said = f"No measurement is needed now. Next: {step.words}. Type done."
+            return (said, None) if left else None
+        joint = next((joint for joint in step.joints if joint in left), None)
         if joint is None:
             return None
         return f"Most useful next reading: {gear.joint(joint).label}.", joint

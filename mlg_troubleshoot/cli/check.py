@@ -53,8 +53,6 @@ _OF_ONE_GEAR: options.ColumnFlags = {
     "measured_again": ("--measured-again", "JOINTS", "Joints measured again with another gauge."),
     "cannot_reach": ("--cannot-reach", "JOINTS", "Joints out of reach today, e.g. 4."),
     "no_spare": ("--no-spare", "JOINTS", "Joints without a spare part, e.g. 3."),
-    "open_areas": ("--open", "AREAS", "Areas that are open already, e.g. sidestay."),
-    "minutes_available": ("--minutes", "MIN", "Minutes left for the work today."),
 }
 
 
@@ -145,10 +143,6 @@ class Wanted(CheckOutputs):
         ),
     ] = None
     remember: options.Remember = False
-    seed: Annotated[
-        int,
-        typer.Option(min=0, help="Seed of the Monte Carlo check of a single gear."),
-    ] = 1
     workers: Annotated[
         int | None,
         typer.Option(min=1, help="Processor cores for more than 512 rows; all if not given."),

@@ -88,7 +88,6 @@ class Run:
             side=None if typed_side is None else Side.parse(typed_side),
             **tables.declared(self._shown.headers),
             remembered=self._shown.note or None,
-            seed=wanted.seed,
             extension=load_model_extension(extensions, tables.gear, causes),
             workers=wanted.workers or os.cpu_count() or 1,
             scheduler=wanted.scheduler and options.dask_client(wanted.scheduler),
@@ -163,7 +162,7 @@ class Run:
         if wanted.as_json and total > 1:
             from mlg_troubleshoot.reporting.json_form import CheckText, inspection_lines
 
-            text = found.text = CheckText(read.gear, read.problems, self._warnings(read), read.seed)
+            text = found.text = CheckText(read.gear, read.problems, self._warnings(read))
             output.write_pieces((text.begin,))
             lines = partial(inspection_lines, read.gear)
             outputs.append(
@@ -266,7 +265,7 @@ class Run:
     def _write_json(self, result: task.CheckResult) -> None:
         from mlg_troubleshoot.reporting.json_form import check_as_json
 
-        said = result.problems, self._warnings(result), result.seed
+        said = result.problems, self._warnings(result)
         output.write_json(check_as_json(result.gear, result.judgements, *said))
 
     def _show(

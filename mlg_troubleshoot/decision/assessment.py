@@ -120,70 +120,6 @@ class Rigging:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadingWorth:
-    """What measuring one joint is worth.
-
-    minutes: from the state of the inspection, areas that are open already being free. [min]
-    risk_drop: expected drop of the decision risk; 0 where this reading alone cannot change the
-    decision. [1] variance_in2: share of the variance of the worst case that the reading removes.
-    [in²] critical: true if no gear can be cleared without it.
-    """
-
-    joint: int
-    minutes: float
-    risk_drop: float
-    variance_in2: float
-    critical: bool
-
-
-@dataclass(frozen=True, slots=True)
-class MeasuringAdvice:
-    """Which joint to measure next, and whether one may stop: no reading will change the verdict.
-
-    Attributes
-    ----------
-    worth : tuple of ReadingWorth
-        What reading each unmeasured joint is worth, the best one first.
-    stop : bool
-        Whether one may stop.
-    verdict : Verdict
-        The verdict that stands if one may stop, else the verdict so far.
-    expected_within : float
-        Chance that the gear is within its margin, unmeasured joints taken by their distribution.
-        For the advice only: a verdict takes them at their bounds. [1]
-    expected : Verdict or None
-        WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is enough to go on troubleshooting,
-        INCONCLUSIVE where measuring the other joints would hardly settle it, else None.
-    text : str
-        The advice in words.
-    """
-
-    worth: tuple[ReadingWorth, ...]
-    stop: bool
-    verdict: Verdict
-    expected_within: float
-    expected: Verdict | None
-    text: str
-
-    @property
-    def joint(self) -> int | None:
-        """The joint to measure next; None if all are measured."""
-        return self.worth[0].joint if self.worth else None
-
-
-@dataclass(frozen=True, slots=True)
-class Confidence:
-    """The probability of being within the margin with a linear response, and with its curvature by
-    Monte Carlo. [1]
-    """
-
-    analytic: float
-    monte_carlo: float
-    standard_error: float
-    draws: int
-
-
-@dataclass(frozen=True, slots=True)
 class UncertaintyBudget:
     """Standard uncertainties behind the probability, at the prediction with unmeasured joints at 0.
     [in]
@@ -352,13 +288,8 @@ class Assessment(_Planned, Result):
         Repair sets; None if they were not asked for.
     warnings : tuple of str
         Everything else a user must see.
-    measuring : MeasuringAdvice or None
-        What further measuring is worth; None if it was not asked for or the linkage does not close.
     rigging : Rigging or None
         What re-rigging alone would do; None if it was not asked for or is not needed.
-    confidence : Confidence or None
-        Monte Carlo check of the probability; None if it was not asked for or nothing
-        is uncertain.
     posterior : Posterior or None
         Which joints explain the measured displacement; None if none was measured or it was not
         asked for.
@@ -391,9 +322,7 @@ class Assessment(_Planned, Result):
     measured_statement: str | None
     repair_sets: tuple[RepairSet, ...] | None
     warnings: tuple[str, ...]
-    measuring: MeasuringAdvice | None = None
     rigging: Rigging | None = None
-    confidence: Confidence | None = None
     posterior: Posterior | None = None
     rigid: RigidBound | None = None
 

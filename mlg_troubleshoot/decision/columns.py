@@ -27,7 +27,6 @@ class Holds(StrEnum):
     DATE = "date"
     MOMENT = "date and time"
     JOINTS = "joints"
-    AREAS = "areas"
 
 
 class Need(StrEnum):
@@ -553,19 +552,6 @@ OF_THE_DAY: tuple[Column, ...] = (
         name="no_spare",
         holds=Holds.JOINTS,
         meaning="Joints without a spare part today.",
-    ),
-    Column(
-        name="open_areas",
-        holds=Holds.AREAS,
-        meaning="Areas that are open already, for example sidestay.",
-    ),
-    Column(
-        name="minutes_available",
-        holds=Holds.NUMBER,
-        meaning="Minutes left for the work today.",
-        high=1e5,
-        unit="min",
-        expected="minutes, {low:g} or more",
     ),
 )
 

@@ -179,10 +179,6 @@ class Inspection(Result):
         Joints that were measured a second time, with another gauge.
     cannot_reach, no_spare : tuple of int
         Joints that cannot be reached today, and those without a spare part.
-    open_areas : tuple of str
-        Areas that are open already.
-    minutes_available : float or None
-        Time left for the work today. [min]
     small_readings_true : bool
         True if somebody confirmed that readings below the play of new parts were read in the stated
         unit.
@@ -233,8 +229,6 @@ class Inspection(Result):
     measured_again: tuple[int, ...] = ()
     cannot_reach: tuple[int, ...] = ()
     no_spare: tuple[int, ...] = ()
-    open_areas: tuple[str, ...] = ()
-    minutes_available: float | None = None
     small_readings_true: bool = False
     unit_question: str = ""
     other_columns: Mapping[str, object] = field(default_factory=dict)

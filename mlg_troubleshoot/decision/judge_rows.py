@@ -28,8 +28,6 @@ from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.decision.likely_worn import explain
-from mlg_troubleshoot.decision.monte_carlo import check_probability
-from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.plan import Basis, Plan
 from mlg_troubleshoot.decision.planner import Judged, correct, plans
 from mlg_troubleshoot.decision.prediction import (
@@ -43,7 +41,6 @@ from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.decision.repair import repair_sets, rigging_alternative
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
-from mlg_troubleshoot.decision.wear_levels import Unread
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
@@ -59,22 +56,21 @@ def assess(
     table: IndexTable,
     *,
     advice: bool = False,
-    seed: int = 1,
     extension: Extension | None = None,
     fleet: Fleet | None = None,
 ) -> tuple[Judgement, ...]:
-    """Judge rows: verdict, plan, repair sets and allowances; with `advice` what is worth it for one
-    gear alone. `fleet` is what other gears teach.
+    """Judge rows: verdict, plan, repair sets and allowances; with `advice` re-rigging and
+    the joints that are likely worn. `fleet` is what other gears teach.
     """
     parts = [rows[start : start + AT_ONCE] for start in range(0, len(rows), AT_ONCE)]
-    task = partial(_judge_part, gear, table, seed if advice else None, extension, fleet)
+    task = partial(_judge_part, gear, table, advice, extension, fleet)
     return tuple(chain.from_iterable(map(task, parts)))
 
 
 def _judge_part(
     gear: Gear,
     table: IndexTable,
-    drawn: int | None,
+    advice: bool,
     extension: Extension | None,
     fleet: Fleet | None,
     part: Sequence[Inspection | InvalidRow],
@@ -83,9 +79,9 @@ def _judge_part(
     # Products of this size take twice as long where they wait for other threads.
     with threadpool_limits(1, "blas"):
         cases = Cases.of(gear, valid, fleet=fleet)
-        found = _assess_valid(cases, table, drawn) if valid else []
+        found = _assess_valid(cases, table, advice) if valid else []
         if extension is not None and valid:
-            extended = _assess_valid(replace(cases, extension=extension), table, drawn)
+            extended = _assess_valid(replace(cases, extension=extension), table, advice)
             found = [_never_relaxed(*both) for both in zip(found, extended, strict=True)]
         assessed = iter(found)
     return tuple(
@@ -143,7 +139,7 @@ def _never_relaxed(plain: Assessment, extended: Assessment) -> Assessment:
     )
 
 
-def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Assessment]:
+def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessment]:
     causes = believed(cases)
     batch = predict_batch(cases, causes.exceeds)
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
@@ -183,7 +179,7 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
     )
     planned = plans(cases, judged, causes, causes.with_chances(sets))
     return [
-        _assessment(cases, judged, i, findings[i], *planned[i], seed) for i in range(len(cases))
+        _assessment(cases, judged, i, findings[i], *planned[i], advice) for i in range(len(cases))
     ]
 
 
@@ -194,7 +190,7 @@ def _assessment(
     findings: tuple[JointFinding, ...],
     plan: Plan,
     sets: tuple[RepairSet, ...],
-    seed: int | None,
+    advice: bool,
 ) -> Assessment:
     inspection = cases.inspections[i]
     found = judged.verdicts[i]
@@ -212,7 +208,7 @@ def _assessment(
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.batch, cases, i) if known else None
     beyond = bool(plunger.beyond[i])
-    detail = _detail(cases, judged, i, plan, budget, seed) if seed is not None and closes else {}
+    detail = _detail(cases, judged, i, budget) if advice and closes else {}
     return Assessment(
         inspection=inspection,
         verdict=found,
@@ -284,30 +280,17 @@ def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
 
 
 def _detail(
-    cases: Cases,
-    judged: Judged,
-    i: int,
-    plan: Plan,
-    budget: UncertaintyBudget | None,
-    seed: int,
+    cases: Cases, judged: Judged, i: int, budget: UncertaintyBudget | None
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
     one = cases.take(np.array([i]))
-    rng = np.random.default_rng(seed)
-    lower = one.predict(one.filled(0.0))
-    found = judged.verdicts[i]
-    causes = believed(one)
-    unread = Unread(one, lower, causes.levels)
-    worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
-    detail: dict[str, Any] = {
-        "measuring": advise(one, unread, found, float(judged.p_within[i]), plan)
-    }
-    if budget is not None:
-        detail["confidence"] = check_probability(one, worst_in, budget, rng)
-        if found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
-            detail["rigging"] = rigging_alternative(one, worst_in, budget)
+    detail: dict[str, Any] = {}
+    if budget is not None and judged.verdicts[i] in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
+        lower = one.predict(one.filled(0.0))
+        worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
+        detail["rigging"] = rigging_alternative(one, worst_in, budget)
     if np.isfinite(one.mean_in[0]):
-        detail["posterior"] = explain(one, causes)
+        detail["posterior"] = explain(one, believed(one))
     return detail
 
 

@@ -183,21 +183,20 @@ class _PlanBuilder:
         # Chance of a second repair up to which one repair is taken for enough. [1]
         self.accepted = _FOR_ONE_REPAIR * self.gear.second_repair_chance.value
         self.taken_again = False
-        self.at_first = frozenset(self.inspection.open_areas)
-        self.opened = self.at_first
+        self.opened: frozenset[str] = frozenset()
         self.over_limit = self._joints(self.cases.over_limit[row])
         self.over = self._joints(facts.over[row])
         self.read_plunger = bool(np.isfinite(self.cases.mean_in[row]))
         self.looked = self.inspection.rigging_checked not in (None, RiggingCheck.NO)
 
     def plan(self) -> Plan:
-        """The steps in their order, within what the day allows."""
+        """The steps in their order."""
         i = self.row
         if not np.isfinite(self.judged.batch.lower.displacement_in[i]):
             return NOT_CLOSING
         if self.judged.questions[i] and not self.judged.plunger.beyond[i]:
             return CONFIRM
-        found = self._within_the_day(self._course())
+        found = self._course()
         return replace(found, open_question=self._open_question(found))
 
     def _course(self) -> Plan:
@@ -603,35 +602,12 @@ class _PlanBuilder:
         left = self._joints(self.facts.open[i])
         never = None
         if left and found.steps[0].action in (Action.CONTINUE, Action.DONE):
-            minutes = minutes_to_measure(self.gear, left, self.at_first)
+            minutes = minutes_to_measure(self.gear, left)
             never = sentences.never_read(left, minutes)
         unread = self._joints(~cases.measured[i] & ~cases.reachable[i])
         over = self._joints(cases.over_limit[i] & ~cases.restorable[i])
         shut = sentences.open_question(unread, over)
         return " ".join(said for said in (found.open_question, shut, never) if said) or None
-
-    def _within_the_day(self, found: Plan) -> Plan:
-        """The plan as far as the minutes of the day reach; its first step is one that fits."""
-        left = self.inspection.minutes_available
-        first = found.steps[0]
-        if left is None or first.minutes <= left:
-            return found
-        joints = first.joints
-        if first.action is Action.MEASURE:
-            while joints and minutes_to_measure(self.gear, joints, self.at_first) > left:
-                joints = joints[:-1]
-            if joints:
-                minutes = minutes_to_measure(self.gear, joints, self.at_first)
-                step = replace(
-                    first,
-                    joints=joints,
-                    minutes=minutes,
-                    text=sentences.measure(self.gear, joints),
-                )
-                return replace(found, steps=(step, *found.steps[1:]))
-        question = sentences.does_not_fit(first, left)
-        stop = Step(Action.CONTINUE, (), 0.0, None, sentences.STOP_FOR_TODAY)
-        return Plan((stop,), End.CANNOT_CLEAR, question)
 
 
 def _verdicts_after_limits(cases: Cases, judged: Judged) -> list[Verdict]:

@@ -10,14 +10,13 @@ from datetime import date
 
 from mlg_troubleshoot.decision.assessment import (
     Assessment,
-    Confidence,
     RepairKind,
     RepairSet,
     Rigging,
     Verdict,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, surely_later
-from mlg_troubleshoot.decision.plan import STOP, End, Step
+from mlg_troubleshoot.decision.plan import STOP, End
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import Length, Sentence
@@ -67,10 +66,6 @@ _BEYOND_NOT_EXPLAINED = (
 _BEYOND_AND_LOOKED = (
     "Joint clearances do not explain the plunger position, and rigging and lock roller were"
     " checked: refer the gear to engineering."
-)
-STOP_FOR_TODAY = (
-    f"{STOP}: what would decide takes longer than the minutes that are left. Hand over what"
-    " stays open."
 )
 RETRACT = "Retract the gear (trial retraction). Enter the outcome with its date and time."
 
@@ -194,11 +189,6 @@ def stop_for_today(over: Sequence[int], if_worn: Sequence[int], barred: Sequence
     else:
         because = f": {joint_list(barred)} would decide, but cannot be reached or restored"
     return f"{STOP}{because}. Hand over what stays open."
-
-
-def does_not_fit(step: Step, left: float) -> str:
-    """What stays open because the minutes of the day do not suffice."""
-    return f"To {step.words} takes {step.minutes:.0f} min; {left:.0f} min are left today."
 
 
 @dataclass(frozen=True, slots=True)
@@ -419,14 +409,6 @@ def correct(columns: Sequence[str]) -> str:
 def joint_list(joints: Sequence[int]) -> str:
     """Joints as a list: ``#3, #5``."""
     return ", ".join(f"#{joint}" for joint in joints)
-
-
-def confidence_words(confidence: Confidence | None) -> str:
-    """Say after a probability what Monte Carlo with the curved response gives."""
-    if confidence is None:
-        return ""
-    error = max(100.0 * confidence.standard_error, 0.01)
-    return f" (Monte Carlo {100.0 * confidence.monte_carlo:.2f} ± {error:.2f} %)"
 
 
 def chance_wrong_sentence(a: Assessment) -> str | None:

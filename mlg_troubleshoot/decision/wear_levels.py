@@ -159,10 +159,6 @@ class Unread:
         scores = (bound_in[:, None] - self.base_in[:, None] - mean) / spread
         return np.asarray(np.sum(self.levels * tabled_normal_cdf(scores), axis=1))
 
-    def within(self) -> Array:
-        """Chance that the worst case is within the margin. [1]"""
-        return self.below(self.margin_in, ~self.read, self.u_in[:, None])
-
     def too_close(self) -> Array:
         """Chance that neither verdict conforms once every joint is read. [1]"""
         return self.below(self.outside_in, ~self.read) - self.below(self.within_in, ~self.read)
@@ -194,22 +190,3 @@ class Unread:
                 # rounds.
                 done = done | (self.settled(chosen, ~self.read & ~chosen) >= enough)
         return chosen
-
-    def known(self, row: int, joint: int) -> tuple[Array, Array]:
-        """Chances of what a joint of one gear may read, and of the gear being within its margin
-        then. [1]
-        """
-        rest = np.delete(self.reach_in[row], joint)
-        reach = self.reach_in[row, joint]
-        chances = self.levels[row][:, None] * DENSITIES
-        mean = self.base_in[row] + (rest.sum() * MEAN)[:, None] + reach * SHARES
-        spread = np.sqrt((rest @ rest) * VARIANCE + self.u_in[row] ** 2)[:, None]
-        within = tabled_normal_cdf((self.margin_in[row] - mean) / spread)
-        read = chances.sum(axis=0)
-        return read, np.sum(chances * within, axis=0) / read
-
-    def variance(self, row: int) -> Array:
-        """Variance of the worst case that a reading of each joint of one gear removes. [in²]"""
-        mean = self.levels[row] @ MEAN
-        variance = self.levels[row] @ (VARIANCE + MEAN**2) - mean**2
-        return np.asarray(self.reach_in[row] ** 2 * variance)

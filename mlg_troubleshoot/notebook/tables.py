@@ -64,7 +64,7 @@ def _worst_case_as_json(worst: WorstCase) -> dict[str, Any]:
 
 # What has a form of its own; any other result is written as it stands.
 _AS_JSON: dict[type, Callable[[Any], Any]] = {
-    CheckResult: lambda r: check_as_json(r.gear, r.judgements, r.problems, r.notes, r.seed),
+    CheckResult: lambda r: check_as_json(r.gear, r.judgements, r.problems, r.notes),
     Assessment: assessment_as_json,
     DiagnoseResult: lambda r: diagnosis_as_json(r.diagnosis, r.extension, r.notes),
     Diagnosis: lambda r: diagnosis_as_json(r, None),

@@ -102,8 +102,7 @@ class TableResult(Result):
 class ReadOptions(TableOptions):
     """What is declared about tables, and what the gear says of the values in them.
 
-    joints: numbers and names of the joints, by which headers are understood. areas: names of the
-    areas to open.
+    joints: numbers and names of the joints, by which headers are understood.
     clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above the one is refused,
     above the other accepted with a warning. [in]
     plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
@@ -114,7 +113,6 @@ class ReadOptions(TableOptions):
     """
 
     joints: Joints = field(default_factory=Joints)
-    areas: tuple[str, ...] = ("sidestay", "link assembly")
     clearance_hard_max_in: float = 0.050
     clearance_confirm_above_in: float = 0.015
     plunger_hard_max_in: float = 0.5
@@ -143,7 +141,6 @@ class ReadOptions(TableOptions):
             **declared,
             joints=Joints.of(gear),
             new_part_in={joint.number: joint.new_part.value for joint in gear.joints},
-            areas=tuple(area.name for area in gear.areas),
             margin_in=gear.margin.value,
             limit_in={joint.number: joint.limit.value for joint in gear.joints},
             clearance_hard_max_in=gear.hard_limit.value,

@@ -70,7 +70,6 @@ from mlg_troubleshoot.records.values import (
     convention_word,
     is_no_name,
     plain_text,
-    read_areas,
     read_date,
     read_joints,
     read_length,
@@ -358,8 +357,6 @@ class RowReader:
                 return read_moment(cell, self._options.dates, self._latest)
             if column.holds is Holds.JOINTS:
                 return read_joints(cell, self._options.joints.numbers)
-            if column.holds is Holds.AREAS:
-                return read_areas(cell, self._options.areas)
             return read_value(
                 column,
                 cell,

@@ -500,18 +500,6 @@ def read_joints(cell: Filled, numbers: Collection[int]) -> tuple[int, ...]:
     return tuple(sorted({int(word) for word in found}))
 
 
-def read_areas(cell: Filled, areas: Collection[str]) -> tuple[str, ...]:
-    """Read names of areas, with commas or semicolons between."""
-    expected = f"areas of this gear: {'; '.join(areas)}"
-    by_name = {name.casefold(): name for name in areas}
-    found = [part.strip() for part in re.split(r"[,;]", plain_text(show(cell))) if part.strip()]
-    unknown = [part for part in found if part.casefold() not in by_name]
-    if unknown:
-        remedy = f"{unknown[0]!r} is not an area of this gear. Enter {' or '.join(areas)}."
-        raise CellFaultError("area_unknown", expected, remedy)
-    return tuple(dict.fromkeys(by_name[part.casefold()] for part in found))
-
-
 def _written_day(text: str, order: DateOrder | None, expected: str, latest: date) -> date:
     no_such_day = "The calendar does not have this day."
     try:

@@ -86,10 +86,9 @@ def check_as_json(
     judgements: Iterable[Judgement],
     problems: Sequence[Problem],
     warnings: Sequence[str],
-    seed: int = 1,
 ) -> dict[str, Any]:
     whole = {
-        **_head(gear, seed),
+        **_head(gear),
         "inspections": [_inspection(j, gear) for j in judgements],
         **_tail(problems, warnings),
     }
@@ -113,10 +112,8 @@ class CheckText:
     stands in memory. `begin`, the lines of each block, `end`.
     """
 
-    def __init__(
-        self, gear: Gear, problems: Sequence[Problem], warnings: Sequence[str], seed: int = 1
-    ) -> None:
-        self.begin = as_text(_head(gear, seed))[:-1] + ', "inspections": [\n'
+    def __init__(self, gear: Gear, problems: Sequence[Problem], warnings: Sequence[str]) -> None:
+        self.begin = as_text(_head(gear))[:-1] + ', "inspections": [\n'
         self.end = "\n], " + as_text(_tail(problems, warnings))[1:] + "\n"
         self._joint = ""
 
@@ -130,10 +127,9 @@ def inspection_lines(gear: Gear, judgements: Iterable[Judgement]) -> str:
     return ",\n".join(as_text(_inspection(judgement, gear)) for judgement in judgements)
 
 
-def _head(gear: Gear, seed: int) -> dict[str, Any]:
+def _head(gear: Gear) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
-        "seed": seed,
         "gear": written(GearIdentity, gear),
     }
 

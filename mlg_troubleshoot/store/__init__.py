@@ -13,9 +13,15 @@ from mlg_troubleshoot.store.database import (
     packed,
 )
 from mlg_troubleshoot.store.drafts import Draft, Drafts
-from mlg_troubleshoot.store.inspections import inspection_from, inspection_record, same_inspection
+from mlg_troubleshoot.store.inspections import (
+    RETIRED,
+    inspection_from,
+    inspection_record,
+    same_inspection,
+)
 
 __all__ = [
+    "RETIRED",
     "Added",
     "Broken",
     "Draft",

@@ -21,6 +21,8 @@ _FIELDS = tuple(
     (field.name, field.default) for field in fields(Inspection) if field.name != "other_columns"
 )
 _NAMES = frozenset(name for name, _ in _FIELDS)
+# What records of 0.2.0 may hold and nothing reads any more: it stays in the record.
+RETIRED = frozenset(("open_areas", "minutes_available"))
 _AS_THEY_ARE = frozenset((str, int, float, bool, type(None)))
 
 
@@ -79,14 +81,18 @@ _READ: dict[str, Callable[[Any], Any]] = {
     **{column.filled: date.fromisoformat for column in COLUMNS if column.holds is Holds.DATE},
     **{column.filled: _moment for column in COLUMNS if column.holds is Holds.MOMENT},
     **{column.filled: column.choices for column in COLUMNS if column.choices is not None},
-    **{c.filled: tuple for c in COLUMNS if c.holds in (Holds.JOINTS, Holds.AREAS)},
+    **{c.filled: tuple for c in COLUMNS if c.holds is Holds.JOINTS},
     **dict.fromkeys(("readings_in", "warnings"), tuple),
 }
 
 
 def inspection_from(record: Record) -> Inspection:
     body = record.body["inspection"]
-    read = {name: _READ[name](value) if name in _READ else value for name, value in body.items()}
+    read = {
+        name: _READ[name](value) if name in _READ else value
+        for name, value in body.items()
+        if name not in RETIRED
+    }
     other = {name: read.pop(name) for name in [*read] if name not in _NAMES}
     return Inspection(**{"clearance_in": {}, "other_columns": other, **read})
 

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, MeasuringAdvice, Verdict
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
 from mlg_troubleshoot.decision.judge_rows import AT_ONCE, assess
+from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.decision.prediction import Extension
 from mlg_troubleshoot.decision.ranking import Listed, listed
 from mlg_troubleshoot.errors import ExitCode, OutputError, UsageError
@@ -56,10 +57,8 @@ class CheckOptions(TableOptions):
     remembered : str or None
         What was remembered, in words for the report.
     advice : bool or None
-        Compute what is looked at for one gear: Monte Carlo, re-rigging, worn joints; None does so
+        Compute what is looked at for one gear: re-rigging, worn joints; None does so
         for a single one.
-    seed : int
-        Seed of the Monte Carlo draws.
     extension : Extension or None
         An extension of the model.
     workers : int
@@ -72,7 +71,6 @@ class CheckOptions(TableOptions):
     gear: Gear | str | Path = DEFAULT_GEAR
     remembered: str | None = None
     advice: bool | None = None
-    seed: int = 1
     extension: Extension | None = None
     workers: int = 1
     scheduler: Any = None
@@ -88,13 +86,10 @@ class CheckResult(TableResult):
         One for each data row, in the order of the input.
     read : ReadResult or None
         What was read, for annotating the user's workbook; None for an inspection entered by hand.
-    seed : int
-        Seed of the Monte Carlo draws.
     """
 
     judgements: tuple[Judgement, ...]
     read: ReadResult | None = None
-    seed: int = 1
 
     @property
     def counts(self) -> dict[Verdict, int]:
@@ -181,7 +176,6 @@ def check_files(
             unread=read.unread,
             inputs_sha256=read.inputs_sha256,
             read=read,
-            seed=options.seed,
         )
         return _judge(found, rows, options, on_judged, store, outputs, processes)
 
@@ -202,7 +196,7 @@ def _start(
 def check_inspection(
     inspection: Inspection, options: CheckOptions, store: Store | None = None
 ) -> CheckResult:
-    found = CheckResult(gear=load_gear(options.gear), judgements=(), seed=options.seed)
+    found = CheckResult(gear=load_gear(options.gear), judgements=())
     return _judge(found, [inspection], options, store=store)
 
 
@@ -247,8 +241,7 @@ def check(
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
     advice : bool, optional
-        Check the probability by Monte Carlo, find worn joints, and say what further measuring and
-        re-rigging are worth; for a single gear unless it is False.
+        Find worn joints and what re-rigging is worth; for a single gear unless it is False.
     extension : Extension, optional
         An extension of the model.
     **declared
@@ -382,11 +375,11 @@ def read_inspections(
     return frame
 
 
-def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice | None:
-    """Say which joint's reading is most useful next, and whether one may stop measuring."""
+def next_step(gear: Gear, measured: Mapping[int, float]) -> Step:
+    """NEXT of a gear of which some clearances are known. [in]"""
     row = replace(trial_inspection(gear), clearance_in=dict(measured))
-    (judged,) = assess([row], gear, load_index_table(gear), advice=True)
-    return judged.measuring if isinstance(judged, Assessment) else None
+    (judged,) = assess([row], gear, load_index_table(gear))
+    return judged.next_action
 
 
 def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Assessment] | None:
@@ -440,7 +433,6 @@ def _judge(
             gear=found.gear,
             table=load_index_table(found.gear),
             advice=total == 1 if options.advice is None else options.advice,
-            seed=options.seed,
             extension=options.extension,
             fleet=fleet,
         ),

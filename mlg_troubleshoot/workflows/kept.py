@@ -32,7 +32,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.values import CellFaultError, read_date, read_moment, read_text
-from mlg_troubleshoot.store import Record, RecordKind
+from mlg_troubleshoot.store import RETIRED, Record, RecordKind
 from mlg_troubleshoot.units import LengthUnit
 
 # Made at run time from the joints of a gear: no checker of types reads them.
@@ -44,12 +44,11 @@ _HASH = Annotated[
 ]
 # Of the program's own making: no more than a number.
 _NUMBER = Annotated[float, Meta(ge=-(10**12), le=10**12)]
-_PLAIN: dict[Holds, Any] = {Holds.YES_NO: bool, Holds.AREAS: tuple[str, ...]}
+_PLAIN: dict[Holds, Any] = {Holds.YES_NO: bool}
 # What is read of a text must be what stands there.
 _READ: dict[Holds, tuple[str, Callable[[str], str]]] = {
     # A store has few aircraft and days, and many records of each.
     Holds.TEXT: ("a text", lru_cache(1024)(lambda text: text if read_text(text, "") else "")),
-    Holds.AREAS: ("texts", lambda text: text if read_text(text, "") else ""),
     Holds.DATE: ("a date", lru_cache(1024)(lambda text: read_date(text).isoformat())),
     Holds.MOMENT: ("a date, with its time if known", lambda text: read_moment(text).isoformat()),
 }
@@ -95,7 +94,7 @@ class KeptGate:
             [
                 (name, kind) if name in needed else (name, kind, msgspec.UNSET)
                 for name, kind in {
-                    **{field.name: Any for field in fields(Inspection)},
+                    **dict.fromkeys((*(f.name for f in fields(Inspection)), *RETIRED), Any),
                     **columns,
                     "gauge_u_is_default": bool,
                     "entered": _BY[self._by_joint, _ENTERED],

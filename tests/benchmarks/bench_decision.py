@@ -22,16 +22,14 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+
 from mlg_troubleshoot.decision import repair
 from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
 from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.likely_worn import explain
-from mlg_troubleshoot.decision.next_joint import enough, outlook
-from mlg_troubleshoot.decision.plan import minutes_to_measure
 from mlg_troubleshoot.decision.prediction import predict
-from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -167,33 +165,6 @@ def posterior(n: int) -> None:
             )
 
 
-def _quick_error(gear: Gear) -> float:
-    linkages = responses(gear)
-    clearance = np.random.default_rng(3).uniform(0.0, 0.0075, (400, 10))
-    exact = worn_gears.worst(clearance)
-    return float(np.max(np.abs(linkages[0].magnitude(clearance) - exact)))
-
-
-@dataclass(slots=True)
-class Tally:
-    """How one way of measuring did over a fleet."""
-
-    readings: Array
-    minutes: Array
-    verdicts: list[Verdict]
-
-    def line(self, within: NDArray[np.bool_]) -> str:
-        """Readings, minutes and errors in one line."""
-        said_within = np.array([v is Verdict.WITHIN_MARGIN for v in self.verdicts])
-        said_outside = np.array([v is Verdict.OUTSIDE_MARGIN for v in self.verdicts])
-        return (
-            f"{self.readings.mean():5.2f} readings {self.minutes.mean():6.1f} min   verdict WITHIN"
-            f" {said_within.mean():5.1%}, OUTSIDE {said_outside.mean():5.1%}; wrong WITHIN"
-            f" {np.mean(said_within & ~within):.2%}, wrong OUTSIDE"
-            f" {np.mean(said_outside & within):.2%}"
-        )
-
-
 def _verdicts(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> list[Verdict]:
     n = len(read)
     rows = [inspection({})] * n
@@ -208,91 +179,6 @@ def _verdicts(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> list[Verd
         verdict(float(low), float(high), critical_missing=bool(miss))
         for low, high, miss in zip(*p, missing, strict=True)
     ]
-
-
-def _expected(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> Verdict | None:
-    """Which verdict the distribution that ranks readings is enough for."""
-    so_far = inspection({j + 1: float(read[j]) for j in np.flatnonzero(measured)})
-    ahead = outlook(Cases.of(gear, [so_far]))
-    return enough(ahead.within, ahead.too_close)
-
-
-Order = Callable[[Gear, Array, NDArray[np.bool_]], int]
-
-
-def fixed_order(_gear: Gear, _read: Array, measured: NDArray[np.bool_]) -> int:
-    """The next joint of the paper's order."""
-    return next(number for number in PAPER_ORDER if not measured[number - 1])
-
-
-def by_worth(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> int:
-    """The next joint by what its reading is worth per minute."""
-    so_far = inspection({j + 1: float(read[j]) for j in np.flatnonzero(measured)})
-    return outlook(Cases.of(gear, [so_far])).worth[0].joint
-
-
-def measure(gear: Gear, read: Array, order: Order, stop: str) -> Tally:
-    """Measure joint by joint until the rule to stop is met."""
-    n = len(read)
-    measured = np.zeros((n, 10), bool)
-    minutes = np.zeros(n)
-    verdicts = [Verdict.INCOMPLETE] * n
-    going = np.arange(n)
-    for _ in range(10):
-        for row in going:
-            joint = order(gear, read[row], measured[row])
-            taken = [int(j) + 1 for j in np.flatnonzero(measured[row])]
-            minutes[row] += minutes_to_measure(
-                gear, [joint], frozenset(gear.joint(n).area for n in taken)
-            )
-            measured[row, joint - 1] = True
-        now = _verdicts(gear, read[going], measured[going])
-        for row, found in zip(going, now, strict=True):
-            verdicts[row] = found
-            if stop == "expected" and found is Verdict.INCOMPLETE:
-                verdicts[row] = _expected(gear, read[row], measured[row]) or found
-        if stop != "never":
-            going = np.array([row for row in going if verdicts[row] is Verdict.INCOMPLETE], int)
-        if not len(going):
-            break
-    return Tally(measured.sum(axis=1).astype(float), minutes, verdicts)
-
-
-def measuring(n: int) -> None:
-    """Readings needed to reach a verdict."""
-    gear = load_gear()
-    error = _quick_error(gear)
-    show(
-        "second-order worst case against the independent linkage, to the limit",
-        f"{error:.5f} in",
-        "<= 0.0006 in",
-        met=error <= 0.0006,
-    )
-    rng = np.random.default_rng(7)
-    true_in = worn_gears.mixed_fleet(n, rng)
-    read = worn_gears.readings(true_in, rng)
-    exact = worn_gears.worst(true_in)
-    within = exact + rng.normal(size=n) * np.maximum(0.003, 0.1 * exact) <= MARGIN_IN
-    cases: dict[str, tuple[Order, str]] = {
-        "paper's order, all ten": (fixed_order, "never"),
-        "paper's order, product's rule to stop": (fixed_order, "verdict"),
-        "product, until the verdict is certain": (by_worth, "verdict"),
-        "paper's order, stop where expected": (fixed_order, "expected"),
-        "product's advice: stop where expected": (by_worth, "expected"),
-    }
-    found = {}
-    for name, (order, stop) in cases.items():
-        found[name] = measure(gear, read, order, stop)
-        print(f"    {name:<40} {found[name].line(within)}", flush=True)
-    advice, whole = found["product's advice: stop where expected"], found["paper's order, all ten"]
-    share = float(advice.readings.mean() / whole.readings.mean())
-    minutes = float(advice.minutes.mean() / whole.minutes.mean())
-    show(
-        "readings to a verdict by the product's advice, of those by the paper's order",
-        f"{share:.1%} ({minutes:.0%} min)",
-        "<= 50 %",
-        met=share <= 0.5,
-    )
 
 
 def _by_hand(gear: Gear, joints: Sequence[int]) -> float:
@@ -388,15 +274,9 @@ def speed() -> None:
 def main() -> None:
     """Run the benchmarks."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", choices=("speed", "measuring", "repairs", "posterior"))
+    parser.add_argument("--only", choices=("speed", "repairs", "posterior"))
     parser.add_argument(
         "--gears", type=int, default=10_000, help="size of the fleet of the posterior"
-    )
-    parser.add_argument(
-        "--measured",
-        type=int,
-        default=2_000,
-        help="size of the fleet that is measured joint by joint",
     )
     parser.add_argument(
         "--repaired", type=int, default=1_000, help="size of the fleet that is repaired"
@@ -404,7 +284,6 @@ def main() -> None:
     chosen = parser.parse_args()
     parts: dict[str, Callable[[], None]] = {
         "speed": speed,
-        "measuring": partial(measuring, chosen.measured),
         "repairs": partial(repairs, chosen.repaired),
         "posterior": partial(posterior, chosen.gears),
     }

@@ -37,7 +37,6 @@ SAID = {
         readings_in=(0.004,),
         outcome=Outcome.FAILED,
         no_spare=(3,),
-        minutes_available=100.0,
     ),
     "stopped": replace(
         GEAR,
@@ -47,7 +46,6 @@ SAID = {
         measured_again=tuple(MANY),
         rigging_checked=RiggingCheck.YES,
         no_spare=(3,),
-        minutes_available=100.0,
     ),
 }
 
@@ -60,7 +58,7 @@ def test_verdict_next_and_keys_fit_on_24_lines_with_all_joints_read(
     monkeypatch.setenv("COLUMNS", str(width))
     result = task.check_inspection(SAID[gear], task.CheckOptions(), None)
     one_gear.show(result.judgements[0], result.gear, console(), detail=False)
-    day = SimpleNamespace(more={"no_spare": "3", "minutes_available": "100"})
+    day = SimpleNamespace(more={"no_spare": "3"})
     said = result.judgements[0].next_action.text
     visit: Any = SimpleNamespace(todo=(3,), before=object(), action=None, next=said, answers=day)
     page = pages.next_page(visit)

@@ -17,7 +17,7 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.short_form import read_short_form
 from mlg_troubleshoot.indices.index_table import read_index_table
-from mlg_troubleshoot.workflows.check import next_joint
+from mlg_troubleshoot.workflows.check import next_step
 from mlg_troubleshoot.workflows.index_tables import load_index_table
 from mlg_troubleshoot.workflows.new_gear import from_pylinkage, new_gear
 from tests.cli.conftest import FAILURE, ROOT, mlg
@@ -228,9 +228,9 @@ def test_from_python_a_renewed_table_is_warned_of(gear: Path) -> None:
     loaded = load_gear(gear)
     loaded.indices_file.unlink()
     with pytest.warns(UserWarning, match="is missing. It was computed again"):
-        next_joint(loaded, {1: 0.001})
+        next_step(loaded, {1: 0.001})
     with warnings.catch_warnings(action="error"):
-        next_joint(loaded, {1: 0.001})
+        next_step(loaded, {1: 0.001})
 
 
 def test_a_file_that_is_not_a_table_is_not_replaced_by_one(gear: Path) -> None:

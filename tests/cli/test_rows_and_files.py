@@ -38,14 +38,6 @@ def test_every_data_row_stands_exactly_once_even_if_it_is_bad(table: Table) -> N
     assert [i["record_id"] for i in found] == ["A", "B", None, "R1"]
 
 
-def test_the_seed_decides_the_draws_of_a_check_and_stands_in_its_json() -> None:
-    entry = (*HAND, "--convention", "RADIAL", "--set", "3=0.013in", "--json", "--seed")
-    one, again, other = (mlg(*entry, seed) for seed in (4, 4, 5))
-    assert one.out == again.out
-    assert [found.json["seed"] for found in (one, other)] == [4, 5]
-    assert one.one["confidence"]["monte_carlo"] != other.one["confidence"]["monte_carlo"]
-
-
 def test_two_files_give_their_rows_in_order(table: Table) -> None:
     first, second = table(row(record_id="A"), name="1.csv"), table(row(record_id="B"), name="2.csv")
     assert [i["record_id"] for i in mlg("check", first, second, "--json").json["inspections"]] == [

@@ -207,7 +207,6 @@ class Hangar:
         needed = {AREA[j - 1] for j in joints} - gear.opened
         gear.minutes += sum(AREA_MIN[name] for name in needed)
         gear.opened |= needed
-        gear.row["open_areas"] = "; ".join(sorted(gear.opened))
 
     def restore(self, gear: Gear, joints: Sequence[int]) -> None:
         """New parts, new directions, areas closed."""
@@ -223,7 +222,6 @@ class Hangar:
             self.read(gear, j)
         gear.repairs += 1
         gear.opened = set()
-        gear.row["open_areas"] = ""
         before = {int(word) for word in gear.row.get("restored_joints", "").split()}
         gear.row["restored_joints"] = " ".join(map(str, sorted({*before, *joints})))
         gear.row["repair_date"] = gear.clock
@@ -305,7 +303,7 @@ class Hangar:
         columns = [
             *("outcome", "outcome_date", "plunger_displacement_in", "plunger_displacement_2_in"),
             *("plunger_date", "plunger_gauge_u_in", "restored_joints", "repair_date"),
-            *("rigging_checked", "open_areas", "cannot_reach", "no_spare", "minutes_available"),
+            *("rigging_checked", "cannot_reach", "no_spare"),
             *(f"clearance_{j}_in" for j in numbers),
             *(f"gauge_u_{j}_in" for j in numbers),
         ]

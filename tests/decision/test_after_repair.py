@@ -200,13 +200,6 @@ def test_a_gear_that_is_too_close_is_looked_at_again_by_a_date_and_landings(judg
     assert "1500 landings or by 2026-09-04" in found.next_action.text
 
 
-def test_measuring_says_what_next_says(judge: Judge) -> None:
-    found = judge({3: 0.005}, advice=True, outcome=Outcome.FAILED, readings_in=(0.036,))
-    assert found.next_action.action is Action.MEASURE
-    assert found.measuring is not None
-    assert found.measuring.joint == found.next_action.joints[0]
-
-
 def test_no_worst_case_is_stated_of_a_gear_of_which_nothing_was_read(judge: Judge) -> None:
     headline = judge({}, readings_in=(0.041,)).headline
     assert "0.0000" not in headline

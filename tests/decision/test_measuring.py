@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,6 @@ from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.inspection import Outcome
-from mlg_troubleshoot.decision.next_joint import (
-    COST_OF_WRONG_WITHIN,
-    decision_risk,
-    enough,
-    outlook,
-)
 from mlg_troubleshoot.decision.plan import minutes_to_measure
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.decision.priors import PRIORS
@@ -96,25 +89,6 @@ def test_the_quick_chance_with_random_directions_is_the_share_of_displacements_b
     )
 
 
-def test_the_minutes_of_a_reading_are_those_in_an_area_that_is_open_already(gear: Gear) -> None:
-    closed = {w.joint: w.minutes for w in outlook(Cases.of(gear, [inspected({})])).worth}
-    opened = {w.joint: w.minutes for w in outlook(Cases.of(gear, [inspected({4: 0.001})])).worth}
-    (area,) = (area for area in gear.areas if area.name == gear.joint(4).area)
-    assert closed[2] - opened[2] == area.access.value
-    assert closed[9] == opened[9]
-
-
-def test_a_wrong_within_costs_nineteen_times_a_wrong_outside() -> None:
-    assert pytest.approx(19.0) == COST_OF_WRONG_WITHIN
-    assert decision_risk(1.0 - 1e-3) == pytest.approx(0.019)
-    assert decision_risk(1e-3) == pytest.approx(1e-3)
-
-
-def test_the_risk_is_greatest_at_the_conformance_probability() -> None:
-    p = np.linspace(0.0, 1.0, 2001)
-    assert p[np.argmax(decision_risk(p))] == pytest.approx(0.95)
-
-
 def test_a_gear_whose_measured_joints_are_worn_is_expected_to_be_worn_elsewhere(
     gear: Gear,
 ) -> None:
@@ -189,18 +163,6 @@ def test_the_table_of_the_normal_distribution_is_exact_to_a_millionth() -> None:
     assert tabled_normal_cdf(z) == pytest.approx(normal_cdf(z), abs=1e-6)
 
 
-def test_the_chance_of_being_within_agrees_with_drawing_gears(gear: Gear) -> None:
-    # Gears drawn level by level, each judged by the exact prediction.
-    measured = {3: 0.003, 5: 0.003}
-    within = outlook(Cases.of(gear, [inspected(measured)])).within
-    clearance = drawn_wear(gear, measured, 400, np.random.default_rng(9))
-    exact = predict(
-        gear, [inspected({})] * 400, clearance, np.ones((400, 10), bool), np.full(400, 0.0005)
-    )
-    p = exact.probability_within(np.full(400, MARGIN_IN), np.zeros(400))
-    assert within == pytest.approx(p.mean(), abs=3.0 * p.std() / 20.0)
-
-
 def test_the_normal_distribution_has_its_known_values() -> None:
     assert normal_cdf(np.array([0.0, 1.6448536, -1.6448536])) == pytest.approx(
         [0.5, 0.95, 0.05], abs=1e-7
@@ -211,67 +173,6 @@ def test_an_area_that_is_open_costs_no_minutes_again(gear: Gear) -> None:
     assert minutes_to_measure(gear, [5]) == 23
     assert minutes_to_measure(gear, [5], frozenset({gear.joint(3).area})) == 8
     assert minutes_to_measure(gear, [6], frozenset({gear.joint(3).area})) == 26
-
-
-def test_missing_critical_joints_stand_before_all_others(gear: Gear) -> None:
-    worth = outlook(Cases.of(gear, [inspected({3: 0.001, 9: 0.001})])).worth
-    assert {w.joint for w in worth[:4]} == {1, 2, 4, 5}
-
-
-def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
-    read = dict.fromkeys((1, 4, 5), 0.0008)
-    worth = [w for w in outlook(Cases.of(gear, [inspected(read)])).worth if w.critical]
-    assert worth[0].risk_drop > 0.0
-    assert worth[0].risk_drop / worth[0].minutes == max(w.risk_drop / w.minutes for w in worth)
-    # The variance alone would choose another joint.
-    assert worth[0].joint != max(worth, key=lambda w: w.variance_in2 / w.minutes).joint
-
-
-def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access(
-    gear: Gear,
-) -> None:
-    critical = dict.fromkeys(range(1, 6), 0.0015)
-    worth = {w.joint: w for w in outlook(Cases.of(gear, [inspected(critical)])).worth}
-    assert worth[8].risk_drop > worth[6].risk_drop
-    assert list(worth).index(6) < list(worth).index(8)
-
-
-def test_where_no_single_reading_has_a_value_the_variance_per_minute_decides(gear: Gear) -> None:
-    # Two badly worn ends: no single reading can make WITHIN the better answer again.
-    worth = [
-        w for w in outlook(Cases.of(gear, [inspected({3: 0.0074, 5: 0.0074})])).worth if w.critical
-    ]
-    assert {w.risk_drop for w in worth} == {0.0}
-    assert worth[0].variance_in2 / worth[0].minutes == max(
-        w.variance_in2 / w.minutes for w in worth
-    )
-
-
-def test_both_ends_of_one_link_are_worth_the_same(gear: Gear) -> None:
-    worth = {w.joint: w for w in outlook(Cases.of(gear, [inspected({1: 0.001, 2: 0.001})])).worth}
-    assert worth[3].risk_drop == pytest.approx(worth[5].risk_drop, rel=1e-3)
-    assert worth[9].variance_in2 == pytest.approx(worth[10].variance_in2, rel=1e-3)
-
-
-def test_a_reading_is_never_worth_less_than_nothing(gear: Gear) -> None:
-    for measured in ({}, {2: 0.002}, {2: 0.007, 4: 0.006}):
-        assert min(w.risk_drop for w in outlook(Cases.of(gear, [inspected(measured)])).worth) >= 0.0
-
-
-def test_an_expectation_is_enough_where_being_wrong_costs_as_little_either_way() -> None:
-    assert enough(0.025) is Verdict.OUTSIDE_MARGIN
-    assert enough(0.026) is None
-    assert enough(0.9986) is None
-    assert enough(0.9987) is Verdict.WITHIN_MARGIN
-
-
-def test_measuring_on_is_not_worth_it_where_the_verdict_will_be_too_close_anyway() -> None:
-    assert enough(0.5, too_close=0.8) is Verdict.INCONCLUSIVE
-    assert enough(0.5, too_close=0.79) is None
-
-
-def test_an_expectation_of_either_side_goes_before_too_close() -> None:
-    assert enough(0.01, too_close=0.95) is Verdict.OUTSIDE_MARGIN
 
 
 @pytest.mark.parametrize("read_in", [0.0016, 0.0020, 0.0024])
@@ -290,9 +191,9 @@ def test_the_chance_of_being_too_close_is_that_of_gears_drawn_from_the_same_dist
     p = found.probability_within(np.full(3000, MARGIN_IN), np.zeros(3000))
     truth = np.mean((p > 0.05) & (p < 0.95))
     # A few joints that are worn out make the sum less normal than it is taken to be.
-    assert outlook(Cases.of(gear, [inspected(measured)])).too_close == pytest.approx(
-        truth, abs=0.06
-    )
+    one = Cases.of(gear, [inspected(measured)])
+    ahead = Unread(one, one.predict(one.filled(0.0)), level_chances(one))
+    assert ahead.too_close()[0] == pytest.approx(truth, abs=0.06)
 
 
 def test_an_expectation_never_becomes_a_verdict(judge: Judge) -> None:
@@ -307,54 +208,6 @@ def test_slopes_are_those_of_the_sense_that_governs(gear: Gear, under_in: float)
     assert response.slopes(start) == pytest.approx(numeric, rel=1e-6)
 
 
-def test_the_variance_that_a_reading_removes_is_that_of_its_joint_s_wear_through_its_amplification(
-    gear: Gear,
-) -> None:
-    chance = levels_of(gear, {2: 0.003})
-    share = chance @ (VARIANCE + MEAN**2) - (chance @ MEAN) ** 2
-    moved = gear.model.plunger_amplification() ** 2 * gear.limits_in**2 * share
-    for worth in outlook(Cases.of(gear, [inspected({2: 0.003})])).worth:
-        assert worth.variance_in2 == pytest.approx(
-            moved[gear.joint_numbers.index(worth.joint)], rel=0.2
-        )
-
-
-def test_with_every_joint_read_the_expectation_is_the_verdict_s(judge: Judge) -> None:
-    found = judge(every_joint(0.0015), gauge_u_in=0.001, advice=True)
-    assert found.measuring is not None
-    assert found.measuring.expected_within == found.probability_within_margin
-
-
-def test_where_the_plan_measures_nothing_one_may_stop(judge: Judge) -> None:
-    found = judge(every_joint(0.004), advice=True).measuring
-    assert found is not None
-    assert (found.stop, found.verdict) == (True, Verdict.OUTSIDE_MARGIN)
-    assert found.text.startswith("No measurement is needed now.")
-
-
-def test_the_next_joint_is_the_first_that_the_plan_measures(judge: Judge) -> None:
-    found = judge({3: 0.001, 5: 0.001}, advice=True)
-    assert found.measuring is not None
-    assert not found.measuring.stop
-    assert found.measuring.joint == found.next_action.joints[0]
-
-
 def test_with_advice_the_next_action_is_the_same(judge: Judge) -> None:
     measured = {3: 0.001, 5: 0.001}
     assert judge(measured, advice=True).next_action == judge(measured).next_action
-
-
-def test_a_critical_joint_is_next_even_where_another_would_tell_more(gear: Gear) -> None:
-    joints = tuple(replace(joint, critical=joint.number == 9) for joint in gear.joints)
-    worth = outlook(Cases.of(replace(gear, joints=joints), [inspected({})])).worth
-    assert worth[0].joint == 9
-    assert worth[0].variance_in2 / worth[0].minutes < worth[1].variance_in2 / worth[1].minutes
-
-
-def test_a_coarse_reading_leaves_more_levels_of_displacement_open(gear: Gear) -> None:
-    measured = {3: 0.004, 5: 0.004}
-    fine, coarse = (
-        outlook(Cases.of(gear, [inspected(measured, gauge_u_by_joint_in={5: u})]))
-        for u in (0.0005, 0.01)
-    )
-    assert abs(coarse.within - 0.5) < abs(fine.within - 0.5)

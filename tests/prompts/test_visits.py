@@ -192,9 +192,8 @@ def test_what_stays_open_stands_with_next_at_the_second_visit(visit: Visit) -> N
 
 
 def test_a_stop_that_the_day_forced_says_how_the_day_is_changed(visit: Visit) -> None:
-    visit(*GEAR, "t", "t", *PLAY, "f p 36 w 3 a 3 t 600", *ENTERS, "")
+    visit(*GEAR, "t", "t", *PLAY, "f p 36 w 3 a 3", *ENTERS, "")
     screen = visit(*GEAR, "").screen
-    assert "t 240 = minutes left" in screen.replace("\u00a0", " ")
     assert "w none = spare at hand" in screen.replace("\u00a0", " ")
     assert "c none" not in screen.replace("\u00a0", " ")
 
@@ -455,53 +454,6 @@ def test_a_result_of_the_prompts_names_no_column_of_a_file(
     assert "counts as older than the repair" in shown
     for column in ("rigging_checked", "outcome_date", "plunger_date"):
         assert column not in shown
-
-
-def test_an_area_that_next_opened_stays_open_until_the_repair(
-    visit: Visit, store: SessionStore
-) -> None:
-    visit(*FIRST)
-    visit(*GEAR, "y", "36")
-    assert "again" in visit(*GEAR, "y", "18").screen
-    assert life(store).inspections[-1].inspection.open_areas == ("sidestay",)
-    visit(*GEAR, "n 3", "1")
-    assert life(store).inspections[-1].inspection.open_areas == ()
-
-
-@pytest.mark.parametrize("did", [("y", "36"), ("p 36",)])
-def test_a_step_takes_its_minutes_from_those_of_the_day(
-    visit: Visit, store: SessionStore, did: tuple[str, ...]
-) -> None:
-    visit(*FIRST)
-    visit(*GEAR, "t 180")
-    screen = visit(*GEAR, *did).screen
-    assert "168 of 180 min are left today; t sets another number." in screen
-    assert life(store).inspections[-1].inspection.minutes_available == 168.0
-
-
-def test_minutes_that_are_entered_with_a_finding_are_those_that_are_left(
-    visit: Visit, store: SessionStore
-) -> None:
-    visit(*FIRST)
-    visit(*GEAR, "t 180")
-    visit(*GEAR, "p 36 t 100")
-    assert life(store).inspections[-1].inspection.minutes_available == 100.0
-
-
-def test_what_is_added_without_a_step_takes_no_minutes(visit: Visit, store: SessionStore) -> None:
-    visit(*FIRST)
-    visit(*GEAR, "t 180")
-    visit(*GEAR, "w 3")
-    assert life(store).inspections[-1].inspection.minutes_available == 180.0
-
-
-def test_a_step_that_no_longer_fits_in_the_day_is_not_next(visit: Visit) -> None:
-    visit(*SOUND)
-    visit(*GEAR, "t 42")
-    visit(*GEAR, "y", "36")
-    screen = visit(*GEAR, "y", "yes").screen
-    assert "0 of 30 min are left today" in screen
-    assert "Stop for today" in visit(*GEAR).screen
 
 
 def test_of_a_gear_of_which_only_the_failure_is_known_the_plunger_is_read_first(

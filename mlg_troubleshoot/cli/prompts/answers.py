@@ -45,8 +45,6 @@ DAY = {
     "a": "measured_again",
     "c": "cannot_reach",
     "w": "no_spare",
-    "o": "open_areas",
-    "t": "minutes_available",
 }
 _DATES = {OUTCOME.name: "outcome_date", PLUNGER_DISPLACEMENT.name: "plunger_date"}
 _REPLACEABLE = (OUTCOME.name, *LENGTHS, *DAY.values(), "repair_date", *_DATES.values())
@@ -280,14 +278,12 @@ _JOINTS = r"\#?\d{1,3}(?![.\d])(?:(?:\s*[,;]\s*|\s+)\#?\d{1,3}(?![.\d]))*"
 # allows, what the gear did, the plunger, the margin.
 _ITEM = re.compile(
     rf"""\s*[,;]?\s*(?:
-        (?P<lifted>[cwot])\s+none(?![a-z])
+        (?P<lifted>[cw])\s+none(?![a-z])
       | (?:n|new)\s*[=:]?\s*(?P<restored_joints>{_JOINTS})
       | (?:a|again)\s*[=:]?\s*(?P<measured_again>{_JOINTS})
       | (?:c|cannot\s+reach)\s*[=:]?\s*(?P<cannot_reach>{_JOINTS})
       | (?:w|no\s+spare)\s*[=:]?\s*(?P<no_spare>{_JOINTS})
       | (?:g|rigging)\s+(?P<rigging_checked>yes|no|corrected)
-      | (?:o|open)\s+(?P<open_areas>[a-z][a-z ;]*)
-      | (?:t|minutes)\s*(?P<minutes_available>\d+)
       | (?P<did>failed|fail|f|retracted|r|x)(?![a-z])
       | (?P<length>plunger|margin|p|m)\s*[=:]?\s*(?P<sign>[{MINUS}+]?)\s*
         (?P<number>\d+[.,]\d+|\d+\.|[.,]?\d+)

@@ -278,8 +278,7 @@ class Flow:
         if word == "n":
             return self._go_on(state.answers)
         if word == "y" and visit.todo:
-            begun = visit.begun(self.today, self.gear)
-            return self._go_on(begun, remarks=pages.minutes_left(visit.answers, begun))
+            return self._go_on(visit.begun(self.today))
         if word == "c":
             return Turn(State(Ask.REVIEW, visit.answers))
         if word == "u" and visit.before is not None:
@@ -292,14 +291,10 @@ class Flow:
         turn = self._added(state, visit.answers, typed)
         given = turn.state.answers
         changed = given.changed_since(visit.answers)
-        if DAY["t"] in changed or changed.isdisjoint(visit.todo):
+        if changed.isdisjoint(visit.todo) or PLUNGER_DISPLACEMENT.name not in changed:
             return turn
-        if PLUNGER_DISPLACEMENT.name in changed:
-            given = visit.with_both_readings(given)
-        spent = visit.spent(given, self.today)
-        said = pages.minutes_left(given, spent)
-        state = replace(turn.state, answers=spent)
-        return replace(turn, state=state, lines=(*turn.lines, *said))
+        state = replace(turn.state, answers=visit.with_both_readings(given))
+        return replace(turn, state=state)
 
     def _added(self, state: State, kept: Answers, typed: str) -> Turn[State]:
         """Take an optional answer that is added to a kept inspection."""
@@ -322,7 +317,7 @@ class Flow:
             # The rigging alone was set right.
             return answers
         read = judge_more(repaired, text, answers.unit, self.gear)
-        return answers.with_more(open_areas=None).reopened(read.restored_joints)
+        return answers.reopened(read.restored_joints)
 
     def _step(self, state: State, typed: str) -> Turn[State]:
         column = str(state.at)

@@ -208,7 +208,7 @@ def visit_lines(visit: Visit, gear: Gear) -> tuple[Line, ...]:
 
 
 # What is typed where the day allows more than it did.
-_LIFTED = {"t 240": "minutes left", "w none": "spare at hand", "c none": "within reach"}
+_LIFTED = {"w none": "spare at hand", "c none": "within reach"}
 
 
 def next_page(visit: Visit) -> Page:
@@ -230,14 +230,6 @@ def next_page(visit: Visit) -> Page:
         lifted = [(how, what) for how, what in _LIFTED.items() if DAY[how[0]] in visit.answers.more]
         shown.insert(0, keys(*lifted))
     return Page(tuple(shown), " " + "y, " * bool(visit.todo) + "another letter, or Enter = done > ")
-
-
-def minutes_left(before: Answers, now: Answers) -> tuple[Line, ...]:
-    """Say how many minutes of the day remain once a step is done."""
-    had, left = (each.more.get(DAY["t"]) for each in (before, now))
-    if had is None or left is None:
-        return ()
-    return (note(f"{left} of {float(had):.0f} min are left today; t sets another number."),)
 
 
 def step_page(answers: Answers, column: str, advised: str) -> Page:
@@ -413,12 +405,10 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
                 ("a", "3", "measured again with another gauge"),
                 ("c", "4", "these joints cannot be reached today"),
                 ("w", "3", "without a spare part for these joints"),
-                ("o", "", f"these areas are open: {'; '.join(a.name for a in gear.areas)}"),
-                ("t", "180", "minutes left for the work today"),
             )
         ),
     )
-    return Page(shown, " f, r, p, m, n, g, a, c, w, o, t, or Enter to go on > ")
+    return Page(shown, " f, r, p, m, n, g, a, c, w, or Enter to go on > ")
 
 
 def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:

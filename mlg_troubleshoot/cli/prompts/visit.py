@@ -53,7 +53,7 @@ class Visit:
     """The last inspection of a gear as it counts today.
 
     `read_on` is the day on which each reading was entered, `before` the answers before the last
-    change that was not undone, `todo` what NEXT asks for, `minutes` how long that takes [min],
+    change that was not undone, `todo` what NEXT asks for,
     `stays_open` what was not settled.
     """
 
@@ -66,33 +66,19 @@ class Visit:
     action: Action | None
     todo: tuple[int | str, ...]
     joints: tuple[int, ...]
-    minutes: float = 0.0
     before: Answers | None = None
     stays_open: Sentence | None = None
 
-    def begun(self, today: date | None, gear: Gear) -> Answers:
-        """The answers with what NEXT asks for still to come, on the day of this visit.
-
-        What is read opens its areas until a repair, or the end of the day, closes them.
-        """
+    def begun(self, today: date | None) -> Answers:
+        """The answers with what NEXT asks for still to come, on the day of this visit."""
         inspected = self.row.inspection_date
-        same_day = self._is_of(today)
-        opened = {*self.row.open_areas} if same_day and self.action is not Action.RESTORE else set()
-        if self.action in _WITH_JOINTS:
-            opened |= {gear.joint(number).area for number in self.joints}
         answers = replace(self.answers, todo=self.todo)
-        answers = answers.with_more(open_areas="; ".join(sorted(opened)) or None)
-        answers = self.spent(answers, today)
         if self.action is Action.MEASURE_AGAIN:
             names = " ".join(map(str, {*self.row.measured_again, *self.joints}))
             answers = answers.with_more(measured_again=names)
         if today is None or inspected is None:
             return answers
         return answers.with_more(inspection_date=max(today, inspected).isoformat())
-
-    def _is_of(self, today: date | None) -> bool:
-        inspected = self.row.inspection_date
-        return today is None or inspected is None or today <= inspected
 
     def with_both_readings(self, answers: Answers) -> Answers:
         """The answers with the plunger's first reading too, where NEXT asked for a second one."""
@@ -107,15 +93,6 @@ class Visit:
         unit = self.answers.unit or unit
         before = self.before and replace(self.before, unit=self.before.unit or unit)
         return replace(self, answers=replace(self.answers, unit=unit), before=before)
-
-    def spent(self, answers: Answers, today: date | None) -> Answers:
-        """The answers once NEXT is done: of the minutes of its day it takes some, those of another
-        day lapse.
-        """
-        had = self.row.minutes_available
-        if had is None or not self._is_of(today):
-            return answers.with_more(minutes_available=None)
-        return answers.with_more(minutes_available=f"{max(had - self.minutes, 0.0):.0f}")
 
     def completed(self, read: Inspection) -> Inspection:
         """What was typed, with what only the kept inspection says: prompts do not ask for all."""
@@ -182,7 +159,6 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> 
         action,
         todo,
         joints,
-        float(step.get("minutes") or 0.0) if todo and not restored else 0.0,
         replace(standing[-2], continues=latest.record.digest) if len(standing) > 1 else None,
         _with_lengths(question) if question and not restored else None,
     )

@@ -19,7 +19,6 @@ from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judge
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
-    confidence_words,
     joint_list,
     percent,
     rigging_sentence,
@@ -82,8 +81,8 @@ def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
         lines += [(follows, "")] if follows is not None else []
         question = judgement.plan.open_question
         lines += [(f"OPEN: {question}", "bold")] if question is not None else []
-        advice = (judgement.measuring, judgement.posterior) if detail else (judgement.posterior,)
-        lines += [(said.text, "") for said in advice if said is not None]
+        if judgement.posterior is not None:
+            lines.append((judgement.posterior.text, ""))
     for said, style in lines:
         body.append_text(text(("\n" if body else "") + screen.said(said), style))
     return body
@@ -94,11 +93,10 @@ def _numbers(a: Assessment) -> Iterator[str]:
     if a.geometry_spread_in is not None and a.probability_within_margin is not None:
         low, high = a.geometry_spread_in
         yield Sentence.of(
-            "Probability that {} is within the margin: {}{}. The ensemble of reconstructed linkages"
+            "Probability that {} is within the margin: {}. The ensemble of reconstructed linkages"
             " gives {} to {}.",
             "the worst case" if a.decided_by_bound else "the plunger",
             percent(a.probability_within_margin),
-            confidence_words(a.confidence),
             Length(low, named=False),
             Length(high),
         )
