@@ -18,7 +18,6 @@ reading taken as bore minus pin or as total play is divided by ``ClearanceConven
 
 =======================  ==============================================================
 load_gear, Gear          a shipped gear, or a gear file of your own
-new_gear, from_pylinkage a gear file from points and links, or from a linkage of pylinkage
 predict                  worst displacement of the plunger, for one gear or a batch
 Inspection, check        one inspection or a DataFrame, and what the decision rule says about it
 read_inspections         a table as the reader of files understands it, as a DataFrame
@@ -79,7 +78,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.workflows.forecast import forecast
     from mlg_troubleshoot.workflows.history import Lives
     from mlg_troubleshoot.workflows.index_tables import load_index_table
-    from mlg_troubleshoot.workflows.new_gear import WrittenGear, from_pylinkage, new_gear
     from mlg_troubleshoot.workflows.study import run_study
     from mlg_troubleshoot.workflows.survey import survey
 
@@ -110,7 +108,6 @@ _HOME = {
     "workflows.forecast": "forecast",
     "workflows.history": "Lives",
     "workflows.index_tables": "load_index_table",
-    "workflows.new_gear": "WrittenGear from_pylinkage new_gear",
     "workflows.study": "run_study",
     "workflows.survey": "survey",
 }
@@ -142,18 +139,15 @@ __all__ = [
     "TroubleshootError",
     "Verdict",
     "WorstCase",
-    "WrittenGear",
     "check",
     "check_files",
     "diagnose",
     "diagnose_files",
     "diagnose_simulation",
     "forecast",
-    "from_pylinkage",
     "load_gear",
     "load_index_table",
     "load_model_extension",
-    "new_gear",
     "parse_length",
     "predict",
     "read_inspections",

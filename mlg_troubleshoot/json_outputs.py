@@ -680,37 +680,3 @@ class SurveyOutput(TypedDict):
     warnings: list[str]
     problems: list[Problem]
     inspections: NotRequired[list[SurveyedInspection]]
-
-
-class LoosePart(TypedDict):
-    """A number of the linkage and which part of its range stays free."""
-
-    number: str
-    free_part: float
-
-
-class MetTarget(TypedDict):
-    """A target of a reconstruction and what was found for it."""
-
-    quantity: str
-    printed: str
-    unit: str
-    accepted: str
-    computed: float
-    holds: bool
-    binds: bool
-
-
-class ReconstructOutput(TypedDict):
-    """Output of mlg gear reconstruct --json."""
-
-    schema_version: Version
-    seed: Count
-    linkages_tried: Count
-    meets_all: bool
-    numbers: Count
-    determined: Count
-    free: Count
-    loosest: list[LoosePart]
-    targets: list[MetTarget]
-    member_toml: str

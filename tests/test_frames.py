@@ -9,7 +9,6 @@ from collections.abc import Callable
 from functools import cache
 from io import BytesIO
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
 
 import joblib
@@ -202,10 +201,8 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "lives": lambda: mlg.forecast(DATA / "fleet_batch.csv"),
     "catalogue": lambda: CATALOGUE,
     "picture": lambda: result("gear").plot(),
-    "written": lambda: mlg.new_gear(FORM, Path(mkdtemp()) / "gear.toml"),
 }
-FORM = ROOT / "docs" / "how-to" / "data" / "four-bar-three-pins.toml"
-NO_TABLE = ("inspection", "extension", "picture", "written")
+NO_TABLE = ("inspection", "extension", "picture")
 
 
 @cache

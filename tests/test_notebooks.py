@@ -10,7 +10,7 @@ import pytest
 from nbclient import NotebookClient
 
 FOLDER = Path(__file__).parents[1] / "docs" / "notebooks"
-NAMES = ("a-gear-of-ones-own", "a-hidden-cause", "another-simulation", "check-a-fleet")
+NAMES = ("a-hidden-cause", "another-simulation", "check-a-fleet")
 
 
 def notebook(name: str) -> Any:
@@ -25,7 +25,7 @@ def shown(cell: Any) -> list[str]:
     ]
 
 
-def test_there_are_four_notebooks() -> None:
+def test_there_are_three_notebooks() -> None:
     assert sorted(path.stem for path in FOLDER.glob("*.ipynb")) == list(NAMES)
 
 

@@ -54,8 +54,8 @@ def test_an_unknown_schema_is_refused() -> None:
         schemas.schema("template")
 
 
-def test_the_contract_names_nine_outputs_and_the_verification() -> None:
-    named = "check diagnose study fleet history life gear survey reconstruct"
+def test_the_contract_names_eight_outputs_and_the_verification() -> None:
+    named = "check diagnose study fleet history life gear survey"
     assert set(schemas.NAMES) == {*named.split(), "verify"}
 
 
@@ -229,7 +229,6 @@ def test_every_output_states_the_version_of_its_schema(name: str) -> None:
         ("gear", ("gear",)),
         ("gear", ("gear", "--gear", FOUR_BAR)),
         ("verify", ("gear", "verify")),
-        ("reconstruct", ("gear", "reconstruct", "--start", "A", "--minutes", "0.01")),
         pytest.param("study", ("study", "--statements"), marks=pytest.mark.slow),
     ],
 )

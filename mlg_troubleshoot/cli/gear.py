@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mlg_troubleshoot.cli import new_gear, options, output, reconstruct, survey
+from mlg_troubleshoot.cli import options, output, survey
 from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 
@@ -78,7 +78,4 @@ app = options.commands(
 )
 app.callback(epilog="Example: [b]mlg gear verify[/b]")(show)
 app.command(epilog="Example: [b]mlg gear verify[/b]")(verify)
-app.command(epilog=new_gear.EPILOG)(new_gear.new)
-app.command(epilog="Example: [b]mlg gear draw gear.svg[/b]")(new_gear.draw)
-app.command(epilog=reconstruct.EPILOG)(reconstruct.reconstruct)
 app.command(epilog=survey.EPILOG)(survey.survey)

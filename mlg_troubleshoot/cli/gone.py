@@ -12,6 +12,10 @@ from mlg_troubleshoot.errors import UsageError
 GONE = {
     "doctor": "mlg gear verify tries the model, and a report that cannot be written says why",
     "gear separable": "a diagnosis says what would split its set of causes (mlg diagnose)",
+    "gear new": "write the gear file: docs/how-to/own-gear.md shows a short one",
+    "gear draw": "load_gear(…).plot() draws a gear in Python",
+    "gear reconstruct": "mlg gear verify compares the linkage with the numbers of the paper",
+    "study --bound": "mlg check gives the worst case, which a test compares with a global search",
 }
 
 

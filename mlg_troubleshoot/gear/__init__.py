@@ -5,12 +5,10 @@ __all__ = [
     "adjustment",
     "design",
     "directions",
-    "from_pylinkage",
     "gauges",
     "gear",
     "gear_file",
     "model",
-    "short_form",
 ]
 
 DEFAULT_GEAR = "hawker-800xp"

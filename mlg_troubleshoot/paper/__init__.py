@@ -1,7 +1,6 @@
-"""What the paper prints, reproduced: its designs, statements and numbers, the reconstruction."""
+"""What the paper prints, reproduced: its designs, statements and numbers."""
 
 __all__ = [
-    "reconstruct",
     "statements",
     "study",
     "targets",

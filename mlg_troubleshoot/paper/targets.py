@@ -23,10 +23,6 @@ from mlg_troubleshoot.datafile import (
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 
-# A limit is met with this share of it, or of 0.05, to spare. [1]
-INSIDE = 0.02
-
-
 JointKey = Annotated[int, Meta(ge=0, le=LARGEST, description="the number of a joint")]
 
 
@@ -38,7 +34,7 @@ class Target(Table):
     clearance_in: clearances by joint, for a case; the others are 0. [in]
     reading: which of two readings of a statement.
     expected: false if it is known not to hold.
-    search: true if a reconstruction must meet it.
+    search: true if the linkage was searched for it.
     claim: the statement of the source that this number bears on; empty if it is a number only.
     """
 
@@ -126,18 +122,6 @@ class Computed:
         """Fitted, calibrated, reproduced or not reproduced, as it turned out."""
         kind = "reproduced" if self.target.kind == "not reproduced" else self.target.kind
         return kind if self.holds else "not reproduced"
-
-    @property
-    def binds(self) -> bool:
-        """True if it determines the linkage: a printed value, or a limit that the linkage lies
-        at.
-        """
-        low = self.target.low
-        high = self.target.high
-        if np.isfinite(low) and np.isfinite(high):
-            return True
-        bound = low if np.isfinite(low) else high
-        return abs(self.computed - bound) <= 2.5 * INSIDE * max(abs(bound), 0.05)
 
 
 def targets_file(gear: Gear) -> Path:

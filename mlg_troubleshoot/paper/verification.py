@@ -13,14 +13,13 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.indices.amplification import STROKES, Amplification, amplification
+from mlg_troubleshoot.indices.amplification import Amplification, amplification
 from mlg_troubleshoot.indices.inputs import HeldDirections, worst_directions
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.targets import Computed, Target, load_targets, targets_file
 
-# Strokes of a curve: of the answer, and while a linkage is still sought. [1]
+# Strokes of a curve. [1]
 _CURVE = 401
-_QUICK_CURVE = 61
 # Nodes and weights of a two-point rule: the response at no clearance and at the limit. [1]
 _CORNERS = (np.array([0, 1], float), np.array([0.5, 0.5]))
 
@@ -33,15 +32,11 @@ def verify(gear: Gear, targets: Path | None = None) -> tuple[Computed, ...]:
 
 
 class Facts:
-    """What a linkage gives for the measures of a targets file; each is computed once.
+    """What a linkage gives for the measures of a targets file; each is computed once."""
 
-    quick: with fewer positions and points: good to 1e-4, for a search.
-    """
-
-    def __init__(self, gear: Gear, model: LinkageModel, *, quick: bool = False) -> None:
+    def __init__(self, gear: Gear, model: LinkageModel) -> None:
         self.gear = gear
         self.model = model
-        self.quick = quick
         self.limits = np.asarray(gear.limits_in, float)
 
     def measure(self, target: Target) -> float:
@@ -67,7 +62,7 @@ class Facts:
     @cached_property
     def indices(self) -> TensorIndices:
         """Indices over the whole range of clearances."""
-        return tensor_indices(self.response, self.limits, order=2 if self.quick else 3)
+        return tensor_indices(self.response, self.limits)
 
     @cached_property
     def corner_indices(self) -> TensorIndices:
@@ -78,12 +73,12 @@ class Facts:
 
     @cached_property
     def growth(self) -> Amplification:
-        return amplification(self.gear, self.model, _QUICK_CURVE if self.quick else STROKES)
+        return amplification(self.gear, self.model)
 
     @cached_property
     def curve(self) -> tuple[Array, Array]:
         """Stroke and plunger position over the release, Fig. 12. [in]"""
-        stroke = np.linspace(*self.model.stroke, _QUICK_CURVE if self.quick else _CURVE)
+        stroke = np.linspace(*self.model.stroke, _CURVE)
         return stroke, self.model.plunger(stroke)
 
     def of(self, values: Array, joints: tuple[int, ...]) -> Array:

@@ -1,4 +1,4 @@
-"""The JSON of what is said about a model: a study, a survey, a reconstruction."""
+"""The JSON of what is said about a model: a study, a survey."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ import msgspec
 
 from mlg_troubleshoot.indices.given_data import GivenDataResult
 from mlg_troubleshoot.json_outputs import (
-    MetTarget,
-    ReconstructOutput,
     StudiedAmplification,
     StudiedStatement,
     SurveyedInspection,
     SurveyOutput,
 )
-from mlg_troubleshoot.paper.reconstruct import Reconstruction
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.reporting.json_form import plain, written
 from mlg_troubleshoot.surveying.plan import Suggested
@@ -116,25 +113,3 @@ def _misfit(misfit: Misfit) -> dict[str, Any]:
     lengths = {f"{k}_in": None if reading.is_angle else v for k, v in ends.items()}
     angles = {f"{k}_deg": reading.in_units(v) for k, v in ends.items() if reading.is_angle}
     return {"row": reading.row, **lengths, **angles, "suggestion": misfit.words}
-
-
-def reconstruction_as_json(found: Reconstruction, text: str) -> dict[str, object]:
-    return written(
-        ReconstructOutput,
-        found,
-        linkages_tried=found.evaluations,
-        free=found.numbers - found.determined,
-        loosest=[{"number": name, "free_part": part} for name, part in found.loosest],
-        targets=[
-            written(
-                MetTarget,
-                each,
-                quantity=each.target.quantity,
-                printed=each.target.printed,
-                unit=each.target.unit,
-                accepted=each.target.accepted,
-            )
-            for each in found.met
-        ],
-        member_toml=text,
-    )

@@ -19,7 +19,6 @@ NAMES = (
     "gear",
     "verify",
     "survey",
-    "reconstruct",
 )
 FILES = ("gear-file", "ensemble", "targets", "indices", "extension", "settings", "beliefs")
 
@@ -30,9 +29,9 @@ def schema(name: str) -> dict[str, Any]:
     Parameters
     ----------
     name : str
-        ``check``, ``diagnose``, ``study``, ``fleet``, ``history``, ``life``, ``gear``, ``verify``,
-        ``survey`` or ``reconstruct``; of files ``gear-file``,
-        ``ensemble``, ``targets``, ``indices``, ``extension``, ``settings`` or ``beliefs``.
+        ``check``, ``diagnose``, ``study``, ``fleet``, ``history``, ``life``, ``gear``, ``verify``
+        or ``survey``; of files ``gear-file``, ``ensemble``, ``targets``, ``indices``,
+        ``extension``, ``settings`` or ``beliefs``.
 
     Returns
     -------

@@ -8,8 +8,6 @@ __all__ = [
     "index_tables",
     "keep",
     "kept",
-    "new_gear",
-    "reconstruct",
     "study",
     "survey",
 ]

@@ -99,13 +99,6 @@ def test_no_file_of_a_gear_is_replaced(
     kept(mlg(*command, path, "--gear", own_gear), path, before, str(command[-1]))
 
 
-def test_a_reconstruction_does_not_replace_its_targets(own_gear: Path) -> None:
-    path = own_gear.with_name("hawker-800xp-targets.toml")
-    before = path.read_bytes()
-    found = mlg("gear", "--gear", own_gear, "reconstruct", "--targets", path, "--out", path)
-    kept(found, path, before, "--out")
-
-
 def test_a_study_does_not_replace_the_measured_table(measured: Path) -> None:
     before = measured.read_bytes()
     kept(mlg("study", "--given", measured, "--csv", measured), measured, before, "--csv")
@@ -299,7 +292,6 @@ def test_an_export_may_be_written_again_and_not_over_that_of_another_store(
         ("check", DATA / "failure_case.xlsx", "--annotate"),
         ("diagnose", DATA / "measured_pressure.csv", "--write-extension"),
         ("study", "--csv"),
-        ("gear", "reconstruct", "--minutes", "0.01", "--out"),
         ("history", "export"),
         ("template",),
         ("gear", "survey", "template"),

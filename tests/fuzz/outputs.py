@@ -80,12 +80,6 @@ OUTPUTS = (
     Output([*SMALL, "--csv"], (), "", rare=True),
     Output([*SMALL, "--state"], (), "", rare=True),
     Output(["gear", "--gear", FOUR_BAR, "survey", SURVEY, "-q", "--write"], (), "", rare=True),
-    Output(
-        ["gear", "reconstruct", "--start", "A", "--minutes", "0.01", "-q", "--out"],
-        (),
-        "",
-        rare=True,
-    ),
 )
 FOREIGN = (
     "mine.txt",

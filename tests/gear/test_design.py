@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 
-from mlg_troubleshoot.gear.design import DesignSpace
+from mlg_troubleshoot.gear.design import DesignSpace, member_values
 from mlg_troubleshoot.gear.gear import Gear, Linkage
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.geometry.mechanism import Dyad, Slider
 from mlg_troubleshoot.geometry.program import write_program
 
@@ -67,3 +70,23 @@ def test_the_numbers_of_a_batch_are_those_of_each_linkage(gear: Gear) -> None:
             assert np.broadcast_to(together[name], len(vectors))[i] == pytest.approx(
                 value, abs=1e-12
             ), name
+
+
+def test_a_linkage_written_as_a_member_reads_back_from_the_ensemble(
+    gear: Gear, tmp_path: Path
+) -> None:
+    for file in gear.path.parent.glob("hawker-800xp*"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    ensemble = tmp_path / "hawker-800xp-ensemble.toml"
+    ensemble.write_text(
+        ensemble.read_text()
+        + "\n"
+        + tomli_w.dumps({"members": {"K": member_values(gear.ensemble[3])}})
+    )
+    enlarged = load_gear(tmp_path / "hawker-800xp.toml")
+    assert [linkage.name for linkage in enlarged.ensemble][-1] == "K"
+    links = [0.001 * (-1) ** i for i in range(20)]
+    again = enlarged.ensemble_models[-1].displacement(links)
+    assert float(again) == pytest.approx(
+        float(gear.ensemble_models[3].displacement(links)), abs=1e-12
+    )
