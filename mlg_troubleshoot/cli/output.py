@@ -47,7 +47,7 @@ _IN_ASCII = str.maketrans(_SIGNS[::2], _SIGNS[1::2])
 # What a sentence says for the cells of a file only.
 _OF_FILES = re.compile(
     r",? or (?:pass --decimal-comma|leave it blank[^.]*)|leave it blank, and "
-    r"| Is it newer\? Then enter \w+_date[^.]*\.|: enter repair_date[^.]*| in restored_joints"
+    r"| Enter \w+_date[^.]*\.|: enter repair_date[^.]*| in restored_joints"
     r"| Enter (?:rigging_checked: yes or corrected|the outcome with its date and time)\."
 )
 

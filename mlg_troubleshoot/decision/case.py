@@ -26,7 +26,6 @@ from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import chance_beyond
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.units import Length, Sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +42,8 @@ class Cases:
     own_gauge: Mask
     margin_in: Array
     margin_u_in: Array
-    mean_in: Array
-    mean_u_in: Array
+    plunger_in: Array
+    plunger_u_in: Array
     failed: Mask
     retracted: Mask
     reachable: Mask
@@ -61,7 +60,8 @@ class Cases:
     ) -> Cases:
         numbers = gear.joint_numbers
         rows = tuple(inspections)
-        means = [i.measured_displacement_in for i in rows]
+        margins = [gear.margin.value if i.margin_in is None else i.margin_in for i in rows]
+        plunger = [plunger_of(i, margin) for i, margin in zip(rows, margins, strict=True)]
         return cls(
             gear=gear,
             inspections=rows,
@@ -76,12 +76,10 @@ class Cases:
                     for i in rows
                 ]
             ),
-            margin_in=np.array(
-                [gear.margin.value if i.margin_in is None else i.margin_in for i in rows]
-            ),
+            margin_in=np.array(margins),
             margin_u_in=np.array([i.margin_u_in for i in rows]),
-            mean_in=np.array([math.nan if mean is None else mean for mean in means]),
-            mean_u_in=np.array([plunger_u(i) for i in rows]),
+            plunger_in=np.array([each for each, _u in plunger]),
+            plunger_u_in=np.array([u for _each, u in plunger]),
             failed=np.array([i.standing_outcome is Outcome.FAILED for i in rows]),
             retracted=np.array([i.standing_outcome is Outcome.RETRACTED for i in rows]),
             reachable=np.array([[n not in i.cannot_reach for n in numbers] for i in rows]),
@@ -110,7 +108,14 @@ class Cases:
     @property
     def beyond_margin(self) -> Mask:
         """Gears whose plunger was measured beyond its margin."""
-        return np.abs(self.mean_in) > self.margin_in + ROUNDING_IN
+        return np.abs(self.plunger_in) > self.margin_in + ROUNDING_IN
+
+    @property
+    def off_down_lock(self) -> Mask:
+        """Gears whose plunger was measured out of its position at Down Lock."""
+        low, high = self.gear.down_lock_range
+        stated = [i.plunger_down_lock_in for i in self.inspections]
+        return np.array([at is not None and not low <= at <= high for at in stated])
 
     @property
     def critical_missing(self) -> Mask:
@@ -119,7 +124,8 @@ class Cases:
 
     @property
     def complained(self) -> Mask:
-        """True for a gear that failed before it was repaired, and was not tried since.
+        """True for a gear that failed, or whose plunger stood beyond its margin, before it was
+        repaired, and that was surely not tried since.
 
         A corrected rigging stands for a failure: nobody sets it right without one.
         """
@@ -127,19 +133,13 @@ class Cases:
             [
                 i.standing_outcome is None
                 and i.is_repaired
-                and (i.outcome is Outcome.FAILED or i.rigging_checked is RiggingCheck.CORRECTED)
-                for i in self.inspections
+                and (
+                    i.outcome is Outcome.FAILED
+                    or i.rigging_checked is RiggingCheck.CORRECTED
+                    or any(abs(each) > margin + ROUNDING_IN for each in i.readings_in)
+                )
+                for i, margin in zip(self.inspections, self.margin_in, strict=True)
             ]
-        )
-
-    @property
-    def questions(self) -> tuple[str, ...]:
-        """What must be answered about the entry of each gear before it can be cleared; empty if
-        nothing.
-        """
-        return tuple(
-            inspection.unit_question or _disagreement(inspection, float(margin_in))
-            for inspection, margin_in in zip(self.inspections, self.margin_in, strict=True)
         )
 
     def filled(self, unmeasured: Array | float) -> Array:
@@ -162,30 +162,27 @@ class Cases:
         return replace(self, inspections=tuple(self.inspections[int(i)] for i in rows), **arrays)
 
 
-def _disagreement(inspection: Inspection, margin_in: float) -> str:
-    """Plunger readings with one outside the margin although their mean is not."""
+def plunger_of(inspection: Inspection, margin_in: float) -> tuple[float, float]:
+    """The plunger displacement that counts, and its standard uncertainty; NaN without one. [in]
+
+    The mean of the readings; the farthest one where any is beyond the margin, since an uncertainty
+    never excuses it. One that may be older than a repair counts only beyond the margin.
+    """
+    readings = inspection.standing_readings_in
     mean = inspection.measured_displacement_in
-    one_u = inspection.plunger_gauge_u_in
-    beyond = margin_in + 2.0 * (DEFAULT_PLUNGER_U_IN if one_u is None else one_u)
-    far = [reading for reading in inspection.standing_readings_in if abs(reading) > beyond]
-    if mean is None or not far or abs(mean) > margin_in:
-        return ""
-    return Sentence.of(
-        "the plunger readings disagree: {} is outside the margin of {}, their mean of {} is not."
-        " Read the plunger again.",
-        Length(far[0]),
-        Length(margin_in),
-        Length(mean),
-    )
+    u = plunger_u(inspection)
+    farthest = max(readings, key=abs, default=math.nan)
+    if abs(farthest) > margin_in + ROUNDING_IN:
+        return farthest, u * math.sqrt(len(readings))
+    if mean is None or inspection.is_plunger_in_doubt:
+        return math.nan, u
+    return mean, u
 
 
 def plunger_u(inspection: Inspection) -> float:
     """Standard uncertainty of the mean plunger reading. [in]"""
-    one = (
-        DEFAULT_PLUNGER_U_IN
-        if inspection.plunger_gauge_u_in is None
-        else inspection.plunger_gauge_u_in
-    )
+    stated = inspection.plunger_gauge_u_in
+    one = DEFAULT_PLUNGER_U_IN if stated is None else stated
     return one / math.sqrt(max(len(inspection.standing_readings_in), 1))
 
 

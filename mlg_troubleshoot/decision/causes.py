@@ -289,7 +289,7 @@ class Causes:
         pins = unread.pins
         gear = self.cases.gear
         margin = float(self.cases.margin_in[row])
-        x = float(self.cases.mean_in[row])
+        x = float(self.cases.plunger_in[row])
         left = np.prod(np.where(members[:, :, None], 1.0, waves), axis=1) * _LINKAGE
         if not np.isfinite(x):
             new = np.prod(np.where(members[:, :, None], unread.fresh, 1.0), axis=1)
@@ -312,7 +312,7 @@ class Causes:
 def believed(cases: Cases) -> Causes:
     """Weigh what may be the matter with n gears, by everything that is known of each."""
     levels = level_chances(cases)
-    u = np.hypot(cases.mean_u_in, 1e-4)
+    u = np.hypot(cases.plunger_u_in, 1e-4)
     doubted = Doubted.of(cases, levels)
     both = tuple(_believed(cases, unread, levels, u, doubted) for unread in _unread(cases.gear))
     chances = np.array([1.0 - cases.fleet.loaded, cases.fleet.loaded])[:, None]
@@ -328,7 +328,7 @@ def believed(cases: Cases) -> Causes:
     found = _weighed(cases, both, mean_in, worn, likely, u, doubted.if_restored(read, levels))
     # Readings in doubt, given where the plunger stands.
     of = doubted.rows
-    is_read = np.isfinite(cases.mean_in[of, None])
+    is_read = np.isfinite(cases.plunger_in[of, None])
     random, held = (each.by_share / each.usually for each in both)
     by_cause = (1.0 - cases.fleet.loaded) * random + cases.fleet.loaded * held
     by_cause *= (np.sqrt(2.0 * np.pi) * u[of] / STEP_IN)[:, None]
@@ -365,9 +365,9 @@ def _believed(
     ]
     for same, joints in alike:
         sums[same] *= np.einsum("nl,lt->nt", levels[same], np.prod(unread.unread[:, joints], 1))
-    rows = np.flatnonzero(np.isfinite(cases.mean_in))
+    rows = np.flatnonzero(np.isfinite(cases.plunger_in))
     if len(rows):
-        at = np.exp(-1j * FREQUENCIES * np.abs(cases.mean_in[rows])[:, None])
+        at = np.exp(-1j * FREQUENCIES * np.abs(cases.plunger_in[rows])[:, None])
         at = (at if pins is HELD else at.real) * blur(u[rows]) * _LINKAGE
         whole = np.zeros((len(cases), len(FREQUENCIES)), at.dtype)
         whole[rows] = at
@@ -426,8 +426,8 @@ def _weighed(
     of another cause in either.
     """
     margin = cases.margin_in[:, None]
-    seen = np.isfinite(cases.mean_in)
-    x = np.nan_to_num(cases.mean_in)
+    seen = np.isfinite(cases.plunger_in)
+    x = np.nan_to_num(cases.plunger_in)
     outside = []
     within = []
     for each in both:

@@ -506,7 +506,7 @@ RESTORED_JOINTS = Column(
     holds=Holds.JOINTS,
     meaning=(
         "Joints restored since the failure, for example 3 5. Their clearances in this row are those"
-        " after the repair; outcome and plunger reading count as older."
+        " after the repair; outcome and plunger reading count where the repair is not surely later."
     ),
     bears_verdict=True,
 )

@@ -8,7 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import date, datetime
+from datetime import date, datetime, timedelta
 from enum import StrEnum
 from typing import Any
 
@@ -81,15 +81,42 @@ class RiggingCheck(StrEnum):
     CORRECTED = "corrected"
 
 
+# How far local time is behind and ahead of UTC at most.
+_BEHIND_UTC, _AHEAD_OF_UTC = timedelta(hours=12), timedelta(hours=14)
+_DAY = timedelta(days=1)
+
+
+def _span(moment: date) -> tuple[timedelta, timedelta, bool]:
+    """When a moment begins and ends, in UTC if it states a zone, and whether it does."""
+    begins = timedelta(days=moment.toordinal())
+    if not isinstance(moment, datetime):
+        return begins, begins + _DAY, False
+    offset = moment.utcoffset()
+    clock = timedelta(
+        hours=moment.hour,
+        minutes=moment.minute,
+        seconds=moment.second,
+        microseconds=moment.microsecond,
+    )
+    at = begins + clock - (offset or timedelta())
+    return at, at, offset is not None
+
+
 def surely_later(one: date | None, other: date | None) -> bool:
-    """Whether a moment is after another: by the day, and within a day by the time if both state
-    one.
+    """Whether a moment is after another, whatever is not stated: its time within the day, or the
+    zone of one where the other states its own. False where either is not known.
     """
     if one is None or other is None:
         return False
-    if isinstance(one, datetime) and isinstance(other, datetime):
-        return one > other
-    return (one.year, one.month, one.day) > (other.year, other.month, other.day)
+    begins, its_end, has_zone = _span(one)
+    other_begins, ends, other_has_zone = _span(other)
+    if has_zone and not other_has_zone:
+        ends += _BEHIND_UTC
+    if other_has_zone and not has_zone:
+        begins -= _AHEAD_OF_UTC
+    # Two days may touch, two instants may not.
+    instants = begins == its_end and other_begins == ends
+    return begins > ends if instants else begins >= ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,17 +282,31 @@ class Inspection(Result):
         """Whether joints were restored, or the rigging set right, since the failure."""
         return bool(self.restored_joints) or self.rigging_checked is RiggingCheck.CORRECTED
 
+    def is_since_repair(self, day: date | None) -> bool | None:
+        """Whether what was found on a day of its own, or else in the inspection, is newer than the
+        repair; None where nothing says so.
+
+        The inspection of a row that states its repair may hold readings from before and after it:
+        its day makes them newer, but never older.
+        """
+        if not self.is_repaired or surely_later(day or self.inspection_date, self.repair_date):
+            return True
+        return False if surely_later(self.repair_date, day) else None
+
     @property
     def standing_readings_in(self) -> tuple[float, ...]:
-        """The plunger readings that still count: none that may be older than a repair. [in]"""
-        old = self.is_repaired and not surely_later(self.plunger_date, self.repair_date)
-        return () if old else self.readings_in
+        """The plunger readings that no repair is surely later than. [in]"""
+        return () if self.is_since_repair(self.plunger_date) is False else self.readings_in
+
+    @property
+    def is_plunger_in_doubt(self) -> bool:
+        """Whether the plunger readings may be older or newer than the repair."""
+        return bool(self.readings_in) and self.is_since_repair(self.plunger_date) is None
 
     @property
     def standing_outcome(self) -> Outcome | None:
-        """The outcome that still counts: none that may be older than a repair."""
-        old = self.is_repaired and not surely_later(self.outcome_date, self.repair_date)
-        return None if old else self.outcome
+        """The outcome that is surely newer than a repair."""
+        return self.outcome if self.is_since_repair(self.outcome_date) else None
 
     @property
     def measured_displacement_in(self) -> float | None:

@@ -146,15 +146,16 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
     plunger = plunger_reading.compare(cases, batch.upper)
     # A gear whose entry leaves a question cannot be cleared either.
-    questions = cases.questions
-    absent = cases.critical_missing | np.array([bool(question) for question in questions])
+    absent = cases.critical_missing | np.array([bool(i.unit_question) for i in cases.inspections])
+    predicted = [
+        verdict(float(low), float(high), critical_missing=bool(missing))
+        for low, high, missing in zip(p_lower, p_upper, absent, strict=True)
+    ]
+    # A reading that may be beyond the margin keeps a gear from being cleared; it clears none.
+    unsettled = plunger.unsettled & np.array([v is Verdict.WITHIN_MARGIN for v in predicted])
     verdicts = [
-        (
-            Verdict.OUTSIDE_MARGIN
-            if beyond
-            else verdict(float(low), float(high), critical_missing=bool(missing))
-        )
-        for beyond, low, high, missing in zip(plunger.beyond, p_lower, p_upper, absent, strict=True)
+        Verdict.OUTSIDE_MARGIN if beyond else Verdict.INCONCLUSIVE if open_ else found
+        for beyond, open_, found in zip(plunger.beyond, unsettled, predicted, strict=True)
     ]
     closes = np.isfinite(batch.lower.displacement_in)
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in verdicts]) & closes
@@ -174,7 +175,7 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
         order,
         p_lower,
         batch.lower.standard_uncertainty(cases.margin_u_in),
-        questions,
+        unsettled,
         np.asarray(cases.retracted & (cases.measured & ~cases.over_limit).all(axis=1)),
     )
     planned = plans(cases, judged, causes, causes.with_chances(sets))
@@ -242,13 +243,11 @@ def _assessment(
         headline=_headline(cases, judged, i),
         measured_statement=(
             None
-            if beyond or not inspection.standing_readings_in
-            else sentences.measured(float(cases.mean_in[i]), margin, "within")
+            if beyond or not np.isfinite(cases.plunger_in[i])
+            else sentences.measured(float(cases.plunger_in[i]), margin, "within")
         ),
         repair_sets=sets if closes else None,
-        warnings=_warnings(
-            inspection, cases.gear, findings, worst, float(judged.u_in[i]), cases.extension
-        ),
+        warnings=_warnings(cases, i, findings, worst, float(judged.u_in[i])),
         **detail,
     )
 
@@ -289,14 +288,14 @@ def _detail(
         lower = one.predict(one.filled(0.0))
         worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
         detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    if np.isfinite(one.mean_in[0]):
+    if np.isfinite(one.plunger_in[0]):
         detail["posterior"] = explain(one, believed(one))
     return detail
 
 
 def _headline(cases: Cases, judged: Judged, i: int) -> str:
     margin = float(cases.margin_in[i])
-    mean = float(cases.mean_in[i])
+    mean = float(cases.plunger_in[i])
     plunger = judged.plunger
     lower = judged.batch.lower
     found = judged.verdicts[i]
@@ -330,7 +329,7 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
             for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True)
             if not read
         ]
-        question = judged.questions[i]
+        question = cases.inspections[i].unit_question
         return (
             sentences.entry_in_question(question, said)
             if question
@@ -350,20 +349,26 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
             joints_done=done,
             repaired=cases.inspections[i].is_repaired,
         )
-    return sentences.inconclusive(margin, said, float(judged.p_within[i]))
+    return (
+        sentences.plunger_unsettled(mean, float(cases.plunger_u_in[i]), margin)
+        if judged.unsettled[i]
+        else sentences.inconclusive(margin, said, float(judged.p_within[i]))
+    )
 
 
 _OF_EXTENSION = "The extension of the model"
 
 
 def _warnings(
-    inspection: Inspection,
-    gear: Gear,
+    cases: Cases,
+    i: int,
     findings: Sequence[JointFinding],
     worst_in: tuple[float, float],
     u: float,
-    extension: Extension | None,
 ) -> tuple[str, ...]:
+    inspection = cases.inspections[i]
+    gear = cases.gear
+    extension = cases.extension
     warnings = list(inspection.warnings)
     margin_in = inspection.margin_in
     if margin_in is not None and margin_in > gear.margin.value + ROUNDING_IN:
@@ -391,13 +396,12 @@ def _warnings(
         warnings.append(sentences.LIMITS_WRITTEN)
     elif len(read) >= sentences.LEAST_ALIKE and len(set(read)) == 1 and read[0] > 0.0:
         warnings.append(sentences.one_value(read[0]))
-    down_lock = inspection.plunger_down_lock_in
     low, high = gear.down_lock_range
-    if down_lock is not None and not low <= down_lock <= high:
+    if inspection.plunger_down_lock_in is not None and cases.off_down_lock[i]:
         warnings.append(
             Sentence.of(
                 "Plunger at Down Lock {} is outside {} to {}: check the rigging first.",
-                Length(down_lock),
+                Length(inspection.plunger_down_lock_in),
                 Length(low, 2, named=False),
                 Length(high, 2),
             )

@@ -53,7 +53,7 @@ def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:
         levels = (len(PRIOR_OF_LEVELS) * PRIOR_OF_LEVELS + each.sum(axis=0)) / (
             len(PRIOR_OF_LEVELS) + len(fits)
         )
-    whole = np.flatnonzero(known.measured.all(axis=1) & np.isfinite(known.mean_in))
+    whole = np.flatnonzero(known.measured.all(axis=1) & np.isfinite(known.plunger_in))
     share = betaincinv(PRIORS.loaded, 1.0 - PRIORS.loaded, _QUANTILES)
     likely = np.zeros(len(share))
     if len(whole):

@@ -30,7 +30,7 @@ from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, Doubted, le
 def explain(one: Cases, causes: Causes | None = None) -> Posterior:
     """Find which joints explain the plunger's reading of one gear."""
     gear = one.gear
-    reading = abs(float(one.mean_in[0]))
+    reading = abs(float(one.plunger_in[0]))
     found = causes or believed(one)
     rigging = float(found.rigging[0])
     loaded = float(found.joints[0] * found.loaded[0])

@@ -75,8 +75,8 @@ class Judged:
         Chance that the worst case is within the margin. [1]
     u_in : ndarray, shape (n,)
         Uncertainty of the worst case against the margin. [in]
-    questions : sequence of str
-        What `Cases` asks about each gear, found once.
+    unsettled : ndarray of bool, shape (n,)
+        Gears that only a plunger reading at the edge of the margin keeps from being within it.
     joints_done : ndarray of bool, shape (n,)
         Gears that retracted, with every joint read and none over its limit.
     """
@@ -87,7 +87,7 @@ class Judged:
     order: Places
     p_within: Array
     u_in: Array
-    questions: Sequence[str]
+    unsettled: Mask
     joints_done: Mask
 
 
@@ -161,8 +161,8 @@ class _BatchContext:
         self.after_limits = _verdicts_after_limits(cases, judged)
         self.again, self.again_u_in = _measure_again(cases, judged)
         self.expected_end = _expected(cases, judged, ahead)
-        u = np.hypot(cases.mean_u_in, cases.margin_u_in)
-        apart = np.abs(np.abs(cases.mean_in) - cases.margin_in)
+        u = np.hypot(cases.plunger_u_in, cases.margin_u_in)
+        apart = np.abs(np.abs(cases.plunger_in) - cases.margin_in)
         self.at_edge: Mask = np.asarray(apart < 2.0 * u)
 
 
@@ -186,7 +186,7 @@ class _PlanBuilder:
         self.opened: frozenset[str] = frozenset()
         self.over_limit = self._joints(self.cases.over_limit[row])
         self.over = self._joints(facts.over[row])
-        self.read_plunger = bool(np.isfinite(self.cases.mean_in[row]))
+        self.read_plunger = bool(np.isfinite(self.cases.plunger_in[row]))
         self.looked = self.inspection.rigging_checked not in (None, RiggingCheck.NO)
 
     def plan(self) -> Plan:
@@ -194,23 +194,35 @@ class _PlanBuilder:
         i = self.row
         if not np.isfinite(self.judged.batch.lower.displacement_in[i]):
             return NOT_CLOSING
-        if self.judged.questions[i] and not self.judged.plunger.beyond[i]:
+        if self.inspection.unit_question and not self.judged.plunger.beyond[i]:
             return CONFIRM
         found = self._course()
         return replace(found, open_question=self._open_question(found))
 
     def _course(self) -> Plan:
-        if self.cases.failed[self.row]:
+        i = self.row
+        corrected = self.inspection.rigging_checked is RiggingCheck.CORRECTED
+        if self.cases.off_down_lock[i] and not corrected:
+            self._check_rigging(again=True)
+        if self.cases.failed[i]:
             return self._failed()
-        if self.facts.complained[self.row]:
+        beyond = bool(self.judged.plunger.beyond[i])
+        if self.facts.complained[i] or (self.inspection.is_repaired and beyond):
             return self._repaired()
+        return self._without_complaint()
+
+    def _without_complaint(self) -> Plan:
+        i = self.row
+        if self.judged.unsettled[i]:
+            if self._again():
+                self._read_the_plunger(again=True)
+            return self._restore_over_limit()._end(End.TOO_CLOSE)
         if self.inspection.is_repaired and not self.over:
             return self._restore_over_limit()._done()
-        if not self.judged.plunger.explained[self.row]:
+        if not self.judged.plunger.explained[i]:
             return self._restore_over_limit()._check_rigging()._end(End.NOT_EXPLAINED)
-        if self.judged.verdicts[self.row] is Verdict.WITHIN_MARGIN:
-            return self._settled(End.WITHIN)
-        return self._to_verdict()
+        within = self.judged.verdicts[i] is Verdict.WITHIN_MARGIN
+        return self._settled(End.WITHIN) if within else self._to_verdict()
 
     def _repaired(self) -> Plan:
         """A gear that failed and was repaired: the plunger says whether the repair holds."""
@@ -222,14 +234,17 @@ class _PlanBuilder:
             return self._restore_over_limit()._stop_for_today()
         if self.read_plunger and beyond and not self._again():
             return self._failed()
-        if not self.read_plunger or beyond:
+        if not self.read_plunger or self._again():
             self._read_the_plunger(again=self.read_plunger)
         return self._retract()
 
     def _again(self) -> bool:
-        """Whether the plunger is read again: at the edge of its margin, and read only once."""
+        """Whether the plunger is read again: read only once and at the edge of its margin, or
+        perhaps before the repair.
+        """
         readings = self.inspection.standing_readings_in
-        return bool(self.facts.at_edge[self.row]) and len(readings) < 2
+        at_edge = bool(self.facts.at_edge[self.row]) and len(readings) < 2
+        return at_edge or self.inspection.is_plunger_in_doubt
 
     def _failed(self) -> Plan:
         """A gear that failed: the plunger first, then whatever is likeliest per minute."""
@@ -453,6 +468,8 @@ class _PlanBuilder:
         """Restore what is over its limit, and end; the joints are done with where some were, or
         where all were read on a gear that retracted.
         """
+        if self.over and self.judged.plunger.beyond[self.row]:
+            return self._try(self.over)
         if self.over_limit:
             return self._restore_over_limit()._done()
         done = bool(self.cases.retracted[self.row]) and not self._left_unread()
@@ -480,7 +497,8 @@ class _PlanBuilder:
         return self._retract()
 
     def _read_the_plunger(self, *, again: bool = False) -> None:
-        text = sentences.READ_PLUNGER_AGAIN if again else sentences.READ_PLUNGER
+        in_doubt = self.inspection.is_plunger_in_doubt
+        text = sentences.READ_PLUNGER_AGAIN if again and not in_doubt else sentences.READ_PLUNGER
         self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, text)
 
     def _retract(self) -> Plan:
@@ -515,15 +533,16 @@ class _PlanBuilder:
         self._step(Action.DONE, 0.0, text)
         return Plan(tuple(self.steps), End.DONE)
 
-    def _check_rigging(self) -> _PlanBuilder:
-        if not self.looked:
+    def _check_rigging(self, *, again: bool = False) -> _PlanBuilder:
+        checked = any(step.action is Action.CHECK_RIGGING for step in self.steps)
+        if not checked and (again or not self.looked):
             beyond = bool(self.judged.plunger.beyond[self.row])
             as_new = self._joints(
                 self.cases.measured[self.row]
                 & (self.cases.filled(0.0)[self.row] <= 2.0 * self.gear.new_parts_in)
             )
             text = sentences.check_rigging(
-                float(self.cases.mean_in[self.row]) if beyond else None,
+                float(self.cases.plunger_in[self.row]) if beyond else None,
                 () if self.inspection.is_repaired or not self.cases.failed[self.row] else as_new,
             )
             self._step(Action.CHECK_RIGGING, self.gear.rigging_check.value, text)
@@ -640,7 +659,8 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
     n = len(cases)
     chosen = np.zeros_like(cases.measured)
     needed = np.full(n, np.nan)
-    rows = np.flatnonzero([v is Verdict.INCONCLUSIVE for v in judged.verdicts] & ~cases.failed)
+    close = np.array([v is Verdict.INCONCLUSIVE for v in judged.verdicts])
+    rows = np.flatnonzero(close & ~cases.failed & ~judged.unsettled)
     if not len(rows):
         return chosen, needed
     some = cases.take(rows)

@@ -21,8 +21,8 @@ class Compared:
 
     Attributes
     ----------
-    beyond, clears : ndarray of bool, shape (n,)
-        Measured beyond the margin; within it by two standard uncertainties.
+    beyond, clears, unsettled : ndarray of bool, shape (n,)
+        Measured beyond the margin; within it by two standard uncertainties; within it by less.
     explained : ndarray of bool, shape (n,)
         False where the displacement is beyond what the joints can explain by two standard
         uncertainties.
@@ -32,6 +32,7 @@ class Compared:
 
     beyond: Mask
     clears: Mask
+    unsettled: Mask
     explained: Mask
     explained_at_most_in: Array
     unexplained_in: Array
@@ -39,15 +40,18 @@ class Compared:
 
 def compare(cases: Cases, upper: Prediction) -> Compared:
     """Split each measured displacement into what the joints can explain at most and the rest."""
-    size = np.abs(cases.mean_in)
+    size = np.abs(cases.plunger_in)
     bound = np.maximum(
-        np.where(cases.mean_in > 0.0, upper.worst.over_in, -upper.worst.under_in), 0.0
+        np.where(cases.plunger_in > 0.0, upper.worst.over_in, -upper.worst.under_in), 0.0
     )
     at_most = np.where(np.isfinite(bound), np.minimum(size, bound), size)
-    u = np.hypot(cases.mean_u_in, upper.standard_uncertainty(np.zeros(len(cases))))
+    u = np.hypot(cases.plunger_u_in, upper.standard_uncertainty(np.zeros(len(cases))))
+    beyond = cases.beyond_margin
+    clears = size + 2.0 * np.hypot(cases.plunger_u_in, cases.margin_u_in) <= cases.margin_in
     return Compared(
-        beyond=cases.beyond_margin,
-        clears=size + 2.0 * np.hypot(cases.mean_u_in, cases.margin_u_in) <= cases.margin_in,
+        beyond=beyond,
+        clears=clears,
+        unsettled=np.isfinite(size) & ~beyond & ~clears,
         explained=~(size > at_most + 2.0 * u),
         explained_at_most_in=at_most,
         unexplained_in=size - at_most,

@@ -11,7 +11,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome, Side
-from mlg_troubleshoot.decision.plan import Basis
+from mlg_troubleshoot.decision.plan import Action, Basis
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
@@ -19,6 +19,8 @@ from mlg_troubleshoot.indices.index_table import IndexTable
 # Two readings differ for sure where they do by this many standard uncertainties of the difference:
 # 90 % intervals. [1]
 _SURELY = 1.645
+# Where one of these comes next a gear is not done with, whatever its joints predict.
+_OPEN = (Action.CHECK_RIGGING, Action.READ_PLUNGER, Action.RETRACT)
 WORST_FIRST = (
     *(Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE, Verdict.INCOMPLETE),
     *(Verdict.INVALID, Verdict.WITHIN_MARGIN),
@@ -130,7 +132,6 @@ class Listed:
     measured: bool
     severity: tuple[int, int, float]
     failed: bool
-    repaired: bool
     over_limit: tuple[int, ...]
     worst_in: float | None
     margin_in: float | None
@@ -149,8 +150,8 @@ class Listed:
             judgement.in_brief,
             a is not None and a.basis is Basis.MEASURED,
             _severity(judgement),
-            a is not None and a.inspection.outcome is Outcome.FAILED,
-            a is not None and a.inspection.is_repaired,
+            a is not None
+            and (a.inspection.outcome is Outcome.FAILED or judgement.next_action.action in _OPEN),
             () if a is None else tuple(f.joint for f in a.joints if f.over_limit),
             a.deciding_in if a is not None and a.inspection.clearance_in else None,
             None if a is None else a.margin_in,
@@ -176,14 +177,14 @@ def latest_of_each_gear(lines: Sequence[Listed]) -> tuple[list[int], list[int]]:
     """Places of the latest inspection of each gear and of the earlier ones, both worst first.
 
     A row whose gear or date is not known stands by itself: nothing says that it is an earlier one.
-    Of several on the last day the one that states a repair is the latest, else the worst: their
-    order in the table does not say which is later.
+    Of several on the last day the worst one stands: their order in the table does not say which is
+    later.
     """
     last: dict[object, int] = {}
 
     def order(place: int) -> tuple[date, bool, tuple[float, ...]]:
         line = lines[place]
-        return line.day or date.min, line.repaired, tuple(-x for x in line.severity)
+        return line.day or date.min, not line.is_fine, tuple(-x for x in line.severity)
 
     for place, line in enumerate(lines):
         key = place if line.day is None else (line.tail_no, line.side)

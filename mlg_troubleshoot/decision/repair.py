@@ -292,7 +292,7 @@ def rigging_alternative(
     the joints. The uncertainties of the decision rule stay as they are.
     """
     over, under = worst_in
-    measured = float(one.mean_in[0])
+    measured = float(one.plunger_in[0])
     if np.isfinite(measured):
         shift = -measured
         left = max(over, -under)

@@ -15,7 +15,7 @@ from mlg_troubleshoot.decision.assessment import (
     Rigging,
     Verdict,
 )
-from mlg_troubleshoot.decision.inspection import Inspection, surely_later
+from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.plan import STOP, End
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
@@ -344,6 +344,17 @@ def inconclusive(margin_in: float, said: Predicted, p_within: float) -> Sentence
     )
 
 
+def plunger_unsettled(measured_in: float, u_in: float, margin_in: float) -> Sentence:
+    """Headline of INCONCLUSIVE where only the plunger's reading is too close to its margin."""
+    return Sentence.of(
+        "Measured: the plunger is {} off, which two standard uncertainties of {} bring beyond its"
+        " margin of {}: too close to decide.",
+        Length(abs(measured_in)),
+        Length(u_in),
+        Length(margin_in),
+    )
+
+
 def measure(gear: Gear, joints: Sequence[int]) -> str:
     """Step MEASURE."""
     if len(joints) == 1:
@@ -450,22 +461,27 @@ def older_than_the_repair(inspection: Inspection, over_limit: Collection[int]) -
         for joint in inspection.restored_joints
         if joint in over_limit
     ]
-    repaired = inspection.repair_date
-    undecided = not surely_later(repaired, inspection.outcome_date)
-    if inspection.outcome is not None and inspection.standing_outcome is None and undecided:
-        said.append(
-            f"The outcome {inspection.outcome} counts as older than the repair. Is it newer? Then"
-            " enter outcome_date, on the day of the repair with both times."
-        )
-    undecided = not surely_later(repaired, inspection.plunger_date)
-    if inspection.readings_in and not inspection.standing_readings_in and undecided:
-        said.append(
-            "The plunger reading counts as older than the repair. Is it newer? Then enter"
-            " plunger_date, on the day of the repair with both times."
-        )
-    if repaired is None:
+    if inspection.outcome is not None:
+        counts = inspection.is_since_repair(inspection.outcome_date)
+        said += _order(f"outcome {inspection.outcome}", "outcome_date", counts)
+    if inspection.readings_in:
+        counts = inspection.is_since_repair(inspection.plunger_date)
+        said += _order("plunger reading", "plunger_date", counts)
+    if inspection.repair_date is None:
         said.append("The repair has no date: enter repair_date, with the time if known.")
     return said
+
+
+def _order(what: str, column: str, is_newer: bool | None) -> list[str]:
+    """Say what of a row does not count, or not for certain, because of its repair."""
+    if is_newer:
+        return []
+    if is_newer is False:
+        return [f"The {what} is older than the repair and does not count."]
+    return [
+        f"The {what} may be older or newer than the repair: the worse of both counts. Enter"
+        f" {column}, on the day of the repair with both times."
+    ]
 
 
 def rigging_sentence(rigging: Rigging) -> Sentence:

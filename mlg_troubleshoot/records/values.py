@@ -475,7 +475,9 @@ def read_moment(cell: Filled, order: DateOrder | None = None, latest: date = dat
         day = read_date(cell, order, latest)
     except AmbiguousDateError as fault:
         raise CellFaultError("date_ambiguous", fault.expected) from None
-    clock = re.search(r"[T ](\d{2}:\d{2}(?::\d{2}(?:\.\d{1,6})?)?)", show(cell))
+    clock = re.search(
+        r"[T ](\d{2}:\d{2}(?::\d{2}(?:\.\d{1,6})?)?(?:Z|[+\-]\d{2}:?\d{2})?)", show(cell)
+    )
     if clock is None:
         return day
     try:

@@ -26,7 +26,7 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.life.since_repairs import since_repairs
+from mlg_troubleshoot.life.since_repairs import doubts, key_of, since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_lines, write_text
 from mlg_troubleshoot.parallel import Processes, Progress, spread
 from mlg_troubleshoot.records.model import TableOptions, TableResult
@@ -404,7 +404,14 @@ def _judge(
 ) -> CheckResult:
     """Judge rows; the list is empty afterwards."""
     total = len(rows)
-    counting = since_repairs(rows, found.gear, store)
+    lives = {}
+    if store is not None:
+        from mlg_troubleshoot.life.folding import lives_of
+
+        lives = lives_of(store, {key_of(row) for row in rows if isinstance(row, Inspection)})
+    counting = since_repairs(rows, found.gear, lives, entered_now=found.read is None)
+    if total > 1:
+        found = replace(found, notes=(*found.notes, *doubts(counting)))
     blocks = [slice(start, start + AT_ONCE) for start in range(0, total, AT_ONCE)]
     # As they were read, and as they count since repairs: packed they take a tenth of the memory.
     pickled = (pickle.dumps((rows[at], counting[at])) for at in blocks)

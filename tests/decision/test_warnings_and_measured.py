@@ -276,17 +276,41 @@ def test_what_the_reader_noticed_stays_with_the_judgement(judge: Judge) -> None:
 
 
 @pytest.mark.parametrize("readings", [(0.045, -0.045), (0.045, 0.001), (0.060, 0.001, 0.001)])
-def test_plunger_readings_that_disagree_over_the_margin_do_not_clear_the_gear(
+def test_of_plunger_readings_that_disagree_over_the_margin_the_worst_stands(
     judge: Judge, readings: tuple[float, ...]
 ) -> None:
     found = judge(every_joint(0.0012), readings_in=readings)
-    assert found.verdict is Verdict.INCOMPLETE
-    assert "the plunger readings disagree" in found.headline
-    assert found.next_action.action is Action.CORRECT
+    assert (found.verdict, found.basis) == (Verdict.OUTSIDE_MARGIN, Basis.MEASURED)
+    assert f"the plunger stands {max(readings):.4f} in beyond" in found.headline
 
 
-def test_plunger_readings_that_scatter_by_their_repeatability_agree(judge: Judge) -> None:
-    assert judge(every_joint(0.0012), readings_in=(0.0305, 0.029)).verdict is Verdict.WITHIN_MARGIN
+@pytest.mark.parametrize(
+    ("readings", "u_in"),
+    [
+        ((0.12, -0.12), 0.05),
+        ((0.0899, 0.0, 0.0), 0.05),
+        ((0.0899, 0.0, 0.0), None),
+        ((0.0299,), 0.05),
+        ((0.03,), 0.002),
+        ((0.0305, 0.029), None),
+    ],
+)
+def test_an_uncertainty_never_clears_what_a_reading_does_not(
+    judge: Judge, readings: tuple[float, ...], u_in: float | None
+) -> None:
+    found = judge(every_joint(0.0003), readings_in=readings, plunger_gauge_u_in=u_in)
+    assert found.verdict is not Verdict.WITHIN_MARGIN
+
+
+def test_a_plunger_reading_that_may_be_beyond_its_margin_is_said_and_taken_again(
+    judge: Judge,
+) -> None:
+    once = judge(every_joint(0.0003), readings_in=(0.029,))
+    assert once.verdict is Verdict.INCONCLUSIVE
+    assert "which two standard uncertainties of 0.0020 in bring beyond" in once.headline
+    assert once.next_action.action is Action.READ_PLUNGER
+    twice = judge(every_joint(0.0003), readings_in=(0.029, 0.029))
+    assert (twice.next_action.action, twice.end) == (Action.CONTINUE, End.TOO_CLOSE)
 
 
 def test_a_displacement_is_not_called_beyond_the_clearances_where_none_was_entered(

@@ -438,6 +438,29 @@ def test_done_is_said_with_the_report_one_key_away(visit: Visit, store: SessionS
     assert life(store).repairs
 
 
+def test_what_fails_again_on_the_day_of_its_repair_is_outside(
+    visit: Visit, capsys: pytest.CaptureFixture
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "y", "36")
+    visit(*GEAR, "y", "18", "y", "", "3", "3")
+    capsys.readouterr()
+    visit(*GEAR, "n", "t", "t", *PLAY, "f p 40", *ENTERS, "")
+    shown = capsys.readouterr().out
+    assert "OUTSIDE MARGIN, MEASURED" in shown
+    assert "40.0 thou beyond" in shown
+    assert "Read the plunger" not in shown.partition("NEXT")[2].partition("Expected")[0]
+
+
+def test_joints_restored_after_a_plunger_beyond_its_margin_leave_it_to_be_read(
+    visit: Visit, capsys: pytest.CaptureFixture
+) -> None:
+    visit(*GEAR, "t", "t", *["1"] * 10, "p 60", "n 6", *ENTERS, "")
+    shown = capsys.readouterr().out
+    assert "NEXT (12 min): Read the plunger" in shown
+    assert "sign it off" not in shown.partition("Expected")[0]
+
+
 def test_next_of_an_earlier_visit_is_said_in_the_unit_of_its_readings(visit: Visit) -> None:
     visit(*SOUND)
     visit(*GEAR, "y", "36")
@@ -451,7 +474,7 @@ def test_a_result_of_the_prompts_names_no_column_of_a_file(
     screen = visit(*GEAR, "y", "36", "n 3", "3").screen
     shown = screen + capsys.readouterr().out
     assert "Check rigging and lock roller" in shown
-    assert "counts as older than the repair" in shown
+    assert "is older than the repair and does not count" in shown
     for column in ("rigging_checked", "outcome_date", "plunger_date"):
         assert column not in shown
 

@@ -11,6 +11,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.folding import lives
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.store import Store, inspection_record
 from tests.cli.conftest import mlg
@@ -37,7 +38,7 @@ def counted(tmp_path_factory: pytest.TempPathFactory, gear: Gear) -> Counted:
     def count(day: date | None, worn_in: float = WORN, **more: Any) -> Inspection:
         of_row = {"tail_no": "N1", "inspection_date": day, **more}
         row = inspected({3: worn_in, 5: SOUND}, **of_row)
-        (found,) = since_repairs([row], gear, Store(Path(place)))
+        (found,) = since_repairs([row], gear, lives(Store(Path(place))))
         assert isinstance(found, Inspection)
         return found
 
@@ -54,15 +55,15 @@ def test_a_row_of_the_day_after_stays_as_it_is(counted: Counted) -> None:
     assert (set(found.clearance_in), found.restored_joints) == ({3, 5}, ())
 
 
-def test_a_row_of_the_same_day_counts_as_older(counted: Counted) -> None:
-    assert counted(THE_DAY, SOUND).repair_date == THE_DAY
+def test_a_row_of_the_same_day_may_be_older(counted: Counted) -> None:
+    found = counted(THE_DAY, SOUND, readings_in=(0.06,))
+    assert found.repair_date == THE_DAY
+    assert found.is_plunger_in_doubt
 
 
-@pytest.mark.parametrize(("worn_in", "left"), [(WORN, {5}), (SOUND, {3, 5})])
-def test_on_the_day_of_the_repair_only_a_reading_over_its_limit_is_of_the_old_part(
-    counted: Counted, worn_in: float, left: set[int]
-) -> None:
-    assert set(counted(THE_DAY, worn_in).clearance_in) == left
+@pytest.mark.parametrize("worn_in", [WORN, SOUND])
+def test_on_the_day_of_the_repair_every_reading_stands(counted: Counted, worn_in: float) -> None:
+    assert set(counted(THE_DAY, worn_in).clearance_in) == {3, 5}
 
 
 def test_a_row_that_states_a_repair_itself_stays_as_it_is(counted: Counted) -> None:
@@ -93,7 +94,8 @@ REPAIRED = {"restored_joints": (3,), "repair_date": date(2026, 1, 20)}
 def again(gear: Gear, *above: Inspection, store: Store | None = None, **more: Any) -> Inspection:
     """A row below others of its gear that states a repair, as it counts."""
     own = inspected({3: SOUND}, inspection_date=date(2026, 1, 21), **{**REPAIRED, **more})
-    found = since_repairs([*above, own], gear, store)[-1]
+    kept = {} if store is None else lives(store)
+    found = since_repairs([*above, own], gear, kept)[-1]
     assert isinstance(found, Inspection)
     return found
 

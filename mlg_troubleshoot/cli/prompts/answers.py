@@ -303,6 +303,19 @@ def _dated(answers: Answers, column: str) -> Answers:
     return answers.with_more(**{_DATES[column]: later.isoformat(" ")})
 
 
+def _repaired_now(answers: Answers) -> Answers:
+    """Date a repair that is typed, and before it what was typed before it."""
+    now = datetime.now()
+    before = (now - timedelta(microseconds=1)).isoformat(" ")
+    known = {date_of: answers.more.get(date_of) for date_of in _DATES.values()}
+    older = {
+        date_of: before
+        for column, date_of in _DATES.items()
+        if column in answers.more and not known[date_of]
+    }
+    return answers.with_more(**older, repair_date=now.isoformat(" "))
+
+
 def _moment(text: str) -> datetime:
     try:
         return datetime.fromisoformat(text)
@@ -352,7 +365,7 @@ def _taken(item: re.Match[str], answers: Answers, gear: Gear) -> tuple[Answers, 
     judge_more(column, text, answers.unit, gear)
     answers = answers.with_more(**{column: text})
     if column == DAY["n"] or text.lower() == "corrected":
-        answers = answers.with_more(repair_date=datetime.now().isoformat(" "))
+        answers = _repaired_now(answers)
     if column in _DATES:
         answers = _dated(answers, column)
     name = column.partition("_")[0] if length else column.replace("_", " ")

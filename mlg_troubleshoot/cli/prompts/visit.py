@@ -123,14 +123,14 @@ def last_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
         return None
     key = (tail if tail in kept else kept[0], side.value)
     life = lives(store, *key)[key]
-    return None if life.latest is None else _visit(life, life.latest, gear, store)
+    return None if life.latest is None else _visit(life, life.latest, gear)
 
 
-def _visit(life: GearLife, latest: KeptInspection, gear: Gear, store: Store) -> Visit | None:
+def _visit(life: GearLife, latest: KeptInspection, gear: Gear) -> Visit | None:
     stood = latest.inspection
     if not set(stood.clearance_in) <= set(gear.joint_numbers):
         return None
-    (row,) = since_repairs([stood], gear, store)
+    (row,) = since_repairs([stood], gear, {life.key: life})
     if not isinstance(row, Inspection):
         raise TypeError("an inspection is not an invalid row")
     restored = tuple(sorted(set(row.restored_joints) - set(stood.restored_joints)))
