@@ -10,9 +10,10 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.case import plunger_u
-from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome
+from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.plan import Action, Basis, End
 from mlg_troubleshoot.decision.plunger_reading import disagreement
+from mlg_troubleshoot.decision.ranking import Listed
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.decision.conftest import Judge, every_joint, inspected
 
@@ -318,3 +319,12 @@ def test_a_displacement_is_not_called_beyond_the_clearances_where_none_was_enter
 ) -> None:
     said = [" ".join(judge(read, readings_in=(0.036,)).warnings) for read in ({}, {3: 0.001})]
     assert ["what the entered clearances can do" in each for each in said] == [False, True]
+
+
+@pytest.mark.parametrize("rigging", [None, RiggingCheck.YES])
+def test_a_plunger_out_of_its_position_at_down_lock_needs_its_rigging_checked(
+    judge: Judge, rigging: RiggingCheck | None
+) -> None:
+    found = judge(every_joint(0.0003), plunger_down_lock_in=0.2, rigging_checked=rigging)
+    assert found.next_action.action is Action.CHECK_RIGGING
+    assert not Listed.of(found).is_fine
