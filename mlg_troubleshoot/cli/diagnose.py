@@ -27,7 +27,7 @@ def diagnose(
         list[str],
         typer.Argument(
             metavar="FILE...",
-            help="Tables with the plunger measured at mid-position or along the stroke, or -.",
+            help="Tables with the plunger measured at mid-position, or -.",
         ),
     ],
     write_extension: Annotated[

@@ -358,28 +358,6 @@ PLUNGER_DISPLACEMENT = Column(
     ),
     bears_verdict=True,
 )
-ACTUATOR_EXTENSION = Column(
-    name="actuator_extension",
-    holds=Holds.LENGTH,
-    meaning=(
-        "Extension of the actuator from Down Lock of a reading along the stroke; of use only with"
-        " plunger_position."
-    ),
-    high=5,
-    in_template=False,
-    covariate=10,
-)
-PLUNGER_POSITION = Column(
-    name="plunger_position",
-    holds=Holds.LENGTH,
-    meaning=(
-        "Plunger position of a reading along the stroke, zero as for plunger_down_lock; of use only"
-        " with actuator_extension."
-    ),
-    low=-2,
-    high=2,
-    in_template=False,
-)
 MARGIN = Column(
     name="margin",
     holds=Holds.LENGTH,
@@ -585,8 +563,6 @@ COLUMNS: tuple[Column, ...] = (
         spellings="plunger gauge uncertainty|repeatability of the plunger reading",
         bears_verdict=True,
     ),
-    ACTUATOR_EXTENSION,
-    PLUNGER_POSITION,
     MARGIN,
     MARGIN_U,
     SMALL_READINGS_TRUE,
@@ -624,5 +600,3 @@ SIGN_OFF: tuple[Column, ...] = tuple(
     sorted((column for column in COLUMNS if column.sign_off), key=lambda c: c.sign_off)
 )
 IDENTITY = (RECORD_ID, TAIL_NO, SIDE)
-# A reading along the stroke: neither is of use without the other.
-STROKE = (ACTUATOR_EXTENSION, PLUNGER_POSITION)

@@ -176,9 +176,6 @@ class Inspection(Result):
         Declared repeatability of one plunger reading. [in]
     plunger_down_lock_in : float or None
         Measured plunger position at Down Lock. [in]
-    actuator_extension_in, plunger_position_in : float or None
-        A reading along the stroke: plunger position, zero as at Down Lock, at an extension from
-        Down Lock. [in]
     margin_in : float or None
         This gear's margin as found at rigging. [in]
     margin_u_in : float
@@ -235,8 +232,6 @@ class Inspection(Result):
     readings_in: tuple[float, ...] = ()
     plunger_gauge_u_in: float | None = None
     plunger_down_lock_in: float | None = None
-    actuator_extension_in: float | None = None
-    plunger_position_in: float | None = None
     margin_in: float | None = None
     margin_u_in: float = 0.0
     outcome: Outcome | None = None

@@ -183,7 +183,7 @@ def _copies(table: DiagnosisTable) -> Mask:
     both = (values > least) & (values[before] > 0.0) & later[:, None]
     same = both & (values == values[before])
     count = both.sum(axis=1)
-    full = (same.sum(axis=1) == count) & (count >= LEAST_ALIKE) & ~table.along
+    full = (same.sum(axis=1) == count) & (count >= LEAST_ALIKE)
     full &= ~np.any(np.nan_to_num(values) != np.nan_to_num(values[before]), axis=1)
     others = both & ~full[:, None]
     usual = (same & others).sum(axis=0) / np.maximum(others.sum(axis=0), 1)
@@ -203,7 +203,7 @@ def _identical(table: DiagnosisTable) -> Mask:
     low = np.where(known, values, np.inf).min(axis=1)
     count = known.sum(axis=1)
     same = (np.where(known, values, -np.inf).max(axis=1) == low) & (low > 0.0)
-    same &= (count >= LEAST_ALIKE) & ~table.along
+    same &= count >= LEAST_ALIKE
     _found, often = np.unique(values[known & ~same[:, None]], return_counts=True)
     alike = float(np.sum((often / max(often.sum(), 1)) ** 2))
     return np.asarray(same & (len(values) * alike ** np.maximum(count - 1.0, 0.0) < BY_CHANCE))
@@ -225,19 +225,18 @@ def _too_coarse(values: Array, step: float) -> bool:
 
 def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     """Values on a step of twice their standard uncertainty or more: half a step is as large."""
-    use = rows & ~table.along
     people = table.people
     least = 2.0 * float(np.median(table.gauge_u_in))
     each = steps_of(table.take(rows))
     steps = {str(p): float(s) for p, s in zip(people[rows], each, strict=True) if s >= least}
-    people_read = set(people[use].tolist())
+    people_read = set(people[rows].tolist())
     for step in sorted(set(steps.values())):
         own = sorted(p for p, s in steps.items() if s == step)
         where = f"clearances, to {step:.4g} in"
         if len(own) < len(people_read):
             where += f", technician {', '.join(own)}"
-        rounded = np.isin(people, own) & use
-        share = float(np.mean(rounded[use]))
+        rounded = np.isin(people, own) & rows
+        share = float(np.mean(rounded[rows]))
         yield DataCondition(
             "rounded",
             where,
@@ -246,7 +245,7 @@ def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
             "the value as the gauge shows it, to 0.0005 in",
             share > _MANY_CUT and _too_coarse(table.clearance_in[rounded], step),
         )
-    plunger = table.readings_in[use]
+    plunger = table.readings_in[rows]
     known = table.plunger_gauge_u_in
     least = 2.0 * (DEFAULT_PLUNGER_U_IN if known is None else float(np.nanmedian(known)))
     if (step := step_of(plunger)) >= least:
@@ -317,7 +316,7 @@ def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
 
 def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
     """Whether the plunger was read depends on the displacement that is predicted."""
-    use = np.isfinite(table.clearance_in).any(axis=1) & ~table.along
+    use = np.isfinite(table.clearance_in).any(axis=1)
     read = np.isfinite(table.readings_in[use]).any(axis=1)
     if min(read.sum(), (~read).sum()) < 2 * LEAST_ROWS:
         return

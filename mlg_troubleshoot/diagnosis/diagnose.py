@@ -12,7 +12,6 @@ from scipy.special import chdtri
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Mask, rms
-from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, offered
@@ -28,7 +27,6 @@ from mlg_troubleshoot.diagnosis.explain import (
 )
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import (
-    LEAST_ALONG,
     DataFault,
     restored_joints,
     screen_faults,
@@ -45,6 +43,7 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import visits
 from mlg_troubleshoot.diagnosis.written import BY_CHANCE
 from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
@@ -459,7 +458,7 @@ def _explained(
 ) -> _Case:
     """Say what may explain the rows, and fit the likeliest explanation of what is said."""
     table = scene.table
-    _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
+    _comparable(table.measured_in, scene.over_in, scene.contribution_in)
     candidates = list(offered(causes, scene, columns))
     if table.doubt:
         candidates = [replace(c, stands_in=not c.cause.is_distinct()) for c in candidates]
@@ -516,18 +515,16 @@ def _explained(
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
-    """Keep the rows with a reading and, at mid-position, at least one clearance; refuse a table
-    without them.
-    """
+    """Keep the rows with a reading and at least one clearance; refuse a table without them."""
     measured = np.isfinite(table.measured_in)
     if not measured.any():
         raise InconclusiveDataError(
             "no row has a measured plunger displacement, so there is nothing to compare the"
             " prediction with",
             "Record plunger_displacement_in at mid-position, twice or three times, with every"
-            " inspection, or plunger_position_in along the stroke with actuator_extension_in.",
+            " inspection.",
         )
-    some = np.isfinite(table.clearance_in).any(axis=1) | table.along
+    some = np.isfinite(table.clearance_in).any(axis=1)
     if not (measured & some).any():
         raise InconclusiveDataError(
             "no row with a measured displacement has a clearance, so nothing can be predicted",
@@ -551,17 +548,10 @@ def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
         )
 
 
-def _comparable(
-    measured_in: Array, predicted_in: Array, contribution_in: Array, at_mid: Mask
-) -> None:
+def _comparable(measured_in: Array, predicted_in: Array, contribution_in: Array) -> None:
     """Refuse measured displacements that cannot be what the prediction is of: sign, unit, or a
     gauge that is stuck.
     """
-    measured_in = measured_in[at_mid]
-    predicted_in = predicted_in[at_mid]
-    contribution_in = contribution_in[at_mid]
-    if not len(measured_in):
-        return
     if np.ptp(measured_in) == 0.0:
         raise InconclusiveDataError(
             "every measured plunger displacement is the same, but a working gauge would vary",
@@ -644,8 +634,6 @@ def _unsaid(table: DiagnosisTable) -> tuple[str, ...]:
 
 
 def _enough(table: DiagnosisTable) -> None:
-    if np.count_nonzero(table.along) >= LEAST_ALONG:
-        return
     if len(table) < LEAST_ROWS:
         raise InconclusiveDataError(
             f"{len(table)} usable row{' is' if len(table) == 1 else 's are'} too few: a cause would"
@@ -681,7 +669,7 @@ def _report(
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
     as_read = np.where(read, table.clearance_in, case.scene.clearance_in)
-    raw = predicted(model, table, as_read)[0]
+    raw = worst_of_sense(model, as_read)[0]
     raw_misfit = table.measured_in - raw
     gain = _gain(case) if case.follows.verdict is Verdict.NAMED else None
     left = misfit - np.sum([cause.effect_in for cause in causes], axis=0)

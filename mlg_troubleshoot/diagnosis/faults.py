@@ -19,24 +19,18 @@ from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, log_sum
-from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.causes.base import Scene
 from mlg_troubleshoot.diagnosis.noise import FREEDOM, robust_scale, student
 from mlg_troubleshoot.diagnosis.sides import swapped_sides
-from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import fleet_history, inspection_of
 from mlg_troubleshoot.diagnosis.written import steps_of
+from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.units import SLIPS
 
-# Degree of the curve along the stroke, rounds to fit it, median distances from it within which rows
-# count, and rows from which there is one.
-_BEND = 6
-_BEND_ROUNDS = 4
-_BEND_FAR = 6
-LEAST_ALONG = 8
 # Share of rows with an entry error, each kind as often. [1]
 _WRONG = 0.005
 # No clearance, reading or misfit is expected more sharply than a gauge reads. [in]
@@ -46,8 +40,6 @@ _LEAST_SPREAD_IN = DEFAULT_GAUGE_U_IN
 _WORN_OUT_IN = 0.0325
 # Log-density of the logarithm of a value that means nothing: anywhere in four decades. [1]
 _ANYTHING = -float(np.log(4 * np.log(10)))
-# Neither plunger nor actuator goes further than this beyond mid-position. [1]
-_REACH = 1.3
 # The kinds of entry errors in a row, and what their cells are to be multiplied by.
 _FACTORS = tuple(
     (kind, factor)
@@ -127,8 +119,8 @@ class _Errors:
     """The entry errors that a row may hold, none first, as what undoes them.
 
     kind, shape (n_errors,): kind of the error; empty for none.
-    order, shape (n_errors, n_cells): cell that each value belongs to; clearances, readings and the
-        extension stand in a row.
+    order, shape (n_errors, n_cells): cell that each value belongs to; clearances and readings stand
+        in a row.
     factor, shape (n_errors, n_cells): of these values, NaN where they mean nothing. [1]
     changed, shape (n_errors, n_cells): 1 where an error made another value of one.
     value, shape (n_errors, n_joints): place in `values` of the clearance of each joint.
@@ -146,14 +138,14 @@ class _Errors:
     @classmethod
     def of(cls, n_joints: int, n_readings: int) -> _Errors:
         """The errors in a row of so many joints and readings."""
-        cells = np.arange(n_joints + n_readings + 1)
-        alone = list(cells[:-1, None])
+        cells = np.arange(n_joints + n_readings)
+        alone = list(cells[:, None])
         joints = cells[:n_joints]
-        readings = cells[n_joints:-1]
+        readings = cells[n_joints:]
         repeated = [readings] if n_readings > 1 else []
         # A gear may be worn less than any other: then all its clearances are small.
         scaled = [(places, *error) for places in (*alone, *repeated) for error in _FACTORS]
-        too_large = [joints, cells[-1:]] if n_joints > 1 else [cells[-1:]]
+        too_large = [joints] if n_joints > 1 else []
         scaled += [(places, *error) for places in too_large for error in _TOO_LARGE]
         scaled += [(places, "implausible", np.nan) for places in (*alone, *repeated)]
         pairs = list(combinations(joints.tolist(), 2))
@@ -165,8 +157,6 @@ class _Errors:
         for error, (a, b) in enumerate(pairs, 1 + len(scaled)):
             order[error, [a, b]] = b, a
         changed = (factor != 1.0).astype(float)
-        # Along the stroke an extension means nothing without the reading.
-        factor[np.isnan(factor[:, readings]).any(axis=1), -1] = np.nan
         made = np.stack(np.broadcast_arrays(joints, order[:, joints], factor[:, joints]), axis=2)
         made = np.nan_to_num(made, nan=np.inf)
         values, value = np.unique(made.reshape(-1, 3), axis=0, return_inverse=True)
@@ -225,32 +215,18 @@ class _Screen:
         """What may be wrong in a row."""
         return _Errors.of(self.table.clearance_in.shape[1], self.table.readings_in.shape[1])
 
-    def readings_of(self, cells: Array, along: Mask) -> Array:
-        """Readings that the cells of rows make, along the stroke less the position at rest. [in]"""
-        readings = cells[..., self.table.clearance_in.shape[1] : -1]
-        return readings - self._at_rest(cells[..., -1], along)
-
-    def _at_rest(self, extension: Array, along: Mask) -> Array:
-        """Position at rest of rows along the stroke, 0 of the others, as columns. [in]"""
-        moved = self.model.plunger(extension) if along.any() else extension
-        return np.where(along, np.nan_to_num(moved), 0.0)[..., None]
-
     def written(self, places: Places) -> Array:
         """Cells of rows as they are written, shape (n_places, n_cells)."""
-        table = self.table
-        extension = table.extension_in[places]
-        readings = table.readings_in[places] + self._at_rest(extension, table.along[places])
-        return np.column_stack([table.clearance_in[places], readings, extension])
+        return np.column_stack([self.table.clearance_in[places], self.table.readings_in[places]])
 
     def misfit_of(self, place: int, cells: Array) -> Array:
         """Misfit beyond what is explained, if the cells of a row were meant so. [in]"""
+        joints = self.usual.expected.shape[1]
         rows = self.table.take(np.full(len(cells), place))
-        quantities = {**rows.quantities, ALONG: cells[:, -1]}
-        readings = self.readings_of(cells, rows.along)
-        rows = replace(rows, readings_in=readings, quantities=quantities)
-        clearance = cells[:, : self.usual.expected.shape[1]]
+        rows = replace(rows, readings_in=cells[:, joints:])
+        clearance = cells[:, :joints]
         clearance = np.where(np.isfinite(clearance), clearance, self.usual.expected[place])
-        over = predicted(self.model, rows, clearance)[0]
+        over = worst_of_sense(self.model, clearance)[0]
         return np.asarray(rows.measured_in - over - self.explained[place])
 
     def near(self, place: int, misfit: Array) -> Array:
@@ -308,19 +284,12 @@ class _Screen:
         none where there is nothing that can be so wrong. [1]
         """
         errors = self.errors
-        along = self.table.along[places]
         written = np.isfinite(cells)
-        clearance, readings, extension = np.split(
-            cells, [self.usual.expected.shape[1], cells.shape[1] - 1], axis=1
-        )
-        end = _REACH * self.model.stroke[1]
-        far = ~along[:, None] | (
-            np.abs(readings) > _REACH * self.model.plunger(self.model.stroke[1])
-        )
-        size = np.hstack([clearance > 0.0, np.isfinite(readings) & far, extension > end])
+        clearance, readings = np.split(cells, [self.usual.expected.shape[1]], axis=1)
+        size = np.hstack([clearance > 0.0, np.isfinite(readings)])
         # A value that means nothing is large: a small one is what a restored joint has.
         large = (clearance > 0.0) & (clearance > self.usual.expected[places])
-        nothing = np.hstack([large, np.isfinite(readings), np.zeros_like(extension, bool)])
+        nothing = np.hstack([large, np.isfinite(readings)])
         lost = errors.kind == "implausible"
         changed = errors.changed
         count = np.where(lost, nothing @ changed.T, size @ changed.T)
@@ -340,7 +309,7 @@ class _Screen:
         """
         written = self.written(places)
         meant = written[:, self.errors.order] * self.errors.factor
-        readings = self.readings_of(meant, self.table.along[places][:, None])
+        readings = meant[..., self.usual.expected.shape[1] :]
         found = self.made(places, written) + self.repeats(readings)
         found += self.wear(places, written)
         read = np.asarray(np.isfinite(readings).any(axis=-1))
@@ -359,15 +328,13 @@ class _Screen:
 
     def faults(self, place: int, kind: str, cells: Array) -> Iterator[DataFault]:
         """The cells of a row that are not as they were meant."""
-        along = bool(self.table.along[place])
-        reading = "plunger_position" if along else "plunger_displacement"
         columns = [f"clearance_{number}_in" for number in self.model.joint_numbers]
         columns += [
-            f"{reading}{f'_{k}' if k > 1 else ''}_in"
+            f"plunger_displacement{f'_{k}' if k > 1 else ''}_in"
             for k in range(1, 1 + self.table.readings_in.shape[1])
         ]
         written = self.written(np.array([place]))[0]
-        values = zip((*columns, ALONG), written.tolist(), cells.tolist(), strict=True)
+        values = zip(columns, written.tolist(), cells.tolist(), strict=True)
         for column, value, right in values:
             if np.isfinite(value) and value != right:
                 suggested = f"{right:.4g}" if np.isfinite(right) else None
@@ -381,20 +348,15 @@ def screen_faults(
     screen, suspects = _suspects(model, table, explained)
     clearance = table.clearance_in.copy()
     readings = table.readings_in.copy()
-    extension = table.extension_in.copy()
     faults: list[DataFault] = []
     places = np.flatnonzero(suspects)
     for some in np.array_split(places, 1 + len(places) // _AT_ONCE):
         for place, kind, cells in screen.best(some):
             faults += screen.faults(place, kind, cells)
             clearance[place] = cells[: clearance.shape[1]]
-            readings[place] = screen.readings_of(cells, table.along[place])
-            extension[place] = cells[-1]
+            readings[place] = cells[clearance.shape[1] :]
     usable = np.asarray(np.isfinite(readings).any(axis=1))
-    quantities = (
-        {**table.quantities, ALONG: extension} if ALONG in table.quantities else table.quantities
-    )
-    repaired = replace(table, clearance_in=clearance, readings_in=readings, quantities=quantities)
+    repaired = replace(table, clearance_in=clearance, readings_in=readings)
     side = repaired.texts("side").copy()
     for row, own, other in swapped_sides(repaired, Beliefs().odds + np.log(_KINDS / _WRONG)):
         faults.append(DataFault.at(table, row, "side", "swapped_side", own, other))
@@ -426,8 +388,8 @@ def restored_joints(
     new[joints] = np.nanquantile(written[:, joints], _NEW, axis=0)
     changed = scene.clearance_in.copy()
     changed[rows, worst] = np.minimum(new[worst], changed[rows, worst])
-    effect = predicted(scene.model, table, changed)[0] - scene.over_in
-    effect = np.where(known.any(axis=1) & ~table.along, effect, 0.0)
+    effect = worst_of_sense(scene.model, changed)[0] - scene.over_in
+    effect = np.where(known.any(axis=1), effect, 0.0)
     habit = np.log(beliefs.expected * beliefs.unlisted / len(_RESTORED))
     likely = []
     chances = []
@@ -482,9 +444,8 @@ def _suspects(
     """
     usual = _usual(table, np.ones(len(table), bool))
     clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, usual.expected)
-    misfit = table.measured_in - predicted(model, table, clearance)[0]
+    misfit = table.measured_in - worst_of_sense(model, clearance)[0]
     named = np.zeros(len(table)) if explained is None else explained
-    named = named + _bend(table, misfit - named)
     rest = misfit - named
     scale = _scale(rest)
     apart = np.diff(np.sort(table.readings_in)).ravel()
@@ -517,25 +478,3 @@ def _usual(table: DiagnosisTable, trusted: Mask) -> _Usual:
     rounding = steps_of(table)[:, None] ** 2 / 12.0
     variance = history.unsure_in2 + history.scatter_in2 + history.reading_in2 + rounding
     return _Usual(history.expected_in, np.sqrt(variance + _LEAST_SPREAD_IN**2))
-
-
-def _bend(table: DiagnosisTable, left: Array) -> Array:
-    """Smooth curve of the rows along the stroke over their extension, most rows near it: that is an
-    effect. [in]
-    """
-    at = np.nan_to_num(table.extension_in)
-    bend = np.zeros(len(left))
-    near = table.along & np.isfinite(left)
-    for _ in range(_BEND_ROUNDS):
-        if near.sum() < LEAST_ALONG:
-            break
-        # A curve through fewer places than it has coefficients is not determined.
-        extent = max(float(np.ptp(at[near])), 1e-9)
-        places = len(np.unique(np.round(at[near] / extent, 2)))
-        curve = np.polynomial.Polynomial.fit(
-            at[near], left[near], min(_BEND, int(near.sum()) // 4, places - 1)
-        )
-        off = np.abs(left - curve(at))
-        bend = np.where(table.along, curve(at), 0.0)
-        near = table.along & (off <= _BEND_FAR * max(float(np.median(off[near])), 1e-9))
-    return bend

@@ -76,8 +76,8 @@ class Rows:
     unread_in : ndarray, shape (n, k)
         What joints that nobody read may add or take away in all rows together, each at one
         standard deviation. [in]
-    along_in : ndarray, shape (n, k)
-        What is not known of rows along the stroke, and of digits that may be cut off, each at one
+    unknown_in : ndarray, shape (n, k)
+        What is not known of wear that nobody read, and of digits that may be cut off, each at one
         standard deviation. [in]
     drawn_in : ndarray, shape (n,)
         Prediction from the readings as they are, minus the prediction with all readings shrunk
@@ -97,7 +97,7 @@ class Rows:
     u_filled_in: Array
     u_shared_in: Array
     unread_in: Array
-    along_in: Array
+    unknown_in: Array
     drawn_in: Array
     trends: Array
     readers: tuple[Array, ...]
@@ -185,7 +185,7 @@ def build_noise(
     scatter but its doubt. Rows further out than `far` standard deviations scatter more than others.
     """
     rest = misfit if explained is None else misfit - explained
-    wide = rows.along_in
+    wide = rows.unknown_in
     noise = _scatter(rest, rest, rows, far)
     gears = numbered(rows.gears)
     unread = rows.unread_in if rows.unread_in.any() else np.empty((len(rest), 0))

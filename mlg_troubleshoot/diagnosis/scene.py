@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unknown_along
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
 from mlg_troubleshoot.diagnosis.noise import (
     Rows,
@@ -24,6 +23,7 @@ from mlg_troubleshoot.diagnosis.wear import (
 )
 from mlg_troubleshoot.diagnosis.written import cut_off
 from mlg_troubleshoot.gear.adjustment import Adjustment
+from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.misfit.beliefs import Beliefs
@@ -61,24 +61,22 @@ def _scene(
 ) -> tuple[Scene, Rows]:
     clearance = worn.likely_in
     as_read = np.where(np.isfinite(table.clearance_in), worn.shown_in, clearance)
-    read = predicted(model, table, as_read)[0]
+    read = worst_of_sense(model, as_read)[0]
     scene = scene_at(model, table, where, clearance)
     slopes = np.empty_like(clearance)
     for j in range(clearance.shape[1]):
         moved = clearance.copy()
         moved[:, j] += 1e-5
-        slopes[:, j] = (
-            displaced(model, table, links_from(moved, scene.directions)) - scene.over_in
-        ) / 1e-5
+        over = model.displacement(links_from(moved, scene.directions))
+        slopes[:, j] = (over - scene.over_in) / 1e-5
     filled_in, shared_in = (
         np.sqrt(np.sum((slopes * u) ** 2, axis=1)) for u in (worn.u_row_in, worn.u_gear_in)
     )
     fleet_in = slopes * worn.u_fleet_in
-    along = unknown_along(model, table, clearance, scene.over_in, scene.directions)
+    unknown = np.sum(slopes, axis=1, keepdims=True) * cut_off(table)
     if not np.nan_to_num(table.clearance_in).any():
-        along = np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)])
+        unknown = np.hstack([wear_of_gears(table, slopes * worn.u_gear_in), unknown])
         shared_in = np.zeros(len(table))
-    along = np.hstack([along, np.sum(slopes, axis=1, keepdims=True) * cut_off(table)])
     rows = Rows(
         scene.over_in,
         table.tails,
@@ -86,7 +84,7 @@ def _scene(
         filled_in,
         shared_in,
         np.hstack([fleet_in, np.sum(fleet_in, axis=1, keepdims=True) * worn.together]),
-        along,
+        unknown,
         np.nan_to_num(read - scene.over_in),
         *small_trends(table),
     )
@@ -104,12 +102,12 @@ def scene_at(
     """The rows with the clearances that act: worst directions, displacement, and what each joint
     adds to it.
     """
-    over, directions = predicted(model, table, clearance_in)
+    over, directions = worst_of_sense(model, clearance_in)
     contribution = np.empty_like(clearance_in)
     for j in range(clearance_in.shape[1]):
         without = clearance_in.copy()
         without[:, j] = 0.0
-        contribution[:, j] = over - displaced(model, table, links_from(without, directions))
+        contribution[:, j] = over - model.displacement(links_from(without, directions))
     return Scene(
         model,
         table,
@@ -129,11 +127,9 @@ def effect(scene: Scene, adjustment: Adjustment) -> Array:
     moved = scene.over_in
     if adjustment.changed or adjustment.scaled or adjustment.acting_in is not scene.clearance_in:
         links = links_from(adjustment.acting_in, scene.directions)
-        moved = displaced(scene.model, scene.table, links, adjustment.numbers(scene.model))
+        moved = scene.model.displacement(links, adjustment.numbers(scene.model))
     if adjustment.rate_factor is not None:
-        # A position along the stroke has the whole travel from Down Lock in it.
-        nominal = travel(scene.model, scene.table)
-        moved = (moved + nominal) * adjustment.rate_factor - nominal
+        moved = moved * adjustment.rate_factor
     if adjustment.offset_in is not None:
         moved = moved + adjustment.offset_in
     return moved - scene.over_in

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.decision.columns import (
-    ACTUATOR_EXTENSION,
     AXIAL_FLOAT,
     COLUMNS,
     COVARIATES,
@@ -29,11 +28,10 @@ from mlg_troubleshoot.results import Result
 Texts = NDArray[np.str_]
 
 _TEXTS = tuple(c for c in COVARIATES if c.holds in (Holds.TEXT, Holds.CHOICE))
-ALONG = ACTUATOR_EXTENSION.filled
 FACTORS = tuple(column.variable for column in _TEXTS)
 # Values from which on a column of a table's own does not group its rows. [1]
 _MOST_VALUES = 6
-QUANTITIES = tuple(c.variable for c in COVARIATES if c not in (*_TEXTS, ACTUATOR_EXTENSION))
+QUANTITIES = tuple(c.variable for c in COVARIATES if c not in _TEXTS)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -47,19 +45,18 @@ class DiagnosisTable(Result):
     clearance_in : ndarray, shape (n, n_joints)
         Radial clearances, NaN where not measured. [in]
     readings_in : ndarray, shape (n, n_readings)
-        Repeat readings of the output, NaN where missing; of a row along the stroke the plunger's
-        position less that without clearances. [in or rad]
+        Repeat readings of the output, NaN where missing. [in or rad]
     record_id : sequence of str
         Identity of each row.
     row : ndarray of int, shape (n,)
         Row in the source, counted from 1.
     margin_in : ndarray, shape (n,)
-        Margin of each row; infinite along the stroke. [in or rad]
+        Margin of each row. [in or rad]
     gauge_u_in : ndarray, shape (n,)
         Standard uncertainty of one radial clearance. [in]
     quantities : mapping of str to ndarray of shape (n,)
         Numbers by name: covariates of the table of columns, ``day`` (days since the earliest
-        date), the extension of rows along the stroke, or a user's own.
+        date), or a user's own.
     factors : mapping of str to ndarray of str of shape (n,)
         Texts by name: covariates of the table of columns, or a user's own.
     axial_float_in : ndarray, shape (n, n_joints), or None
@@ -97,18 +94,6 @@ class DiagnosisTable(Result):
         count = np.isfinite(self.readings_in).sum(axis=1)
         total = np.nansum(self.readings_in, axis=1)
         return np.where(count > 0, total / np.maximum(count, 1), np.nan)
-
-    @property
-    def extension_in(self) -> Array:
-        """Actuator extension from Down Lock of each row along the stroke, shape (n,); NaN at
-        mid-position. [in]
-        """
-        return self.numbers(ALONG)
-
-    @property
-    def along(self) -> Mask:
-        """Rows along the stroke, shape (n,)."""
-        return np.isfinite(self.extension_in)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -168,12 +153,6 @@ class DiagnosisTable(Result):
         return replace(self, **taken)
 
 
-def _read_along(inspection: Inspection) -> bool:
-    return (
-        inspection.actuator_extension_in is not None and inspection.plunger_position_in is not None
-    )
-
-
 def _own_texts(inspections: Sequence[Inspection]) -> dict[str, list[str]]:
     """Columns that only this source has and that group its rows: few values, each written often."""
     known = {column.name for column in COLUMNS}
@@ -182,9 +161,7 @@ def _own_texts(inspections: Sequence[Inspection]) -> dict[str, list[str]]:
     return {name: own for name, own in texts.items() if len({*own} - {""}) <= _MOST_VALUES}
 
 
-def table_from_inspections(
-    inspections: Sequence[Inspection], gear: Gear, *, along: bool = False
-) -> DiagnosisTable:
+def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> DiagnosisTable:
     """Put inspections into columns.
 
     Parameters
@@ -193,22 +170,12 @@ def table_from_inspections(
         The inspections, with or without measured displacements.
     gear : Gear
         The gear.
-    along : bool
-        True for a further row of each plunger position along the stroke.
 
     Returns
     -------
     DiagnosisTable
         The columns; a covariate that no inspection has is absent.
     """
-    positions = [i for i in inspections if _read_along(i)] if along else []
-    at_mid = (
-        [i for i in inspections if i.readings_in or not _read_along(i)] if along else inspections
-    )
-    stroke = np.array(
-        [*[np.nan] * len(at_mid), *(i.actuator_extension_in for i in positions)], float
-    )
-    inspections = [*at_mid, *positions]
     shape = len(inspections), len(gear.joint_numbers)
 
     def of_joints(cell: Callable[[Inspection, int], Any], kind: type = float) -> NDArray[Any]:
@@ -219,12 +186,10 @@ def table_from_inspections(
     floats = of_joints(lambda i, number: i.axial_float_in.get(number))
     below = of_joints(lambda i, n: n in i.entered and i.entered[n].bound == "<", bool)
     clearance[below] *= 0.5
-    width = max((len(i.readings_in) for i in at_mid), default=0)
+    width = max((len(i.readings_in) for i in inspections), default=0)
     readings = np.full((len(inspections), max(width, 1)), np.nan)
-    for row, inspection in enumerate(at_mid):
+    for row, inspection in enumerate(inspections):
         readings[row, : len(inspection.readings_in)] = inspection.readings_in
-    readings[len(at_mid) :, 0] = [i.plunger_position_in for i in positions]
-    readings[len(at_mid) :, 0] -= np.nan_to_num(gear.model.plunger(stroke[len(at_mid) :]))
     dates = [i.inspection_date for i in inspections]
     first = min((day for day in dates if day is not None), default=None)
     given: dict[str, Sequence[Any]] = {
@@ -232,7 +197,6 @@ def table_from_inspections(
     }
     given[DATE.variable] = [day and first and (day - first).days for day in dates]
     quantities = {name: np.array(values, float) for name, values in given.items()}
-    quantities[ALONG] = stroke
     factors = {c.variable: [str(i.value(c.filled) or "") for i in inspections] for c in _TEXTS}
     factors |= _own_texts(inspections)
     declared = np.array([i.plunger_gauge_u_in for i in inspections], float)
@@ -241,10 +205,8 @@ def table_from_inspections(
         readings_in=readings,
         record_id=tuple(i.record_id for i in inspections),
         row=np.array([i.source.row or k + 1 for k, i in enumerate(inspections)], np.int64),
-        margin_in=np.where(
-            np.isnan(stroke),
-            [gear.margin.value if i.margin_in is None else i.margin_in for i in inspections],
-            np.inf,
+        margin_in=np.array(
+            [gear.margin.value if i.margin_in is None else i.margin_in for i in inspections]
         ),
         gauge_u_in=np.array([i.gauge_u_in for i in inspections]),
         quantities={name: own for name, own in quantities.items() if np.isfinite(own).any()},

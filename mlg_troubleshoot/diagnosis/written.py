@@ -54,9 +54,8 @@ class Blanks:
 def blanks_by_wear(table: DiagnosisTable) -> list[Blanks]:
     """The habit of all rows, else those of single technicians."""
     people = table.people
-    people = np.where(table.along, "", people)
     own = {str(person): people == person for person in np.unique(people[people != ""])}
-    whole = list(_habit(table, "", ~table.along))
+    whole = list(_habit(table, "", np.ones(len(table), bool)))
     return whole or [found for one, rows in own.items() for found in _habit(table, one, rows)]
 
 
@@ -229,10 +228,10 @@ def steps_of(table: DiagnosisTable) -> Array:
     people = table.people
     values = _read(table)
     found = np.zeros(len(table))
-    every = step_of(values[~table.along])
+    every = step_of(values)
     for person in np.unique(people):
         own = people == person
-        mine = values[own & ~table.along]
+        mine = values[own]
         enough = np.count_nonzero(np.nan_to_num(mine)) >= _LEAST_VALUES
         found[own] = step_of(mine) if enough else every
     return found
@@ -278,11 +277,9 @@ def piles(table: DiagnosisTable) -> list[Pile]:
 
     Only rows on the usual step tell: whoever writes another one prefers its multiples.
     """
-    if table.along.all():
-        return []
     steps = steps_of(table)
-    each, often = np.unique(steps[~table.along], return_counts=True)
-    values = _read(table)[~table.along & (steps == each[np.argmax(often)])]
+    each, often = np.unique(steps, return_counts=True)
+    values = _read(table)[steps == each[np.argmax(often)]]
     found, counts = np.unique(np.round(values[np.isfinite(values)], 7), return_counts=True)
     if len(found) < _LED_BY + 2:
         return []

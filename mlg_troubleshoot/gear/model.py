@@ -105,20 +105,15 @@ class LinkageModel:
             values[self.kernel.parameter_index(name)] = value
         return values
 
-    def displacement(
-        self, links: Sequence[Any], changed: Mapping[str, Any] | None = None, stroke: Any = None
-    ) -> Array:
-        """Displacement of the plunger by clearances, measured from the same linkage without them.
+    def displacement(self, links: Sequence[Any], changed: Mapping[str, Any] | None = None) -> Array:
+        """Displacement of the plunger at mid-position by clearances, from where it stands without.
 
         links: components of each virtual link. [in]
         changed: numbers of the linkage that differ from the nominal ones.
-        stroke: actuator extension, else mid-position. [in]
         Returns: displacement, over-travel positive; NaN where the linkage does not close. [in]
         """
-        at = self.stroke[1] if stroke is None else stroke
-        zero = self.mid if stroke is None else self.kernel.output(at, self.kernel.no_clearance())
-        moved = self.kernel.output(at, links, self.numbers(changed) if changed else None) - zero
-        return self.rate * moved
+        numbers = self.numbers(changed) if changed else None
+        return self.rate * (self.kernel.output(self.stroke[1], links, numbers) - self.mid)
 
     def plunger(self, stroke: Any, links: Sequence[Any] | None = None) -> Array:
         """Plunger position (Fig. 12), P(s) = P(0) + k (p(s) − p(0)), by extension and links; NaN if

@@ -10,7 +10,6 @@ from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,
     IDENTITY,
-    STROKE,
     UNIT,
     Holds,
 )
@@ -120,9 +119,6 @@ def frame_of(rows: Iterable[Inspection | InvalidRow], joints: Joints) -> pd.Data
     known = {name: None for row in cells for name in row}
     needed = [column.name for column in (*IDENTITY, CONVENTION)]
     clearances = [CLEARANCE.header(joint, LengthUnit.INCH) for joint in joints.numbers]
-    if {f"{column.name}_in" for column in STROKE} <= {*known}.difference(clearances):
-        # A reading along the stroke needs no clearance.
-        clearances = [name for name in clearances if name in known]
     first = dict.fromkeys([*needed, *clearances])
     frame = pd.DataFrame(cells, columns=[*first, *(name for name in known if name not in first)])
     return frame.astype({name: _dtype(name, joints) for name in frame.columns})

@@ -13,7 +13,6 @@ from mlg_troubleshoot.decision.columns import (
     JOINT,
     RECORD_ID,
     SIDE,
-    STROKE,
     TAIL_NO,
     Column,
 )
@@ -349,7 +348,7 @@ class ColumnReader:
         else:
             columns.ids_made = missing.pop(RECORD_ID.name, "") != ""
         clearance_refused = any(p.refused for p in columns.placed)
-        if CLEARANCE not in fields and not clearance_refused and not fields >= set(STROKE):
+        if CLEARANCE not in fields and not clearance_refused:
             missing["clearance_1_in"] = "at least one clearance column, such as clearance_3_in"
         unknown = {
             _in_one_word(p.header): p.header

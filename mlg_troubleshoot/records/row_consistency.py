@@ -158,9 +158,8 @@ def _copies(seen: Sequence[Inspection]) -> dict[int, str]:
     first: dict[frozenset[tuple[int, float]], Inspection] = {}
     found: dict[int, str] = {}
     for at, row in enumerate(seen):
-        # Rows along the stroke and after a repair are of one reading of the clearances.
-        same = row.actuator_extension_in is not None or row.is_repaired
-        if same or len({v for v in row.clearance_in.values() if v > 0.0}) < _DIFFERENT:
+        # Rows after a repair are of one reading of the clearances.
+        if row.is_repaired or len({v for v in row.clearance_in.values() if v > 0.0}) < _DIFFERENT:
             continue
         before = first.setdefault(frozenset(row.clearance_in.items()), row)
         if before is row or before.record_id == row.record_id:

@@ -28,7 +28,6 @@ from mlg_troubleshoot.decision.columns import (
     RECORD_ID,
     SIDE,
     SMALL_READINGS_TRUE,
-    STROKE,
     TAIL_NO,
     UNIT,
     Column,
@@ -382,10 +381,6 @@ class RowReader:
                 "every clearance is 0: a zero is read as measured; leave a joint blank if it was"
                 " not measured"
             )
-        alone = [column for column in STROKE if column in found.lengths]
-        if len(alone) == 1:
-            (other,) = set(STROKE) - set(alone)
-            found.warnings.append(f"{alone[0].filled} is not used: the row has no {other.filled}")
         idle = [
             f"#{joint}"
             for joint in found.lengths.get(GAUGE_U, {})
@@ -489,8 +484,6 @@ class RowReader:
         if index is not None and self._cells[index] is not None:
             found: ClearanceConvention | None = self._noted(CONVENTION, index)
             return found
-        if declared is None and self._is_curve_alone():
-            return ClearanceConvention.RADIAL
         if declared is None and index is not None:
             self._fault(index, CellFaultError("convention_missing", *_MISSING_CONVENTION))
         elif declared is None:
@@ -510,11 +503,6 @@ class RowReader:
         except CellFaultError as fault:
             self._fault(index, fault)
             return None
-
-    def _is_curve_alone(self) -> bool:
-        """A position along the stroke needs no clearance, and then no convention of one."""
-        filled = {of.column for i, of, _ in self._lengths if self._cells[i] is not None}
-        return filled >= set(STROKE) and CLEARANCE not in filled
 
     def _read_row_unit(self) -> LengthUnit | None:
         index = self._at.get(UNIT)

@@ -67,7 +67,7 @@ def _values(residuals: Residuals) -> Markup:
     across = Axis(f"clearance, {residuals.unit}", 0.0, float(np.nanmax(written)) or 1.0)
     plot = lanes("Clearances as they were written", across, [name for name, _rows in people])
     for place, (_name, rows) in enumerate(people):
-        values = written[rows & ~table.along]
+        values = written[rows]
         found, counts = np.unique(np.round(values[np.isfinite(values)], 6), return_counts=True)
         tops = place + 1 - 0.9 * counts / counts.max(initial=1)
         for value, top in zip(found.tolist(), tops.tolist(), strict=True):

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, CLEARANCE, COVARIATES, TAIL_NO
 from mlg_troubleshoot.diagnosis import Candidate, Diagnosis
-from mlg_troubleshoot.diagnosis.table import ALONG
 from mlg_troubleshoot.reporting.diagnosis_lines import column_words
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, PALE, PAPER, SOFT, Axis, Canvas, Plot
 from mlg_troubleshoot.reporting.formats import short
@@ -128,7 +127,7 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
             return against_column(residuals, AXIAL_FLOAT.header(residuals.joints[widest]))
         if need in table.quantities or need in table.factors:
             return against_column(residuals, need)
-    return against_column(residuals, ALONG if table.along.any() else "predicted")
+    return against_column(residuals, "predicted")
 
 
 def _over_time(residuals: Residuals, candidate: Candidate, effect_in: Array) -> ResidualAxis:

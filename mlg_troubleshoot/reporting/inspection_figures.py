@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import pairwise
@@ -187,8 +186,8 @@ def plunger_curve(
     """Draw how far clearances move the plunger from where it would stand without them, over the
     release stroke.
 
-    Both worst cases, the margin at mid-position, and what was measured: at mid-position, at Down
-    Lock and along the stroke.
+    Both worst cases, the margin at mid-position, and what was measured: at mid-position and at Down
+    Lock.
     """
     a = assessment
     model = gear.model
@@ -209,7 +208,7 @@ def plunger_curve(
             moved = model.plunger(strokes, links) - nominal
             drawn = tuple((moved * per_inch).tolist())
             series.append(figures.Series(label, x, drawn, dash=dash, width=2.2))
-    measured = _measured_along(gear, a, start, end)
+    measured = _measured(gear, a, start, end)
     margin = a.margin_in * per_inch
     farthest = max([end + 0.3 * (end - start), *(place for place, _ in measured)])
     values = (
@@ -263,23 +262,13 @@ def plunger_curve(
     return canvas.svg()
 
 
-def _measured_along(
-    gear: Gear, a: Assessment, start: float, end: float
-) -> list[tuple[float, float]]:
+def _measured(gear: Gear, a: Assessment, start: float, end: float) -> list[tuple[float, float]]:
     """What was measured, as actuator extension and displacement from nominal. [in]"""
-    inspection = a.inspection
-    found: list[tuple[float, float]] = []
-    if inspection.plunger_down_lock_in is not None:
-        found.append((start, inspection.plunger_down_lock_in))
-    if inspection.actuator_extension_in is not None and inspection.plunger_position_in is not None:
-        found.append((inspection.actuator_extension_in, inspection.plunger_position_in))
-    displaced = [
-        (place, position - float(gear.model.plunger(np.array([place]))[0]))
-        for place, position in found
-    ]
-    if inspection.measured_displacement_in is not None:
-        displaced.append((end, inspection.measured_displacement_in))
-    return [(place, value) for place, value in displaced if math.isfinite(value)]
+    down_lock = a.inspection.plunger_down_lock_in
+    found = [] if down_lock is None else [(start, down_lock - gear.model.calibration.down_lock_in)]
+    if a.inspection.measured_displacement_in is not None:
+        found.append((end, a.inspection.measured_displacement_in))
+    return found
 
 
 def _spread_out(places: Sequence[float], gap: float) -> list[float]:

@@ -143,7 +143,7 @@ def diagnose_files(
     # What a check says of single rows is said of the data as a whole: landings that fall.
     of_rows = {warning for inspection in valid for warning in inspection.warnings}
     general = (note for note in read.notes if note not in of_rows)
-    whole = table_from_inspections(once, gear, along=True)
+    whole = table_from_inspections(once, gear)
     notes = (*general, *_evidence_notes(once, len(valid) - len(once), gear, whole.own_factors))
     condition, aside = data_condition(whole, gear)
     table = replace(whole.take(~aside), doubt=doubt_of(condition))
@@ -211,7 +211,7 @@ def _unused(
     from mlg_troubleshoot.reporting.diagnosis_lines import condition_words
 
     unmeasured = np.count_nonzero(np.isnan(whole.measured_in))
-    unread = np.count_nonzero(np.isnan(whole.clearance_in).all(axis=1) & ~whole.along)
+    unread = np.count_nonzero(np.isnan(whole.clearance_in).all(axis=1))
     counts = {
         "with an error": len(read.rows) - len(read.inspections),
         "without a measured displacement": unmeasured,

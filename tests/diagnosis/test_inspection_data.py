@@ -94,7 +94,7 @@ def test_the_seeds_in_the_description_are_those_of_the_command() -> None:
     later = {
         f"{name}_later": made[name] + 1000 for name in ("measured_pressure", "measured_far_below")
     }
-    assert said == {**made, **later, "measured_rig": data_sets.RIG[1]}
+    assert said == {**made, **later}
 
 
 def test_the_pressure_is_named() -> None:

@@ -111,14 +111,3 @@ def test_some_rows_of_an_adjustment_move_as_they_do_among_all(gear: Gear) -> Non
     )
     assert last.over_in == pytest.approx(all_rows.over_in[[2, 1]])
     assert last.under_in == pytest.approx(all_rows.under_in[[2, 1]])
-
-
-@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_without_clearance_nothing_is_displaced_anywhere_along_the_stroke(
-    gear: Gear, share: float
-) -> None:
-    low, high = gear.model.stroke
-    assert (
-        gear.model.displacement(gear.model.kernel.no_clearance(), stroke=low + share * (high - low))
-        == 0.0
-    )

@@ -15,7 +15,6 @@ from typing import Any
 from .simulator import EffectSpec, Fleet, FleetSpec, follow_up, simulate_fleet, write_csv
 from .simulator.records import RESOLUTION_IN
 from .simulator.records import write_csv as write_columns
-from .simulator.stroke import CurveSpec, curve_table
 
 #: What is hidden in each file, and the seed that made it.
 DATA_SETS: dict[str, tuple[FleetSpec, int]] = {
@@ -43,9 +42,6 @@ DATA_SETS: dict[str, tuple[FleetSpec, int]] = {
     "measured_nothing_wrong": (FleetSpec(), 41_003),
     "measured_frozen_grease": (FleetSpec(), 41_004),
 }
-#: One worn gear of another linkage, read along the stroke without a clearance, and the seed that
-#: made it.
-RIG = CurveSpec(gears=1, rows=24, fleet=False, geometry="A-G:0.2"), 41_006
 #: What frost takes off a reading in ``measured_frozen_grease`` [in/°C].
 DRAG_IN_PER_C = 0.001
 _LATER_ROWS = 40
@@ -115,11 +111,6 @@ def main(arguments: Sequence[str]) -> int:
         write_csv(fleet, folder / f"{name}.csv")
         if name in {"measured_pressure", "measured_far_below"}:
             write_columns(later_rows(fleet, seed + 1000), folder / f"{name}_later.csv")
-    table = curve_table(*RIG)[0]
-    write_columns(
-        {name: table[name] for name in table if not name.startswith("clearance")},
-        folder / "measured_rig.csv",
-    )
     return 0
 
 

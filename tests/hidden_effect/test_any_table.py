@@ -16,7 +16,6 @@ from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 from . import departures
 from .simulator import linkage, simulate_fleet
 from .simulator.records import write_csv
-from .simulator.stroke import CurveSpec, curve_table
 
 Table = dict[str, list[Any]]
 STAYS = ("record_id", "tail_no", "side", "clearance_convention")
@@ -24,20 +23,10 @@ ODD = ("", "x", "-5", "1000000", "0")
 
 
 def drawn(seed: int, rng: np.random.Generator) -> Table:
-    """The table of a departure's fleet, or of readings along the stroke."""
-    if rng.random() < 0.65:
-        group = str(rng.choice(list(departures.PLAN)))
-        return dict(
-            simulate_fleet(departures._spec(group, int(rng.integers(100)), seed), seed).table
-        )
-    effect = str(rng.choice(["", "calibration_rate", "load_directions", "thermal_growth"])) or None
-    gears, rows = int(rng.choice([1, 2, 5, 12])), int(rng.choice([5, 10, 24]))
-    geometry = str(rng.choice(["A", "C", "A-G:0.2"]))
-    return dict(
-        curve_table(
-            CurveSpec(gears, rows, effect, {}, geometry, fleet=bool(rng.random() < 0.6)), seed
-        )[0]
-    )
+    """The table of a departure's fleet."""
+    group = str(rng.choice(list(departures.PLAN)))
+    spec = departures._spec(group, int(rng.integers(100)), seed)
+    return dict(simulate_fleet(spec, seed).table)
 
 
 def spoiled(table: Table, rng: np.random.Generator) -> Table:

@@ -212,8 +212,6 @@ def test_every_kind_of_record_that_the_program_keeps_is_read_again(
             gauge_u_3_in="0.0002",
             clearance_7_in="<0.002",
             axial_float_4_in="0.01",
-            actuator_extension_in="0.5",
-            plunger_position_in="-0.1",
         ),
     )
     assert mlg("check", table, "--keep").code == 0

@@ -52,19 +52,18 @@ class ConventionSlip(Cause):
         """Yield each group whose readings are far off the fleet's share of their prediction; any
         other group might have been.
         """
-        at_mid = ~scene.table.along
         measured = scene.table.measured_in / np.maximum(scene.over_in, 1e-3)
-        usual = float(np.median(measured[at_mid])) if at_mid.any() else 0.0
+        usual = float(np.median(measured))
         if usual <= 0.0:
             return
         groups = [
             (column, label, value)
             for column, label in _LABELS.items()
-            for value in levels(scene.table.texts(column)[at_mid], _LEAST_ROWS)
+            for value in levels(scene.table.texts(column), _LEAST_ROWS)
         ]
         found: list[Candidate] = []
         for column, label, value in groups:
-            group = at_mid & (scene.table.factors[column] == value)
+            group = scene.table.factors[column] == value
             own = float(np.median(measured[group])) / usual
             setting = {"column": column, "value": value}
             target = f"{label} {value}"

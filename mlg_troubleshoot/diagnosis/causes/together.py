@@ -15,14 +15,13 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.polynomial import legendre
 from scipy.linalg import block_diag
 from scipy.special import ndtri
 
 from mlg_troubleshoot.arrays import Array, log_sum
-from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
+from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel
 
 # Standard deviations of the angle between a pin's resting place and the worst direction that are
@@ -43,9 +42,6 @@ NEAR = ALONE / 3
 # far behind another.
 _LIKELY = 250
 _ROUNDS = 8
-# Degree of the polynomials in the extension that stand for the curves of linkages between those of
-# the ensemble.
-_DEGREE = 6
 
 
 @dataclass(frozen=True)
@@ -160,10 +156,7 @@ class JointFactors(Cause):
         # What each adds is taken so that together they are the displacement: with all at nothing
         # nothing moves.
         total = np.sum(scene.contribution_in, axis=1)
-        at_mid = ~scene.table.along
-        whole = np.divide(
-            scene.over_in, total, out=np.ones_like(total), where=at_mid & (total > 0.0)
-        )
+        whole = np.divide(scene.over_in, total, out=np.ones_like(total), where=total > 0.0)
         columns = scene.contribution_in[:, used] * whole[:, None]
         share = 1.0 / max(len(found), 1)
         return [Block(self, joints, columns, k[np.ix_(used, used)], share) for k in found]
@@ -252,19 +245,15 @@ class OtherGeometry(JointFactors):
         apart = _apart(scene.model, ensemble)[
             :, [scene.joints.index(joint) for joint in found[0].joints]
         ]
-        moved = [
-            predicted(other, scene.table, scene.clearance_in)[0] - scene.over_in
-            for other in ensemble
-        ]
+        moved = [worst_of_sense(other, scene.clearance_in)[0] - scene.over_in for other in ensemble]
         bent = np.array(moved) - apart @ found[0].columns.T
         # A linkage that does not close with clearances that were read is not the one that they were
         # read in.
         closes = np.isfinite(bent).all(axis=1)
         bent = bent[closes]
         apart = apart[closes]
-        curves = _curves(scene, ensemble)
-        columns = np.column_stack([found[0].columns, *bent, curves])
-        even = block_diag(np.eye(len(bent)) / max(len(bent), 1), np.eye(curves.shape[1]))
+        columns = np.column_stack([found[0].columns, *bent])
+        even = np.eye(len(bent)) / max(len(bent), 1)
         between = [
             replace(
                 block,
@@ -345,22 +334,3 @@ def _apart(model: LinkageModel, ensemble: Sequence[LinkageModel]) -> Array:
     """
     drawn = model.plunger_amplification()
     return np.array([other.plunger_amplification() / drawn - 1.0 for other in ensemble])
-
-
-def _curves(scene: Scene, ensemble: Sequence[LinkageModel]) -> Array:
-    """Smooth curves along the stroke that differ as those of an ensemble do, each at one standard
-    deviation. [in]
-    """
-    if not scene.table.along.any():
-        return np.empty((len(scene.table), 0))
-    most = float(np.nanmax(scene.table.extension_in))
-    stroke = np.linspace(0.0, most, 41)
-    curves = np.array([other.plunger(stroke) - scene.model.plunger(stroke) for other in ensemble])
-    curves = curves[np.isfinite(curves).all(axis=1)]
-    if not len(curves):
-        return np.empty((len(scene.table), 0))
-    size = np.sqrt(
-        np.mean(legendre.legfit(2.0 * stroke / most - 1.0, curves.T, _DEGREE) ** 2, axis=1)
-    )
-    at = 2.0 * np.nan_to_num(scene.table.extension_in) / most - 1.0
-    return np.asarray(scene.table.along[:, None] * legendre.legvander(at, _DEGREE) * size)
