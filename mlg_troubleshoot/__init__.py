@@ -39,7 +39,9 @@ Names are imported when they are first used, so that importing the package stays
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+
+# typing is not imported: python -m has the current folder on its path until __main__ takes it off.
+TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.decision.assessment import Assessment, Verdict

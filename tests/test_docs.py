@@ -84,6 +84,8 @@ def test_there_are_sessions() -> None:
     [
         pytest.param(example, marks=[pytest.mark.slow] * (example.path.name in LONG))
         for example in find_examples(*PAGES)
+        # Needs a cluster: tests/decision/test_workers.py starts one.
+        if example.path.name != "cluster.md"
     ],
     ids=str,
 )

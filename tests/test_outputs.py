@@ -190,9 +190,9 @@ def test_two_outputs_are_two_files(tmp_path: Path, second: str) -> None:
     (tmp_path / "link.csv").symlink_to("a.csv")
     outputs = [
         OutputFile("--csv", tmp_path / "a.csv", TABLE),
-        OutputFile("--state", f"{tmp_path}/{second}", TABLE),
+        OutputFile("--annotate", f"{tmp_path}/{second}", TABLE),
     ]
-    with pytest.raises(UsageError, match=r"--state .* is the file of --csv as well"):
+    with pytest.raises(UsageError, match=r"--annotate .* is the file of --csv as well"):
         claim_outputs([], outputs, force=True)
 
 

@@ -147,10 +147,6 @@ class Wanted(CheckOutputs):
         int | None,
         typer.Option(min=1, help="Processor cores for more than 512 rows; all if not given."),
     ] = None
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Dask cluster that judges the rows."),
-    ] = None
 
 
 @options.flat

@@ -26,7 +26,6 @@ from mlg_troubleshoot.decision.ranking import Listed, listed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import OutputFile, whole_file
-from mlg_troubleshoot.parallel import Blocks, packed
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
@@ -49,9 +48,9 @@ _FEW = 2
 class _Gathered:
     """What is still needed of judgements that went out as they came."""
 
-    lines: Blocks[Listed] = field(default_factory=Blocks)
+    lines: list[Listed] = field(default_factory=list)
     held: list[Judgement] = field(default_factory=list)
-    entries: Blocks[JudgedEntry] = field(default_factory=Blocks)
+    entries: list[JudgedEntry] = field(default_factory=list)
     annotated: dict[RowSource, task.Annotated] = field(default_factory=dict)
     text: CheckText | None = None
 
@@ -90,7 +89,6 @@ class Run:
             remembered=self._shown.note or None,
             extension=load_model_extension(extensions, tables.gear, causes),
             workers=wanted.workers or os.cpu_count() or 1,
-            scheduler=wanted.scheduler and options.dask_client(wanted.scheduler),
         )
         self._records = options.Records(wanted.store, tables.gear)
         # A store in which no record will be kept is not opened: SQLAlchemy is a third of a check.
@@ -143,7 +141,7 @@ class Run:
             elif wanted.as_json:
                 self._write_json(result)
             else:
-                self._show(result, seen.show, [*found.lines], detail=wanted.detail)
+                self._show(result, seen.show, found.lines, detail=wanted.detail)
         if wanted.annotate is not None and result.read is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
         if wanted.report is not None:
@@ -158,7 +156,7 @@ class Run:
     ) -> list[task.BlockOutput]:
         """What is made of the judgements as they come."""
         wanted = self._wanted
-        outputs = [task.BlockOutput(partial(packed, listed), lambda block: found.lines.add(*block))]
+        outputs = [task.BlockOutput(listed, found.lines.extend)]
         if wanted.as_json and total > 1:
             from mlg_troubleshoot.reporting.json_form import CheckText, inspection_lines
 
@@ -179,8 +177,8 @@ class Run:
         if self._place is not None:
             from mlg_troubleshoot.workflows.keep import entries, judged_by
 
-            made = partial(packed, partial(entries, judged_by(read.gear, self._asked)))
-            outputs.append(task.BlockOutput(made, lambda block: found.entries.add(*block)))
+            made = partial(entries, judged_by(read.gear, self._asked))
+            outputs.append(task.BlockOutput(made, found.entries.extend))
         if total <= _FEW or wanted.report is not None:
             outputs.append(task.BlockOutput(tuple, found.held.extend))
         return outputs
@@ -327,7 +325,7 @@ class Run:
         self,
         result: task.CheckResult,
         before: Record | None = None,
-        judged: Blocks[JudgedEntry] | None = None,
+        judged: Sequence[JudgedEntry] | None = None,
     ) -> None:
         """Add what was found to the store; what continues a kept inspection takes its place."""
         if self._place is None:

@@ -11,6 +11,9 @@ from mlg_troubleshoot.errors import UsageError
 # it, alone. What follows completes "… is gone since 0.2.0: ".
 GONE = {
     "doctor": "mlg gear verify tries the model, and a report that cannot be written says why",
+    "check --scheduler": "CheckOptions(executor=client.get_executor()) judges on a Dask cluster",
+    "study --scheduler": "StudyOptions(executor=client.get_executor()) computes on a Dask cluster",
+    "study --state": "the paper's whole design takes minutes; --workers shortens it",
     "gear separable": "a diagnosis says what would split its set of causes (mlg diagnose)",
     "gear new": "write the gear file: docs/how-to/own-gear.md shows a short one",
     "gear draw": "load_gear(…).plot() draws a gear in Python",

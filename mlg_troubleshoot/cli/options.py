@@ -7,7 +7,6 @@ from copy import copy
 from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import partial, wraps
-from importlib import import_module
 from inspect import Parameter, Signature, get_annotations, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_type_hints
@@ -350,19 +349,3 @@ def alone(command: Callable[..., None], epilog: str) -> typer.Typer:
     app = commands()
     app.command(epilog=epilog)(command)
     return app
-
-
-def dask_client(address: str) -> Any:
-    try:
-        distributed: Any = import_module("distributed")
-    except ImportError:
-        raise UsageError(
-            "--scheduler needs dask.distributed",
-            "Install the extra: pip install 'mlg-troubleshoot[cluster]'",
-        ) from None
-    try:
-        return distributed.Client(address, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise UsageError(
-            f"no Dask scheduler at {address}: {error}", "Start one, or leave out --scheduler."
-        ) from error

@@ -89,14 +89,9 @@ class StudyFlags(options.OutputOptions):
         int | None,
         typer.Option(help="Iterations of a paper design; 10 if not given."),
     ] = None
-    workers: Annotated[int, typer.Option(min=1, help="Cores for the total order of lhs.")] = 2
-    state: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Keep finished blocks here and resume from them."),
-    ] = None
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Dask cluster for the total order of lhs."),
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Cores for the total order of lhs; all if not given."),
     ] = None
     csv: Annotated[Path | None, typer.Option(metavar="OUT.csv", help="One line per joint.")] = None
     write_table: Annotated[
@@ -121,12 +116,11 @@ def study(flags: StudyFlags, _version: options.Version = False) -> None:
     from mlg_troubleshoot.cli.claims import WRITE_TABLE
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.indices.index_table import INDEX_TABLE
-    from mlg_troubleshoot.outputs import CONTINUED, OutputFile
+    from mlg_troubleshoot.outputs import OutputFile
     from mlg_troubleshoot.workflows.study import STUDY_CSV
 
     outputs = [
         OutputFile("--csv", flags.csv, STUDY_CSV),
-        OutputFile("--state", flags.state, CONTINUED),
     ]
     if flags.write_table:
         outputs.append(OutputFile(WRITE_TABLE, load_gear(flags.gear).indices_file, INDEX_TABLE))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import fields, replace
 
 import numpy as np
@@ -30,7 +32,7 @@ _LONGEST_BAR = 50
 
 @contextmanager
 def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
-    """Read what the flags ask of the study itself, and hold its cluster while it runs."""
+    """Read what the flags ask of the study itself, and hold its processes while it runs."""
     known = load_gear(flags.gear)
     fixed = None
     if flags.fixed is not None:
@@ -56,10 +58,17 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
         "fixed_rad": fixed,
         "limits_in": None if flags.limit is None else np.full(len(known.joints), flags.limit),
     }
-    with (
-        nullcontext() if flags.scheduler is None else options.dask_client(flags.scheduler) as client
-    ):
-        yield known, StudyOptions(**{**plain, **read, "scheduler": client})
+    with _workers(flags) as executor:
+        yield known, StudyOptions(**{**plain, **read, "executor": executor})
+
+
+def _workers(flags: StudyFlags) -> AbstractContextManager[Executor | None]:
+    count = flags.workers or os.cpu_count() or 1
+    if count == 1 or flags.design.lower() != StudyDesign.LHS:
+        return nullcontext()
+    from mlg_troubleshoot.workers import WorkerProcesses
+
+    return WorkerProcesses(count)
 
 
 def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings) -> None:

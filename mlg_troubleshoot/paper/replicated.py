@@ -8,7 +8,7 @@ exchanging one joint's clearance among them lets that joint vary while the other
 A group mean over n1 samples still carries 1/n1 of the variance within the group, so that the
 variance of the group means is too large: the plain index exceeds the true one by (1 − S)/n1 on
 average. Both columns are given. The total-order study of Fig. 5b is in
-:mod:`~mlg_troubleshoot.paper.blocks`.
+:mod:`~mlg_troubleshoot.paper.total_order`.
 """
 
 from __future__ import annotations

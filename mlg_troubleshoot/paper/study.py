@@ -5,10 +5,10 @@ goes with them.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +17,13 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.indices.amplification import Amplification, amplification
-from mlg_troubleshoot.indices.estimators import GroupIndices, Indices, group_indices, student_half
+from mlg_troubleshoot.indices.estimators import (
+    GroupIndices,
+    Indices,
+    failed_note,
+    group_indices,
+    student_half,
+)
 from mlg_troubleshoot.indices.index_table import (
     IndexTable,
     JointIndices,
@@ -91,12 +97,9 @@ class StudyOptions(Result):
         Maximum number of evaluations.
     n1, n2, iterations : int or None
         Size of a paper design in place of the paper's.
-    workers : int
-        Cores for the total-order study of ``lhs``.
-    state : Path or None
-        File to resume that study from.
-    scheduler : object or None
-        Dask client to compute it with.
+    executor : Executor or None
+        What computes the total-order study of ``lhs``: any executor of `concurrent.futures`, of a
+        Dask cluster, of Ray.
     """
 
     design: StudyDesign = StudyDesign.FAST
@@ -111,9 +114,7 @@ class StudyOptions(Result):
     n1: int | None = None
     n2: int | None = None
     iterations: int | None = None
-    workers: int = 2
-    state: Path | None = None
-    scheduler: Any = None
+    executor: Executor | None = None
 
     @property
     def is_standard(self) -> bool:
@@ -306,8 +307,8 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
 
 def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, on_stage: Stages) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
-    from mlg_troubleshoot.paper.blocks import BlockStudy, total_order_study
     from mlg_troubleshoot.paper.replicated import ITERATIONS, PAPER_DESIGNS, replicated_first_order
+    from mlg_troubleshoot.paper.total_order import TotalOrderStudy, total_order
 
     if options.directions is Directions.RANDOM:
         raise UsageError(
@@ -330,18 +331,16 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, on_stage: Stages) 
     finished = found.iterations == iterations
     note = f"first order corrected for the bias (1 - S)/{n1}"
     if options.design is StudyDesign.LHS and finished and not options.beyond_margin:
-        response = _held(gear.model, inputs, options)
-        study = BlockStudy(response, inputs, gear.geometry_sha256, options.seed, n1, n2, iterations)
-        totals = total_order_study(
-            study, options.workers, options.state, options.scheduler, on_stage("total order")
+        study = TotalOrderStudy(
+            _held(gear.model, inputs, options), inputs, options.seed, n1, n2, iterations
         )
+        totals = total_order(study, options.executor, on_stage("total order"))
         total = totals.total_order
-        spread = student_half(totals.scatter, totals.iterations)
+        spread = student_half(totals.scatter, iterations)
         evaluations = evaluations + totals.evaluations
         failed = failed + totals.failed
-        finished = totals.iterations == iterations
-        if totals.note:
-            note += f"; {totals.note}"
+        if totals.failed:
+            note += f"; {failed_note(totals.failed, totals.evaluations)}"
     if not finished:
         note += "; interrupted, averages of the finished part"
     name = (

@@ -1,14 +1,13 @@
-"""Documents to files: HTML always, PDF where the engine can; many of them in parallel."""
+"""Documents to files: HTML always, PDF where the engine can."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import re
-import threading
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +15,6 @@ from typing import BinaryIO
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.outputs import OutputKind, write_bytes
-from mlg_troubleshoot.parallel import spread
 from mlg_troubleshoot.reporting.glyphs import missing_characters, spell_out
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
@@ -161,33 +159,20 @@ def publish_all(
     page: str,
     progress: Progress | None,
 ) -> list[WrittenReport]:
-    """Write many documents, the PDFs in several child processes."""
-    own = threading.local()
-    started: list[PdfEngine] = []
+    """Write many documents, the PDFs in one child process."""
+    engine = PdfEngine()
     seen: Counter[str] = Counter()
-
-    def numbered() -> Iterator[Document]:
+    written: list[WrittenReport] = []
+    try:
         for document in documents:
             # Files of inspections that carry the same identity are numbered: none overwrites
             # another.
             seen[document.stem] += 1
             again = seen[document.stem]
-            yield document if again == 1 else replace(document, stem=f"{document.stem}-{again}")
-
-    def one(document: Document) -> WrittenReport:
-        if not hasattr(own, "engine"):
-            own.engine = PdfEngine()
-            started.append(own.engine)
-        return publish(document, directory, formats=formats, page=page, engine=own.engine)
-
-    written: list[WrittenReport] = []
-    try:
-        workers = min(4, os.cpu_count() or 1)
-        for report in spread(one, numbered(), workers, threads=True):
-            written.append(report)
+            own = document if again == 1 else replace(document, stem=f"{document.stem}-{again}")
+            written.append(publish(own, directory, formats=formats, page=page, engine=engine))
             if progress is not None:
                 progress(len(written), total)
         return written
     finally:
-        for engine in started:
-            engine.close()
+        engine.close()

@@ -41,7 +41,7 @@ def study_document(
     findings: StudyFindings, provenance: ReportProvenance, unit: LengthUnit = LengthUnit.INCH
 ) -> Document:
     options = findings.options
-    asked = repr(replace(options, scheduler=None, state=None, workers=1))
+    asked = repr(replace(options, executor=None))
     mark = sha256(f"{findings.result.table.gear.geometry_sha256} {asked}".encode()).hexdigest()[:8]
     stem = safe_stem("study", findings.gear.id, options.design, f"seed {options.seed}", mark)
     return Document("study.html.j2", _context(findings, provenance, Lengths(unit)), stem)

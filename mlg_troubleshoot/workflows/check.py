@@ -6,7 +6,7 @@ import gc
 import pickle
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -28,12 +28,14 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.since_repairs import doubts, key_of, since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_lines, write_text
-from mlg_troubleshoot.parallel import Processes, Progress, spread
+from mlg_troubleshoot.parallel import Progress, map_blocks
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     import pandas as pd
 
     from mlg_troubleshoot.arrays import Array
@@ -64,8 +66,8 @@ class CheckOptions(TableOptions):
     workers : int
         Cores that judge more than 512 rows; what is found does not depend on it. A script that
         asks for more than one needs ``if __name__ == "__main__":``, as `multiprocessing` does.
-    scheduler : distributed.Client or None
-        Dask client to judge them with.
+    executor : Executor or None
+        What judges them instead: any executor of `concurrent.futures`, of a Dask cluster, of Ray.
     """
 
     gear: Gear | str | Path = DEFAULT_GEAR
@@ -73,7 +75,7 @@ class CheckOptions(TableOptions):
     advice: bool | None = None
     extension: Extension | None = None
     workers: int = 1
-    scheduler: Any = None
+    executor: Executor | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -161,36 +163,20 @@ def check_files(
 
     options = options or CheckOptions()
     gear = load_gear(options.gear)
-    alone = options.workers <= 1 or options.scheduler is not None
-    with nullcontext() if alone else Processes(options.workers) as processes:
-        counted = on_read if processes is None else partial(_start, processes, on_read)
-        read = read_many(sources, ReadOptions.of(gear, options), progress=counted)
-        rows = list(read.rows)
-        if outputs is not None:
-            read = replace(read, rows=())
-        found = CheckResult(
-            gear=gear,
-            judgements=(),
-            problems=read.problems,
-            notes=read.notes,
-            unread=read.unread,
-            inputs_sha256=read.inputs_sha256,
-            read=read,
-        )
-        return _judge(found, rows, options, on_judged, store, outputs, processes)
-
-
-def _start(
-    processes: Processes,
-    on_read: Progress | None,
-    done: int,
-    total: int | None,
-) -> None:
-    """Start processes for the blocks of rows that were read."""
-    if done > AT_ONCE:
-        processes.start(-(-done // AT_ONCE), __name__)
-    if on_read is not None:
-        on_read(done, total)
+    read = read_many(sources, ReadOptions.of(gear, options), progress=on_read)
+    rows = list(read.rows)
+    if outputs is not None:
+        read = replace(read, rows=())
+    found = CheckResult(
+        gear=gear,
+        judgements=(),
+        problems=read.problems,
+        notes=read.notes,
+        unread=read.unread,
+        inputs_sha256=read.inputs_sha256,
+        read=read,
+    )
+    return _judge(found, rows, options, on_judged, store, outputs)
 
 
 def check_inspection(
@@ -400,7 +386,6 @@ def _judge(
     on_judged: Progress | None = None,
     store: Store | None = None,
     outputs: Callable[[CheckResult, int], Sequence[BlockOutput]] | None = None,
-    processes: Processes | None = None,
 ) -> CheckResult:
     """Judge rows; the list is empty afterwards."""
     total = len(rows)
@@ -446,17 +431,25 @@ def _judge(
         [output.make for output in wanted],
     )
     done = 0
-    single = len(waiting) == 1
-    judged = (
-        map(task, waiting) if single else spread(task, waiting, processes or 1, options.scheduler)
-    )
-    for count, made in judged:
-        for output, each in zip(wanted, made, strict=True):
-            output.take(each)
-        done += count
-        if on_judged is not None:
-            on_judged(done, total)
+    with _executor(options, len(waiting)) as executor:
+        for count, made in map_blocks(task, waiting, executor):
+            for output, each in zip(wanted, made, strict=True):
+                output.take(each)
+            done += count
+            if on_judged is not None:
+                on_judged(done, total)
     return replace(found, judgements=tuple(held))
+
+
+def _executor(options: CheckOptions, blocks: int) -> AbstractContextManager[Executor | None]:
+    if blocks <= 1 or (options.executor is None and options.workers <= 1):
+        return nullcontext()
+    if options.executor is not None:
+        return nullcontext(options.executor)
+    # multiprocessing is not loaded by a check of one gear.
+    from mlg_troubleshoot.workers import WorkerProcesses
+
+    return WorkerProcesses(min(options.workers, blocks))
 
 
 def _made(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
@@ -19,7 +19,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, find, life_of, warnings_of
 from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
-from mlg_troubleshoot.parallel import Blocks, Progress
+from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
     Record,
@@ -70,7 +70,7 @@ def keep(
     store: Store,
     same_tail: Callable[[str, str], bool] | None = None,
     progress: Progress = lambda _done, _total: None,
-    judged: Blocks[JudgedEntry] | None = None,
+    judged: Sequence[JudgedEntry] | None = None,
 ) -> Kept:
     """Add the judged inspections of a check and their assessments, all or none.
 
@@ -79,8 +79,7 @@ def keep(
     """
     by = judged_by(result.gear, options)
     if judged is None:
-        judged = Blocks()
-        judged.extend(entries(by, result.judgements))
+        judged = entries(by, result.judgements)
     tails = _settled_tails((entry.inspection.tail_no for entry in judged), store, same_tail)
 
     def written() -> Iterator[Inspection]:
@@ -92,7 +91,7 @@ def keep(
                 else (entry.inspection)
             )
 
-    records = Blocks[Record]()
+    records: list[Record] = []
     first: dict[bytes, bytes] = {}
     stood = done = 0
     made_records = map(inspection_record, _under_first_ids(written(), store))
@@ -101,16 +100,14 @@ def keep(
         known = store.known([record.identity_hash for _entry, _row, record in block])
         stood += len(known.keys() - first.keys())
         first.update({i: kept.packed for i, kept in known.items() if i not in first})
-        made: list[Record] = []
         for entry, row, record in block:
             # Before what was read after it.
-            made += _repairs_of(row, store)
+            records += _repairs_of(row, store)
             # Wherever an inspection was entered again, it is the first entry that was assessed.
             of = first.setdefault(record.identity_hash, record.packed)
-            made += [record, assessment_record(by, entry.assessment, record, of)]
+            records += [record, assessment_record(by, entry.assessment, record, of)]
             done += 1
             progress(done, len(judged))
-        records.extend(made)
     store.add(
         records,
         lambda kept, new: new.kind is not RecordKind.INSPECTION or _agrees(store, kept, new),

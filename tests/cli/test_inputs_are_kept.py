@@ -86,7 +86,7 @@ def test_a_file_that_a_check_reads_beside_the_table_is_not_replaced(
     [
         (("check", FAILURE, "--csv"), "mine.toml"),
         (("study", "--csv"), "hawker-800xp-ensemble.toml"),
-        (("study", "--state"), "hawker-800xp-indices.json"),
+        (("study", "--csv"), "hawker-800xp-indices.json"),
         (("diagnose", FAILURE, "--write-extension"), "mine-targets.toml"),
     ],
 )
@@ -470,12 +470,3 @@ def test_a_template_that_was_filled_in_is_not_replaced(tmp_path: Path) -> None:
     assert found.code == 2
     assert "may have been filled in" in found.err
     assert (tmp_path / "t.xlsx").read_bytes() == before
-
-
-def test_a_state_file_that_is_not_text_is_refused(text: Path) -> None:
-    text.write_bytes(b"\xff\xfe\x00")
-    found = mlg(
-        "study", "--design", "lhs", "--state", text, "--iterations", 1, "--n1", 2, "--n2", 2
-    )
-    assert found.code == 2
-    assert text.read_bytes() == b"\xff\xfe\x00"

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import os
+import re
+import subprocess
+import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Judgement
-from mlg_troubleshoot.parallel import Blocks, Processes, spread
+from mlg_troubleshoot.parallel import map_blocks
 from mlg_troubleshoot.reporting.json_form import inspection_lines
+from mlg_troubleshoot.workers import WorkerProcesses
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.check import BlockOutput, CheckOptions, check_files
 
-BATCH = Path(__file__).parents[2] / "inspection_data" / "fleet_batch.csv"
+ROOT = Path(__file__).parents[2]
+BATCH = ROOT / "inspection_data" / "fleet_batch.csv"
+PAGE = ROOT / "docs" / "how-to" / "cluster.md"
 
 
 @pytest.fixture
 def many_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The 46 rows of the batch are judged as a long file is: in three parts."""
+    """The 46 rows of the batch are judged as a long file is: in three blocks."""
     monkeypatch.setattr(task, "AT_ONCE", 20)
 
 
@@ -38,26 +45,23 @@ def process_and_rows(judgements: Sequence[Judgement]) -> tuple[int, int]:
     return os.getpid(), len(judgements)
 
 
-def process_of(_part: int) -> int:
-    return os.getpid()
-
-
-def a_failure(part: int) -> int:
-    return 1 // part
-
-
 @pytest.mark.usefixtures("many_parts")
 def test_what_is_found_does_not_depend_on_the_number_of_workers() -> None:
     assert written(CheckOptions(workers=2)) == written(CheckOptions())
 
 
 @pytest.mark.usefixtures("many_parts")
+def test_any_executor_finds_the_same() -> None:
+    with ThreadPoolExecutor(2) as executor:
+        assert written(CheckOptions(executor=executor)) == written(CheckOptions())
+
+
+@pytest.mark.usefixtures("many_parts")
 def test_progress_counts_rows_whoever_judges_them() -> None:
-    said: list[tuple[int, int]] = []
+    counts: list[tuple[int, int]] = []
     options = CheckOptions(workers=2)
-    check_files([BATCH], options, on_judged=lambda done, total: said.append((done, total)))
-    assert len(said) == 3
-    assert sorted(said)[-1] == (46, 46)
+    check_files([BATCH], options, on_judged=lambda done, total: counts.append((done, total)))
+    assert counts == [(20, 46), (40, 46), (46, 46)]
 
 
 @pytest.mark.usefixtures("many_parts")
@@ -82,18 +86,6 @@ def test_what_is_written_of_a_block_is_made_where_it_is_judged() -> None:
     assert os.getpid() not in dict(made)
 
 
-def test_processes_start_while_a_long_table_is_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    header, *rows = BATCH.read_text(encoding="utf-8").splitlines()
-    long = tmp_path / "long.csv"
-    long.write_text("\n".join([header, *(rows * 14)]), encoding="utf-8")
-    started: list[int] = []
-    monkeypatch.setattr(Processes, "start", lambda _self, count, _module: started.append(count))
-    check_files([long], CheckOptions(workers=2), on_judged=lambda *_: started.append(0))
-    assert started == [2, 0, 0]
-
-
 @pytest.mark.usefixtures("many_parts")
 def test_outputs_are_asked_for_once_with_the_number_of_rows() -> None:
     asked: list[int] = []
@@ -101,58 +93,99 @@ def test_outputs_are_asked_for_once_with_the_number_of_rows() -> None:
     assert asked == [46]
 
 
-def slower_the_earlier(part: int) -> int:
-    time.sleep(0.1 * (3 - part))
-    return part
+def slower_the_earlier(block: int) -> int:
+    time.sleep(0.1 * (3 - block))
+    return block
 
 
-def test_results_come_in_the_order_of_the_parts_whoever_is_first() -> None:
-    assert list(spread(slower_the_earlier, range(4), workers=4)) == [0, 1, 2, 3]
+def test_results_come_in_the_order_of_the_blocks_whoever_is_first() -> None:
+    with ThreadPoolExecutor(4) as executor:
+        assert list(map_blocks(slower_the_earlier, range(4), executor)) == [0, 1, 2, 3]
 
 
-def test_a_list_in_blocks_gives_its_items_again_each_time() -> None:
-    blocks = Blocks[int]()
-    blocks.extend([1, 2])
-    blocks.extend([3])
-    assert (list(blocks), list(blocks), len(blocks)) == ([1, 2, 3], [1, 2, 3], 3)
-
-
-def test_no_more_parts_are_taken_than_the_processes_can_soon_compute() -> None:
+def test_blocks_are_taken_as_the_executor_needs_them() -> None:
     taken: list[int] = []
-    parts = (taken.append(part) or part for part in range(40))
-    found = spread(process_of, parts, workers=2)
-    next(found)
-    assert len(taken) <= 6
+    blocks = (taken.append(block) or block for block in range(100))
+    with ThreadPoolExecutor(2) as executor:
+        next(map_blocks(abs, map(len, map(str, blocks)), executor))
+    assert len(taken) < 40
 
 
-def test_parts_are_computed_by_other_processes() -> None:
-    assert os.getpid() not in set(spread(process_of, range(4), workers=2))
+def inverse(block: int) -> int:
+    return 1 // block
 
 
-def test_a_single_part_is_computed_here() -> None:
-    assert list(spread(process_of, [0], workers=2)) == [os.getpid()]
+def test_an_error_in_a_block_reaches_the_caller() -> None:
+    with WorkerProcesses(2) as executor, pytest.raises(ZeroDivisionError):
+        list(map_blocks(inverse, [0, 1], executor))
 
 
-def test_an_error_of_a_part_reaches_the_caller() -> None:
-    with pytest.raises(ZeroDivisionError):
-        list(spread(a_failure, [0, 1], workers=2))
+def wait_long(block: int) -> int:
+    time.sleep(60 * block)
+    return block
+
+
+def test_an_interruption_ends_what_is_being_computed() -> None:
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), WorkerProcesses(2) as executor:
+        for _ in map_blocks(wait_long, [0, 1, 1, 1], executor):
+            raise KeyboardInterrupt
+    assert time.monotonic() - start < 30
+
+
+_KILLED = """
+import os, sys, time
+from mlg_troubleshoot.workers import WorkerProcesses
+
+def at_work(_block):
+    print(os.getpid(), flush=True)
+    time.sleep(60)
+
+if __name__ == "__main__":
+    pool = WorkerProcesses(2)
+    pool.submit(at_work, 0), pool.submit(at_work, 1)
+    time.sleep(60)
+"""
+
+
+def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "killed.py"
+    script.write_text(_KILLED, encoding="utf-8")
+    command = [sys.executable, str(script)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        workers = {int(parent.stdout.readline()) for _ in range(2)}
+        parent.kill()
+        # The pipe ends when no process holds it any more: no worker, nor what they started.
+        rest, _ = parent.communicate(timeout=30)
+    assert (len(workers), rest) == (2, "")
 
 
 @pytest.fixture
-def cluster() -> Iterator[object]:
+def cluster() -> Iterator[str]:
+    """The address of a Dask scheduler with two processes."""
     distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-        ) as local,
-        distributed.Client(local.scheduler_address) as client,
-    ):
-        yield client
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as local:
+        yield local.scheduler_address
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.usefixtures("many_parts")
-def test_a_dask_cluster_of_two_processes_finds_the_same(cluster: object) -> None:
-    alone = CheckOptions()
-    assert written(replace(alone, scheduler=cluster)) == written(alone)
+def test_the_page_on_clusters_finds_the_same_on_two_dask_workers(
+    cluster: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    header, *rows = BATCH.read_text(encoding="utf-8").splitlines()
+    table = tmp_path / "inspections.csv"
+    table.write_text("\n".join([header, *(f"{k}{row}" for k in range(12) for row in rows)]))
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(code.replace("tcp://host:8786", cluster), names)
+    found = names["result"]
+    alone = check_files([table.name])
+    assert len(found.judgements) == 552
+    assert inspection_lines(found.gear, found.judgements) == inspection_lines(
+        alone.gear, alone.judgements
+    )

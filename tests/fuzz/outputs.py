@@ -78,7 +78,6 @@ OUTPUTS = (
         rare=True,
     ),
     Output([*SMALL, "--csv"], (), "", rare=True),
-    Output([*SMALL, "--state"], (), "", rare=True),
     Output(["gear", "--gear", FOUR_BAR, "survey", SURVEY, "-q", "--write"], (), "", rare=True),
 )
 FOREIGN = (

@@ -41,9 +41,7 @@ def test_directions_fixed_by_a_load_need_one_for_each_joint(gear: Gear) -> None:
 
 
 def test_the_papers_design_reports_plain_and_corrected_indices(gear: Gear) -> None:
-    found = run_study(
-        gear, StudyOptions(design=StudyDesign.LHS, n1=10, n2=100, iterations=2, workers=1)
-    )
+    found = run_study(gear, StudyOptions(design=StudyDesign.LHS, n1=10, n2=100, iterations=2))
     assert found.plain is not None
     assert found.plain.min() > found.table.first_order.min()
     assert "bias" in found.indices.note

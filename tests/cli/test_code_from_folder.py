@@ -1,0 +1,64 @@
+"""No process of ours imports a file of the current folder, which holds tables of others."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+
+from .conftest import FLEET
+
+MLG = (str(Path(sys.executable).with_name("mlg")),)
+AS_A_MODULE = (sys.executable, "-m", "mlg_troubleshoot")
+# What is imported under one of these names was not found in the folder, or its tests would end.
+OWN = {"mlg_troubleshoot", "tests"}
+LEFT = "imported.txt"
+TRAP = f'with open({LEFT!r}, "a") as file: file.write(__name__ + "\\n")\n'
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A table of 552 rows and a file for each module that anything imports."""
+    folder = tmp_path_factory.mktemp("folder")
+    header, *rows = FLEET.read_text(encoding="utf-8").splitlines()
+    numbered = [f"{k}{row}" for k in range(12) for row in rows]
+    (folder / "table.csv").write_text("\n".join([header, *numbered]), encoding="utf-8")
+    (folder / "few.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    for name in (sys.stdlib_module_names | packages_distributions().keys()) - OWN:
+        (folder / f"{name}.py").write_text(TRAP, encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments"),
+    [
+        (MLG, "check table.csv --workers 2 --csv verdicts.csv"),
+        (AS_A_MODULE, "check table.csv --workers 2"),
+        (MLG, "check few.csv --report report --keep"),
+        (AS_A_MODULE, "check few.csv --json"),
+        (MLG, "fleet"),
+        (MLG, "history"),
+        (MLG, "diagnose few.csv"),
+        (MLG, "study --design lhs --n1 4 --n2 60 --iterations 1 --workers 2"),
+        (MLG, "gear verify"),
+        (MLG, "template form.pdf"),
+        (MLG, "template form.xlsx"),
+    ],
+)
+def test_nothing_in_the_folder_runs(folder: Path, program: tuple[str, ...], arguments: str) -> None:
+    run = subprocess.run(
+        [*program, *arguments.split()],
+        cwd=folder,
+        env={**os.environ, "MLG_STORE": str(folder / "store.db")},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    imported = folder / LEFT
+    assert not imported.exists(), imported.read_text(encoding="utf-8")
+    assert run.returncode in {0, 1, 3}, run.stderr
