@@ -1,6 +1,6 @@
-"""The one place where files are written: whole or not at all, only over a file of the same output.
+"""The one place where files are written: whole or not at all, over another file only if asked to.
 
-An output never replaces an input, a store, a device, or a file that something else wrote.
+An output never replaces an input, a store or a device.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import stat
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import Literal
 
 from mlg_troubleshoot.errors import OutputError, UsageError
 
@@ -34,40 +33,7 @@ _SEPARATORS = re.compile(r'[,;|\t"\r\n]')
 # How a file of SQLite begins: such a file is a store, of this program or of another.
 _DATABASE = b"SQLite format 3\0"
 _STANDARD_OUTPUT = "-"
-
-
-@dataclass(frozen=True, slots=True)
-class OutputKind:
-    """What an output writes, and how a file that an earlier run of it wrote is known.
-
-    ``otherwise`` says of another file why it is not replaced: ``is not a table of verdicts``.
-    """
-
-    otherwise: str
-    is_own: Callable[[BinaryIO], bool]
-
-    @classmethod
-    def marked(cls, otherwise: str, mark: str) -> OutputKind:
-        """Return the kind of files that begin with a text; an empty text marks none."""
-        start = mark.encode("utf-8")
-        return cls(otherwise, lambda file: bool(start) and file.read(len(start)) == start)
-
-
-# Somebody has measured what stands in such a file by now.
-TO_FILL_IN = OutputKind("may have been filled in", lambda _: False)
-# A file that is gone on with, by a reader that refuses what is not its own.
-CONTINUED = OutputKind("", lambda _: True)
-
-
-@dataclass(frozen=True, slots=True)
-class OutputFile:
-    """A file that a run is asked to write: by which option, where, and what; none without a
-    path.
-    """
-
-    option: str
-    path: str | Path | None
-    kind: OutputKind
+_EXISTS = "exists"
 
 
 @contextmanager
@@ -156,59 +122,47 @@ def harmless(value: Field) -> str:
 
 def claim_outputs(
     inputs: Iterable[str | Path | int],
-    outputs: Iterable[OutputFile],
+    outputs: Iterable[tuple[str, str | Path | None]],
     *,
     force: bool = False,
 ) -> None:
     """Refuse, before anything is read, an output that would replace what it must not.
 
-    That is an input, the file of another output, or a file that no earlier run of this output
-    wrote; the last may be replaced with ``force``, if it is not a database. Inputs are files,
-    folders of which every file counts, or the descriptor of an open file. A file is the one that
-    would be written, through links and missing folders. Raises `UsageError` (exit code 2), and
-    `OutputError` (5) where nothing can be written.
+    That is an input, the file of another output, or a file that exists; with ``force`` the last is
+    replaced, if it is not a database. Inputs are files, folders of which every file counts, or the
+    descriptor of an open file; outputs are options and their files, None where nothing is asked
+    for. A file is the one that would be written, through links and missing folders. Raises
+    `UsageError` (exit code 2), and `OutputError` (5) where nothing can be written.
     """
     files = [file for given in inputs for file in _files_of(given)]
     taken = {_identity(file): f"is one of the inputs ({_named(file)})" for file in files}
-    for each in outputs:
-        if each.path is None:
+    for option, path in outputs:
+        if path is None:
             continue
-        shown = f"{each.option} {each.path}"
-        if str(each.path) == _STANDARD_OUTPUT:
+        shown = f"{option} {path}"
+        if str(path) == _STANDARD_OUTPUT:
             raise UsageError(f"{shown} is not the name of a file", "Give the name of a file.")
-        why = taken.get(_identity(each.path))
-        if why is not None:
-            raise UsageError(
-                f"{shown} {why}: nothing was read and nothing written",
-                f"Give {each.option} another name.",
-            )
-        taken[_identity(each.path)] = f"is the file of {each.option} as well"
-        _refuse_another(each, shown, force=force)
+        why = taken.get(_identity(path)) or _why_not_replaced(path, shown, force=force)
+        if why:
+            remedy = f"Give {option} another name"
+            if why == _EXISTS:
+                remedy += ", or --force to replace the file"
+            raise UsageError(f"{shown} {why}: nothing was read and nothing written", f"{remedy}.")
+        taken[_identity(path)] = f"is the file of {option} as well"
 
 
-def _refuse_another(output: OutputFile, shown: str, *, force: bool) -> None:
-    """Refuse to replace a file that no earlier run of this output wrote, unless it is empty."""
-    target = Path(os.path.realpath(str(output.path)))
+def _why_not_replaced(path: str | Path, shown: str, *, force: bool) -> str:
+    target = Path(os.path.realpath(str(path)))
     try:
-        _mode_of(target, str(output.path))
-        if not target.exists() or not target.stat().st_size:
-            return
+        _mode_of(target, str(path))
+        if not target.exists():
+            return ""
         with target.open("rb") as file:
-            is_database = file.read(len(_DATABASE)) == _DATABASE
-            file.seek(0)
-            if not is_database and (force or output.kind.is_own(file)):
-                return
+            if file.read(len(_DATABASE)) == _DATABASE:
+                return "is a database, such as a store of inspections, which is never replaced"
     except OSError as error:
         raise _cannot_be_written(shown, error) from error
-    if is_database:
-        raise UsageError(
-            f"{shown} is a database, such as a store of inspections: it is never replaced",
-            f"Give {output.option} another name.",
-        )
-    raise UsageError(
-        f"{shown} exists and {output.kind.otherwise}: nothing was read and nothing written",
-        f"Give {output.option} another name, or --force to replace the file.",
-    )
+    return "" if force else _EXISTS
 
 
 def _cannot_be_written(path: str | Path, error: OSError) -> OutputError:

@@ -26,6 +26,11 @@ settings.load_profile("everyday")
 OF_THE_USER = (
     *(
         "MLG_STORE",
+        "MLG_GEAR",
+        "MLG_UNIT",
+        "MLG_CONVENTION",
+        "MLG_SHOW",
+        "MLG_PAGE",
         "MLG_DEBUG",
         "SOURCE_DATE_EPOCH",
         "XDG_CONFIG_HOME",

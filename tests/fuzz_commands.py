@@ -26,7 +26,7 @@ from tests.fuzz.outputs import outputs
 
 # How often each kind comes in a round.
 ROUND: tuple[Callable[[Desk], Case], ...] = (
-    *(*inputs.INPUTS, *stores.STORES * 3, *(outputs,) * 5, inputs.settings) * 3,
+    *(*inputs.INPUTS, *stores.STORES * 3, *(outputs,) * 5) * 3,
     inputs.targets,
     stores.large,
 )

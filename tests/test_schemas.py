@@ -280,14 +280,6 @@ def test_an_extension_that_was_written_fits_the_schema_of_its_kind(tmp_path: Pat
     assert complain("extension", as_read(extension)) == []
 
 
-def test_settings_that_were_remembered_fit_the_schema_of_their_kind(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    mlg("check", FAILURE, "--show", "mm", "--map", "Spiel=clearance_3", "--remember")
-    assert complain("settings", as_read(tmp_path / "mlg.toml")) == []
-
-
 def test_a_gear_file_that_is_refused_does_not_fit_its_schema(gear: Gear) -> None:
     spoilt = as_read(gear.path)
     spoilt["joints"][0]["limit"] = 0

@@ -47,10 +47,7 @@ def test_in_the_background_and_under_nohup_where_signals_are_ignored() -> None:
     started("trap '' INT HUP", ON_A_TERMINAL, LANG="C")
 
 
-def test_with_the_settings_of_a_user(tmp_path: Path) -> None:
-    kept = tmp_path / "mlg-troubleshoot" / "mlg.toml"
-    kept.parent.mkdir()
-    kept.write_text('show = "mm"\n')
+def test_with_the_settings_of_a_user() -> None:
     narrow = {
         "COLUMNS": "40",
         "LINES": "10",
@@ -61,7 +58,8 @@ def test_with_the_settings_of_a_user(tmp_path: Path) -> None:
     started(
         "umask 077",
         WHAT_A_USER_SETS,
-        XDG_CONFIG_HOME=str(tmp_path),
+        MLG_SHOW="mm",
+        MLG_PAGE="Letter",
         TZ="Pacific/Auckland",
         **narrow,
     )

@@ -19,4 +19,4 @@ def main() -> None:
     app(prog_name="mlg")
 
 
-__all__ = ["main", "remembered"]
+__all__ = ["main"]

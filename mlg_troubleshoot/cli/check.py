@@ -142,7 +142,6 @@ class Wanted(CheckOutputs):
             " aircraft.",
         ),
     ] = None
-    remember: options.Remember = False
     workers: Annotated[
         int | None,
         typer.Option(min=1, help="Processor cores for more than 512 rows; all if not given."),

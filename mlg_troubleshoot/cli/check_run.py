@@ -18,14 +18,13 @@ import typer
 from mlg_troubleshoot.cli import by_hand, options, output
 from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
-from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
 from mlg_troubleshoot.decision.columns import RECORD_ID, SIDE
 from mlg_troubleshoot.decision.inspection import RowSource, Side
 from mlg_troubleshoot.decision.ranking import Listed, listed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.outputs import OutputFile, whole_file
+from mlg_troubleshoot.outputs import whole_file
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
@@ -71,22 +70,17 @@ class Run:
         self._flags = flags
         self._wanted = wanted
         self._asks = not (files or flags.values)
-        outputs = [OutputFile("--csv", wanted.csv, task.VERDICTS)]
-        if wanted.annotate is not None:
-            from mlg_troubleshoot.records.annotate import ANNOTATED
-
-            outputs.append(OutputFile("--annotate", wanted.annotate, ANNOTATED))
-        # The prompts may write a report that was not asked for by a flag.
-        written = replace(wanted, report=_ASKED_FOR) if self._asks and not wanted.report else wanted
-        inputs = [*files, *extensions, *causes]
-        self._shown = written.begin(
-            tables.gear, inputs, outputs, store=wanted.store, tables=tables, keep=wanted.remember
+        outputs = [("--csv", wanted.csv), ("--annotate", wanted.annotate)]
+        wanted.claim(
+            tables.gear,
+            [*files, *extensions, *causes, *tables.map_files],
+            outputs,
+            store=wanted.store,
         )
         typed_side = flags.typed.get(SIDE.name) if files else None
         self._asked = task.CheckOptions(
             side=None if typed_side is None else Side.parse(typed_side),
-            **tables.declared(self._shown.headers),
-            remembered=self._shown.note or None,
+            **tables.declared(),
             extension=load_model_extension(extensions, tables.gear, causes),
             workers=wanted.workers or os.cpu_count() or 1,
         )
@@ -121,7 +115,7 @@ class Run:
                 "Give either a FILE or the values of one gear.",
             )
         wanted = self._wanted
-        seen = wanted.seen(self._shown, LengthUnit.INCH)
+        unit = wanted.unit()
         # On one terminal a bar would stand between the lines of the result.
         quiet = wanted.quiet or (wanted.as_json and sys.stdout.isatty())
         with ExitStack() as files:
@@ -141,11 +135,11 @@ class Run:
             elif wanted.as_json:
                 self._write_json(result)
             else:
-                self._show(result, seen.show, found.lines, detail=wanted.detail)
+                self._show(result, unit, found.lines, detail=wanted.detail)
         if wanted.annotate is not None and result.read is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
         if wanted.report is not None:
-            self._write_reports(result, wanted.report, seen)
+            self._write_reports(result, wanted.report, unit)
         self._keep(result, judged=found.entries)
         if result.problems and not wanted.as_json and not found.lines:
             output.say("No row could be judged.")
@@ -160,7 +154,7 @@ class Run:
         if wanted.as_json and total > 1:
             from mlg_troubleshoot.reporting.json_form import CheckText, inspection_lines
 
-            text = found.text = CheckText(read.gear, read.problems, self._warnings(read))
+            text = found.text = CheckText(read.gear, read.problems, read.notes)
             output.write_pieces((text.begin,))
             lines = partial(inspection_lines, read.gear)
             outputs.append(
@@ -234,9 +228,9 @@ class Run:
                     if wanted.report is not None or wanted.as_json:
                         return result
                 case Effect.SHOW:
-                    self._show(result, wanted.seen(self._shown, unit).show, detail=True)
+                    self._show(result, wanted.unit(unit), detail=True)
                 case Effect.REPORT:
-                    self._write_reports(result, _ASKED_FOR, wanted.seen(self._shown, unit))
+                    self._write_reports(result, _ASKED_FOR, wanted.unit(unit))
                 case _:
                     return result
             visit = find(inspection.tail_no, inspection.side)
@@ -247,23 +241,20 @@ class Run:
     def _publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
         """Show and write one gear that was entered by hand."""
         wanted = self._wanted
-        seen = wanted.seen(self._shown, entered_in)
+        unit = wanted.unit(entered_in)
         if wanted.as_json:
             self._write_json(result)
         else:
-            self._show(result, seen.show, detail=wanted.detail)
+            self._show(result, unit, detail=wanted.detail)
         if wanted.csv is not None:
             task.write_verdicts(result, wanted.csv)
         if wanted.report is not None:
-            self._write_reports(result, wanted.report, seen)
-
-    def _warnings(self, result: task.CheckResult) -> tuple[str, ...]:
-        return (*filter(None, [self._asked.remembered]), *result.notes)
+            self._write_reports(result, wanted.report, unit)
 
     def _write_json(self, result: task.CheckResult) -> None:
         from mlg_troubleshoot.reporting.json_form import check_as_json
 
-        said = result.problems, self._warnings(result)
+        said = result.problems, result.notes
         output.write_json(check_as_json(result.gear, result.judgements, *said))
 
     def _show(
@@ -297,7 +288,7 @@ class Run:
         if not self._wanted.quiet:
             output.say(f"Annotated workbook: {out}")
 
-    def _write_reports(self, result: task.CheckResult, directory: Path, seen: Settings) -> None:
+    def _write_reports(self, result: task.CheckResult, directory: Path, unit: LengthUnit) -> None:
         before = []
         if self._place is not None:
             from mlg_troubleshoot.life.looking_back import seen_before
@@ -314,10 +305,12 @@ class Run:
                 self._asked,
                 directory,
                 formats,
-                str(seen.page),
+                self._wanted.page.value,
                 on_written=progress,
-                unit=seen.show,
+                unit=unit,
                 before=before,
+                # The prompts write the report of one inspection anew after each change.
+                replace_files=self._asks or self._wanted.force,
             )
         output.say_written(written, quiet=self._wanted.quiet)
 

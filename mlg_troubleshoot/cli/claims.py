@@ -7,18 +7,17 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from mlg_troubleshoot.cli import remembered
 from mlg_troubleshoot.errors import OutputError, UsageError
-from mlg_troubleshoot.outputs import OutputFile
 
 WRITE_TABLE = "--write-table"
 _STANDARD_INPUT = "-"
+Outputs = Sequence[tuple[str, str | Path | None]]
 
 
 def claim(
     gear: str | None,
     inputs: Iterable[str | Path | None],
-    outputs: Sequence[OutputFile],
+    outputs: Outputs,
     report: Path | None = None,
     *,
     store: str | None = None,
@@ -26,28 +25,28 @@ def claim(
 ) -> None:
     """Refuse, before anything is read, an output that would replace what it must not.
 
-    Inputs of every command are the store, `mlg.toml`, the gear file and what it names. A report is
-    a file of its own name: of the files in its folder only those that a report could replace count.
+    Inputs of every command are the store, the gear file and what it names. The names of reports
+    follow from what is read: here none of the inputs may have one, in the folder of the reports.
     """
-    wanted = [each for each in outputs if each.path is not None]
-    if report is not None:
-        wanted += _reports(report, wanted)
-    if not wanted:
+    wanted = [(option, path) for option, path in outputs if path is not None]
+    if not wanted and report is None:
         return
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.outputs import claim_outputs
     from mlg_troubleshoot.store import files_of
 
-    files: list[str | Path | int] = [*remembered.files(), *files_of(store)]
+    files: list[str | Path | int] = [*files_of(store)]
     for name in inputs:
         files += _read(name)
     if gear is not None:
         known = load_gear(gear)
-        writes_table = any(each.option == WRITE_TABLE for each in wanted)
+        writes_table = any(option == WRITE_TABLE for option, _ in wanted)
         # The table of indices may be written again, unless it is the gear file that is named so.
         own = {known.indices_file} - {known.path} if writes_table else set()
         files += [file for file in known.files if file not in own]
     claim_outputs(files, wanted, force=force)
+    if report is not None:
+        claim_outputs(files, _reports(report, wanted), force=True)
 
 
 def _read(name: str | Path | None) -> Sequence[str | Path | int]:
@@ -64,16 +63,17 @@ def _read(name: str | Path | None) -> Sequence[str | Path | int]:
         return ()
 
 
-def _reports(folder: Path, others: Sequence[OutputFile]) -> list[OutputFile]:
-    from mlg_troubleshoot.reporting.publish import REPORT, could_be_report
+def _reports(folder: Path, others: Outputs) -> Outputs:
+    """Return the files of a folder that a report could replace."""
+    from mlg_troubleshoot.reporting.publish import could_be_report
 
     real = Path(os.path.realpath(folder))
-    for each in others:
-        path = Path(os.path.realpath(str(each.path)))
+    for option, other in others:
+        path = Path(os.path.realpath(str(other)))
         if could_be_report(path) and path.parent == real:
             raise UsageError(
-                f"{each.option} {each.path} has the name of a report in --report {folder}",
-                f"Give {each.option} another name.",
+                f"{option} {other} has the name of a report in --report {folder}",
+                f"Give {option} another name.",
             )
     try:
         known = [*real.iterdir()] if real.is_dir() else []
@@ -82,4 +82,4 @@ def _reports(folder: Path, others: Sequence[OutputFile]) -> list[OutputFile]:
             f"--report {folder} cannot be read: {error.strerror}",
             "Give a folder that you may read and write.",
         ) from error
-    return [OutputFile("--report", path, REPORT) for path in known if could_be_report(path)]
+    return [("--report", path) for path in known if could_be_report(path)]

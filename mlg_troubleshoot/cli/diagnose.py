@@ -56,7 +56,6 @@ def diagnose(
     ] = None,
     tables: options.Tables,
     shown: options.OutputOptions,
-    remember: options.Remember = False,
     _version: options.Version = False,
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
@@ -65,19 +64,15 @@ def diagnose(
     """
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
-    from mlg_troubleshoot.diagnosis import EXTENSION
     from mlg_troubleshoot.diagnosis import write_extension as keep_extension
     from mlg_troubleshoot.json_outputs import NotConcluded
-    from mlg_troubleshoot.outputs import OutputFile
     from mlg_troubleshoot.reporting.json_form import diagnosis_as_json, written
     from mlg_troubleshoot.workflows import diagnose as task
 
-    outputs = [OutputFile("--write-extension", write_extension, EXTENSION)]
-    inputs = [*files, *(causes or ()), *([beliefs] if beliefs else [])]
-    settings = shown.begin(tables.gear, inputs, outputs, tables=tables, keep=remember)
+    inputs = [*files, *(causes or ()), *tables.map_files, beliefs]
+    shown.claim(tables.gear, inputs, [("--write-extension", write_extension)])
     asked = task.DiagnoseOptions(
-        **tables.declared(settings.headers),
-        remembered=settings.note or None,
+        **tables.declared(),
         cause_files=tuple(causes or ()),
         sure=sure,
         beliefs_file=beliefs,
@@ -98,12 +93,11 @@ def diagnose(
         show_problems(error.problems)
         raise
     if shown.as_json:
-        warnings = (*filter(None, [asked.remembered]), *result.notes)
-        output.write_json(diagnosis_as_json(result.diagnosis, result.extension, warnings))
+        output.write_json(diagnosis_as_json(result.diagnosis, result.extension, result.notes))
     else:
         show_notes(result.unread if shown.quiet else result.notes)
         show_problems(result.problems)
-        _show(result.diagnosis, settings.show)
+        _show(result.diagnosis, shown.unit())
     if write_extension is not None and result.extension is None:
         output.say(_unwritten(result.diagnosis))
     elif write_extension is not None and result.extension is not None:
@@ -113,7 +107,11 @@ def diagnose(
         )
     if shown.report is not None:
         made = task.write_diagnosis_report(
-            result, asked, shown.report, str(settings.page), unit=settings.show
+            result,
+            shown.report,
+            shown.page.value,
+            unit=shown.unit(),
+            replace_files=shown.force,
         )
         output.say_written([made], quiet=shown.quiet)
     nothing = result.diagnosis.verdict == "NONE" and not result.diagnosis.faults

@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from mlg_troubleshoot.cli import history, options, output
-from mlg_troubleshoot.outputs import OutputFile
 
 EPILOG = (
     "Example: [b]mlg fleet[/b] · [b]mlg fleet --only OUTSIDE_MARGIN --sort due --csv due.csv[/b]"
@@ -50,12 +49,6 @@ def fleet(
     csv: Annotated[
         Path | None, typer.Option(metavar="OUT.csv", help="The gears as CSV, one line per gear.")
     ] = None,
-    xlsx: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="OUT.xlsx", help="A workbook of gears, readings, landings left and records."
-        ),
-    ] = None,
     shown: options.OutputOptions,
 ) -> None:
     """Show every gear in the store: verdict, landings left, next inspection due; worst first.
@@ -67,22 +60,17 @@ def fleet(
     from mlg_troubleshoot.life.folding import lives_of
     from mlg_troubleshoot.life.landings_left import Order
     from mlg_troubleshoot.life.unrecorded_work import suggestions
-    from mlg_troubleshoot.reporting.life_json import FLEET_CSV, fleet_as_json
+    from mlg_troubleshoot.reporting.life_json import fleet_as_json
     from mlg_troubleshoot.workflows.history import show_fleet
 
     known = load_gear(records.gear)
-    outputs = [OutputFile("--csv", csv, FLEET_CSV)]
-    if xlsx is not None:
-        from mlg_troubleshoot.records import template
-
-        outputs.append(OutputFile("--xlsx", xlsx, template.SHEETS))
-    settings = shown.begin(records.gear, (), outputs, store=records.store)
+    shown.claim(records.gear, (), [("--csv", csv)], store=records.store)
     with stages(quiet=shown.quiet) as bar:
         everything = show_fleet(
             records.kept,
             known,
             ahead=not no_forecast,
-            whole=shown.report is not None or xlsx is not None,
+            whole=shown.report is not None,
             progress=bar,
         )
         order = Order(sort)
@@ -103,9 +91,7 @@ def fleet(
         output.console().print(history.no_records(records.kept.place))
     if csv is not None:
         found.write_csv(csv)
-    if xlsx is not None:
-        found.write_workbook(xlsx)
-    history.write_pages(found, shown, settings, fleet=True)
+    history.write_pages(found, shown, shown.unit(), fleet=True)
 
 
 app = options.alone(fleet, EPILOG)

@@ -14,11 +14,16 @@ GONE = {
     "check --scheduler": "CheckOptions(executor=client.get_executor()) judges on a Dask cluster",
     "study --scheduler": "StudyOptions(executor=client.get_executor()) computes on a Dask cluster",
     "study --state": "the paper's whole design takes minutes; --workers shortens it",
+    "fleet --xlsx": "--csv OUT.csv writes the gears, --report DIR their pages",
+    "check --open": "NEXT is one step with its minutes; stop when the time is over",
+    "check --minutes": "NEXT is one step with its minutes; stop when the time is over",
+    "check --seed": "the probability is that of JCGM 106, without random draws",
     "gear separable": "a diagnosis says what would split its set of causes (mlg diagnose)",
     "gear new": "write the gear file: docs/how-to/own-gear.md shows a short one",
     "gear draw": "load_gear(…).plot() draws a gear in Python",
     "gear reconstruct": "mlg gear verify compares the linkage with the numbers of the paper",
     "study --bound": "mlg check gives the worst case, which a test compares with a global search",
+    "--remember": "set MLG_SHOW and MLG_PAGE, and keep headers in a file for --map FILE.toml",
 }
 
 

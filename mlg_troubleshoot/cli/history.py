@@ -16,7 +16,6 @@ from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.units import Length, LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.cli.remembered import Settings
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.life.folding import GearLife
     from mlg_troubleshoot.life.forecast import Forecast, Quantiles
@@ -74,7 +73,7 @@ def show(
 
     place = records.kept
     known = load_gear(records.gear)
-    settings = shown.begin(records.gear, store=records.store)
+    shown.claim(records.gear, store=records.store)
     if tail is None:
         if shown.report is not None:
             raise UsageError(
@@ -106,18 +105,17 @@ def show(
             f"{tail} has two gears here, and JSON shows one", f"Run: mlg history {tail} LH --json"
         )
     latest = found.lives[0].latest
-    if latest is not None:
-        settings = shown.seen(settings, latest.inspection.unit_entered)
+    unit = shown.unit(LengthUnit.INCH if latest is None else latest.inspection.unit_entered)
     for life in found.lives:
         if shown.as_json:
             output.write_json(life_json.life_as_json(life, found.forecasts[life.key], known))
         else:
-            _show_life(life, found.forecasts[life.key], known, settings.show)
-    write_pages(found, shown, settings, fleet=False)
+            _show_life(life, found.forecasts[life.key], known, unit)
+    write_pages(found, shown, unit, fleet=False)
 
 
 def write_pages(
-    found: Lives, shown: options.OutputOptions, settings: Settings, *, fleet: bool
+    found: Lives, shown: options.OutputOptions, unit: LengthUnit, *, fleet: bool
 ) -> None:
     """Write the pages of gears if they are asked for, and name them on stderr."""
     from mlg_troubleshoot.workflows import history
@@ -128,9 +126,9 @@ def write_pages(
         found,
         shown.report,
         fleet=fleet,
-        page=settings.page.value,
-        unit=settings.show,
-        remembered=settings.note or None,
+        page=shown.page.value,
+        unit=unit,
+        replace_files=shown.force,
     )
     output.say_written(written, quiet=shown.quiet)
 
@@ -477,13 +475,10 @@ def verify(
 def export(*, file: Chain, records: options.Records, force: options.Force = False) -> None:
     """Write the whole chain as JSON Lines."""
     from mlg_troubleshoot.cli.claims import claim
-    from mlg_troubleshoot.outputs import OutputFile, OutputKind, write_text
+    from mlg_troubleshoot.outputs import write_text
 
+    claim(None, (), [("the export", file)], store=records.store, force=force)
     lines = list(records.kept.export())
-    # An export of another store may be all that is left of it.
-    own = OutputKind.marked("is not an export of this store", lines[0] if lines else "")
-    export = OutputFile("the export", file, own)
-    claim(None, (), [export], store=records.store, force=force)
     write_text(file, "".join(lines))
     output.say(f"Written: {file}, {len(lines)} records.")
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
 from functools import partial, wraps
 from inspect import Parameter, Signature, get_annotations, signature
@@ -18,8 +19,7 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.cli.remembered import Settings
-    from mlg_troubleshoot.outputs import OutputFile
+    from mlg_troubleshoot.cli.claims import Outputs
     from mlg_troubleshoot.store import Store
 
 
@@ -77,7 +77,10 @@ Version = Annotated[
     ),
 ]
 Gear = Annotated[
-    str, typer.Option("--gear", metavar="NAME|TOML", help="Shipped gear or a gear file.")
+    str,
+    typer.Option(
+        "--gear", metavar="NAME|TOML", envvar="MLG_GEAR", help="Shipped gear or a gear file."
+    ),
 ]
 Unit = Annotated[
     LengthUnit | None,
@@ -85,6 +88,7 @@ Unit = Annotated[
         "--unit",
         parser=LengthUnit.parse,
         metavar="in|thou|mm",
+        envvar="MLG_UNIT",
         help="Unit of lengths that do not state one.",
     ),
 ]
@@ -94,6 +98,7 @@ Convention = Annotated[
         "--convention",
         parser=ClearanceConvention.parse,
         metavar="RADIAL|DIAMETRAL|TOTAL_PLAY",
+        envvar="MLG_CONVENTION",
         help=(
             "What a clearance reading is, for rows that do not state it. No default: the factor"
             " of 2 changes verdicts."
@@ -107,8 +112,8 @@ ColumnMap = Annotated[
     list[str] | None,
     typer.Option(
         "--map",
-        metavar="HEADER=COLUMN",
-        help="How to read a header, e.g. 'Spiel 3=clearance_3_mm'.",
+        metavar="HEADER=COLUMN|TOML",
+        help="How to read a header, e.g. 'Spiel 3=clearance_3_mm', or a file of such headers.",
     ),
 ]
 DecimalComma = Annotated[bool, typer.Option("--decimal-comma", help="0,013 means 0.013.")]
@@ -138,25 +143,22 @@ Report = Annotated[
     typer.Option("--report", metavar="DIR", help="Write printable reports to this folder."),
 ]
 Paper = Annotated[
-    PaperSize | None, typer.Option("--page", help="Paper size of the report; A4 unless remembered.")
+    PaperSize, typer.Option("--page", envvar="MLG_PAGE", help="Paper size of the report.")
 ]
 Show = Annotated[
-    str | None,
+    LengthUnit | None,
     typer.Option(
-        "--show", metavar="in|thou|mm", help="Unit to show lengths in; inches unless remembered."
-    ),
-]
-Remember = Annotated[
-    bool,
-    typer.Option(
-        "--remember", help="Keep --show, --page and --map in mlg.toml here, for later runs."
+        "--show",
+        parser=LengthUnit.parse,
+        metavar="in|thou|mm",
+        envvar="MLG_SHOW",
+        help="Unit to show lengths in; else that of the entry, or inches.",
     ),
 ]
 Force = Annotated[
     bool,
     typer.Option(
-        "--force",
-        help="Replace a file that an earlier run did not write; never an input or a store.",
+        "--force", help="Replace outputs that exist; never an input, a store or a gear file."
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")]
@@ -168,7 +170,8 @@ Place = Annotated[
     typer.Option(
         "--store",
         metavar="PATH|URL",
-        help="Store of the records; else MLG_STORE, else a file of your own.",
+        envvar="MLG_STORE",
+        help="Store of the records; else a file of your own.",
     ),
 ]
 # The flag of a column, what it takes and its help.
@@ -187,38 +190,28 @@ class OutputOptions:
     panel: ClassVar = "Output"
 
     report: Report = None
-    page: Paper = None
+    page: Paper = PaperSize.A4
     force: Force = False
     show: Show = None
     as_json: Json = False
     quiet: Quiet = False
 
-    def begin(
+    def claim(
         self,
         gear: str,
         inputs: Iterable[str | Path | None] = (),
-        outputs: Sequence[OutputFile] = (),
+        outputs: Outputs = (),
         *,
         store: str | None = None,
-        tables: Tables | None = None,
-        keep: bool = False,
-    ) -> Settings:
-        """Claim what will be written before anything is read; return how it is shown, and how the
-        headers of tables are read.
-        """
+    ) -> None:
+        """Refuse, before anything is read, what must not be written."""
         from mlg_troubleshoot.cli.claims import claim
-        from mlg_troubleshoot.cli.remembered import settings
 
         claim(gear, inputs, outputs, self.report, store=store, force=self.force)
-        columns = {} if tables is None else tables.columns
-        return settings(gear, self.show, self.page, columns, keep=keep)
 
-    def seen(self, settings: Settings, entered_in: LengthUnit) -> Settings:
-        """Lengths are shown in the unit that a flag or the memory says, or else in that of the
-        entry.
-        """
-        said = self.show or settings.show is not LengthUnit.INCH
-        return settings if said else replace(settings, show=entered_in)
+    def unit(self, entered_in: LengthUnit = LengthUnit.INCH) -> LengthUnit:
+        """The unit that lengths are shown in; where none is asked for, that of the entry."""
+        return self.show or entered_in
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,29 +246,41 @@ class Tables:
     small_readings_true: SmallReadingsTrue = False
     dates: Dates = None
 
-    def declared(self, remembered: Mapping[str, str]) -> dict[str, Any]:
-        """What a task receives of them, with the headers that are remembered."""
-        from mlg_troubleshoot.records.dates import DateOrder
+    @property
+    def map_files(self) -> list[str]:
+        """Files of headers among what ``--map`` was given."""
+        return [given for given in self.column_map or () if given.endswith(".toml")]
 
-        declared = {each.name: getattr(self, each.name) for each in fields(self)}
-        dates = None if self.dates is None else DateOrder.parse(self.dates)
+    def declared(self) -> dict[str, Any]:
+        """What a task receives of them."""
+        from mlg_troubleshoot.cli.output import say
+        from mlg_troubleshoot.records.dates import DateOrder
+        from mlg_troubleshoot.workflows.header_file import read_header_file
+
+        for name, used in (("MLG_UNIT", self.unit), ("MLG_CONVENTION", self.convention)):
+            if used is not None and os.environ.get(name, "").upper() == used.upper():
+                say(f"Note: {name}={used} counts for rows that do not state it.")
+        shared: dict[str, str] = {}
+        for file in self.map_files:
+            shared.update(read_header_file(Path(file)))
         return {
-            **declared,
-            "dates": dates,
-            "column_map": self.columns,
-            "remembered_map": remembered,
+            **{each.name: getattr(self, each.name) for each in fields(self)},
+            "dates": None if self.dates is None else DateOrder.parse(self.dates),
+            "column_map": self._columns(),
+            "shared_map": shared,
         }
 
-    @property
-    def columns(self) -> dict[str, str]:
+    def _columns(self) -> dict[str, str]:
         """What ``--map`` was given, by header."""
         mapped = {}
         for pair in self.column_map or ():
             header, sign, column = pair.rpartition("=")
+            if pair in self.map_files:
+                continue
             if not sign or not header.strip() or not column.strip():
                 raise UsageError(
                     f"--map {pair!r} is not HEADER=COLUMN",
-                    "Write for example --map 'Spiel 3=clearance_3_mm'.",
+                    "Write for example --map 'Spiel 3=clearance_3_mm', or name a TOML file.",
                 )
             mapped[header.strip()] = column.strip()
         return mapped

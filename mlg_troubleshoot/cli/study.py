@@ -115,18 +115,13 @@ def study(flags: StudyFlags, _version: options.Version = False) -> None:
     from mlg_troubleshoot.cli import study_run
     from mlg_troubleshoot.cli.claims import WRITE_TABLE
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.indices.index_table import INDEX_TABLE
-    from mlg_troubleshoot.outputs import OutputFile
-    from mlg_troubleshoot.workflows.study import STUDY_CSV
 
-    outputs = [
-        OutputFile("--csv", flags.csv, STUDY_CSV),
-    ]
+    outputs = [("--csv", flags.csv)]
     if flags.write_table:
-        outputs.append(OutputFile(WRITE_TABLE, load_gear(flags.gear).indices_file, INDEX_TABLE))
-    shown = flags.begin(flags.gear, [flags.given], outputs)
+        outputs.append((WRITE_TABLE, load_gear(flags.gear).indices_file))
+    flags.claim(flags.gear, [flags.given], outputs)
     with study_run.asked(flags) as (known, wanted):
-        study_run.run(known, wanted, flags, shown)
+        study_run.run(known, wanted, flags)
 
 
 app = options.alone(study, EPILOG)

@@ -13,7 +13,6 @@ import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.cli.progress import stages
-from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.cli.study import StudyFlags
 from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -71,7 +70,7 @@ def _workers(flags: StudyFlags) -> AbstractContextManager[Executor | None]:
     return WorkerProcesses(count)
 
 
-def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings) -> None:
+def run(gear: Gear, options: StudyOptions, flags: StudyFlags) -> None:
     """Run a study and show, write and return what was asked for; exit 130 if it was interrupted."""
     wants_report = flags.report is not None
     given = None if flags.given is None else task.given_data_study(flags.given, gear, options.seed)
@@ -92,7 +91,7 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
 
         output.write_json(study_as_json(shown, given))
     else:
-        screen = output.console(unit=settings.show, elsewhere=output.WIDEST)
+        screen = output.console(unit=flags.unit(), elsewhere=output.WIDEST)
         rows = [*zip(gear.joints, findings.result.table.joints, strict=True)]
         first = np.nan_to_num([entry.first_order for _, entry in rows]).clip(0.0)
         lengths = _LONGEST_BAR * first / max(first.max(), 1e-9)
@@ -110,9 +109,8 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
         written = task.write_study_report(
             findings,
             flags.report,
-            settings.page.value,
-            unit=settings.show,
-            remembered=settings.note or None,
+            flags.page.value,
+            unit=flags.unit(),
         )
         output.say_written([written])
     if flags.write_table:

@@ -62,27 +62,25 @@ def survey(
     """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
-    from mlg_troubleshoot.cli.remembered import settings
-    from mlg_troubleshoot.outputs import TO_FILL_IN, OutputFile
     from mlg_troubleshoot.workflows import survey as task
 
     gear = context.obj or DEFAULT_GEAR
-    shown = settings(gear, wanted.show, wanted.page)
+    unit = wanted.unit()
     if file in ("template", "ask") and template is None and not Path(file).exists():
         raise UsageError(
             f"{file} needs the name of a file",
             f"Give for example: mlg gear survey {file} survey.csv",
         )
     if file == "template" and template is not None:
-        claim(gear, (), [OutputFile("the template", template, TO_FILL_IN)], force=wanted.force)
-        task.write_survey_template(template, gear, shown.show)
+        claim(gear, (), [("the template", template)], force=wanted.force)
+        task.write_survey_template(template, gear, unit)
         output.write(
             f"Written: {template}. Fill in what you read, then: mlg gear survey {template} --write"
             " my-gear.toml"
         )
         return
     if file == "ask" and template is not None:
-        file = _asked(template, gear, shown.show)
+        file = _asked(template, gear, unit)
     elif template is not None:
         raise UsageError(
             f"unexpected {str(template)!r}",
@@ -110,11 +108,11 @@ def survey(
             )
         each = result.gear.joints, result.amplification, result.interval, result.before
         rows = [*zip(*each, strict=True)]
-        output.show_page("survey", output.console(unit=shown.show), result=result, rows=rows)
+        output.show_page("survey", output.console(unit=unit), result=result, rows=rows)
     written = None
     if wanted.report is not None:
         written = task.write_survey_report(
-            result, Path(file), wanted.report, shown.page, shown.show, remembered=shown.note or None
+            result, Path(file), wanted.report, wanted.page.value, unit
         )
     if written is not None:
         output.say_written([written], quiet=wanted.quiet)
@@ -129,7 +127,6 @@ def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
     from mlg_troubleshoot.cli.prompts import RichTerminal
     from mlg_troubleshoot.cli.survey_prompts import ask_survey
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.outputs import CONTINUED, OutputFile
     from mlg_troubleshoot.workflows.survey import write_survey_template
 
     if not output.can_ask():
@@ -137,7 +134,7 @@ def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
             "this is not a terminal to ask on",
             "Fill in a template: mlg gear survey template FILE.csv",
         )
-    claim(gear, (), [OutputFile("the survey", file, CONTINUED)])
+    claim(gear, (), [("the survey", file)], force=True)
     if not file.exists():
         write_survey_template(file, gear, unit)
     again = f"Kept: {file}. Continue with: mlg gear survey ask {file}"

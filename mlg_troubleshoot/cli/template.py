@@ -10,6 +10,7 @@ import typer
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
+from mlg_troubleshoot.units import LengthUnit
 
 
 def template(
@@ -21,14 +22,12 @@ def template(
     ],
     gear: options.Gear = DEFAULT_GEAR,
     force: options.Force = False,
-    page: options.Paper = None,
+    page: options.Paper = options.PaperSize.A4,
     show: options.Show = None,
     _version: options.Version = False,
 ) -> None:
     """Write an empty inspection workbook, or a one-page form (.pdf, .html) to fill in by hand."""
     from mlg_troubleshoot.cli.claims import claim
-    from mlg_troubleshoot.cli.remembered import settings
-    from mlg_troubleshoot.outputs import TO_FILL_IN, OutputFile
     from mlg_troubleshoot.workflows import check as task
 
     if file.suffix.lower() not in (".xlsx", ".pdf", ".html"):
@@ -36,9 +35,8 @@ def template(
             f"{file.name!r} is not the name of a workbook or a form",
             "Give a name that ends in .xlsx, .pdf or .html.",
         )
-    claim(gear, (), [OutputFile("the template", file, TO_FILL_IN)], force=force)
-    shown = settings(gear, show, page)
-    task.write_template(file, gear, page=str(shown.page), unit=shown.show)
+    claim(gear, (), [("the template", file)], force=force)
+    task.write_template(file, gear, page=page.value, unit=show or LengthUnit.INCH)
     if file.suffix.lower() == ".xlsx":
         output.write(f"Written: {file}. Fill it in, then: mlg check {file} --report DIR")
     else:

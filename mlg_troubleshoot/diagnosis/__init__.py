@@ -7,7 +7,6 @@ from mlg_troubleshoot.diagnosis.data_condition import DataCondition, data_condit
 from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
 from mlg_troubleshoot.diagnosis.explain import WeighedCause
 from mlg_troubleshoot.diagnosis.extension import (
-    EXTENSION,
     ModelExtension,
     Term,
     load_extension,
@@ -25,7 +24,6 @@ from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 __all__ = [
     "CATALOGUE",
-    "EXTENSION",
     "Candidate",
     "Cause",
     "DataCondition",

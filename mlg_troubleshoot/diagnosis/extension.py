@@ -43,11 +43,10 @@ from mlg_troubleshoot.errors import GearFileError, TroubleshootError
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies, Gear
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.outputs import OutputKind, write_text
+from mlg_troubleshoot.outputs import write_text
 from mlg_troubleshoot.results import Result
 
 _HEADING = "# Extension of the model by a diagnosis of measured displacements.\n"
-EXTENSION = OutputKind.marked("is not an extension of the model", _HEADING)
 # No plunger moves further; a larger scatter would clear nothing and reject nothing. [in]
 MOST_IN = 1.0
 

@@ -24,7 +24,7 @@ from mlg_troubleshoot.datafile import (
 )
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputKind, write_text
+from mlg_troubleshoot.outputs import write_text
 from mlg_troubleshoot.results import Result
 
 # A sampled index may lie a little outside 0 to 1, its interval further.
@@ -184,13 +184,6 @@ def _read_once(path: Path, _changed_ns: int, _size: int) -> IndexTable:
 
 def _text(values: Mapping[str, Any]) -> str:
     return json.dumps(values, indent=1, allow_nan=False) + "\n"
-
-
-# How every table begins, up to the name of its gear.
-INDEX_TABLE = OutputKind.marked(
-    "is not a table of indices",
-    _text({"schema_version": SCHEMA_VERSION, "gear": {"id": ""}}).partition('""')[0],
-)
 
 
 def write_index_table(table: IndexTable, path: Path) -> None:

@@ -5,7 +5,6 @@ workbooks.
 from __future__ import annotations
 
 from mlg_troubleshoot.records.gate import admit, judge_again, judge_length, made_record_id
-from mlg_troubleshoot.records.layout import why_not_remembered
 from mlg_troubleshoot.records.model import (
     ColumnReading,
     FileRead,
@@ -38,5 +37,4 @@ __all__ = [
     "survey_table",
     "template",
     "values",
-    "why_not_remembered",
 ]

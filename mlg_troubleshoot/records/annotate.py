@@ -25,11 +25,11 @@ from openpyxl.writer.excel import ExcelWriter
 from mlg_troubleshoot.decision.columns import CLEARANCE, IDENTITY, RECORD_ID
 from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.errors import OutputError, Problem, UsageError
-from mlg_troubleshoot.outputs import OutputKind, write_bytes
+from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
 from mlg_troubleshoot.records.source import FileRefusedError
-from mlg_troubleshoot.records.template import BOLD, HEADER_FILL, saved_by
+from mlg_troubleshoot.records.template import BOLD, HEADER_FILL
 from mlg_troubleshoot.records.xlsx import XlsxFile, XlsxSheet
 from mlg_troubleshoot.units import LengthUnit
 
@@ -47,14 +47,8 @@ _ON_A_LINE = 58
 # At which the verdicts fit on the width of a landscape page. [%]
 _LANDSCAPE_SCALE = 55
 
-# Who saved a workbook last: another program puts its own user here.
-_SAVED_BY = "mlg check --annotate"
-
 VerdictColumns = Mapping[RowSource, Mapping[str, str | float | None]]
 OverLimit = Mapping[RowSource, Mapping[int, float]]
-
-
-ANNOTATED = OutputKind("is not an annotated workbook as it was written", saved_by(_SAVED_BY))
 
 
 def annotate_workbook(
@@ -79,7 +73,6 @@ def annotate_workbook(
             macros = Path(out).suffix.lower() == ".xlsm"
             book = load_workbook(io.BytesIO(data), keep_vba=macros, rich_text=True)
             _annotate(book, label, result, verdicts, over_limit)
-            book.properties.lastModifiedBy = _SAVED_BY
             ExcelWriter(book, package).save()
     except (
         BadZipFile,

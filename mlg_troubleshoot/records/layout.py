@@ -191,21 +191,6 @@ def _unit_row(
     return tuple(units) if any(units) else None
 
 
-def why_not_remembered(header: str, column: str, options: ReadOptions) -> str:
-    """Say why a mapping must be given anew with each table; empty if it may be remembered.
-
-    A header that is understood by itself has no other meaning; one in doubt is not passed over.
-    """
-    found = _understood(header, options)
-    if found.field is not None:
-        return f"is read as {found.field.name}"
-    if found.reason:
-        target = parse_target(column, options.joints)
-        if target is None or not (target.column.bears_verdict or target.column.needs_joint):
-            return f"is doubtful: {found.reason}"
-    return ""
-
-
 def _understood(header: str, options: ReadOptions) -> Recognition:
     """Return what a header is understood as by itself, with no mapping."""
     found = recognise(header, options.joints)
@@ -257,8 +242,8 @@ class ColumnReader:
     def _mapped_to(self, text: str, index: int) -> str | None:
         """What the caller reads a header as; None if it is not mapped."""
         named = self._options.column_map
-        for key, target in (*named.items(), *self._options.remembered_map.items()):
-            # Letters name a place in this table: nothing that was remembered from another knows it.
+        for key, target in (*named.items(), *self._options.shared_map.items()):
+            # Letters name a place in one table, not in several.
             if tidy(key) == tidy(text) or (key in named and _names(key, text, index)):
                 return target
         return None

@@ -40,8 +40,8 @@ class TableOptions:
     column_map : mapping of str to str
         Column by header (or by letter), for headers that are not understood: ``{"Spiel 3":
         "clearance_3_mm"}``; the target ``carry`` lets a column travel to the report unread.
-    remembered_map : mapping of str to str
-        The same as remembered from another table: a header that is absent is not reported.
+    shared_map : mapping of str to str
+        The same for several tables: a header that is absent is not reported.
     decimal_comma : bool
         True if ``0,013`` means 0.013.
     small_readings_true : bool
@@ -59,7 +59,7 @@ class TableOptions:
     convention: ClearanceConvention | None = None
     sheet: str | None = None
     column_map: Mapping[str, str] = field(default_factory=dict)
-    remembered_map: Mapping[str, str] = field(default_factory=dict)
+    shared_map: Mapping[str, str] = field(default_factory=dict)
     decimal_comma: bool = False
     small_readings_true: bool = False
     dates: DateOrder | None = None

@@ -125,7 +125,7 @@ def _sides(
     """
     known = [recognise(text, options.joints).field for text in header.texts]
     columns = {field.column for field in known if field is not None}
-    mapped = {*options.column_map.values(), *options.remembered_map.values()}
+    mapped = {*options.column_map.values(), *options.shared_map.values()}
     if SIDE in columns or SIDE.name in mapped:
         return options, None, ""
     for index, text in enumerate(header.texts):

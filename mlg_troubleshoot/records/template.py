@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import io
-import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
-from zipfile import BadZipFile, ZipFile
 
 from openpyxl import Workbook
 from openpyxl.comments import Comment
@@ -29,16 +26,13 @@ from mlg_troubleshoot.decision.columns import (
 )
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.gear import Gear, JointSpec
-from mlg_troubleshoot.outputs import OutputKind, write_bytes
+from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters
 from mlg_troubleshoot.records.forms import FORM_TITLE
 from mlg_troubleshoot.records.headers import Field
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _ROWS = 500
-# Where a workbook says who saved it last, and the most that is read of it. [bytes]
-_PROPERTIES = "docProps/core.xml"
-_MOST_BYTES = 100_000
 # The fonts and the colour of headers of what this program writes into workbooks.
 FONT = "Calibri"
 BOLD = Font(name=FONT, bold=True)
@@ -94,56 +88,6 @@ def write_template(path: str | Path, gear: Gear, *, unit: LengthUnit = LengthUni
     _table(book, gear, unit)
     _form(book, gear, unit)
     book.active = 1
-    write_book(path, book)
-
-
-def saved_by(name: str) -> Callable[[BinaryIO], bool]:
-    """Return how a workbook is known that this program saved last, under this name: another program
-    puts its own user there.
-    """
-    mark = f"<cp:lastModifiedBy>{name}</cp:lastModifiedBy>".encode()
-
-    def is_own(file: BinaryIO) -> bool:
-        try:
-            with ZipFile(file) as package, package.open(_PROPERTIES) as properties:
-                return mark in properties.read(_MOST_BYTES)
-        except (
-            BadZipFile,
-            KeyError,
-            ValueError,
-            RuntimeError,
-            NotImplementedError,
-            EOFError,
-            zlib.error,
-        ):
-            return False
-
-    return is_own
-
-
-_FLEET = "mlg fleet --xlsx"
-SHEETS = OutputKind("is not a workbook of a fleet as it was written", saved_by(_FLEET))
-
-
-def write_sheets(
-    path: str | Path, sheets: Mapping[str, tuple[Sequence[str], Sequence[Sequence[Any]]]]
-) -> None:
-    """Write tables as the sheets of a workbook in which every text stays a text."""
-    book = Workbook()
-    book.properties.lastModifiedBy = _FLEET
-    for number, (title, (header, rows)) in enumerate(sheets.items()):
-        sheet = book.create_sheet(title, number)
-        sheet.freeze_panes = "C2"
-        for place, row in enumerate((header, *rows), 1):
-            for column, value in enumerate(row, 1):
-                if value is not None:
-                    cell = sheet.cell(place, column, value)
-                    if isinstance(value, str):
-                        cell.data_type = "s"
-                    if place == 1:
-                        cell.font = BOLD
-        sheet.auto_filter.ref = sheet.dimensions
-    del book["Sheet"]
     write_book(path, book)
 
 

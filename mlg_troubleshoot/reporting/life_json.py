@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mlg_troubleshoot.decision.sentences import joint_list
@@ -13,7 +13,6 @@ from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.landings_left import FleetLine, Order, fleet_lines, work_sentence
 from mlg_troubleshoot.life.looking_back import Advice
 from mlg_troubleshoot.life.wear_paths import stretches
-from mlg_troubleshoot.outputs import OutputKind, csv_text
 from mlg_troubleshoot.reporting.json_form import filled, written
 from mlg_troubleshoot.store import Record, RecordKind
 
@@ -49,41 +48,6 @@ def fleet_table(gears: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[lis
     unknown = dict.fromkeys(FleetGear.__annotations__)
     header = [column for name in unknown for column in flat(name, None)]
     return header, [[*row.values()] for row in rows]
-
-
-FLEET_CSV = OutputKind.marked("is not a table of a fleet", csv_text(fleet_table(())[0], ()))
-
-
-def fleet_sheets(
-    lives: Iterable[GearLife],
-    forecasts: Mapping[GearKey, Forecast],
-    gear: Gear,
-    order: Order,
-) -> dict[str, tuple[list[str], list[list[Any]]]]:
-    """The sheets of a fleet's workbook: gears, readings, landings left of each joint, records."""
-    by_key = {life.key: life for life in lives}
-    gears = [*map(FleetLine.of, by_key.values())]
-    lines = fleet_lines(gears, forecasts, order)
-    whole = [life_as_json(by_key[line.key], forecasts[line.key], gear) for line in lines]
-    readings: list[list[Any]] = []
-    left: list[list[Any]] = []
-    events: list[list[Any]] = []
-    kept = ("date", "gear_landings", "kind", "record_id", "verdict", "predicted_displacement_in")
-    for life in whole:
-        whose = [life["tail_no"], life["side"]]
-        for joint in life["joints"]:
-            named = [*whose, joint["joint"], joint["limit_in"]]
-            readings += [[*named, *reading] for reading in joint["readings"]]
-            ends = joint["landings_to_limit"] or {}
-            left += [[*named, *ends.values()]] if ends else []
-        events += [[*whose, *(event.get(name) for name in kept)] for event in life["events"]]
-    identity = ["tail_no", "side", "joint", "limit_in"]
-    return {
-        "Gears": fleet_table(fleet_as_json(gears, forecasts, order)["gears"]),
-        "Readings": ([*identity, "gear_landings", "clearance_in"], readings),
-        "Landings left": ([*identity, "p05", "p50", "p95"], left),
-        "Records": ([*identity[:2], *kept], events),
-    }
 
 
 def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:

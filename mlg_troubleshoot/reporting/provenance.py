@@ -28,8 +28,7 @@ class ReportProvenance:
     """Program, inputs and moment behind a report.
 
     input_sha256: hash of the bytes of each input file by its name; empty for prompts and the
-    command line. remembered: remembered settings that shaped the report, and the file that they
-    come from.
+    command line.
     """
 
     program_version: str
@@ -38,7 +37,6 @@ class ReportProvenance:
     input_sha256: Mapping[str, str] = field(default_factory=dict)
     seed: int | None = None
     extension: str | None = None
-    remembered: str | None = None
 
 
 def provenance_of(
@@ -47,10 +45,9 @@ def provenance_of(
     *,
     seed: int | None = None,
     extension: str | None = None,
-    remembered: str | None = None,
 ) -> ReportProvenance:
     made = program_version(), moment_of_report(), gear.geometry_sha256
-    return ReportProvenance(*made, dict(input_sha256), seed, extension, remembered)
+    return ReportProvenance(*made, dict(input_sha256), seed, extension)
 
 
 @cache

@@ -11,10 +11,9 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.outputs import OutputKind, write_bytes
+from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.reporting.glyphs import missing_characters, spell_out
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
@@ -23,24 +22,6 @@ Progress = Callable[[int, int], None]
 FORMATS = ("html", "pdf")
 PAGES = ("A4", "Letter")
 _NAME = re.compile(r"(mlg-.*|fleet)\.(html|pdf)", re.IGNORECASE)
-# How a report is known: base.html.j2 writes the one into the head of a page; the other stands as a
-# comment before the last lines of a PDF, and no longer there when another program has added to it.
-_IN_PAGE = b'<meta name="generator" content="mlg-troubleshoot">'
-_IN_PDF = b"%mlg-troubleshoot\n"
-_HEAD = 1000
-_END = 64
-
-
-def _is_report(file: BinaryIO) -> bool:
-    start = file.read(_HEAD)
-    if not start.startswith(b"%PDF"):
-        return _IN_PAGE in start
-    size = file.seek(0, os.SEEK_END)
-    file.seek(max(size - _END, 0))
-    return _IN_PDF in file.read()
-
-
-REPORT = OutputKind("is not a report of this program as it was written", _is_report)
 
 
 def could_be_report(path: Path) -> bool:
@@ -86,12 +67,21 @@ def publish(
     formats: Sequence[str] = FORMATS,
     page: str = "A4",
     engine: PdfEngine | None = None,
+    replace_files: bool = True,
 ) -> WrittenReport:
     unknown = sorted(set(formats) - set(FORMATS))
     if unknown or page not in PAGES:
         asked, known = (unknown[0], FORMATS) if unknown else (page, PAGES)
         raise UsageError(
             f"a report cannot be written as {asked!r}", f"Give one of {', '.join(known)}."
+        )
+    real = Path(os.path.realpath(directory))
+    files = [real / f"{document.stem}.{each}" for each in FORMATS]
+    old = next((file for file in files if file.exists()), None)
+    if old is not None and not replace_files:
+        raise UsageError(
+            f"--report {old} exists: it was not replaced",
+            "Give --report another folder, or --force to replace the file.",
         )
     running = engine or PdfEngine()
     wanted = set(formats)
@@ -107,7 +97,7 @@ def publish(
             try:
                 pdf, found = _pdf(document, page, running)
                 notes += found
-                made["pdf"] = _written(directory / f"{document.stem}.pdf", _marked(pdf))
+                made["pdf"] = _written(directory / f"{document.stem}.pdf", pdf)
             except PdfError as error:
                 instead = f"Open {web.name} in a web browser and print it"
                 notes.append(f"No PDF: {error}. {instead}; it is laid out for {page} paper.")
@@ -123,11 +113,6 @@ def publish(
 def _written(file: Path, data: bytes) -> Path:
     write_bytes(file, data)
     return file
-
-
-def _marked(pdf: bytes) -> bytes:
-    before, end, after = pdf.rpartition(b"startxref")
-    return before + _IN_PDF + end + after
 
 
 def _pdf(document: Document, page: str, engine: PdfEngine) -> tuple[bytes, list[str]]:
@@ -158,6 +143,7 @@ def publish_all(
     formats: Sequence[str],
     page: str,
     progress: Progress | None,
+    replace_files: bool = True,
 ) -> list[WrittenReport]:
     """Write many documents, the PDFs in one child process."""
     engine = PdfEngine()
@@ -170,7 +156,15 @@ def publish_all(
             seen[document.stem] += 1
             again = seen[document.stem]
             own = document if again == 1 else replace(document, stem=f"{document.stem}-{again}")
-            written.append(publish(own, directory, formats=formats, page=page, engine=engine))
+            report = publish(
+                own,
+                directory,
+                formats=formats,
+                page=page,
+                engine=engine,
+                replace_files=replace_files,
+            )
+            written.append(report)
             if progress is not None:
                 progress(len(written), total)
         return written

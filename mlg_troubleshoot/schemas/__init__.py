@@ -20,7 +20,7 @@ NAMES = (
     "verify",
     "survey",
 )
-FILES = ("gear-file", "ensemble", "targets", "indices", "extension", "settings", "beliefs")
+FILES = ("gear-file", "ensemble", "targets", "indices", "extension", "headers", "beliefs")
 
 
 def schema(name: str) -> dict[str, Any]:
@@ -31,7 +31,7 @@ def schema(name: str) -> dict[str, Any]:
     name : str
         ``check``, ``diagnose``, ``study``, ``fleet``, ``history``, ``life``, ``gear``, ``verify``
         or ``survey``; of files ``gear-file``, ``ensemble``, ``targets``, ``indices``,
-        ``extension``, ``settings`` or ``beliefs``.
+        ``extension``, ``headers`` or ``beliefs``.
 
     Returns
     -------
@@ -70,12 +70,12 @@ def _kinds(name: str) -> list[Any]:
     from mlg_troubleshoot import json_outputs as outputs
 
     if name in FILES:
-        from mlg_troubleshoot.cli.remembered import SettingsFile
         from mlg_troubleshoot.diagnosis.extension import ExtensionFile
         from mlg_troubleshoot.gear.gear_file import EnsembleFile, GearFile
         from mlg_troubleshoot.indices.index_table import IndexTable
         from mlg_troubleshoot.paper.targets import TargetsFile
         from mlg_troubleshoot.workflows.beliefs_file import BeliefsFile
+        from mlg_troubleshoot.workflows.header_file import HeaderFile
 
         files = (
             GearFile,
@@ -83,7 +83,7 @@ def _kinds(name: str) -> list[Any]:
             TargetsFile,
             IndexTable,
             ExtensionFile,
-            SettingsFile,
+            HeaderFile,
             BeliefsFile,
         )
         return [dict(zip(FILES, files, strict=True))[name]]

@@ -4,6 +4,7 @@ __all__ = [
     "beliefs_file",
     "check",
     "diagnose",
+    "header_file",
     "history",
     "index_tables",
     "keep",

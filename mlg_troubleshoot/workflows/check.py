@@ -27,7 +27,7 @@ from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.since_repairs import doubts, key_of, since_repairs
-from mlg_troubleshoot.outputs import OutputKind, csv_lines, write_text
+from mlg_troubleshoot.outputs import csv_lines, write_text
 from mlg_troubleshoot.parallel import Progress, map_blocks
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
@@ -56,8 +56,6 @@ class CheckOptions(TableOptions):
     ----------
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
-    remembered : str or None
-        What was remembered, in words for the report.
     advice : bool or None
         Compute what is looked at for one gear: re-rigging, worn joints; None does so
         for a single one.
@@ -71,7 +69,6 @@ class CheckOptions(TableOptions):
     """
 
     gear: Gear | str | Path = DEFAULT_GEAR
-    remembered: str | None = None
     advice: bool | None = None
     extension: Extension | None = None
     workers: int = 1
@@ -469,7 +466,7 @@ def _made(
     return len(rows), [make(judged) for make in makers]
 
 
-def write_reports(
+def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
     result: CheckResult,
     options: CheckOptions,
     directory: Path | str,
@@ -479,6 +476,7 @@ def write_reports(
     *,
     unit: LengthUnit | str = LengthUnit.INCH,
     before: Sequence[Sequence[PastInspection]] = (),
+    replace_files: bool = True,
 ) -> tuple[WrittenReport, ...]:
     """Write a report for each inspection that was judged and, for a batch, its summary, in which
     rows that cannot be judged are listed.
@@ -501,6 +499,8 @@ def write_reports(
         The unit that its readers use.
     before : sequence, optional
         What each gear was like before, as `looking_back.seen_before` says it.
+    replace_files : bool
+        Replace reports that exist; False refuses to.
 
     Returns
     -------
@@ -511,6 +511,8 @@ def write_reports(
     ------
     OutputError
         If the folder cannot be written to.
+    UsageError
+        If a report exists that must not be replaced.
     """
     directory = Path(directory)
     unit = LengthUnit.parse(unit)
@@ -526,9 +528,7 @@ def write_reports(
     judgements = result.judgements
     problems = result.problems
     extension = None if options.extension is None else options.extension.describe()
-    made = provenance_of(
-        gear, result.inputs_sha256, extension=extension, remembered=options.remembered
-    )
+    made = provenance_of(gear, result.inputs_sha256, extension=extension)
     alone = len(judgements) == 1
     steps = before or [()] * len(judgements)
     places = [k for k, j in enumerate(judgements) if alone or isinstance(j, Assessment)]
@@ -536,7 +536,13 @@ def write_reports(
         inspection_document(judgements[k], gear, made, problems, unit, steps[k]) for k in places
     )
     reports = publish_all(
-        documents, len(places), directory, formats=formats, page=page, progress=on_written
+        documents,
+        len(places),
+        directory,
+        formats=formats,
+        page=page,
+        progress=on_written,
+        replace_files=replace_files,
     )
     if alone:
         return tuple(reports)
@@ -546,7 +552,8 @@ def write_reports(
         for place, (html, pdf) in zip(places, names, strict=True)
     }
     summary = batch_document(judgements, problems, gear, made, result.notes, links, unit)
-    return (publish(summary, directory, formats=formats, page=page), *reports)
+    whole = publish(summary, directory, formats=formats, page=page, replace_files=replace_files)
+    return (whole, *reports)
 
 
 def write_template(
@@ -596,7 +603,6 @@ _VERDICT_HEADER = (
     *("file", "sheet", "row"),
 )
 VERDICT_HEADER = csv_lines([_VERDICT_HEADER])
-VERDICTS = OutputKind.marked("is not a table of verdicts", VERDICT_HEADER)
 
 
 def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:

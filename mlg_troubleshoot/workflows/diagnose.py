@@ -44,8 +44,6 @@ class DiagnoseOptions(TableOptions):
     ----------
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
-    remembered : str or None
-        What was remembered, in words for the report.
     cause_files : tuple of Path or str
         Python files with the user's own causes.
     sure : float
@@ -55,7 +53,6 @@ class DiagnoseOptions(TableOptions):
     """
 
     gear: Gear | str | Path = DEFAULT_GEAR
-    remembered: str | None = None
     cause_files: tuple[Path | str, ...] = ()
     sure: float = 0.9
     beliefs_file: Path | str | None = None
@@ -316,21 +313,20 @@ def _evidence_notes(
 
 def write_diagnosis_report(
     result: DiagnoseResult,
-    options: DiagnoseOptions,
     directory: Path,
     page: str,
     *,
     unit: LengthUnit = LengthUnit.INCH,
+    replace_files: bool = True,
 ) -> WrittenReport:
     from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
     from mlg_troubleshoot.reporting.provenance import provenance_of
     from mlg_troubleshoot.reporting.publish import publish
 
-    made = provenance_of(result.gear, result.inputs_sha256, remembered=options.remembered)
+    made = provenance_of(result.gear, result.inputs_sha256)
     findings = (result.extension, unit, result.problems, result.notes)
-    return publish(
-        diagnosis_document(result.diagnosis, result.gear, made, *findings), directory, page=page
-    )
+    document = diagnosis_document(result.diagnosis, result.gear, made, *findings)
+    return publish(document, directory, page=page, replace_files=replace_files)
 
 
 def load_model_extension(

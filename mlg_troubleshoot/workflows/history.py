@@ -101,13 +101,6 @@ class Lives(Result):
         gears = fleet_as_json(self.lines, self.forecasts, self.order)["gears"]
         write_csv(file, *fleet_table(gears))
 
-    def write_workbook(self, file: Path) -> None:
-        """Write the fleet, its readings, forecasts and records as a workbook."""
-        from mlg_troubleshoot.records import template
-        from mlg_troubleshoot.reporting.life_json import fleet_sheets
-
-        template.write_sheets(file, fleet_sheets(self.lives, self.forecasts, self.gear, self.order))
-
 
 def show_fleet(
     store: Store,
@@ -213,7 +206,7 @@ def write_pages(
     fleet: bool,
     page: str = "A4",
     unit: LengthUnit = LengthUnit.INCH,
-    remembered: str | None = None,
+    replace_files: bool = True,
 ) -> list[WrittenReport]:
     """Write the page of each gear's life and, for a fleet, the page that links them."""
     from mlg_troubleshoot.reporting import fleet_report
@@ -223,19 +216,20 @@ def write_pages(
     records = (record for life in shown.lives for record in life.records)
     last = max(records, key=lambda record: record.seq, default=None)
     hashes = {} if last is None else {f"store up to record {last.seq}": last.digest}
-    made = provenance_of(shown.gear, hashes, remembered=remembered)
+    made = provenance_of(shown.gear, hashes)
+    write = partial(publish, directory=directory, page=page, replace_files=replace_files)
     documents = (
         fleet_report.life_document(life, shown.forecasts[life.key], shown.gear, made, unit)
         for life in shown.lives
     )
     if not fleet:
-        return [publish(document, directory, page=page) for document in documents]
+        return [*map(write, documents)]
     sheet = fleet_report.fleet_document(
         shown.lives, shown.forecasts, shown.gear, made, unit, shown.order
     )
-    written = [publish(sheet, directory, page=page)]
+    written = [write(sheet)]
     # The pages behind the lines of a fleet are for the screen.
-    return written + [publish(each, directory, formats=("html",), page=page) for each in documents]
+    return written + [write(each, formats=("html",)) for each in documents]
 
 
 def key_of(tail: str, side: str) -> GearKey:

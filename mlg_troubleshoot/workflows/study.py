@@ -19,7 +19,7 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import write_index_table
-from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
+from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.parallel import StageProgress
 
@@ -134,7 +134,6 @@ def write_study_report(
     page: str,
     *,
     unit: LengthUnit,
-    remembered: str | None,
 ) -> WrittenReport:
     from mlg_troubleshoot.reporting.provenance import provenance_of
     from mlg_troubleshoot.reporting.publish import publish
@@ -142,7 +141,7 @@ def write_study_report(
 
     targets = targets_file(findings.gear)
     hashes = {targets.name: sha256(targets.read_bytes()).hexdigest()} if findings.statements else {}
-    made = provenance_of(findings.gear, hashes, seed=findings.options.seed, remembered=remembered)
+    made = provenance_of(findings.gear, hashes, seed=findings.options.seed)
     return publish(study_document(findings, made, unit), directory, page=page)
 
 
@@ -163,7 +162,6 @@ _HEADS = (
     "first_order_least",
     "first_order_greatest",
 )
-STUDY_CSV = OutputKind.marked("is not a table of a study", csv_text(_HEADS, ()))
 
 
 def write_study_csv(findings: StudyFindings, path: Path) -> None:

@@ -16,8 +16,8 @@ from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import GearFile, load_gear
-from mlg_troubleshoot.indices.index_table import INDEX_TABLE, write_index_table
-from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
+from mlg_troubleshoot.indices.index_table import write_index_table
+from mlg_troubleshoot.outputs import claim_outputs, write_text
 from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.units import LengthUnit
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.surveying.survey import Survey
 
 _HEADING = "# Written by mlg gear survey.\n"
-SURVEYED = OutputKind.marked("is not of a gear that was surveyed", _HEADING)
 # Draws of the prior that stand for a gear of which nothing was read yet.
 _UNREAD = 2000
 # Of many inspections about so many stand for all.
@@ -153,7 +152,7 @@ def survey(
     return SurveyResult(*read, suggestion, gears, warnings, path, digest, seed)
 
 
-def written_with(write: Path) -> list[OutputFile]:
+def written_with(write: Path) -> list[tuple[str, Path]]:
     """What is written for a surveyed gear: its file, its ensemble, its table of indices."""
     if write.suffix.lower() != ".toml" or not is_name(write.stem) or len(write.stem) > LONGEST_NAME:
         raise UsageError(
@@ -161,8 +160,7 @@ def written_with(write: Path) -> list[OutputFile]:
             "Give a short name that ends in .toml.",
         )
     ensemble, indices = _beside(write)
-    kinds = ((write, SURVEYED), (ensemble, SURVEYED), (indices, INDEX_TABLE))
-    return [OutputFile("--write", path, kind) for path, kind in kinds]
+    return [("--write", path) for path in (write, ensemble, indices)]
 
 
 def _beside(path: Path) -> tuple[Path, Path]:
@@ -242,8 +240,6 @@ def write_survey_report(
     directory: Path,
     page: str,
     unit: LengthUnit,
-    *,
-    remembered: str | None,
 ) -> WrittenReport | None:
     """Write the report of a survey; None if nothing follows from the table."""
     from mlg_troubleshoot.reporting.provenance import provenance_of
@@ -253,5 +249,5 @@ def write_survey_report(
     if result.survey is None:
         return None
     hashes = {file.name: result.input_sha256}
-    provenance = provenance_of(result.gear, hashes, seed=result.seed, remembered=remembered)
+    provenance = provenance_of(result.gear, hashes, seed=result.seed)
     return publish(survey_document(result, result.survey, provenance, unit), directory, page=page)

@@ -48,7 +48,7 @@ def test_no_case_ends_in_an_internal_error_late_large_or_with_another_file_chang
         "beside",
         "extension",
         "draft",
-        "settings",
+        "headers",
         "store",
         "import",
         "outputs",

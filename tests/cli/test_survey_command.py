@@ -307,15 +307,6 @@ def test_screen_and_report_of_a_survey_stand_in_the_readers_unit(
         assert not re.search(rf"\d ({'|'.join(others)})\b", page)
 
 
-def test_the_unit_of_a_survey_is_remembered(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "mlg.toml").write_text('show = "mm"\npage = "Letter"\n')
-    monkeypatch.chdir(tmp_path)
-    assert survey("template", "s.csv").code == 0
-    assert "lengths shown in mm" in survey("s.csv").err
-
-
 def test_a_template_in_millimetres_means_the_same_as_one_in_inches(tmp_path: Path) -> None:
     linkage = SurveyedLinkage(load_gear())
     plan = [

@@ -25,7 +25,7 @@ TABLE = (
     "R2,N2,RH,TOTAL_PLAY,0.006,0.007,,,,2026-03-05,1800,RETRACTED,,W2\n"
     "R3,N1,LH,RADIAL,0.004,0.005,,,,2025-06-04,1500,RETRACTED,,W3\n"
 )
-# Outside its margin as measured: whatever is remembered, this never ends with 0.
+# Outside its margin as measured: this never ends with 0.
 OUTSIDE = (
     "record_id,tail_no,side,clearance_convention,"
     + ",".join(f"clearance_{n}_in" for n in range(1, 11))
@@ -50,10 +50,7 @@ target = "gauge G1"
 [terms.setting]
 value = "G1"
 """
-SETTINGS = """show = "mm"
-page = "Letter"
-
-[headers]
+HEADERS = """[headers]
 "A/C" = "tail_no"
 "Landings since new" = "gear_landings"
 """

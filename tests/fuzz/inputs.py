@@ -1,19 +1,18 @@
 """Cases of damaged inputs: tables, workbooks, names, gear files and what they name, extensions,
-drafts, settings.
+drafts, headers.
 """
 
 from __future__ import annotations
 
 import os
 import zipfile
-from pathlib import Path
 
 from mlg_troubleshoot.cli.prompts.store import SessionStore
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.store import Draft, Drafts, Store
 from tests.fuzz.case import Case
 from tests.fuzz.damage import HOSTILE, NUMBERS, damaged
-from tests.fuzz.desk import DATA, GEAR_FILES, SETTINGS, Desk
+from tests.fuzz.desk import DATA, GEAR_FILES, HEADERS, Desk
 
 DRAFT = """{"schema_version": 1, "id": "draft", "gear": "hawker-800xp",
 "started": "2026-03-04T10:00:00",
@@ -23,28 +22,6 @@ DRAFT = """{"schema_version": 1, "id": "draft", "gear": "hawker-800xp",
 "plunger_in": 0.02, "margin_in": null,
 "outcome": null}"""
 FAILURE = str(DATA / "failure_case.csv")
-COLUMNS = (
-    "plunger_displacement_in",
-    "outcome",
-    "clearance_3_in",
-    "record_id",
-    "side",
-    "tail_no",
-    "clearance_convention",
-)
-# Without these two the measured gear that is outside looks as if it were within.
-DECISIVE = ("plunger_displacement_in", "outcome")
-READ_AS = (
-    *("carry",) * 4,
-    "remarks",
-    "record_id",
-    "tail_no",
-    "outcome",
-    "gear_landings",
-    "clearance_3",
-    "clearance_3_mm",
-    "",
-)
 
 
 def table(desk: Desk) -> Case:
@@ -124,55 +101,13 @@ def draft(desk: Desk) -> Case:
     return Case("draft", [()], frozenset({"work/drafts.sqlite"}), action=read)
 
 
-def settings(desk: Desk) -> Case:
-    """A damaged or hostile mlg.toml, here or in the user's folder: it turns no verdict, and no
-    other file changes.
-    """
+def headers(desk: Desk) -> Case:
+    """A damaged or hostile file of headers, in the place of one or beside others."""
     rng = desk.rng
-    place = "work/mlg.toml" if rng.random() < 0.7 else "home/.config/mlg-troubleshoot/mlg.toml"
-    _settings_file(desk, Path(place))
-    desk.take("outside.csv", "in.csv", "kept.sqlite")
-    if rng.random() < 0.6:
-        more = rng.choice(
-            (
-                [],
-                ["-q"],
-                ["--json"],
-                ["--remember", "--show", "mm"],
-                ["--csv", "out.csv"],
-                ["--map", "X=remarks"],
-            )
-        )
-        line = ["check", "outside.csv", *more]
-        writes = {"work/out.csv", "work/mlg.toml"} if "--remember" in more else {"work/out.csv"}
-        return Case("settings", [line], frozenset(writes), codes=frozenset({1, 2, 3}))
-    line = rng.choice(
-        (
-            ["history", "N1", "LH", "--no-forecast", "--store", "kept.sqlite"],
-            ["fleet", "--no-forecast", "--store", "kept.sqlite"],
-            ["template", "new.xlsx"],
-            ["diagnose", "in.csv"],
-            ["diagnose", "in.csv", "--remember", "--show", "mm"],
-            ["gear"],
-        )
-    )
-    writes = {"work/new.xlsx"} | ({"work/mlg.toml"} if "--remember" in line else set())
-    return Case("settings", [line], frozenset(writes))
-
-
-def _settings_file(desk: Desk, place: Path) -> None:
-    rng, file = desk.rng, desk.folder / place
-    file.parent.mkdir(parents=True, exist_ok=True)
-    what = rng.random()
-    if what < 0.45:
-        taken = {
-            *rng.sample(COLUMNS, rng.randint(0, 3)),
-            *rng.choice((DECISIVE, DECISIVE, COLUMNS[:1])),
-        }
-        lines = [f'"{column}" = "{rng.choice(READ_AS)}"' for column in sorted(taken)]
-        file.write_text("[headers]\n" + "\n".join(lines) + "\n", encoding="utf-8")
-    elif what < 0.9:
-        file.write_bytes(damaged(SETTINGS, rng))
+    file, what = desk.work / "headers.toml", rng.random()
+    desk.take("in.csv")
+    if what < 0.9:
+        file.write_bytes(damaged(HEADERS, rng))
     elif what < 0.93:
         os.mkfifo(file)
     elif what < 0.96:
@@ -180,7 +115,12 @@ def _settings_file(desk: Desk, place: Path) -> None:
     elif what < 0.98:
         file.mkdir()
     else:
-        file.symlink_to(desk.work / "in.csv")
+        file.symlink_to("in.csv")
+    command = rng.choice(
+        (["check", "in.csv"], ["check", "in.csv", "--json"], ["diagnose", "in.csv"])
+    )
+    more = rng.choice(([], ["--map", "X=remarks"]))
+    return Case("headers", [[*command, *more, "--map", "headers.toml"]])
 
 
-INPUTS = (table, workbook, name, gear, beside, extension, draft, settings)
+INPUTS = (table, workbook, name, gear, beside, extension, draft, headers)

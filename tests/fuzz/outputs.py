@@ -19,7 +19,7 @@ SMALL = ["study", "--design", "lhs", "--n1", "2", "--n2", "20", "--iterations", 
 
 @dataclass(frozen=True)
 class Output:
-    """A command up to the name of its output, what it reads beside store and settings, and its own
+    """A command up to the name of its output, what it reads beside its store, and its own
     earlier file.
     """
 
@@ -107,14 +107,12 @@ NOT_FILES = ("-", "pipe", "folder", "/dev/full", "/dev/null", ".", "..", "", "in
 
 
 def outputs(desk: Desk) -> Case:
-    """An output at a place: only what is new or its own kind is written, or another's file with
-    ``--force``.
-    """
+    """An output at a place: only what is new is written, or what exists with ``--force``."""
     rng = desk.rng
     output = rng.choice([each for each in OUTPUTS if not each.rare or rng.random() < 0.05])
     _furnish(desk)
     store, environment = _known_store(desk)
-    inputs = {*output.reads, "mlg.toml", *store}
+    inputs = {*output.reads, *store}
     if output.takes_a_store:
         inputs.add(STORE)
     named, real = _place(desk, output, inputs)
@@ -146,7 +144,6 @@ def _furnish(desk: Desk) -> None:
     desk.take(STORE)
     (desk.work / STORE).replace(desk.work / "other.sqlite")
     desk.take(STORE)
-    desk.write("mlg.toml", 'page = "Letter"\n')
     (desk.work / "folder").mkdir()
     desk.write("folder/in.html", "words of somebody\n")
     os.mkfifo(desk.work / "pipe")
@@ -211,7 +208,9 @@ def _asked(
     target = desk.work / real
     if output.folder:
         stands = (
-            [f"work/{real}/{file.name}" for file in target.iterdir()] if real == output.own else []
+            [f"work/{real}/{file.name}" for file in target.iterdir()]
+            if real == output.own and forced
+            else []
         )
         return frozenset(stands), (f"work/{real}",)
     if not target.exists():
@@ -219,6 +218,5 @@ def _asked(
     protected = any(
         (desk.work / name).exists() and target.samefile(desk.work / name) for name in inputs
     )
-    own = bool(output.own) and target.samefile(desk.work / output.own)
-    allowed = target.is_file() and not protected and (own or forced)
+    allowed = target.is_file() and not protected and forced
     return frozenset({f"work/{real}"} if allowed else ()), ()

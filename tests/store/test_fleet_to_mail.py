@@ -1,4 +1,4 @@
-"""``mlg fleet`` as it is asked and passed on: chosen gears, CSV, workbook, pages and plots."""
+"""``mlg fleet`` as it is asked and passed on: chosen gears, CSV, pages and plots."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import re
 import shutil
 from pathlib import Path
 
-import openpyxl
 import pytest
 
 from tests.cli.conftest import mlg
@@ -94,23 +93,6 @@ def test_the_csv_holds_what_the_json_holds(store: Path, tmp_path: Path) -> None:
         rows = list(csv.DictReader(lines))
     assert [row["next_action"] for row in rows] == [gear["next_action"] for gear in found]
     assert [float(row["margin_in"]) for row in rows] == [gear["margin_in"] for gear in found]
-
-
-def test_the_workbook_has_gears_readings_forecasts_and_records(store: Path, tmp_path: Path) -> None:
-    out = tmp_path / "fleet.xlsx"
-    gears(store, "--xlsx", str(out))
-    book = openpyxl.load_workbook(out)
-    assert book.sheetnames == ["Gears", "Readings", "Landings left", "Records"]
-    assert book["Gears"].max_row == 1 + 3
-    assert book["Readings"].max_row == 1 + 3 * 3 * 10
-
-
-def test_a_workbook_of_somebody_else_is_not_replaced(store: Path, tmp_path: Path) -> None:
-    out = tmp_path / "fleet.xlsx"
-    openpyxl.Workbook().save(out)
-    assert mlg("fleet", "--store", store, "--xlsx", out, "--no-forecast").code == 2
-    gears(store, "--xlsx", str(out), "--force", "--no-forecast")
-    gears(store, "--xlsx", str(out), "--no-forecast")
 
 
 def test_minutes_and_parts_are_summed_over_the_fleet(store: Path) -> None:
