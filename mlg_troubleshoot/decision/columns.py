@@ -309,9 +309,9 @@ OUTCOME = Column(
     choices=Outcome,
     spellings=(
         "result|test result|retraction result|retraction|retracted|gear retracted|failed"
-        "|gear failed|failed to retract|did it retract|did the gear retract|retracted y n"
-        "|gear retracted y n|failed y n|gear failed y n|failure|retraction failed|not retracted"
-        "|retraction ok|retraction outcome|retraction test|gear result|ergebnis"
+        "|gear failed|failed to retract|did it retract|did the gear retract|failure"
+        "|retraction failed|not retracted|retraction ok|retraction outcome|retraction test"
+        "|gear result|ergebnis"
     ),
     bears_verdict=True,
 )

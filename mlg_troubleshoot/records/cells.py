@@ -87,6 +87,11 @@ def quote(cell: Cell, limit: int = 300) -> str:
     return writable(_STEERING.sub(_visible, text))
 
 
+def plain_text(text: str) -> str:
+    """Return a text without blanks at its ends and without what nobody sees."""
+    return text.strip() if text.isascii() else text.translate(_INVISIBLE).strip()
+
+
 def writable(text: str) -> str:
     """Return a text with the characters made visible that neither XML nor UTF-8 can carry."""
     return UNWRITABLE.sub(_visible, text)
@@ -97,6 +102,18 @@ def _visible(match: re.Match[str]) -> str:
 
 
 UNWRITABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+# What Unicode calls default ignorable: soft hyphens, joiners, marks of direction, fillers.
+_INVISIBLE = dict.fromkeys(
+    (
+        *(0xAD, 0x34F, 0x61C, 0x115F, 0x1160, 0x17B4, 0x17B5, 0x3164, 0xFEFF, 0xFFA0),
+        *range(0x180B, 0x1810),
+        *range(0x200B, 0x2010),
+        *range(0x202A, 0x202F),
+        *range(0x2060, 0x2070),
+        *range(0xFE00, 0xFE10),
+        *range(0xE0000, 0xE0FFF),
+    )
+)
 _STEERING = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 _ELAPSED = re.compile(r"\[[hms]+\]", re.IGNORECASE)
 _BUILTIN_DATES = frozenset((*range(14, 23), *range(27, 37), *range(45, 48), *range(50, 59)))

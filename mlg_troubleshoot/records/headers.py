@@ -22,6 +22,7 @@ from mlg_troubleshoot.decision.columns import (
 )
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records.cells import plain_text
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
 
@@ -132,6 +133,14 @@ _FOREIGN_UNITS = frozenset(
 _CONVENTION_WORDS = frozenset(
     ("radial", "diametral", "diametrical", "diameter", "diam", "dia", "play")
 )
+_PLUNGER = re.compile(r"plung|\brv\b|reversing|(?:over|under)[ -]?travel|mid[ -]?position")
+# Words of readings, and of numbers that are given next to readings.
+_READING_WORDS = frozenset(
+    ("reading", "gap", "slop", "looseness", "wear", "displacement", "displ", "spiel", "offset")
+)
+_REFERENCE_WORDS = frozenset(
+    ("limit", "limits", "max", "maximum", "min", "minimum", "nominal", "new", "part", "drawing")
+)
 _CLEARANCE_WORDS = frozenset(("clearance", "clearances", "clr"))
 _JOINT_WORDS = frozenset(("joint", "jt", "j", "no", "nr", "number", "#"))
 _FLOAT_WORDS = frozenset(("axial", "float", "end", "endfloat"))
@@ -189,6 +198,7 @@ _CANONICAL = re.compile(
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _TOKEN = re.compile(r"""[a-zµμ]+\d*|\d+(?:[.,]\d+)?|["″]|''|\#""")
 _GLUED = re.compile(r"(j|jt|joint|clearance|clr|no|nr)0?(\d{1,2})", re.ASCII)
+_YES_NO = re.compile(r"[\W_]+(?:y|yes)[\W_]*(?:n|no)[\W_]*$")
 _DASHES = re.compile(r"[\u2010-\u2015\u2212]")
 
 
@@ -197,9 +207,9 @@ def tidy(header: str) -> str:
     the end.
     """
     text = unicodedata.normalize(
-        "NFKC", header.replace("″", '"').replace("”", '"').replace("“", '"')
+        "NFKC", plain_text(header).replace("″", '"').replace("”", '"').replace("“", '"')
     )
-    text = _DASHES.sub("-", text).replace("\u200b", "").replace("\ufeff", "")
+    text = _DASHES.sub("-", text)
     return re.sub(r"\s+", " ", text).strip().rstrip(":*").strip().casefold()
 
 
@@ -221,7 +231,7 @@ def parse_canonical(name: str, joints: Joints) -> Field | None:
 
 @lru_cache(maxsize=4096)
 def recognise(header: str, joints: Joints) -> Recognition:
-    text = tidy(header)
+    text = _YES_NO.sub("", tidy(header))
     if not text or len(text) > 120:
         return UNKNOWN
     snake = re.sub(r"[\s\-]+", "_", text)
@@ -245,6 +255,32 @@ def recognise(header: str, joints: Joints) -> Recognition:
             found = _resembles_plunger(words, bool(units))
         return _resembles_clearance(words, bool(units), joints) if found is UNKNOWN else found
     return numbered if numbered.field is None else _with_unit(numbered.field, units, foreign, odd)
+
+
+def suspect(header: str, joints: Joints) -> tuple[str, bool]:
+    """The column of readings that an unread header may name, else empty; and whether any number
+    may be one, or only a fraction.
+    """
+    text = tidy(header).replace("_", " ")
+    found = _TOKEN.findall(text)
+    units, foreign, _ = _units_in(_BRACKETS.findall(text))
+    has_unit = bool(units or foreign) or _trailing_unit(found)[1] is not None
+    said = {word for word in found if word not in UNIT_SPELLINGS} - _FILLERS
+    plain = {word for word in said if not word.isdigit()} - _JOINT_WORDS
+    if plain and plain <= _REFERENCE_WORDS:
+        return "", False
+    numbers = {int(n) for n in re.findall(r"\d+", text)} & {*joints.numbers}
+    is_plunger = _PLUNGER.search(text) is not None
+    is_reading = bool(said & (_CLEARANCE_WORDS | _CONVENTION_WORDS | _READING_WORDS))
+    named = len(said) > 1 and said <= joints.vocabulary
+    sure = not said & _OTHER_MATTER and (is_plunger or is_reading or named or has_unit)
+    if not (sure or is_plunger or numbers or said & joints.vocabulary or not text):
+        return "", False
+    fitting = [*numbers] or joints.called(said)
+    joint = fitting[0] if len(fitting) == 1 else joints.numbers[0]
+    return (PLUNGER_DISPLACEMENT if is_plunger else CLEARANCE).header(
+        None if is_plunger else joint
+    ), sure
 
 
 def _units_in(bracketed: list[str]) -> tuple[set[LengthUnit], list[str], list[str]]:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 
 from mlg_troubleshoot.decision.columns import JOINT, RECORD_ID
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, show, stored
+from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, plain_text, show, stored
 from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.records.model import CellPlace, TableInHand, to_correct
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
-from mlg_troubleshoot.records.values import CellFaultError, plain_text
+from mlg_troubleshoot.records.values import CellFaultError
 
 _JOINT_TEXT = re.compile(r"(?:joint|jt|j)?\W*(?:no|nr|number|#)?\W*0?(\d{1,3})", re.ASCII)
 
@@ -26,6 +26,7 @@ class _Group:
     places: list[CellPlace]
     bad: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    questions: list[str] = field(default_factory=list)
 
     def put(self, slot: int, place: CellPlace, cell: Cell) -> Cell:
         """Put a cell where none stands yet; return the one that stands there and differs."""
@@ -83,6 +84,8 @@ class LongReader:
                 remedy = "All rows of one record must agree. Correct one of them, or the record id."
                 fault = CellFaultError("record_contradicts", expected, remedy)
                 self._fault(group, place, filled[p.index], fault)
+        asked = self.reader.ask_about(filled, of_joint=True)
+        group.questions += [each for each in asked if each not in group.questions]
         if self._joint is not None:
             self._take_readings(group, row, filled, self._joint)
 
@@ -140,5 +143,8 @@ class LongReader:
             warnings = (*read.warnings, *group.warnings)
             if group.bad:
                 read = to_correct(read, *group.bad)
+            elif group.questions and isinstance(read, Inspection):
+                asked = filter(None, (read.unit_question, *group.questions))
+                read = replace(read, unit_question=" ".join(asked))
             done.append(replace(read, warnings=warnings))
         return done

@@ -46,13 +46,14 @@ from mlg_troubleshoot.records.cells import (
     Cells,
     Filled,
     column_letters,
+    plain_text,
     quote,
     show,
     stored,
     writable,
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings
-from mlg_troubleshoot.records.headers import Field
+from mlg_troubleshoot.records.headers import Field, suspect
 from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand
 from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.unit_fit import (
@@ -66,15 +67,16 @@ from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
     AmbiguousDateError,
     CellFaultError,
+    answers_outcome,
     convention_word,
     is_no_name,
-    plain_text,
     read_date,
     read_joints,
     read_length,
     read_moment,
     read_value,
     says_failed,
+    written_number,
 )
 from mlg_troubleshoot.units import (
     UNIT_SPELLINGS,
@@ -203,8 +205,12 @@ class RowReader:
         self._unread_words = [
             p
             for p in placed
-            if (p.field is None or p.field.column.carried)
-            and not (p.refused or p.is_mapped or re.search(r"\d", p.header))
+            if (p.field is None or p.field.column.carried) and not (p.refused or p.is_mapped)
+        ]
+        self._suspects = [
+            (p, *suspect(p.header, self._options.joints))
+            for p in self._unread_words
+            if p.field is None
         ]
         # What a number format adds counts where a unit does.
         self._plain = [
@@ -247,7 +253,10 @@ class RowReader:
         self._begin(row, cells, places)
         found = _Found(self._read_convention())
         self._read_cells(found, self._read_row_unit())
-        question = self._unit_question(found)
+        asked = self._unit_questions(found)
+        if self._suspects:
+            asked += self.ask_about(self._cells)
+        question = Sentence.joined(asked) if asked else ""
         source = self._table.source(row)
         for index, fault in sorted(self._faults, key=itemgetter(0)):
             if isinstance(fault, AmbiguousDateError):
@@ -449,11 +458,14 @@ class RowReader:
         stated = found.convention
         for placed in self._unread_words:
             cell = self._cells[placed.index]
-            if not isinstance(cell, str):
+            if cell is None:
                 continue
-            said = convention_word(cell)
-            unit = UNIT_SPELLINGS.get(plain_text(cell).lower())
-            if OUTCOME not in found.values and says_failed(cell):
+            text = cell if isinstance(cell, str) else ""
+            said = convention_word(text)
+            unit = UNIT_SPELLINGS.get(plain_text(text).lower())
+            if OUTCOME not in found.values and (
+                says_failed(text) or answers_outcome(placed.header, cell)
+            ):
                 column = OUTCOME
             elif said is not None and (stated is None or said.per_radial != stated.per_radial):
                 column = CONVENTION
@@ -469,6 +481,30 @@ class RowReader:
             expected = f"the {what} in a column {column.name}"
             self._fault(placed.index, CellFaultError(f"{what}_elsewhere", expected, remedy))
             self._bad.add(placed.index)
+
+    def ask_about(self, cells: Cells, *, of_joint: bool = False) -> list[str]:
+        """Ask about numbers in columns that are not read and may hold readings; next to a joint
+        any fraction may be one.
+        """
+        asked = []
+        for placed, nearest, is_sure in self._suspects:
+            cell = cells[placed.index]
+            if cell is None or not (nearest or of_joint):
+                continue
+            value, unit = written_number(cell, decimal_comma=self._table.decimal_comma)
+            usual = list(LengthUnit) if is_sure else [LengthUnit.INCH, LengthUnit.MILLIMETRE]
+            size = min(abs(each.to_inches(value)) for each in ([unit] if unit else usual))
+            if not 0.0 < size <= self._options.plunger_hard_max_in or not (
+                is_sure or unit or value % 1.0
+            ):
+                continue
+            header = placed.header or column_letters(placed.index)
+            asked.append(
+                f"{header!r} is not read and says {quote(cell, 40)}: if it is a reading, pass --map"
+                f' "{header}={nearest or CLEARANCE.name}" (a length with its unit); else'
+                f' "{header}=carry".'
+            )
+        return asked
 
     def _made_id(self) -> str:
         cells = [show(cell) for cell in self._cells]
@@ -665,13 +701,13 @@ class RowReader:
                 rows[place] = replace(row, inspection_date=fault.days[order])
         return f"dates are read as {order.words}: no other order fits all dates of the column"
 
-    def _unit_question(self, found: _Found) -> str:
+    def _unit_questions(self, found: _Found) -> list[str]:
         """Refuse readings that cannot be of the stated unit; return what must be asked before the
         gear is cleared.
         """
         confirmed = self._options.small_readings_true or found.values.get(SMALL_READINGS_TRUE)
         if found.convention is None or confirmed:
-            return ""
+            return []
         clearance = found.lengths.get(CLEARANCE, {})
         fit = judge_unit(clearance, found.entered, found.convention, self._options)
         again = {*found.lengths.get(GAUGE_U, {}), *found.values.get(MEASURED_AGAIN, ())}
@@ -690,4 +726,4 @@ class RowReader:
         found.warnings += asked
         if fit.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL):
             asked.insert(0, fit.question)
-        return Sentence.joined(asked) if asked else ""
+        return asked

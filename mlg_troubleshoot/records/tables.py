@@ -322,8 +322,6 @@ class _Table:
         """Refuse a row that was set aside and holds a reading over its limit, a plunger beyond the
         margin or a failure that no other row has.
         """
-        if not self._aside:
-            return
         reader = RowReader(self._columns, replace(self._table, report=lambda _problem: None))
         others = self._alarms(self._out.rows)
         for number, name, cells in self._aside:
@@ -379,7 +377,8 @@ class _Table:
             )
             reader = self._long.reader
         self._dates = reader.settle_dates(self._out.rows)
-        self._judge_aside()
+        if self._aside:
+            self._judge_aside()
 
     def notes(self) -> list[str]:
         notes = []

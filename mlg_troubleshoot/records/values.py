@@ -15,8 +15,17 @@ from typing import Any
 from mlg_troubleshoot.decision.columns import OUTCOME, Column, Holds
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.records.cells import UNWRITABLE, Filled, OddCell, OddKind, show, show_number
+from mlg_troubleshoot.records.cells import (
+    UNWRITABLE,
+    Filled,
+    OddCell,
+    OddKind,
+    plain_text,
+    show,
+    show_number,
+)
 from mlg_troubleshoot.records.dates import DateOrder, readings, written_day
+from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.units import MINUS, ClearanceConvention, LengthUnit, parse_length
 
 
@@ -79,7 +88,6 @@ _COMMA_NUMBER = re.compile(r"\s*[+\-]?\d*,\d+(?![\d,.])[^,.]*")
 _UNCLEAR_GROUP = re.compile(r"[+\-]?[1-9]\d{0,2}[,.]\d{3}")
 _PLAIN = re.compile(r"[+\-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+\-]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[+\-]?\s*(nan|inf|infinity|1\.#\w+)", re.IGNORECASE)
-_INVISIBLE = {ord(c): None for c in "\u200b\u200c\u200d\u2060\ufeff"}
 
 # What people write where nothing was measured; the error value #N/A is not one of them.
 NOT_MEASURED = frozenset(
@@ -137,10 +145,6 @@ def _number_of(cell: float | OddCell, expected: str) -> float:
     if cell.kind not in (OddKind.PADDED, OddKind.WORDED) or cell.number is None:
         raise odd_cell_fault(cell, expected)
     return cell.number
-
-
-def plain_text(text: str) -> str:
-    return text.translate(_INVISIBLE).strip()
 
 
 def read_length(
@@ -399,15 +403,35 @@ _OUTCOME_WORDS = {
 }
 
 
+def in_words(text: str) -> str:
+    """A text as plain words: lower case, one blank for whatever stands between them."""
+    return re.sub(r"[\W_]+", " ", tidy(text).replace(".", "")).strip()
+
+
 def _outcome_word(text: str) -> Outcome | None:
-    return _OUTCOME_WORDS.get(
-        re.sub(r"[\s_\-]+", " ", plain_text(text).replace(".", "")).casefold()
-    )
+    return _OUTCOME_WORDS.get(in_words(text))
 
 
 def says_failed(text: str) -> bool:
     """Whether a text says that the gear failed, wherever it stands."""
     return _outcome_word(text) is Outcome.FAILED
+
+
+def answers_outcome(header: str, cell: Filled) -> bool:
+    """Whether a header asks what the gear did, and a cell says yes or no to it."""
+    return re.search(r"fail|retract", in_words(header)) is not None and _yes_no(cell) is not None
+
+
+def written_number(cell: Filled, *, decimal_comma: bool) -> tuple[float, LengthUnit | None]:
+    """The number in a cell with its unit, NaN where it is not a plain number or a length."""
+    if isinstance(cell, OddCell):
+        return (math.nan if cell.number is None else cell.number), None
+    if not isinstance(cell, str):
+        return cell, None
+    try:
+        return _written_length(plain_text(cell).lstrip("<>=≤≥ "), decimal_comma, "", None)
+    except CellFaultError:
+        return math.nan, None
 
 
 def convention_word(text: str) -> ClearanceConvention | None:
@@ -426,8 +450,9 @@ def _read_outcome(cell: Filled, header: str) -> Outcome:
         found = _outcome_word(cell)
         if found is not None:
             return found
-    asks_failure = re.search(r"fail|not retract", header, re.IGNORECASE) is not None
-    said = _yes_no(cell) if asks_failure or "retract" in header.casefold() else None
+    question = in_words(header)
+    asks_failure = re.search(r"fail|\b(?:no|not) retract", question) is not None
+    said = _yes_no(cell) if asks_failure or "retract" in question else None
     if said is None:
         if isinstance(cell, OddCell):
             raise odd_cell_fault(cell, "RETRACTED or FAILED")

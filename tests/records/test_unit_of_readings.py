@@ -320,13 +320,13 @@ def test_inches_of_a_worn_gear_in_millimetres_do_not_clear_it_although_some_are_
     ("column", "value", "unit"),
     [
         ("plunger_displacement_mm", 0.045, "inches"),
+        ("plunger_displacement_mm", 0.09, "inches"),
+        ("plunger_displacement_mm", -0.5, "inches"),
         ("plunger_displacement_thou", 0.045, "inches"),
         ("plunger_displacement_thou", 1.143, "millimetres"),
     ],
 )
-def test_a_plunger_reading_near_zero_that_another_unit_puts_outside_is_asked_about(
-    gear, column, value, unit
-):
+def test_a_plunger_reading_that_another_unit_puts_outside_is_asked_about(gear, column, value, unit):
     row, _ = judged(gear, [0.0012] * 10, LengthUnit.INCH, LengthUnit.INCH, **{column: value})
     found = check(row, gear)
     assert found.verdict is Verdict.INCOMPLETE
@@ -334,7 +334,7 @@ def test_a_plunger_reading_near_zero_that_another_unit_puts_outside_is_asked_abo
 
 
 @pytest.mark.parametrize(
-    ("column", "value"), [("plunger_displacement_mm", 0.25), ("plunger_displacement_in", 0.0018)]
+    ("column", "value"), [("plunger_displacement_mm", 0.51), ("plunger_displacement_in", 0.0018)]
 )
 def test_a_plunger_reading_that_no_other_unit_explains_is_not_asked_about(gear, column, value):
     row, _ = judged(gear, [0.0012] * 10, LengthUnit.INCH, LengthUnit.INCH, **{column: value})
