@@ -64,6 +64,11 @@ class Run:
             raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
         if wanted.formats and wanted.report is None:
             output.say("Note: --format is for reports: without --report DIR none is written.")
+        if wanted.causes and not wanted.extension:
+            raise UsageError(
+                "--causes was given without the extension that its causes are for",
+                "Give --extension EXT.toml as well, or leave out --causes.",
+            )
         extensions = wanted.extension or ()
         causes = wanted.causes or ()
         self._files = files
@@ -143,7 +148,7 @@ class Run:
         self._keep(result, judged=found.entries)
         if result.problems and not wanted.as_json and not found.lines:
             output.say("No row could be judged.")
-        return task.exit_code_of(found.lines)
+        return task.exit_code_of(found.lines, result.unread_files)
 
     def _outputs(
         self, found: _Gathered, files: ExitStack, read: task.CheckResult, total: int
@@ -276,6 +281,7 @@ class Run:
             both = task.before_and_after(result.judgements)
             if both is not None:
                 batch.show_before_and_after(*both, screen)
+        notes.show_unread(result.unread_files, screen)
 
     def _annotate(
         self, read: ReadResult, said: Mapping[RowSource, task.Annotated], out: Path

@@ -13,6 +13,7 @@ from mlg_troubleshoot.errors import ExitCode, InconclusiveDataError
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis
     from mlg_troubleshoot.units import LengthUnit
+    from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
 
 EPILOG = (
     "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE"
@@ -97,7 +98,7 @@ def diagnose(
     else:
         show_notes(result.unread if shown.quiet else result.notes)
         show_problems(result.problems)
-        _show(result.diagnosis, shown.unit())
+        _show(result, shown.unit())
     if write_extension is not None and result.extension is None:
         output.say(_unwritten(result.diagnosis))
     elif write_extension is not None and result.extension is not None:
@@ -114,8 +115,8 @@ def diagnose(
             replace_files=shown.force,
         )
         output.say_written([made], quiet=shown.quiet)
-    nothing = result.diagnosis.verdict == "NONE" and not result.diagnosis.faults
-    raise typer.Exit(ExitCode.FINE if nothing else ExitCode.ATTENTION)
+    found = result.diagnosis.verdict != "NONE" or result.diagnosis.faults or result.unread_files
+    raise typer.Exit(ExitCode.ATTENTION if found else ExitCode.FINE)
 
 
 def _unwritten(diagnosis: Diagnosis) -> str:
@@ -127,13 +128,15 @@ def _unwritten(diagnosis: Diagnosis) -> str:
     )
 
 
-def _show(diagnosis: Diagnosis, unit: LengthUnit) -> None:
+def _show(result: DiagnoseResult, unit: LengthUnit) -> None:
+    from mlg_troubleshoot.cli.views.notes import show_unread
     from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
 
     console = output.console(unit=unit)
-    for line in seven_lines(diagnosis):
+    for line in seven_lines(result.diagnosis):
         said = output.text(line.text, "not bold")
         console.print(output.text(f"{line.number} {line.word:<7}", "bold").append_text(said))
+    show_unread(result.unread_files, console)
 
 
 app = options.alone(diagnose, EPILOG)

@@ -87,6 +87,8 @@ class TableResult(Result):
         Notes on the input as a whole.
     unread : tuple of str
         Those of the notes that say what of the input was not read.
+    unread_files : tuple of str
+        Files that were given and hold no row that could be read.
     inputs_sha256 : mapping of str to str
         Hash of each input file by name.
     """
@@ -95,6 +97,7 @@ class TableResult(Result):
     problems: tuple[Problem, ...] = ()
     notes: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
+    unread_files: tuple[str, ...] = ()
     inputs_sha256: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -267,6 +270,11 @@ class ReadResult:
     def inputs_sha256(self) -> dict[str, str]:
         """Hash of each file that could be opened, by its name."""
         return {file.name: file.sha256 for file in self.files if file.sha256 is not None}
+
+    @property
+    def unread_files(self) -> tuple[str, ...]:
+        """The files that no row came from."""
+        return tuple(file.name for file in self.files if not file.rows)
 
     @property
     def inspections(self) -> tuple[Inspection, ...]:

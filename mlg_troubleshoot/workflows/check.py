@@ -98,15 +98,16 @@ class CheckResult(TableResult):
     @property
     def exit_code(self) -> ExitCode:
         """NO_CONCLUSION if no row was judged, ATTENTION if one needs it."""
-        return exit_code_of(listed(self.judgements))
+        return exit_code_of(listed(self.judgements), self.unread_files)
 
 
-def exit_code_of(lines: Iterable[Listed]) -> ExitCode:
-    """NO_CONCLUSION if no row was judged, ATTENTION if one needs it."""
+def exit_code_of(lines: Iterable[Listed], unread_files: Sequence[str] = ()) -> ExitCode:
+    """NO_CONCLUSION if no row was judged, ATTENTION if a row or a file needs it."""
     states = {(line.is_judged, line.is_fine) for line in lines}
     if not any(judged for judged, _fine in states):
         return ExitCode.NO_CONCLUSION
-    return ExitCode.FINE if all(fine for _judged, fine in states) else ExitCode.ATTENTION
+    is_fine = not unread_files and all(fine for _judged, fine in states)
+    return ExitCode.FINE if is_fine else ExitCode.ATTENTION
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +171,7 @@ def check_files(
         problems=read.problems,
         notes=read.notes,
         unread=read.unread,
+        unread_files=read.unread_files,
         inputs_sha256=read.inputs_sha256,
         read=read,
     )

@@ -175,6 +175,7 @@ def diagnose_files(
         problems=read.problems,
         notes=notes,
         unread=read.unread,
+        unread_files=read.unread_files,
         inputs_sha256=read.inputs_sha256,
     )
 

@@ -12,6 +12,7 @@ from mlg_troubleshoot.errors import Problem, ProblemGroup, grouped
 
 _LINES_OF_PROBLEMS = 40
 _LINES_OF_NOTES = (8, 4)
+_FILES = 6
 
 
 def show_notes(notes: Sequence[str]) -> None:
@@ -47,6 +48,14 @@ def show_problems(problems: Sequence[Problem]) -> None:
             f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook."
         )
         _message(console, more, indent=2)
+
+
+def show_unread(files: Sequence[str], screen: output.DataConsole) -> None:
+    """Count the files that were given and not read, where the result ends."""
+    if files:
+        shown = ", ".join(files[:_FILES]) + " …" * (len(files) > _FILES)
+        noun = "1 file was" if len(files) == 1 else f"{len(files)} files were"
+        screen.print(f"{noun} given and not read: {shown}.", style="bold")
 
 
 def _show_problem(console: output.DataConsole, group: ProblemGroup) -> None:
