@@ -172,9 +172,12 @@ def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -
 
 def _read_frame(frame: pd.DataFrame, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
     sheet = FrameSheet(frame)
-    found = read_table(
-        sheet, sheet.header, sheet.rows(), options, file=FRAME, delimiter=None, tick=ticker
-    )
+    try:
+        found = read_table(
+            sheet, sheet.header, sheet.rows(), options, file=FRAME, delimiter=None, tick=ticker
+        )
+    except FileRefusedError as refusal:
+        found = Collected(problems=[replace(refusal.problem, file=FRAME)])
     if not found.rows and not found.problems:
         found.problems.append(
             replace(FileRefusedError("no_rows", "it is empty").problem, file=FRAME)

@@ -31,6 +31,8 @@ from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.source import FileRefusedError, MergedRange, NumberedRow, Sheet
 from mlg_troubleshoot.units import ClearanceConvention
 
+# So many in one table are one mistake: they would take memory and help nobody.
+MAX_PROBLEMS = 20_000
 _PROGRESS_ROWS = 500
 # Rows by which a column is known that holds sides, whatever its header says.
 _LOOKED_AT = 50
@@ -52,6 +54,19 @@ class Collected:
     layouts: list[SheetLayout] = field(default_factory=list)
     invalid_content: dict[RowSource, int] = field(default_factory=dict)
 
+    def tell(self, problem: Problem) -> None:
+        """Take a problem; a table that has far too many of them is refused, with the first."""
+        self.problems.append(problem)
+        if len(self.problems) > MAX_PROBLEMS:
+            first = self.problems[0]
+            raise FileRefusedError(
+                "problems_many",
+                f"more than {MAX_PROBLEMS} problems up to row {problem.row}; the first in"
+                f" {first.cell or f'row {first.row}'}: {first.value or 'nothing'}",
+                first.expected,
+                first.remedy,
+            )
+
 
 def read_table(
     sheet: Sheet,
@@ -68,7 +83,7 @@ def read_table(
     first = list(islice(rows, _LOOKED_AT))
     rows = chain(first, rows)
     options, side, said = _sides(sheet.name, header, first, options, file)
-    in_hand = TableInHand(options, file, sheet.name, out.problems.append, comma, side)
+    in_hand = TableInHand(options, file, sheet.name, out.tell, comma, side)
     columns = ColumnReader(in_hand).place(header.texts, header.row, units=header.units)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
     taken = 0
