@@ -176,7 +176,7 @@ def _load(source: str | Path, out: str | Path) -> tuple[bytes, XlsxFile]:
         )
     try:
         data = path.read_bytes()
-        if not data.startswith(b"PK") or b"opendocument" in data[:200]:
+        if not data.startswith(b"PK"):
             raise UsageError(
                 f"{source} is not an .xlsx workbook, so it cannot be annotated",
                 "Save it as .xlsx first, or use --csv for the results.",

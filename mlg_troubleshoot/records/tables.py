@@ -28,7 +28,7 @@ from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header, heade
 from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
-from mlg_troubleshoot.records.source import FileRefusedError, MergedRange, NumberedRow, Sheet
+from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet
 from mlg_troubleshoot.units import ClearanceConvention
 
 # So many in one table are one mistake: they would take memory and help nobody.
@@ -213,8 +213,7 @@ class _Table:
             if p.field.column is not RECORD_ID or columns.is_long
         ]
         self._above: dict[int, tuple[int, Filled]] = {}
-        self._last_rows: dict[tuple[int, int], int] = {}
-        self._merged: Sequence[MergedRange] | None = None
+        self._last_rows: dict[tuple[int, int], int] | None = None
         self._filled_in = 0
         self._repeated = 0
         self._aside: list[tuple[int, str, Cells]] = []
@@ -280,11 +279,10 @@ class _Table:
 
     def _last_row(self, top: int, index: int) -> int:
         """The last row of the merged cells that begin in a row and a column; 0 if none do."""
-        if self._merged is None:
-            self._merged = self._sheet.merged()
-        # An ods tells them row by row.
-        for first, left, last, _right in islice(self._merged, len(self._last_rows), None):
-            self._last_rows[first, left] = last
+        if self._last_rows is None:
+            self._last_rows = {
+                (first, left): last for first, left, last, _right in self._sheet.merged()
+            }
         return self._last_rows.get((top, index), 0)
 
     def _begins_again(self, number: int, cells: Cells) -> FileRefusedError | None:
