@@ -409,24 +409,6 @@ class StudiedStatement(TypedDict):
     paragraph: str
 
 
-class GivenJoint(TypedDict):
-    """First-order index of one joint from measured inspections."""
-
-    joint: JointNumber
-    first_order: float | None
-    first_order_interval: Ends
-    rows: Count
-
-
-class GivenData(TypedDict):
-    """Indices of measured inspections, without a model."""
-
-    file: str
-    rows_read: Count
-    rows_used: Count
-    joints: list[GivenJoint]
-
-
 class StudyOutput(TypedDict):
     """Output of mlg study --json, and, up to joints, the table of indices that ships with a gear.
 
@@ -442,19 +424,13 @@ class StudyOutput(TypedDict):
     joints: Annotated[list[StudiedJoint], Meta(min_length=1)]
     directions: NotRequired[str]
     distribution: NotRequired[str]
-    of: NotRequired[str]
-    accuracy: NotRequired[float]
-    finished: NotRequired[bool]
     note: NotRequired[str]
     mean: NotRequired[float | None]
     variance: NotRequired[float | None]
     first_order_plain: NotRequired[list[float | None] | None]
-    second_order: NotRequired[list[list[float | None]] | None]
     groups: NotRequired[list[StudiedGroup]]
     ensemble: NotRequired[list[str]]
     amplification: NotRequired[StudiedAmplification]
-    statements: NotRequired[list[StudiedStatement]]
-    given_data: NotRequired[GivenData]
 
 
 class Landings(TypedDict):
@@ -624,6 +600,7 @@ class VerifyOutput(TypedDict):
     schema_version: Version
     gear: str
     numbers: list[VerifiedNumber]
+    statements: list[StudiedStatement]
 
 
 class SurveyedJoint(TypedDict):

@@ -42,21 +42,29 @@ def verify(
 ) -> None:
     """Print every number of the paper and that of the model; exit 1 if a required one fails."""
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.paper import verification
+    from mlg_troubleshoot.paper import statements, verification
 
     gear = load_gear(context.obj)
+    checked = statements.check_statements(gear)
     numbers = verification.verify(gear)
     failed = [n for n in numbers if n.target.expected and not n.holds]
     if as_json:
-        from mlg_troubleshoot.json_outputs import VerifyOutput
+        from mlg_troubleshoot.json_outputs import StudiedStatement, VerifyOutput
         from mlg_troubleshoot.reporting.json_form import written
 
         output.write_json(
-            written(VerifyOutput, gear=gear.id, numbers=[_number(n) for n in numbers])
+            written(
+                VerifyOutput,
+                gear=gear.id,
+                numbers=[_number(n) for n in numbers],
+                statements=[written(StudiedStatement, each) for each in checked],
+            )
         )
     else:
         screen = output.console()
-        output.show_page("verify", screen, gear=gear, numbers=numbers, failed=failed)
+        output.show_page(
+            "verify", screen, gear=gear, numbers=numbers, failed=failed, statements=checked
+        )
     raise typer.Exit(ExitCode.ATTENTION if failed else ExitCode.FINE)
 
 

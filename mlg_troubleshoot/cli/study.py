@@ -2,126 +2,134 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mlg_troubleshoot.cli import options
+from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 
+if TYPE_CHECKING:
+    from mlg_troubleshoot.paper.study import StudyFindings
+
 EPILOG = (
-    "Example: [b]mlg study[/b] · the paper's design: [b]mlg study --design lhs[/b] · its"
-    " statements: [b]mlg study --statements[/b] · the table that mlg check uses: [b]mlg study"
-    " --design tensor --write-table[/b]"
+    "Example: [b]mlg study[/b] · the paper's design: [b]mlg study --design lhs[/b] · the table"
+    " that mlg check uses: [b]mlg study --write-table[/b]"
 )
+# Bar of the largest first-order index. [characters]
+_LONGEST_BAR = 50
 
 
 @dataclass(frozen=True, slots=True)
-class StudyFlags(options.OutputOptions):
-    """What ``mlg study`` computes, shows and writes."""
+class StudyFlags:
+    """What ``mlg study`` computes and writes."""
 
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Write a printable report with figures and statements.",
-        ),
-    ] = None
     gear: options.Gear = DEFAULT_GEAR
     design: Annotated[
         str,
         typer.Option(
-            metavar="fast|sampled|tensor|lhs|lhs+ccd|ccd",
-            help=(
-                "fast = polynomial chaos that checks itself; sampled = Sobol points; tensor = exact"
-                " reference; the others are the paper's."
-            ),
+            metavar="tensor|sampled|lhs|lhs+ccd|ccd",
+            help="tensor = exact; sampled = Sobol points; the others are the paper's.",
         ),
-    ] = "fast"
-    accuracy: Annotated[float, typer.Option(help="Maximum error of every index.")] = 1e-3
+    ] = "tensor"
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0
-    directions: Annotated[
-        str,
-        typer.Option(metavar="worst|over|under|random", help="Direction of the clearances."),
-    ] = "worst"
-    fixed: Annotated[
+    size: Annotated[
         str | None,
-        typer.Option(metavar="DEG,DEG,…", help="Directions set by a load, one per joint."),
-    ] = None
-    distribution: Annotated[
-        str,
         typer.Option(
-            metavar="uniform|falling|rising|half-normal",
-            help="Distribution of the clearances.",
+            metavar="N1,N2,ITERATIONS",
+            help="Size of a paper design; 100,1000,10 (lhs) or 100,862,10 if not given.",
         ),
-    ] = "uniform"
-    limit: Annotated[
-        float | None,
-        typer.Option(
-            metavar="IN",
-            help="One limit in inches for all joints, instead of the gear's.",
-        ),
-    ] = None
-    beyond_margin: Annotated[
-        bool,
-        typer.Option(
-            "--beyond-margin",
-            help="Indices of the event that the margin is exceeded, instead of the displacement.",
-        ),
-    ] = False
-    statements: Annotated[
-        bool,
-        typer.Option(
-            "--statements", help="Which statements of section 4.3 hold, with the numbers."
-        ),
-    ] = False
-    most: Annotated[int, typer.Option(min=1, help="Maximum number of evaluations.")] = 1 << 24
-    n1: Annotated[
-        int | None, typer.Option(help="Repetitions of a paper design; 100 if not given.")
-    ] = None
-    n2: Annotated[
-        int | None,
-        typer.Option(help="Levels of a paper design; 1000 (lhs) or 862 (lhs+ccd) if not given."),
-    ] = None
-    iterations: Annotated[
-        int | None,
-        typer.Option(help="Iterations of a paper design; 10 if not given."),
     ] = None
     workers: Annotated[
         int | None,
         typer.Option(min=1, help="Cores for the total order of lhs; all if not given."),
     ] = None
     csv: Annotated[Path | None, typer.Option(metavar="OUT.csv", help="One line per joint.")] = None
+    figure: Annotated[
+        Path | None, typer.Option(metavar="OUT.svg", help="The indices of all joints as bars.")
+    ] = None
     write_table: Annotated[
         bool,
         typer.Option(
             "--write-table", help="Write the table that mlg check uses, next to the gear file."
         ),
     ] = False
-    given: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Also estimate indices from measured inspections, without a model.",
-        ),
-    ] = None
+    as_json: options.Json = False
+    force: options.Force = False
 
 
 @options.flat
-def study(flags: StudyFlags, _version: options.Version = False) -> None:
+def study(flags: StudyFlags) -> None:
     """Recompute the sensitivity and amplification indices of every joint."""
-    from mlg_troubleshoot.cli import study_run
-    from mlg_troubleshoot.cli.claims import WRITE_TABLE
+    from mlg_troubleshoot.cli.claims import WRITE_TABLE, claim
+    from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.paper.study import StudyDesign, StudyOptions
+    from mlg_troubleshoot.workflows import study as task
 
-    outputs = [("--csv", flags.csv)]
-    if flags.write_table:
-        outputs.append((WRITE_TABLE, load_gear(flags.gear).indices_file))
-    flags.claim(flags.gear, [flags.given], outputs)
-    with study_run.asked(flags) as (known, wanted):
-        study_run.run(known, wanted, flags)
+    gear = load_gear(flags.gear)
+    table = gear.indices_file if flags.write_table else None
+    outputs = [("--csv", flags.csv), ("--figure", flags.figure), (WRITE_TABLE, table)]
+    claim(flags.gear, (), outputs, force=flags.force)
+    design = options.one_of(StudyDesign, flags.design.lower(), "--design")
+    n1, n2, iterations = _size(flags.size)
+    with ExitStack() as processes, stages(quiet=False) as progress:
+        executor = None
+        count = flags.workers or os.cpu_count() or 1
+        if design is StudyDesign.LHS and count > 1:
+            from mlg_troubleshoot.workers import WorkerProcesses
+
+            executor = processes.enter_context(WorkerProcesses(count))
+        asked = StudyOptions(design, flags.seed, n1=n1, n2=n2, iterations=iterations)
+        if flags.write_table:
+            task.refuse_other_tables(asked)
+        findings = task.run_study(gear, replace(asked, executor=executor), progress)
+    if flags.as_json:
+        from mlg_troubleshoot.reporting.model_json import study_as_json
+
+        output.write_json(study_as_json(findings))
+    else:
+        _show(findings)
+    if flags.csv is not None:
+        task.write_study_csv(findings, flags.csv)
+    if flags.figure is not None:
+        task.write_study_figure(findings, flags.figure)
+    if table is not None:
+        task.write_study_table(findings)
+        output.say(f"Table written: {table}")
+
+
+def _size(text: str | None) -> Sequence[int | None]:
+    if text is None:
+        return None, None, None
+    try:
+        n1, n2, iterations = map(int, text.split(","))
+    except ValueError:
+        raise UsageError(
+            f"size {text!r}", "Give N1,N2,ITERATIONS, for example 100,1000,10."
+        ) from None
+    return n1, n2, iterations
+
+
+def _show(findings: StudyFindings) -> None:
+    import numpy as np
+
+    rows = [*zip(findings.gear.joints, findings.result.table.joints, strict=True)]
+    first = np.nan_to_num([entry.first_order for _, entry in rows]).clip(0.0)
+    lengths = _LONGEST_BAR * first / max(first.max(), 1e-9)
+    output.show_page(
+        "study",
+        output.console(elsewhere=output.WIDEST),
+        f=findings,
+        rows=rows,
+        bars=["█" * round(length) for length in lengths],
+    )
 
 
 app = options.alone(study, EPILOG)

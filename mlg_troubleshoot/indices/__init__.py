@@ -3,9 +3,8 @@
 __all__ = [
     "amplification",
     "estimators",
-    "given_data",
     "index_table",
     "inputs",
-    "saltelli",
+    "sampled",
     "tensor",
 ]

@@ -22,8 +22,7 @@ class Indices:
     total_order_interval, shape (n, 2): their 95 % intervals. [1] mean, variance: moments of the
     response. [its unit, its unit squared] evaluations, failed: evaluations of the response, and
     those that gave no number: one makes the indices NaN. note: what the user should know about the
-    route taken; empty if nothing. second_order, shape (n, n): share of each pair beyond its two
-    first orders, where the route gives it. [1]
+    route taken; empty if nothing.
     """
 
     design: str
@@ -37,7 +36,6 @@ class Indices:
     evaluations: int
     failed: int
     note: str = ""
-    second_order: Array | None = None
 
     @classmethod
     def around(
@@ -47,14 +45,6 @@ class Indices:
         first_interval = _interval(*first)
         total_interval = _interval(*total)
         return cls(design, seed, first[0], first_interval, total[0], total_interval, *rest)
-
-    @property
-    def half_width(self) -> float:
-        """Largest half width of all intervals; NaN without any. [1]"""
-        widths = [
-            np.diff(i, axis=1) for i in (self.first_order_interval, self.total_order_interval)
-        ]
-        return float(np.max(np.abs(np.concatenate(widths)))) / 2.0
 
 
 @dataclass(frozen=True, slots=True)

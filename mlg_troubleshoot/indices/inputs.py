@@ -12,7 +12,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, frozen
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case, worst_of_sense
-from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.gear.model import LinkageModel
 
 Response = Callable[[Array], Array]
 
@@ -122,27 +122,3 @@ class Inputs:
 
     def on_unit_cube(self, response: Response) -> Response:
         return lambda unit: response(self.at(unit))
-
-
-def with_random_directions(model: LinkageModel, inputs: Inputs) -> Response:
-    """Displacement when every clearance takes a uniformly random direction (as Zhu and Ting do)."""
-    n = len(inputs.limits_in)
-
-    def response(unit: Array) -> Array:
-        clearance_in = inputs.at(unit[:, :n])
-        directions = 2.0 * np.pi * unit[:, n:]
-        return model.displacement(links_from(clearance_in, directions))
-
-    return response
-
-
-def joint_groups(n_joints: int) -> tuple[tuple[int, ...], ...]:
-    """Group each joint's clearance with its direction, for :func:`with_random_directions`."""
-    return tuple((j, n_joints + j) for j in range(n_joints))
-
-
-def beyond_margin(response: Response, margin_in: float) -> Response:
-    """Turn a displacement into 1 where it exceeds the margin or the linkage does not close, else
-    0.
-    """
-    return lambda variables: np.asarray(~(np.abs(response(variables)) <= margin_in), dtype=float)

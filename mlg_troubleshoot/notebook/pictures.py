@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.decision.assessment import Assessment
@@ -13,12 +12,11 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.reporting import diagnosis_figures
-from mlg_troubleshoot.reporting.figures import Style
 from mlg_troubleshoot.reporting.fleet_figures import wear_figure
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.picture import Picture
 from mlg_troubleshoot.reporting.schematic import Schematic, blank_schematic, schematic
-from mlg_troubleshoot.reporting.study_figures import BarSeries, grouped_bars
+from mlg_troubleshoot.reporting.study_figures import indices_figure
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.check import CheckResult
 from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
@@ -44,19 +42,7 @@ def _panels(drawn: Schematic) -> list[Markup]:
 
 def _indices(result: StudyFindings | IndexTable) -> list[Markup]:
     table = result.result.table if isinstance(result, StudyFindings) else result
-    joints = table.joints
-    styles: dict[str, Style] = {"first_order": "solid", "total_order": "open"}
-    series = [
-        BarSeries(
-            name.replace("_", " "),
-            np.array([getattr(joint, name) for joint in joints]),
-            style,
-            np.array([getattr(joint, f"{name}_interval") for joint in joints]),
-        )
-        for name, style in styles.items()
-    ]
-    said = "First-order and total-order index of each joint with its 95 % interval"
-    return [grouped_bars([f"#{joint.joint}" for joint in joints], series, "Indices", said)]
+    return [indices_figure(table)]
 
 
 def _residuals(

@@ -149,15 +149,8 @@ class ReplicatedIndices:
     plain: Array
     corrected: Array
     scatter: Array
-    iterations: int
     evaluations: int
     failed: int
-
-    @property
-    def shares(self) -> Array:
-        """Plain indices normalised to 1 in total, as Fig. 13c shows them, shape (n,). [1]"""
-        shares: Array = self.plain / self.plain.sum()
-        return shares
 
 
 def bias_corrected(plain: Array, n1: int) -> Array:
@@ -179,44 +172,33 @@ def replicated_first_order(
     """Estimate first-order indices (Eq. 1) with a replicated design.
 
     response: unit cube, shape (n_points, n), to values, shape (n_points,). progress: called with
-    the iterations done and their number; a KeyboardInterrupt in it ends the study with what
-      is done.
+    the iterations done and their number.
     Raises `UsageError` if the design has fewer than two repetitions or no points.
     """
-    if design.n1 < 2 or design.n2 + design.n_ccd < 2:
+    if design.n1 < 2 or design.n2 + design.n_ccd < 2 or iterations < 1:
         raise UsageError(
-            f"a replicated design of {design.n1} × ({design.n2} + {design.n_ccd}) points",
-            "It has at least two repetitions and two points in each.",
+            f"{iterations} iterations of a replicated design of {design.n1} × ({design.n2} +"
+            f" {design.n_ccd}) points",
+            "It has at least two repetitions, two points in each, and one iteration.",
         )
     ccd = central_composite(n) if design.n_ccd else None
     found: list[Array] = []
     evaluations = failed = 0
     for stream in np.random.SeedSequence(seed).spawn(iterations):
-        try:
-            rng = np.random.default_rng(stream)
-            rows = first_order_design(n, design.n1, design.n2, ccd, rng)
-            values = response(rows.points.reshape(-1, n))
-            values = values.reshape(design.n1, -1)
-            evaluations += values.size
-            failed += count_failed(values)
-            found.append(_group_shares(values, rows.places))
-            if progress is not None:
-                progress(len(found), iterations)
-        except KeyboardInterrupt:
-            break
-    unknown = np.full(n, np.nan)
-    plain = np.array(found or [unknown])
+        rng = np.random.default_rng(stream)
+        rows = first_order_design(n, design.n1, design.n2, ccd, rng)
+        values = response(rows.points.reshape(-1, n))
+        values = values.reshape(design.n1, -1)
+        evaluations += values.size
+        failed += count_failed(values)
+        found.append(_group_shares(values, rows.places))
+        if progress is not None:
+            progress(len(found), iterations)
+    plain = np.array(found)
     mean = plain.mean(axis=0)
-    scatter = plain.std(axis=0, ddof=1) if len(found) > 1 else unknown
+    scatter = plain.std(axis=0, ddof=1) if iterations > 1 else np.full(n, np.nan)
     return ReplicatedIndices(
-        design,
-        seed,
-        mean,
-        bias_corrected(mean, design.n1),
-        scatter,
-        len(found),
-        evaluations,
-        failed,
+        design, seed, mean, bias_corrected(mean, design.n1), scatter, evaluations, failed
     )
 
 

@@ -1,14 +1,12 @@
-"""The study of one gear: a design, indices of every joint, their spread over the ensemble, what
-goes with them.
-"""
+"""The study of one gear: a design, indices of every joint, and their spread over the ensemble."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +21,7 @@ from mlg_troubleshoot.indices.estimators import (
     failed_note,
     group_indices,
     student_half,
+    without_numbers,
 )
 from mlg_troubleshoot.indices.index_table import (
     IndexTable,
@@ -31,33 +30,27 @@ from mlg_troubleshoot.indices.index_table import (
     rank_ranges,
     ranks,
 )
-from mlg_troubleshoot.indices.inputs import (
-    HeldDirections,
-    Inputs,
-    Response,
-    beyond_margin,
-    joint_groups,
-    with_random_directions,
-    worst_directions,
-    worst_sense,
-)
-from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
-from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs, worst_directions, worst_sense
+from mlg_troubleshoot.indices.sampled import sampled_indices
+from mlg_troubleshoot.indices.tensor import CORNERS, TensorIndices, has_tensor, tensor_indices
 from mlg_troubleshoot.outputs import SCHEMA_VERSION
+from mlg_troubleshoot.paper.replicated import (
+    ITERATIONS,
+    PAPER_DESIGNS,
+    PaperDesign,
+    central_composite,
+    replicated_first_order,
+)
+from mlg_troubleshoot.paper.total_order import TotalOrderStudy, total_order
+from mlg_troubleshoot.parallel import StageProgress
 from mlg_troubleshoot.results import Result
-
-if TYPE_CHECKING:
-    from mlg_troubleshoot.paper.replicated import PaperDesign, ReplicatedIndices
-    from mlg_troubleshoot.paper.statements import Statement
-
-Progress = Callable[[str, int, int | None], None]
-Stages = Callable[[str], Callable[[int, int | None], None]]
 
 
 class StudyDesign(StrEnum):
-    FAST = "fast"
-    SAMPLED = "sampled"
+    """How the points are chosen; a gear with too many joints for a tensor is sampled."""
+
     TENSOR = "tensor"
+    SAMPLED = "sampled"
     LHS = "lhs"
     LHS_CCD = "lhs+ccd"
     CCD = "ccd"
@@ -67,7 +60,6 @@ class Directions(StrEnum):
     WORST = "worst"
     OVER = "over"
     UNDER = "under"
-    RANDOM = "random"
     FIXED = "fixed"
 
 
@@ -79,8 +71,6 @@ class StudyOptions(Result):
     ----------
     design : StudyDesign
         How the points are chosen.
-    accuracy : float
-        Wanted error of every index, where the design takes one. [1]
     seed : int
         Seed of all random draws.
     distribution : str
@@ -91,10 +81,6 @@ class StudyOptions(Result):
         Directions of the virtual links.
     fixed_rad : ndarray, shape (n_joints,), or None
         Directions set by a load, with ``fixed``. [rad]
-    beyond_margin : bool
-        Look at exceeding the margin instead of the displacement.
-    most : int
-        Maximum number of evaluations.
     n1, n2, iterations : int or None
         Size of a paper design in place of the paper's.
     executor : Executor or None
@@ -102,15 +88,12 @@ class StudyOptions(Result):
         Dask cluster, of Ray.
     """
 
-    design: StudyDesign = StudyDesign.FAST
-    accuracy: float = 1e-3
+    design: StudyDesign = StudyDesign.TENSOR
     seed: int = 0
     distribution: str = "uniform"
     limits_in: Array | None = None
     directions: Directions = Directions.WORST
     fixed_rad: Array | None = None
-    beyond_margin: bool = False
-    most: int = 1 << 24
     n1: int | None = None
     n2: int | None = None
     iterations: int | None = None
@@ -120,11 +103,10 @@ class StudyOptions(Result):
     def is_standard(self) -> bool:
         """True if the result is the table that goes with a gear."""
         return (
-            self.design in (StudyDesign.FAST, StudyDesign.SAMPLED, StudyDesign.TENSOR)
+            self.design in (StudyDesign.TENSOR, StudyDesign.SAMPLED)
             and self.distribution == "uniform"
             and self.limits_in is None
             and self.directions is Directions.WORST
-            and not self.beyond_margin
         )
 
 
@@ -133,11 +115,10 @@ class StudyResult(Result):
     """What a study found.
 
     table: indices of every joint with their spread over the ensemble.
-    indices: the same of the reference, with moments and notes.
+    indices: indices of the reference, with moments and notes.
     plain, shape (n_joints,): first-order indices of a paper design before its bias is removed. [1]
     groups: both ends of each link as one; empty if the design cannot tell.
     growth: amplification indices of the reference.
-    finished: false if it was interrupted: the table holds what was done.
     """
 
     table: IndexTable
@@ -145,7 +126,6 @@ class StudyResult(Result):
     plain: Array | None
     groups: tuple[GroupIndices, ...]
     growth: Amplification
-    finished: bool
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -160,17 +140,11 @@ class StudyFindings(Result):
         What was asked for.
     result : StudyResult
         Indices and amplification.
-    designs : tuple of ReplicatedIndices
-        The paper's designs; empty if they were not run.
-    statements : tuple of Statement
-        What became of the source's statements; empty if they were not checked.
     """
 
     gear: Gear
     options: StudyOptions
     result: StudyResult
-    designs: tuple[ReplicatedIndices, ...] = ()
-    statements: tuple[Statement, ...] = ()
 
 
 @dataclass(slots=True)
@@ -180,67 +154,36 @@ class _Run:
     indices: Indices
     plain: Array | None = None
     groups: tuple[GroupIndices, ...] = ()
-    finished: bool = True
 
 
-def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = None) -> StudyResult:
-    """Run a study of a gear: its reference by the chosen design, its ensemble by the fast route."""
-    if not options.accuracy > 0.0:
-        raise UsageError(
-            f"accuracy {options.accuracy}", "Give a positive number, for example 0.001."
-        )
-    inputs = _inputs(gear, options)
+def run_study(
+    gear: Gear, options: StudyOptions, progress: StageProgress = lambda _stage, _done, _total: None
+) -> StudyResult:
+    """Study the reference of a gear by the chosen design, and the other linkages of its ensemble by
+    the tensor.
+    """
+    limits = gear.limits_in if options.limits_in is None else options.limits_in
+    inputs = Inputs(limits, options.distribution)
     if len(inputs.limits_in) != len(gear.joints):
         raise UsageError(
             f"{len(inputs.limits_in)} limits for {len(gear.joints)} joints",
             "Give one per joint.",
         )
-
-    def on_stage(name: str) -> Callable[[int, int | None], None]:
-        return lambda done, total: None if progress is None else progress(name, done, total)
-
-    if options.design in (StudyDesign.LHS, StudyDesign.LHS_CCD, StudyDesign.CCD):
-        run = _paper(gear, inputs, options, on_stage)
+    if options.design in (StudyDesign.TENSOR, StudyDesign.SAMPLED):
+        run = _on_linkage(gear, inputs, options, 0)
     else:
-        run = _on_linkage(gear, inputs, options, 0, on_stage("samples"))
+        run = _paper(gear, inputs, options, progress)
     found = [run.indices]
-    advance = on_stage("ensemble")
-    finished = run.finished and "interrupted" not in run.indices.note
+    others = replace(options, design=StudyDesign.TENSOR)
     for k in range(1, len(gear.ensemble)):
-        try:
-            found.append(_on_linkage(gear, inputs, options, k).indices)
-            advance(k, len(gear.ensemble) - 1)
-        except KeyboardInterrupt:
-            finished = False
-            break
+        found.append(_on_linkage(gear, inputs, others, k).indices)
+        progress("ensemble", k, len(gear.ensemble) - 1)
     growth = amplification(gear)
     table = _table(gear, inputs, options, found, growth)
-    return StudyResult(table, run.indices, run.plain, run.groups, growth, finished)
+    return StudyResult(table, run.indices, run.plain, run.groups, growth)
 
 
-def _inputs(gear: Gear, options: StudyOptions) -> Inputs:
-    return Inputs(
-        gear.limits_in if options.limits_in is None else options.limits_in, options.distribution
-    )
-
-
-def _response(
-    gear: Gear, model: LinkageModel, inputs: Inputs, options: StudyOptions
-) -> tuple[Response, int]:
-    """Response on the unit cube and its number of variables."""
-    n = len(inputs.limits_in)
-    cube: Response
-    if options.directions is Directions.RANDOM:
-        cube = with_random_directions(model, inputs)
-        n = 2 * n
-    else:
-        cube = inputs.on_unit_cube(_held(model, inputs, options))
-    if options.beyond_margin:
-        cube = beyond_margin(cube, gear.margin.value)
-    return cube, n
-
-
-def _held(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDirections:
+def _response(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDirections:
     if options.directions is Directions.FIXED:
         if options.fixed_rad is None or len(options.fixed_rad) != len(inputs.limits_in):
             raise UsageError("directions fixed by load", "Give one direction per joint.")
@@ -252,40 +195,22 @@ def _held(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDir
     )
 
 
-def _on_linkage(
-    gear: Gear,
-    inputs: Inputs,
-    options: StudyOptions,
-    k: int,
-    on_stage: Callable[[int, int | None], None] | None = None,
-) -> _Run:
-    """Indices of linkage k of the ensemble; of the reference, which is the first, by the design
-    that was asked for.
-    """
-    cube, n = _response(gear, gear.ensemble_models[k], inputs, options)
-    seeds = np.random.SeedSequence(options.seed, spawn_key=(k,))
-    stream = np.random.default_rng(seeds)
-    accuracy = options.accuracy
-    most = options.most
-    advance = None if on_stage is None else (lambda done, _width: on_stage(done, None))
-    if options.directions is Directions.RANDOM:
-        if k:
-            accuracy = max(accuracy, 3e-3)
-            most = 1 << 20
-        sets = joint_groups(len(inputs.limits_in))
-        return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, sets, advance))
-    if options.design is StudyDesign.TENSOR:
-        tensor = tensor_indices(cube, np.ones(n))
-        coarse = None if k else tensor_indices(cube, np.ones(n), order=2)
-        return _Run(
-            _of_tensor(tensor, coarse, options.seed), groups=group_indices(gear, tensor.closed)
-        )
-    if options.design is StudyDesign.SAMPLED and not k:
-        return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, None, advance))
-    if k and options.beyond_margin:
-        most = 1 << 18
-    indices, fit = fast_indices(cube, n, stream, options.seed, accuracy, most, advance)
-    return _Run(indices, groups=() if fit is None else group_indices(gear, fit.closed))
+def _on_linkage(gear: Gear, inputs: Inputs, options: StudyOptions, k: int) -> _Run:
+    """Indices of linkage k of the ensemble; the first is the reference."""
+    cube = inputs.on_unit_cube(_response(gear.ensemble_models[k], inputs, options))
+    n = len(inputs.limits_in)
+    if options.design is StudyDesign.SAMPLED or not has_tensor(n):
+        seeds = np.random.SeedSequence(options.seed, spawn_key=(k,))
+        return _Run(sampled_indices(cube, n, np.random.default_rng(seeds), options.seed))
+    corners = tensor_indices(cube, np.ones(n), nodes=CORNERS)
+    if corners.failed:
+        # Gauss points lie inside the range, and a linkage opens at its corners first.
+        design = f"{corners.evaluations} corners of the range"
+        count = corners.evaluations
+        return _Run(without_numbers(design, options.seed, n, count, failed=corners.failed))
+    tensor = tensor_indices(cube, np.ones(n))
+    coarse = None if k else tensor_indices(cube, np.ones(n), order=2)
+    return _Run(_of_tensor(tensor, coarse, options.seed), groups=group_indices(gear, tensor.closed))
 
 
 def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -> Indices:
@@ -305,89 +230,62 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
     )
 
 
-def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, on_stage: Stages) -> _Run:
+def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, progress: StageProgress) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
-    from mlg_troubleshoot.paper.replicated import ITERATIONS, PAPER_DESIGNS, replicated_first_order
-    from mlg_troubleshoot.paper.total_order import TotalOrderStudy, total_order
-
-    if options.directions is Directions.RANDOM:
-        raise UsageError(
-            f"design {options.design} with random directions",
-            "The paper's designs keep directions fixed; use sampled.",
-        )
-    cube, n = _response(gear, gear.model, inputs, options)
+    response = _response(gear.model, inputs, options)
+    n = len(inputs.limits_in)
     design = _sized(PAPER_DESIGNS[str(options.design)], n, options)
-    n1 = design.n1
-    n2 = design.n2
     iterations = ITERATIONS if options.iterations is None else options.iterations
     found = replicated_first_order(
-        cube, n, design, options.seed, iterations, on_stage("first order")
+        inputs.on_unit_cube(response),
+        n,
+        design,
+        options.seed,
+        iterations,
+        partial(progress, "first order"),
     )
-    half = student_half(found.scatter, found.iterations)
-    total = np.full(n, np.nan)
-    spread = np.full(n, np.nan)
+    total = spread = np.full(n, np.nan)
     evaluations = found.evaluations
     failed = found.failed
-    finished = found.iterations == iterations
-    note = f"first order corrected for the bias (1 - S)/{n1}"
-    if options.design is StudyDesign.LHS and finished and not options.beyond_margin:
-        study = TotalOrderStudy(
-            _held(gear.model, inputs, options), inputs, options.seed, n1, n2, iterations
-        )
-        totals = total_order(study, options.executor, on_stage("total order"))
+    note = f"first order corrected for the bias (1 - S)/{design.n1}"
+    if options.design is StudyDesign.LHS:
+        study = TotalOrderStudy(response, inputs, options.seed, design.n1, design.n2, iterations)
+        totals = total_order(study, options.executor, partial(progress, "total order"))
         total = totals.total_order
         spread = student_half(totals.scatter, iterations)
-        evaluations = evaluations + totals.evaluations
-        failed = failed + totals.failed
+        evaluations += totals.evaluations
+        failed += totals.failed
         if totals.failed:
             note += f"; {failed_note(totals.failed, totals.evaluations)}"
-    if not finished:
-        note += "; interrupted, averages of the finished part"
     name = (
-        f"{design.name}: n1 = {n1}, n2 = {n2}, nCCD = {design.n_ccd}, mean of {found.iterations}"
-        " iterations"
+        f"{design.name}: n1 = {design.n1}, n2 = {design.n2}, nCCD = {design.n_ccd}, mean of"
+        f" {iterations} iterations"
     )
-    estimates = (found.corrected, half), (total, spread)
+    half = student_half(found.scatter, iterations)
     indices = Indices.around(
-        name, options.seed, *estimates, np.nan, np.nan, evaluations, failed, note
+        name,
+        options.seed,
+        (found.corrected, half),
+        (total, spread),
+        np.nan,
+        np.nan,
+        evaluations,
+        failed,
+        note,
     )
-    return _Run(indices, plain=found.plain, finished=finished)
+    return _Run(indices, plain=found.plain)
 
 
 def _sized(paper: PaperDesign, n: int, options: StudyOptions) -> PaperDesign:
     """Return a paper design in the size asked for, with the composite points of this number of
     variables.
     """
-    from mlg_troubleshoot.paper.replicated import central_composite
-
     return replace(
         paper,
         n1=paper.n1 if options.n1 is None else options.n1,
         n2=paper.n2 if options.n2 is None or not paper.n2 else options.n2,
         n_ccd=len(central_composite(n)) if paper.n_ccd else 0,
     )
-
-
-def compare_designs(
-    gear: Gear, options: StudyOptions, progress: Progress | None = None
-) -> tuple[ReplicatedIndices, ...]:
-    """Estimate the first-order indices of the reference with each design of the paper (Fig.
-    13c).
-    """
-    from mlg_troubleshoot.paper.replicated import ITERATIONS, PAPER_DESIGNS, replicated_first_order
-
-    if options.directions is Directions.RANDOM:
-        return ()
-    cube, n = _response(gear, gear.model, _inputs(gear, options), options)
-    iterations = ITERATIONS if options.iterations is None else options.iterations
-    found = []
-    for k, paper in enumerate(PAPER_DESIGNS.values(), start=1):
-        found.append(
-            replicated_first_order(cube, n, _sized(paper, n, options), options.seed, iterations)
-        )
-        if progress is not None:
-            progress("designs", k, len(PAPER_DESIGNS))
-    return tuple(found)
 
 
 def _table(

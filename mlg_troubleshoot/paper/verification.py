@@ -15,13 +15,11 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.indices.amplification import Amplification, amplification
 from mlg_troubleshoot.indices.inputs import HeldDirections, worst_directions
-from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.indices.tensor import CORNERS, TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.targets import Computed, Target, load_targets, targets_file
 
 # Strokes of a curve. [1]
 _CURVE = 401
-# Nodes and weights of a two-point rule: the response at no clearance and at the limit. [1]
-_CORNERS = (np.array([0, 1], float), np.array([0.5, 0.5]))
 
 
 def verify(gear: Gear, targets: Path | None = None) -> tuple[Computed, ...]:
@@ -69,7 +67,7 @@ class Facts:
         """Indices with every clearance at an end of its range: the limit of a central composite
         design.
         """
-        return tensor_indices(self.response, self.limits, nodes=_CORNERS)
+        return tensor_indices(self.response, self.limits, nodes=CORNERS)
 
     @cached_property
     def growth(self) -> Amplification:

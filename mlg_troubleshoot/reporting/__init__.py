@@ -4,7 +4,6 @@ __all__ = [
     "diagnosis_figures",
     "diagnosis_lines",
     "diagnosis_report",
-    "figures",
     "fleet_figures",
     "fleet_report",
     "formats",
@@ -18,6 +17,5 @@ __all__ = [
     "publish",
     "schematic",
     "study_figures",
-    "study_report",
     "survey_report",
 ]

@@ -6,10 +6,8 @@ from typing import Any
 
 import msgspec
 
-from mlg_troubleshoot.indices.given_data import GivenDataResult
 from mlg_troubleshoot.json_outputs import (
     StudiedAmplification,
-    StudiedStatement,
     SurveyedInspection,
     SurveyOutput,
 )
@@ -20,7 +18,7 @@ from mlg_troubleshoot.surveying.result import SurveyResult
 from mlg_troubleshoot.surveying.survey import Misfit
 
 
-def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None) -> dict[str, Any]:
+def study_as_json(findings: StudyFindings) -> dict[str, Any]:
     """Return the study as plain values, as the JSON contract has it; what is not known is null."""
     result = findings.result
     options = findings.options
@@ -29,33 +27,14 @@ def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None)
         **msgspec.to_builtins(result.table),
         "directions": str(options.directions),
         "distribution": options.distribution,
-        "of": "exceeding the margin" if options.beyond_margin else "displacement",
-        "accuracy": options.accuracy,
-        "finished": result.finished,
         "note": result.indices.note,
         "mean": result.indices.mean,
         "variance": result.indices.variance,
         "first_order_plain": result.plain,
-        "second_order": result.indices.second_order,
         "groups": result.groups,
         "ensemble": [linkage.name for linkage in findings.gear.ensemble],
         "amplification": written(StudiedAmplification, growth, exact_plunger=growth.exact),
-        "statements": [written(StudiedStatement, statement) for statement in findings.statements],
     }
-    if given is not None:
-        found = given.indices
-        lists = (found.first_order.tolist(), found.interval.tolist(), found.rows.tolist())
-        values["given_data"] = {
-            "file": given.file,
-            "rows_read": given.rows_read,
-            "rows_used": given.rows_used,
-            "joints": [
-                {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
-                for number, first, ends, rows in zip(
-                    findings.gear.joint_numbers, *lists, strict=True
-                )
-            ],
-        }
     cleaned: dict[str, Any] = plain(values)
     return cleaned
 

@@ -1,6 +1,4 @@
-"""Figures of the study report: plunger over the release, and indices side by side (counterparts of
-Figs. 12 and 13).
-"""
+"""The figure of a study: indices side by side (counterpart of Fig. 13)."""
 
 from __future__ import annotations
 
@@ -12,24 +10,10 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.figures import (
-    INK,
-    PALE,
-    RULE,
-    SOFT,
-    Axis,
-    Bar,
-    Canvas,
-    Plot,
-    Series,
-    Style,
-    draw_bar,
-)
-from mlg_troubleshoot.reporting.formats import Lengths, number
+from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.reporting.figures import SOFT, Bar, Canvas, Style, draw_bar
+from mlg_troubleshoot.reporting.formats import number
 
-# Points of a curve. [1]
-_POINTS = 81
 # Bars: height of one, the gap below it, room above all, width of the chart and its labels. [px]
 _BAR_HEIGHT = 9
 _GAP = 7
@@ -97,51 +81,18 @@ def grouped_bars(
     return canvas.svg()
 
 
-def release_curve(gear: Gear, lengths: Lengths) -> Markup:
-    """Draw the plunger over the release of the Down Lock (Fig. 12), on the reference and on the
-    other linkages.
-    """
-    share = np.linspace(0.0, 1.0, _POINTS)
-    curves = []
-    for model in gear.ensemble_models:
-        start, end = model.stroke
-        curves.append(model.plunger(start + share * (end - start)) * lengths.unit.per_inch)
-    x = tuple(share.tolist())
-    others = [
-        Series("other linkages", x, tuple(c.tolist()), colour=RULE, width=1.0) for c in curves[1:]
+def indices_figure(table: IndexTable) -> Markup:
+    """Draw first- and total-order index of each joint with their 95 % intervals (as Fig. 13a)."""
+    styles: dict[str, Style] = {"first_order": "solid", "total_order": "open"}
+    series = [
+        BarSeries(
+            name.replace("_", " "),
+            np.array([getattr(joint, name) for joint in table.joints]),
+            style,
+            np.array([getattr(joint, f"{name}_interval") for joint in table.joints]),
+        )
+        for name, style in styles.items()
     ]
-    reference = Series(f"linkage {gear.reference.name}", x, tuple(curves[0].tolist()), width=2.4)
-    canvas = Canvas(
-        _WIDTH,
-        262.0,
-        "Plunger over the release of the Down Lock, without clearance",
-        "Plunger position against the share of the release stroke, on the reference linkage and on"
-        " the others; the margin around mid-position is marked",
-    )
-    mid = float(curves[0][-1])
-    margin = gear.margin.value * lengths.unit.per_inch
-    values = [float(v) for curve in curves for v in (curve.min(), curve.max())]
-    plot = Plot(
-        canvas,
-        Axis("share of the release stroke", 0.0, 1.16),
-        Axis.around(f"plunger position, {lengths.unit}", [*values, mid + margin], 0.05),
-        top=22,
-    )
-    plot.draw_axes()
-    for one in (*others, reference):
-        plot.draw(one)
-    px, high = plot.at(1.0, mid + margin)
-    _, low = plot.at(1.0, mid - margin)
-    canvas.rectangle(
-        px,
-        high,
-        7,
-        low - high,
-        fill=PALE,
-        colour=INK,
-        width=1.2,
-    )
-    for i, text in enumerate(("margin", f"±{lengths.bare(gear.margin.value)}")):
-        canvas.text(px + 11, (high + low) / 2 + 1 + 10 * i, text, size=9)
-    plot.draw_legend([reference, others[0]] if others else [reference], plot.area[0], 8)
-    return canvas.svg()
+    description = "First-order and total-order index of each joint with its 95 % interval"
+    labels = [f"#{joint.joint}" for joint in table.joints]
+    return grouped_bars(labels, series, "Indices", description)

@@ -1,5 +1,4 @@
-"""A study and what goes with it: statements, indices of measured inspections, table,
-report.
+"""A study of the indices of a gear, and what is written of it.
 
 What computes is imported where it is needed: a check must not wait for scipy.
 """
@@ -7,12 +6,8 @@ What computes is imported where it is needed: a check must not wait for scipy.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
@@ -20,129 +15,64 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import write_index_table
 from mlg_troubleshoot.outputs import write_csv
-from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.parallel import StageProgress
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.indices.given_data import GivenDataResult
     from mlg_troubleshoot.paper.study import StudyFindings, StudyOptions
-    from mlg_troubleshoot.reporting.publish import WrittenReport
-
-from mlg_troubleshoot.units import LengthUnit
 
 
 def run_study(
     gear: Gear | str | Path = DEFAULT_GEAR,
     options: StudyOptions | None = None,
-    *,
-    statements: bool = False,
-    designs: bool = False,
-    progress: StageProgress | None = None,
+    progress: StageProgress = lambda _stage, _done, _total: None,
 ) -> StudyFindings:
-    """Recompute the sensitivity and amplification indices of a gear, and what is asked for with
-    them.
+    """Recompute the sensitivity and amplification indices of a gear.
 
     Parameters
     ----------
     gear : Gear or str or Path
         The gear, a shipped one's name, or a gear file.
     options : StudyOptions, optional
-        Design, accuracy, seed, distribution and directions; else the standard study.
-    statements : bool
-        Check the statements of the gear's source.
-    designs : bool
-        Compare the designs of the paper.
-    progress : callable, optional
+        Design, seed, distribution and directions; else the standard study.
+    progress : callable
         Called with the stage, how much of it is done, and how much there is or None.
 
     Returns
     -------
     StudyFindings
-        The study; an interrupted one has ``result.finished`` false and nothing else.
+        The study.
 
     Raises
     ------
     UsageError
-        If the options do not fit together, or statements are asked for that the gear does not have.
+        If the options do not fit together.
     """
     from mlg_troubleshoot.paper import study
-    from mlg_troubleshoot.paper.statements import check_statements
 
     known = load_gear(gear)
     wanted = options or study.StudyOptions()
-    report = progress or (lambda _stage, _done, _total: None)
-    if statements and not targets_file(known).exists():
-        raise UsageError(
-            f"{known.name} has no printed statements",
-            f"Write {targets_file(known).name} next to it.",
-        )
-    findings = study.StudyFindings(known, wanted, study.run_study(known, wanted, report))
-    if not findings.result.finished:
-        return findings
-    if designs:
-        findings = replace(findings, designs=study.compare_designs(known, wanted, report))
-    if statements:
-        found = check_statements(
-            known, progress=lambda done, total: report("statements", done, total)
-        )
-        findings = replace(findings, statements=found)
-    return findings
+    return study.StudyFindings(known, wanted, study.run_study(known, wanted, progress))
 
 
 def refuse_other_tables(options: StudyOptions) -> None:
     """Refuse a study whose result is not the table that goes with a gear, before the work."""
     if not options.is_standard:
-        raise UsageError(
-            "--write-table needs the standard study",
-            "Use design fast, sampled or tensor, without --directions, --distribution, --limit,"
-            " --beyond-margin.",
-        )
+        raise UsageError("--write-table needs the standard study", "Use design tensor or sampled.")
 
 
-def write_study_table(findings: StudyFindings) -> Path:
-    """Write the table of indices that goes with the gear; one that is not complete or not standard
-    is refused.
-    """
+def write_study_table(findings: StudyFindings) -> None:
+    """Write the table of indices that goes with the gear; another one is refused."""
     refuse_other_tables(findings.options)
-    if not findings.result.finished:
-        raise UsageError(
-            "the study was interrupted, its table is not complete", "Run it again to the end."
-        )
     write_index_table(findings.result.table, findings.gear.indices_file)
-    return findings.gear.indices_file
 
 
-def given_data_study(file: Path, gear: Gear, seed: int) -> GivenDataResult:
-    """Estimate first-order indices from the inspections of a table: no model, only what was
-    measured.
-    """
-    from mlg_troubleshoot.diagnosis import table_from_inspections
-    from mlg_troubleshoot.indices.given_data import GivenDataResult, given_data_indices
-    from mlg_troubleshoot.records import ReadOptions, read_many
+def write_study_figure(findings: StudyFindings, file: Path) -> None:
+    """Draw the indices of all joints with their intervals, as SVG."""
+    from mlg_troubleshoot.reporting.picture import Picture
+    from mlg_troubleshoot.reporting.study_figures import indices_figure
 
-    read = read_many([file], ReadOptions.of(gear))
-    measured = [each for each in read.inspections if each.measured_displacement_in is not None]
-    displacement = np.array([each.measured_displacement_in for each in measured], dtype=np.float64)
-    clearance = table_from_inspections(measured, gear).clearance_in
-    indices = given_data_indices(clearance, displacement, np.random.default_rng(seed))
-    return GivenDataResult(file.name, len(read.rows), len(measured), indices)
-
-
-def write_study_report(
-    findings: StudyFindings,
-    directory: Path,
-    page: str,
-    *,
-    unit: LengthUnit,
-) -> WrittenReport:
-    from mlg_troubleshoot.reporting.provenance import provenance_of
-    from mlg_troubleshoot.reporting.publish import publish
-    from mlg_troubleshoot.reporting.study_report import study_document
-
-    targets = targets_file(findings.gear)
-    hashes = {targets.name: sha256(targets.read_bytes()).hexdigest()} if findings.statements else {}
-    made = provenance_of(findings.gear, hashes, seed=findings.options.seed)
-    return publish(study_document(findings, made, unit), directory, page=page)
+    title = f"Sensitivity indices of {findings.gear.name}"
+    Picture.of(title, indices_figure(findings.result.table)).save(file)
 
 
 _HEADS = (

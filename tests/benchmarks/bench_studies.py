@@ -1,9 +1,9 @@
-"""Forward model and sensitivity indices beside other libraries: ``python
+"""The forward model beside other libraries: ``python
 tests/benchmarks/bench_studies.py``.
 
 Not collected by pytest. Everything runs in one process on one core in turn, so that the ratios mean
 something on a shared machine; each time is the least of several runs. A library that is not
-installed is left out and named: ``pip install numba SALib openturns pylinkage python-solvespace``.
+installed is left out and named: ``pip install numba pylinkage python-solvespace``.
 ``--full`` adds the paper-size total-order study.
 """
 
@@ -19,7 +19,6 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
@@ -30,13 +29,9 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.geometry.kernel import Kernel, numba_is_installed
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Mechanism, Output, Plane, Point, Slider
-from mlg_troubleshoot.indices.chaos import chaos_indices
 from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs, worst_directions
-from mlg_troubleshoot.indices.tensor import tensor_indices
 
 Array = NDArray[np.float64]
-ACCURACY = 1e-3
-SEEDS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,130 +221,6 @@ def _solvespace() -> tuple[float, tuple[float, float]]:
     return rate, (x, y)
 
 
-def indices(response: HeldDirections) -> list[Line]:
-    """Time to every index within the accuracy, worst of ten seeds."""
-    limits = np.asarray(response.model.joint_numbers, float) * 0.0 + 0.0075
-    cube = Inputs(limits).on_unit_cube(response)
-    exact = tensor_indices(response, limits, order=4)
-
-    def error(first: Array, total: Array) -> float:
-        return float(
-            max(np.abs(first - exact.first_order).max(), np.abs(total - exact.total_order).max())
-        )
-
-    own_errors, own_counts = [], []
-    for seed in range(SEEDS):
-        found, _ = chaos_indices(cube, 10, np.random.default_rng(seed), seed, ACCURACY)
-        own_errors.append(error(found.first_order, found.total_order))
-        own_counts.append(found.evaluations)
-    own = least(lambda: chaos_indices(cube, 10, np.random.default_rng(0), 0, ACCURACY), 50)
-    holds = max(own_errors) <= ACCURACY and max(own_counts) <= 512
-    lines = [
-        Line(
-            "indices to 1e-3, fast route",
-            f"{own * 1e3:.2f} ms, {max(own_counts)} evaluations, worst error {max(own_errors):.1g}",
-            "≤ 512, ≤ 1e-3",
-            holds,
-        )
-    ]
-    for name, peer, factor in (
-        ("OpenTURNS chaos", _openturns, 3),
-        ("scipy sobol_indices", _scipy, 300),
-        ("SALib", _salib, 1000),
-    ):
-        try:
-            needed, seconds, worst = peer(cube, error)
-        except ImportError:
-            lines.append(Line(f"indices, {name}", "not installed", "", None))
-            continue
-        ratio = seconds / own
-        text = (
-            f"{seconds * 1e3:.1f} ms, {needed} evaluations, worst error {worst:.1g}, ratio"
-            f" {ratio:.0f}"
-        )
-        lines.append(Line(f"indices, {name}", text, f"≥ {factor}", ratio >= factor))
-    return lines
-
-
-Error = Callable[[Array, Array], float]
-
-
-def _growing(
-    run: Callable[[int, int], tuple[Array, Array]], error: Error, power: int, per: int
-) -> tuple[int, float, float]:
-    """Double the points until the worst of ten seeds is within the accuracy; then time one run."""
-    while True:
-        worst = max(error(*run(power, seed)) for seed in range(SEEDS))
-        if worst <= ACCURACY or power == 17:
-            return per << power, least(partial(run, power, 0), 3), worst
-        power += 1
-
-
-def _scipy(cube: Callable[[Array], Array], error: Error) -> tuple[int, float, float]:
-    from scipy.stats import sobol_indices, uniform
-
-    def run(power: int, seed: int) -> tuple[Array, Array]:
-        found = sobol_indices(
-            func=lambda x: cube(np.ascontiguousarray(x.T)),
-            n=1 << power,
-            dists=[uniform()] * 10,
-            rng=np.random.default_rng(seed),
-        )
-        return found.first_order, found.total_order
-
-    return _growing(run, error, 7, 12)
-
-
-def _salib(cube: Callable[[Array], Array], error: Error) -> tuple[int, float, float]:
-    from SALib.analyze import sobol as analyze
-    from SALib.sample import sobol as sample
-
-    problem = {"num_vars": 10, "names": [str(i) for i in range(10)], "bounds": [[0.0, 1.0]] * 10}
-
-    def run(power: int, seed: int) -> tuple[Array, Array]:
-        points = sample.sample(problem, 1 << power, seed=seed)
-        found = analyze.analyze(problem, cube(points), seed=seed)
-        return np.asarray(found["S1"]), np.asarray(found["ST"])
-
-    return _growing(run, error, 7, 22)
-
-
-def _openturns(cube: Callable[[Array], Array], error: Error) -> tuple[int, float, float]:
-    import openturns as ot
-
-    ot.Log.Show(ot.Log.NONE)
-    inputs = ot.JointDistribution([ot.Uniform(0.0, 1.0)] * 10)
-    basis = ot.OrthogonalProductPolynomialFactory(
-        [ot.LegendreFactory()] * 10, ot.LinearEnumerateFunction(10)
-    )
-
-    def run(seed: int) -> tuple[Array, Array]:
-        ot.RandomGenerator.SetSeed(seed)
-        sample = ot.LHSExperiment(inputs, 512).generate()
-        values = cube(np.asarray(sample))
-        best = None
-        for degree in (1, 2, 3):
-            size = basis.getEnumerateFunction().getBasisSizeFromTotalDegree(degree)
-            algorithm = ot.LeastSquaresExpansion(
-                sample[:384], ot.Sample(values[:384, None]), inputs, basis, size, "QR"
-            )
-            algorithm.run()
-            result = algorithm.getResult()
-            misses = np.asarray(result.getMetaModel()(sample[384:]))[:, 0] - values[384:]
-            residual = float((misses**2).mean())
-            if best is None or residual < best[0]:
-                best = (residual, result)
-        assert best is not None
-        found = ot.FunctionalChaosSobolIndices(best[1])
-        return (
-            np.array([found.getSobolIndex(i) for i in range(10)]),
-            np.array([found.getSobolTotalIndex(i) for i in range(10)]),
-        )
-
-    worst = max(error(*run(seed)) for seed in range(3))
-    return 512, least(lambda: run(0), 5), worst
-
-
 def paper_study(response: HeldDirections) -> list[Line]:
     """The paper-size total-order study on two cores."""
     import resource
@@ -384,7 +255,7 @@ def main() -> int:
     gear = load_gear()
     response = worst_directions(gear.model, gear.limits_in)
     lines = paper_study(response) if full else []
-    lines = [*forward(response), *indices(response), *lines]
+    lines = [*forward(response), *lines]
     for line in lines:
         mark = "" if line.holds is None else ("holds" if line.holds else "MISSED")
         print(f"{line.what:45s} {line.value:62s} {line.target:14s} {mark}")

@@ -30,7 +30,7 @@ COMMANDS = {
     "gear": (("gear",), 0),
     "verify": (("gear", "verify"), 0),
     "template": (("template", "neu–1.xlsx"), 0),
-    "study": (("study", "--design", "lhs", "--n1", "2", "--n2", "20", "--iterations", "2"), 0),
+    "study": (("study", "--design", "lhs", "--size", "2,20,2"), 0),
     "history": (("history", "--store", str(STORE)), 0),
     "fleet": (("fleet", "--no-forecast", "--store", str(STORE)), 0),
     "survey template": (("gear", "survey", "template", "neu–2.csv"), 0),

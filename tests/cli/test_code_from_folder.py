@@ -43,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (MLG, "fleet"),
         (MLG, "history"),
         (MLG, "diagnose few.csv"),
-        (MLG, "study --design lhs --n1 4 --n2 60 --iterations 1 --workers 2"),
+        (MLG, "study --design lhs --size 4,60,1 --workers 2"),
         (MLG, "gear verify"),
         (MLG, "template form.pdf"),
         (MLG, "template form.xlsx"),

@@ -99,11 +99,6 @@ def test_no_file_of_a_gear_is_replaced(
     kept(mlg(*command, path, "--gear", own_gear), path, before, str(command[-1]))
 
 
-def test_a_study_does_not_replace_the_measured_table(measured: Path) -> None:
-    before = measured.read_bytes()
-    kept(mlg("study", "--given", measured, "--csv", measured), measured, before, "--csv")
-
-
 def test_a_study_may_write_its_table_again_but_not_over_the_gear(own_gear: Path) -> None:
     text = own_gear.read_text(encoding="utf-8").replace(
         '"hawker-800xp-indices.json"', '"mine.toml"'

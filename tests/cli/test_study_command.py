@@ -1,62 +1,65 @@
-"""``mlg study`` as a command: its report, indices from measured data, and what it refuses before it
-works.
-"""
+"""``mlg study`` as a command: what it writes, and what it refuses before it works."""
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
+from typer.main import get_command
 
-from .conftest import FAILURE, mlg
+from mlg_troubleshoot.cli.study import app
+from mlg_troubleshoot.reporting.formats import MINUS
 
-MEASURED = Path(__file__).parents[2] / "inspection_data" / "measured_pressure.csv"
-SMALL = ("--n1", "10", "--n2", "50", "--iterations", "2")
-
-
-def test_a_report_is_written_as_html_and_pdf(tmp_path: Path) -> None:
-    run = mlg("study", *SMALL, "--report", tmp_path / "out")
-    assert run.code == 0, run.err
-    assert sorted(path.suffix for path in (tmp_path / "out").iterdir()) == [".html", ".pdf"]
-    assert run.err.count("Report: ") == 2
+from .conftest import mlg
 
 
-def test_a_report_does_not_change_what_stdout_says(tmp_path: Path) -> None:
-    assert mlg("study", *SMALL, "--report", tmp_path).out == mlg("study", *SMALL).out
+def test_it_has_ten_options() -> None:
+    assert len(get_command(app).params) == 10
 
 
-def test_an_unknown_paper_is_refused_before_the_study(tmp_path: Path) -> None:
-    run = mlg("study", "--report", tmp_path, "--page", "A5")
+def test_the_figure_is_an_svg_with_every_joint(tmp_path: Path) -> None:
+    file = tmp_path / "study.svg"
+    assert mlg("study", "--figure", file).code == 0
+    texts = [each.text for each in ET.parse(file).iter() if each.tag.endswith("text")]
+    assert {f"#{joint}" for joint in range(1, 11)} <= set(texts)
+
+
+def test_a_figure_that_exists_is_replaced_by_force_only(tmp_path: Path) -> None:
+    file = tmp_path / "study.svg"
+    file.write_text("mine", encoding="utf-8")
+    assert mlg("study", "--figure", file).code == 2
+    assert file.read_text(encoding="utf-8") == "mine"
+    assert mlg("study", "--figure", file, "--force").code == 0
+
+
+def test_screen_json_and_csv_give_the_same_indices(tmp_path: Path) -> None:
+    file = tmp_path / "study.csv"
+    small = ("study", "--design", "lhs", "--size", "10,50,2", "--workers", "1")
+    found = mlg(*small, "--json").json["joints"]
+    shown = mlg(*small, "--csv", file).out
+    with file.open(encoding="utf-8-sig", newline="") as text:
+        rows = list(csv.DictReader(text))
+    for joint, row in zip(found, rows, strict=True):
+        assert float(row["first_order"]) == pytest.approx(joint["first_order"], rel=1e-5)
+        assert f"{joint['first_order']:.4f}".replace("-", MINUS) in shown
+
+
+@pytest.mark.parametrize("size", ["10", "10,50", "ten,50,2", "1,50,2", "10,50,0"])
+def test_a_size_that_is_not_one_of_a_design_is_refused(size: str) -> None:
+    assert mlg("study", "--design", "lhs", "--size", size).code == 2
+
+
+def test_the_table_of_a_gear_is_not_written_from_a_design_of_the_paper() -> None:
+    run = mlg("study", "--design", "lhs", "--write-table", "--force")
     assert run.code == 2
-    assert "A4" in run.err
-    assert "Letter" in run.err
+    assert "standard study" in run.err
 
 
-def test_directions_set_by_a_load_are_read_in_degrees() -> None:
-    def moved(degrees: str) -> list[float]:
-        found = mlg("study", *SMALL, "--fixed", ",".join([degrees] * 10), "--json").json
-        return [joint["first_order"] for joint in found["joints"]]
-
-    assert moved("360") == pytest.approx(moved("0"))
-    assert moved("90") != pytest.approx(moved("0"))
-
-
-@pytest.mark.parametrize("degrees", ["0,ninety", "0,90"])
-def test_directions_that_are_not_numbers_or_too_few_are_refused(degrees: str) -> None:
-    run = mlg("study", *SMALL, "--fixed", degrees)
-    assert run.code == 2
-    assert "per joint" in run.err
-
-
-def test_indices_of_measured_inspections_stand_beside_the_study() -> None:
-    given = mlg("study", "--given", MEASURED, "--json").json["given_data"]
-    assert (given["rows_read"], given["rows_used"]) == (200, 199)
-    for joint in given["joints"]:
-        low, high = joint["first_order_interval"]
-        assert low < joint["first_order"] < high
-
-
-def test_a_table_without_measured_displacements_is_refused() -> None:
-    run = mlg("study", "--given", FAILURE)
-    assert run.code != 0
-    assert "Indices from data need at least 20." in run.err
+def test_the_statements_of_the_paper_stand_in_gear_verify() -> None:
+    run = mlg("gear", "verify")
+    assert "near the input" in run.out
+    statements = mlg("gear", "verify", "--json").json["statements"]
+    assert len(statements) == 10
+    assert {statement["outcome"] for statement in statements} >= {"holds", "does not hold"}

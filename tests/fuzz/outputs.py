@@ -14,7 +14,7 @@ from tests.fuzz.desk import DATA, STORE, Desk
 
 SURVEY = str(DATA.parent / "tests" / "studies" / "data" / "four-bar-survey.csv")
 FOUR_BAR = str(DATA.parent / "tests" / "geometry" / "data" / "four-bar.toml")
-SMALL = ["study", "--design", "lhs", "--n1", "2", "--n2", "20", "--iterations", "1", "-q"]
+SMALL = ["study", "--design", "lhs", "--size", "2,20,1"]
 
 
 @dataclass(frozen=True)

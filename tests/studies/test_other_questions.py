@@ -1,16 +1,15 @@
-"""Distributions, margin, groups, given data, statements."""
+"""Distributions, groups, statements."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.errors import InconclusiveDataError, UsageError
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.estimators import group_indices
-from mlg_troubleshoot.indices.given_data import given_data_indices
-from mlg_troubleshoot.indices.inputs import DISTRIBUTIONS, HeldDirections, Inputs, beyond_margin
+from mlg_troubleshoot.indices.inputs import DISTRIBUTIONS, HeldDirections, Inputs
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.statements import ClaimOutcome, Statement, check_statements
 
@@ -31,11 +30,6 @@ def test_an_unknown_distribution_and_a_limit_of_zero_are_refused() -> None:
         Inputs(np.array([0.01]), "normal")
     with pytest.raises(UsageError):
         Inputs(np.array([0.0]))
-
-
-def test_a_gear_that_does_not_close_counts_as_beyond_the_margin() -> None:
-    exceeds = beyond_margin(lambda x: x[:, 0], 0.03)
-    assert exceeds(np.array([[0.02], [0.04], [np.nan], [-0.04]])).tolist() == [0.0, 1.0, 1.0, 1.0]
 
 
 def test_the_groups_are_the_links_of_the_linkage(gear: Gear) -> None:
@@ -73,41 +67,6 @@ def test_directions_found_anew_for_every_sample_change_the_displacement_by_less_
     clearance = gear.limits_in * np.random.default_rng(0).random((500, 10))
     anew = worst_case(gear.model, clearance).magnitude_in
     assert np.abs(anew - response(clearance)).max() < 1e-5
-
-
-def test_given_data_find_the_indices_of_many_inspections(
-    gear: Gear, response: HeldDirections
-) -> None:
-    rng = np.random.default_rng(0)
-    clearance = gear.limits_in * rng.random((4000, 10))
-    found = given_data_indices(clearance, response(clearance), rng, resamples=200)
-    exact = tensor_indices(response, gear.limits_in).first_order
-    assert np.all((found.interval[:, 0] - 0.01 <= exact) & (exact <= found.interval[:, 1] + 0.01))
-    assert found.first_order == pytest.approx(exact, abs=0.04)
-
-
-def test_given_data_give_no_share_to_a_joint_without_effect() -> None:
-    rng = np.random.default_rng(1)
-    x = rng.random((60, 2))
-    shares = [
-        given_data_indices(rng.random((60, 2)), x[:, 0], rng, 20).first_order for _ in range(40)
-    ]
-    assert abs(float(np.mean(shares))) < 0.02
-
-
-def test_an_unmeasured_joint_is_not_imputed() -> None:
-    rng = np.random.default_rng(0)
-    x = rng.random((50, 2))
-    x[:35, 1] = np.nan
-    found = given_data_indices(x, x[:, 0], rng, 50)
-    assert np.isfinite(found.first_order[0])
-    assert np.isnan(found.first_order[1])
-    assert found.rows.tolist() == [50, 15]
-
-
-def test_a_handful_of_inspections_is_refused() -> None:
-    with pytest.raises(InconclusiveDataError, match="12 inspections"):
-        given_data_indices(np.ones((12, 3)), np.ones(12), np.random.default_rng(0))
 
 
 @pytest.fixture(scope="module")

@@ -74,16 +74,6 @@ def test_a_seed_gives_the_same_bits_again(on_cube: Response) -> None:
     assert not np.array_equal(runs[0], runs[2])
 
 
-def test_an_interruption_leaves_the_iterations_done(on_cube: Response) -> None:
-    def stop(done: int, _total: int) -> None:
-        if done == 2:
-            raise KeyboardInterrupt
-
-    found = replicated_first_order(on_cube, 10, PaperDesign("lhs", 5, 50, 0), 0, 10, stop)
-    assert found.iterations == 2
-    assert np.all(np.isfinite(found.plain))
-
-
 def test_a_failed_sample_is_counted_and_shown(on_cube: Response) -> None:
     def failing(unit: np.ndarray) -> np.ndarray:
         return np.where(unit[:, 0] > 0.98, np.nan, on_cube(unit))
@@ -96,3 +86,5 @@ def test_a_failed_sample_is_counted_and_shown(on_cube: Response) -> None:
 def test_a_design_without_repetition_is_refused(on_cube: Response) -> None:
     with pytest.raises(UsageError):
         replicated_first_order(on_cube, 10, PaperDesign("lhs", 1, 100, 0), 0)
+    with pytest.raises(UsageError, match="0 iterations"):
+        replicated_first_order(on_cube, 10, PaperDesign("lhs", 2, 100, 0), 0, iterations=0)
