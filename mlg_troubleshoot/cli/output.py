@@ -11,7 +11,6 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from mlg_troubleshoot.errors import ExitCode, OutputError
+from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.units import LengthUnit, said_in
 from mlg_troubleshoot.visible import visible
 
@@ -66,17 +65,8 @@ def to_ascii(text: str) -> str:
 def prepare_streams() -> None:
     """Let stdout and stderr degrade to what they can show; no character ends a run.
 
-    Python turns a C locale into UTF-8 for itself, so for a terminal the locale is asked. A stream
-    that is closed is opened on nothing, so that no other file takes its number; without stdout the
-    run ends.
+    Python turns a C locale into UTF-8 for itself, so for a terminal the locale is asked.
     """
-    closed = [name for name in ("stdin", "stdout", "stderr") if getattr(sys, name) is None]
-    for name in closed:
-        place = os.open(os.devnull, os.O_RDONLY if name == "stdin" else os.O_WRONLY)
-        setattr(sys, name, os.fdopen(place, "r" if name == "stdin" else "w"))
-    if "stdout" in closed:
-        say("Error: standard output is closed.\nWhat to do: Send it to a file or another program.")
-        raise SystemExit(ExitCode.NOT_WRITTEN)
     codecs.register_error(_PLAIN, _shown_instead)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -266,9 +256,7 @@ def joint(number: int | None) -> str:
 
 
 def say(message: str) -> None:
-    """Write a message to stderr; one that cannot be written changes no result."""
-    with suppress(OSError):
-        print(visible(message), file=sys.stderr, flush=True)
+    print(visible(message), file=sys.stderr, flush=True)
 
 
 def say_written(written: Iterable[WrittenReport], *, quiet: bool = False) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -87,7 +88,9 @@ def _scene(
         np.nan_to_num(read - scene.over_in),
         *small_trends(table),
     )
-    return scene, rows
+    misfit = scene.expected_in
+    noise = build_noise(misfit, rows) if np.isfinite(misfit).all() else None
+    return replace(scene, noise=noise), rows
 
 
 def scene_at(

@@ -14,5 +14,6 @@ __all__ = [
     "posterior",
     "simulation",
     "simulation_result",
+    "steps",
     "verdict",
 ]

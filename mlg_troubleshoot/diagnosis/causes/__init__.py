@@ -10,6 +10,11 @@ from traceback import walk_tb
 
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip
+from mlg_troubleshoot.diagnosis.causes.gradual import (
+    GaugeDrift,
+    Modification,
+    TechnicianLearning,
+)
 from mlg_troubleshoot.diagnosis.causes.linkage import (
     CalibrationRate,
     DirectionNotWorstCase,
@@ -24,7 +29,6 @@ from mlg_troubleshoot.diagnosis.causes.reading import (
     ApproachHysteresis,
     DateStep,
     GaugeBias,
-    Modification,
     RiggingOffset,
     SideDifference,
     TechnicianBias,
@@ -53,6 +57,8 @@ CATALOGUE = Catalogue(
         DateStep(),
         GaugeBias(),
         TechnicianBias(),
+        GaugeDrift(),
+        TechnicianLearning(),
         Modification(),
         SideDifference(),
         CalibrationRate(),
