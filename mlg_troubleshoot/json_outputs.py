@@ -6,7 +6,7 @@ The order of the keys is that of the output. Records that are written whole are 
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NotRequired, TypedDict
+from typing import Annotated, Literal, NotRequired, TypedDict
 
 from msgspec import Meta
 
@@ -491,7 +491,7 @@ class FleetOutput(TypedDict):
 class LifeEvent(TypedDict):
     """One record of a gear, in the order of the chain; further keys by its kind."""
 
-    kind: Literal["inspection", "assessment", "repair", "rerig", "correction", "void", "outcome"]
+    kind: Literal["inspection", "repair", "rerig", "correction", "void", "outcome"]
     record_id: str | None
     date: str | None
     gear_landings: float | None
@@ -499,12 +499,11 @@ class LifeEvent(TypedDict):
     verdict: NotRequired[Verdict | None]
     predicted_displacement_in: NotRequired[float | None]
     margin_in: NotRequired[float | None]
-    program_version: NotRequired[str | None]
-    geometry_sha256: NotRequired[Sha256 | None]
-    extension: NotRequired[Any]
     counts: NotRequired[bool]
     supersedes: NotRequired[Sha256 | None]
     clearance_in: NotRequired[dict[str, float]]
+    at: NotRequired[str]
+    stated_by: NotRequired[str]
     work_order: NotRequired[str | None]
     joints: NotRequired[list[JointNumber]]
     voids: NotRequired[Sha256]

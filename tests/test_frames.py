@@ -351,7 +351,7 @@ def test_a_store_gives_what_it_keeps_as_tables(tmp_path: Path) -> None:
     store = mlg.Store(tmp_path / "store.sqlite")
     options = mlg.CheckOptions(advice=False)
     checked = mlg.check_files([DATA / "fleet_batch.csv"], options)
-    keep(checked, options, store)
+    keep(checked, store)
     kept = store.inspections()
     assert set(kept["record_id"]) == set(checked.to_frame()["record_id"])
     gears = checked.to_frame()[["tail_no", "side"]].drop_duplicates()

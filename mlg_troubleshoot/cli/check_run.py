@@ -20,7 +20,7 @@ from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
 from mlg_troubleshoot.decision.columns import RECORD_ID, SIDE
-from mlg_troubleshoot.decision.inspection import RowSource, Side
+from mlg_troubleshoot.decision.inspection import Inspection, RowSource, Side
 from mlg_troubleshoot.decision.ranking import Listed, listed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.json_form import CheckText
     from mlg_troubleshoot.store import Record
-    from mlg_troubleshoot.workflows.keep import JudgedEntry
 
 # Where the prompts write a report that was not asked for by a flag.
 _ASKED_FOR = Path("report")
@@ -49,7 +48,7 @@ class _Gathered:
 
     lines: list[Listed] = field(default_factory=list)
     held: list[Judgement] = field(default_factory=list)
-    entries: list[JudgedEntry] = field(default_factory=list)
+    entries: list[Inspection] = field(default_factory=list)
     annotated: dict[RowSource, task.Annotated] = field(default_factory=dict)
     text: CheckText | None = None
 
@@ -174,10 +173,9 @@ class Run:
         if wanted.annotate is not None:
             outputs.append(task.BlockOutput(task.annotated, found.annotated.update))
         if self._place is not None:
-            from mlg_troubleshoot.workflows.keep import entries, judged_by
+            from mlg_troubleshoot.workflows.keep import inspections_of
 
-            made = partial(entries, judged_by(read.gear, self._asked))
-            outputs.append(task.BlockOutput(made, found.entries.extend))
+            outputs.append(task.BlockOutput(inspections_of, found.entries.extend))
         if total <= _FEW or wanted.report is not None:
             outputs.append(task.BlockOutput(tuple, found.held.extend))
         return outputs
@@ -299,7 +297,8 @@ class Run:
         if self._place is not None:
             from mlg_troubleshoot.life.looking_back import seen_before
 
-            before = seen_before(result.judgements, self._place)
+            table = load_index_table(result.gear)
+            before = seen_before(result.judgements, self._place, result.gear, table)
         formats = tuple(
             str(f)
             for f in self._wanted.formats or (options.ReportFormat.HTML, options.ReportFormat.PDF)
@@ -324,7 +323,7 @@ class Run:
         self,
         result: task.CheckResult,
         before: Record | None = None,
-        judged: Sequence[JudgedEntry] | None = None,
+        judged: Sequence[Inspection] | None = None,
     ) -> None:
         """Add what was found to the store; what continues a kept inspection takes its place."""
         if self._place is None:
@@ -334,7 +333,7 @@ class Run:
 
         if before is not None:
             if not is_same(before, result):
-                supersede(self._place, before, result, self._asked)
+                supersede(self._place, before, result)
             warnings = warnings_of(self._place, [(before.tail_no, before.side)])
             added = Kept(1, 0, tuple(warnings))
         else:
@@ -342,7 +341,6 @@ class Run:
                 progress = partial(bar, "Keeping")
                 added = keep(
                     result,
-                    self._asked,
                     self._place,
                     self._same_tail(),
                     progress,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -57,7 +56,6 @@ def fleet(
     """
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.life.folding import lives_of
     from mlg_troubleshoot.life.landings_left import Order
     from mlg_troubleshoot.life.unrecorded_work import suggestions
     from mlg_troubleshoot.reporting.life_json import fleet_as_json
@@ -75,11 +73,8 @@ def fleet(
         )
         order = Order(sort)
         found = everything.chosen(tail, only or (), order)
-        bar("Comparing the last inspections", 0, None)
-        read = partial(lives_of, records.kept)
-        compared = () if shown.quiet else found.lines
-        noted = suggestions(compared, found.forecasts, read, found.model, known)
-    for line in noted:
+    compared = () if shown.quiet else [line.key for line in found.lines]
+    for line in suggestions(compared, found.forecasts):
         output.say(f"Note: {line}")
     if shown.as_json:
         output.write_json(fleet_as_json(found.lines, found.forecasts, order))

@@ -243,7 +243,6 @@ def _show_joints(
     ahead: Forecast,
     gear: Gear,
 ) -> None:
-    from mlg_troubleshoot.cli.views.wear import wear_lines
     from mlg_troubleshoot.decision.sentences import joint_list
     from mlg_troubleshoot.life.landings_left import span
     from mlg_troubleshoot.life.wear_paths import stretches
@@ -270,8 +269,6 @@ def _show_joints(
         )
     if rows:
         output.print_table(console, headings, rows, ())
-    for each in wear_lines(life, ahead, gear, console.width):
-        console.print(each)
     ever = {n for kept in life.inspections for n in kept.inspection.clearance_in}
     since = stretches(life, gear.joint_numbers)
     unread = [n for n, of in since.items() if not of[-1].readings]
@@ -292,11 +289,6 @@ def _what(event: dict[str, Any], unit: LengthUnit) -> str:
     from mlg_troubleshoot.decision.sentences import joint_list
 
     match event["kind"]:
-        case "assessment":
-            found = event["predicted_displacement_in"]
-            # It is zero only where no joint has play, or none was read.
-            worst = f", worst case {Length(found).said_in(unit)}" if found else ""
-            return str(event["verdict"]).replace("_", " ") + worst
         case "repair":
             return f"restored {joint_list(event['joints'])}"
         case "void":
@@ -306,6 +298,11 @@ def _what(event: dict[str, Any], unit: LengthUnit) -> str:
             return f"found: {event['found']}{joint}"
         case "inspection" if not event["counts"]:
             return "inspection (corrected or void)"
+        case "inspection" | "correction" if event.get("verdict"):
+            found = event["predicted_displacement_in"]
+            # It is zero only where no joint has play, or none was read.
+            worst = f", worst case {Length(found).said_in(unit)}" if found else ""
+            return f"{event['kind']}: {event['verdict'].replace('_', ' ')}{worst}"
         case kind:
             return "re-rigged" if kind == "rerig" else str(kind)
 
@@ -398,7 +395,7 @@ def correct(
     place = records.kept
     wrong, result = keep.row_of(place, record, result)
     notes.show_problems(result.problems)
-    added = keep.correct(place, wrong, result, asked)
+    added = keep.correct(place, wrong, result)
     _say_added(place, f"correction of {record} ({added.tail_no} {added.side})", added)
 
 

@@ -112,10 +112,18 @@ class Cases:
 
     @property
     def off_down_lock(self) -> Mask:
-        """Gears whose plunger was measured out of its position at Down Lock."""
+        """Gears whose plunger was measured out of its position at Down Lock, and whose rigging was
+        not corrected since.
+        """
         low, high = self.gear.down_lock_range
-        stated = [i.plunger_down_lock_in for i in self.inspections]
-        return np.array([at is not None and not low <= at <= high for at in stated])
+        corrected = RiggingCheck.CORRECTED
+        return np.array(
+            [
+                at is not None and not low <= at <= high and i.rigging_checked is not corrected
+                for i in self.inspections
+                for at in (i.plunger_down_lock_in,)
+            ]
+        )
 
     @property
     def critical_missing(self) -> Mask:

@@ -151,8 +151,9 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
         verdict(float(low), float(high), critical_missing=bool(missing))
         for low, high, missing in zip(p_lower, p_upper, absent, strict=True)
     ]
-    # A reading that may be beyond the margin keeps a gear from being cleared; it clears none.
-    unsettled = plunger.unsettled & np.array([v is Verdict.WITHIN_MARGIN for v in predicted])
+    # A reading that may be beyond the margin, or off at Down Lock, keeps a gear from being cleared.
+    unsettled = plunger.unsettled | cases.off_down_lock
+    unsettled &= np.array([v is Verdict.WITHIN_MARGIN for v in predicted])
     verdicts = [
         Verdict.OUTSIDE_MARGIN if beyond else Verdict.INCONCLUSIVE if open_ else found
         for beyond, open_, found in zip(plunger.beyond, unsettled, predicted, strict=True)
@@ -350,7 +351,9 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
             repaired=cases.inspections[i].is_repaired,
         )
     return (
-        sentences.plunger_unsettled(mean, float(cases.plunger_u_in[i]), margin)
+        sentences.OFF_DOWN_LOCK
+        if judged.unsettled[i] and cases.off_down_lock[i]
+        else sentences.plunger_unsettled(mean, float(cases.plunger_u_in[i]), margin)
         if judged.unsettled[i]
         else sentences.inconclusive(margin, said, float(judged.p_within[i]))
     )
@@ -396,16 +399,7 @@ def _warnings(
         warnings.append(sentences.LIMITS_WRITTEN)
     elif len(read) >= sentences.LEAST_ALIKE and len(set(read)) == 1 and read[0] > 0.0:
         warnings.append(sentences.one_value(read[0]))
-    low, high = gear.down_lock_range
-    if inspection.plunger_down_lock_in is not None and cases.off_down_lock[i]:
-        warnings.append(
-            Sentence.of(
-                "Plunger at Down Lock {} is outside {} to {}: check the rigging first.",
-                Length(inspection.plunger_down_lock_in),
-                Length(low, 2, named=False),
-                Length(high, 2),
-            )
-        )
+    warnings += _down_lock(cases, i)
     if not np.all(np.isfinite(worst_in)):
         warnings.append(
             "With these clearances the linkage does not close in every direction: check the"
@@ -438,6 +432,21 @@ def _warnings(
         over = [f.joint for f in findings if f.over_limit]
         warnings += sentences.older_than_the_repair(inspection, over)
     return tuple(warnings)
+
+
+def _down_lock(cases: Cases, i: int) -> list[str]:
+    at = cases.inspections[i].plunger_down_lock_in
+    if at is None or not cases.off_down_lock[i]:
+        return []
+    low, high = cases.gear.down_lock_range
+    return [
+        Sentence.of(
+            "Plunger at Down Lock {} is outside {} to {}: check the rigging first.",
+            Length(at),
+            Length(low, 2, named=False),
+            Length(high, 2),
+        )
+    ]
 
 
 def allowances(cases: Cases, lower: Prediction) -> Array:

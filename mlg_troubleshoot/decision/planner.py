@@ -76,7 +76,8 @@ class Judged:
     u_in : ndarray, shape (n,)
         Uncertainty of the worst case against the margin. [in]
     unsettled : ndarray of bool, shape (n,)
-        Gears that only a plunger reading at the edge of the margin keeps from being within it.
+        Gears that only a plunger reading at the edge of the margin, or off at Down Lock, keeps from
+        being within it.
     joints_done : ndarray of bool, shape (n,)
         Gears that retracted, with every joint read and none over its limit.
     """
@@ -201,8 +202,7 @@ class _PlanBuilder:
 
     def _course(self) -> Plan:
         i = self.row
-        corrected = self.inspection.rigging_checked is RiggingCheck.CORRECTED
-        if self.cases.off_down_lock[i] and not corrected:
+        if self.cases.off_down_lock[i]:
             self._check_rigging(again=True)
         if self.cases.failed[i]:
             return self._failed()
@@ -214,6 +214,8 @@ class _PlanBuilder:
     def _without_complaint(self) -> Plan:
         i = self.row
         if self.judged.unsettled[i]:
+            if self.cases.off_down_lock[i]:
+                return self._restore_over_limit()._end(End.NOT_EXPLAINED)
             if self._again():
                 self._read_the_plunger(again=True)
             return self._restore_over_limit()._end(End.TOO_CLOSE)

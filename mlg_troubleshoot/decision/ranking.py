@@ -20,7 +20,7 @@ from mlg_troubleshoot.indices.index_table import IndexTable
 # 90 % intervals. [1]
 _SURELY = 1.645
 # Where one of these comes next a gear is not done with, whatever its joints predict.
-_OPEN = (Action.CHECK_RIGGING, Action.READ_PLUNGER, Action.RETRACT)
+_OPEN = (Action.READ_PLUNGER, Action.RETRACT)
 WORST_FIRST = (
     *(Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE, Verdict.INCOMPLETE),
     *(Verdict.INVALID, Verdict.WITHIN_MARGIN),

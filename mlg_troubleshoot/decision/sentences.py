@@ -51,6 +51,10 @@ GO_ON = {
 }
 
 
+OFF_DOWN_LOCK = (
+    "The plunger is out of its position at Down Lock: what is predicted does not hold before the"
+    " rigging is checked."
+)
 ALL_WITHIN_LIMITS = "Every joint was measured and is within its limit."
 FAILED_BUT_WITHIN = (
     "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."

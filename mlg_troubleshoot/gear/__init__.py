@@ -8,7 +8,6 @@ __all__ = [
     "gauges",
     "gear",
     "gear_file",
-    "gear_tables",
     "model",
 ]
 

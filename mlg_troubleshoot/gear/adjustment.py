@@ -46,7 +46,9 @@ class Adjustment:
 
     def numbers(self, model: LinkageModel) -> dict[str, Array]:
         """New values of the changed numbers of one linkage, by name, shape (n,). [in, rad or 1]"""
-        nominal = model.kernel.numbers()
+        nominal = dict(
+            zip(model.kernel.parameter_names, model.kernel.parameters.tolist(), strict=True)
+        )
         return {
             name: (
                 nominal[name] * np.asarray(self.scaled.get(name, 1.0))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import date, datetime
 from functools import cached_property, lru_cache
 from math import inf
-from typing import Any
 
-from mlg_troubleshoot.decision.inspection import Inspection, Side, plain_tail
+from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.inspection import Inspection, Side, plain_tail, surely_later
+from mlg_troubleshoot.decision.plan import Plan
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order, overhauls
@@ -34,35 +36,15 @@ def _inspection_of(record: Record, _judge: Judge | None) -> Inspection:
     return inspection_from(record)
 
 
-@lru_cache(_UNPACKED)
-def _result_of(assessed: Record, _judge: Judge | None) -> Mapping[str, Any]:
-    result: Mapping[str, Any] = assessed.body["result"]
-    return result
-
-
 @dataclass(frozen=True, slots=True)
 class KeptInspection:
-    """An inspection as it stands after corrections, with its last assessment; unpacked when it is
-    asked for.
-    """
+    """An inspection as it stands after corrections, unpacked when it is asked for."""
 
     record: Record
-    assessed: Record | None = None
 
     @property
     def inspection(self) -> Inspection:
         return _inspection_of(self.record, self.record.judge)
-
-    @property
-    def result(self) -> Mapping[str, Any]:
-        """What the check said, in the form of its JSON; empty if it was never judged."""
-        return {} if self.assessed is None else _result_of(self.assessed, self.assessed.judge)
-
-    @property
-    def worst_joint(self) -> int | None:
-        """The joint to look at first."""
-        joints = self.result.get("joints", ())
-        return next((joint["joint"] for joint in joints if joint["rank"] == 1), None)
 
     @property
     def moment(self) -> Moment:
@@ -70,6 +52,22 @@ class KeptInspection:
 
 
 Event = KeptInspection | Record
+
+
+@dataclass(frozen=True, slots=True)
+class TodaysVerdict:
+    """What a check says of one kept inspection; the worse of two has the greater `severity`.
+
+    worst_joint: the joint to look at first.
+    """
+
+    verdict: Verdict
+    predicted_displacement_in: float | None
+    margin_in: float
+    worst_joint: int
+    plan: Plan
+    in_brief: str
+    severity: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -81,6 +79,8 @@ class GearLife:
     them nothing is forecast.
     overhauls: events from which landings begin anew, by their place, with the joints that were
     restored there.
+    judged, standing: what is said of inspections as they were found, and of those that may be the
+    last one since the repairs, by their hash; empty until they are judged.
     """
 
     key: GearKey
@@ -89,6 +89,8 @@ class GearLife:
     outcomes: tuple[Record, ...]
     warnings: tuple[str, ...]
     overhauls: Mapping[int, frozenset[int]] = field(default_factory=dict)
+    judged: Mapping[str, TodaysVerdict] = field(default_factory=dict)
+    standing: Mapping[str, TodaysVerdict] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -115,6 +117,48 @@ class GearLife:
     @property
     def latest(self) -> KeptInspection | None:
         return self.inspections[-1] if self.inspections else None
+
+    @property
+    def newest(self) -> tuple[KeptInspection, ...]:
+        """The inspections that may be the last one, as far as days, landings and the order of what
+        was entered by hand say.
+        """
+        newest = max((kept.record.day for kept in self.inspections), default="")
+        return tuple(kept for kept in self.inspections if self._may_be_last(kept, newest))
+
+    def _may_be_last(self, kept: KeptInspection, newest: str) -> bool:
+        last = self.inspections[-1]
+        if kept is last:
+            return True
+        if not kept.record.day:
+            # Nobody can say that an inspection without a date is an earlier one, unless a repair
+            # was entered after it; rows of a table are in no order.
+            entered = [r.seq for r in self.repairs if "stated_by" not in r.body]
+            return kept.record.seq > max(entered, default=-1)
+        if not last.record.day:
+            return kept.record.day == newest and not self.is_repaired_since(kept)
+        landings = kept.inspection.gear_landings, last.inspection.gear_landings
+        ordered = None not in landings and landings[0] != landings[1]
+        by_hand = kept.inspection.source.file is last.inspection.source.file is None
+        return kept.record.day == last.record.day and not ordered and not by_hand
+
+    def is_repaired_since(self, kept: KeptInspection) -> bool:
+        """Whether a repair is surely later, also than the one that the inspection states."""
+        row = kept.inspection
+        days = (row.inspection_date, *((row.repair_date,) if row.is_repaired else ()))
+        return any(
+            all(surely_later(moment_of_repair(record), day) for day in days)
+            for record in self.repairs
+        )
+
+    @property
+    def worst(self) -> tuple[KeptInspection, TodaysVerdict] | None:
+        """Of the inspections that may be the last one the worst; None until they are judged."""
+        known = [kept for kept in self.newest if kept.record.digest in self.standing]
+        if not known:
+            return None
+        worst = max(known, key=lambda kept: self.standing[kept.record.digest].severity)
+        return worst, self.standing[worst.record.digest]
 
     def versions(self, last: Record) -> list[Record]:
         """An inspection from its first entry to the given one."""
@@ -210,6 +254,14 @@ def find(store: Store, record_id: str) -> Record:
     )
 
 
+def moment_of_repair(record: Record) -> date | None:
+    """When a kept repair was done, with its time where the inspection that states it has one."""
+    try:
+        return datetime.fromisoformat(record.body["at"])
+    except (KeyError, TypeError, ValueError):
+        return date.fromisoformat(record.day) if record.day else None
+
+
 def is_readable(record: Record) -> bool:
     try:
         return bool(record.body)
@@ -233,19 +285,7 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
             gone = record.body["voids"]
             kept = {k: s for k, s in kept.items() if gone not in (k, s.record.digest)}
             others.pop(gone, None)
-        elif record.kind is RecordKind.ASSESSMENT:
-            assessed = (record.record_id, record.day)
-            same = next(
-                (
-                    k
-                    for k, s in reversed(kept.items())
-                    if (s.record.record_id, s.record.day) == assessed
-                ),
-                None,
-            )
-            if same is not None:
-                kept[same] = KeptInspection(kept[same].record, record)
-        else:
+        elif record.kind is not RecordKind.ASSESSMENT:
             others[record.digest] = record
     work = (RecordKind.REPAIR, RecordKind.RERIG)
     repairs = [r for r in others.values() if r.kind in work]

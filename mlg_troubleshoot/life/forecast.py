@@ -10,7 +10,6 @@ from datetime import date
 from functools import partial
 from hashlib import sha256
 from itertools import islice
-from math import inf
 from operator import attrgetter
 
 import numpy as np
@@ -22,7 +21,6 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.wear_paths import newest_readings, placed_in_time, unit_of, wear_paths
-from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.wear import (
     Samples,
     WearModel,
@@ -98,17 +96,6 @@ def teachers_first(keys: Iterable[GearKey]) -> list[GearKey]:
     return sorted(keys, key=lambda key: sha256("\0".join(key).encode()).digest())
 
 
-def taught_up_to(store: Store, gears: int) -> float:
-    """Number of the newest record that the wear of a store's gears is learnt from: in a large fleet
-    that of the newest record rounded down to two digits, so that it is learnt again seldom.
-    """
-    if gears <= TEACHERS:
-        return inf
-    newest = store.count()
-    step: int = 10 ** max(len(str(newest)) - 2, 0)
-    return newest // step * step
-
-
 def fit_fleet(
     lives: Iterable[GearLife],
     gear: Gear,
@@ -169,20 +156,22 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
     """
     over = _over_limit(newest_readings(life, gear.joint_numbers), gear)
     reasons = []
-    if life.inspections[-1].result.get("verdict") == Verdict.OUTSIDE_MARGIN.value:
-        reasons.append("outside the margin at the last inspection")
-    # Nobody can say that an inspection without a date is an earlier one, unless the gear was
-    # restored after it.
-    restored = max((record.seq for record in life.repairs), default=-1)
-    for kept in life.inspections[:-1]:
-        if kept.record.day or kept.record.seq <= restored:
+    last = life.inspections[-1]
+    for kept in life.newest[::-1]:
+        said = life.standing.get(kept.record.digest)
+        outside = (
+            said is not None
+            and said.verdict is Verdict.OUTSIDE_MARGIN
+            and not life.is_repaired_since(kept)
+        )
+        if kept is last:
+            reasons += ["outside the margin at the last inspection"] if outside else []
             continue
         read_over = _over_limit(kept.inspection.clearance_in, gear)
         over |= read_over
-        if read_over or kept.result.get("verdict") == Verdict.OUTSIDE_MARGIN.value:
-            reasons.append(
-                f"inspection {kept.record.record_id} has no date and may be the last one"
-            )
+        if read_over or outside:
+            why = "is of the same day" if kept.record.day else "has no date"
+            reasons.append(f"inspection {kept.record.record_id} {why} and may be the last one")
     if over:
         reasons.append(f"{joint_list(list(over))} over the limit when last read")
     if not reasons:
@@ -280,15 +269,6 @@ def _asked_about(
         paths += [path for own, _begun in of_joints for path in own]
         begun[life.key] = [since for _own, since in of_joints]
     return model.of(paths), begun
-
-
-def departures(
-    lives: Sequence[GearLife], model: WearModel, gear: Gear
-) -> list[Mapping[int, float]]:
-    """How far the last inspection of each gear lies from what its history promised, as its forecast
-    says it; of gears that state the landings of their last inspection.
-    """
-    return _departures(lives, _asked_about(lives, model, gear)[0], gear)
 
 
 def _departures(

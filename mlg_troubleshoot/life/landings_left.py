@@ -11,19 +11,18 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 
-from mlg_troubleshoot.decision.inspection import Outcome
-from mlg_troubleshoot.decision.plan import Action, End, in_brief
+from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.ranking import WORST_FIRST
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection
+from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast, Quantiles
 from mlg_troubleshoot.life.looking_back import Advice
 
 
 @dataclass(frozen=True, slots=True)
 class FleetLine:
-    """One gear of a fleet as every output shows it: its latest inspection, and its landings left
-    once they are forecast.
+    """One gear of a fleet as every output shows it: its latest inspection, of those that may be it
+    the worst, and its landings left once they are forecast.
 
     inspections, repairs: how many count. Numbers stand as they did in the record.
     """
@@ -53,28 +52,30 @@ class FleetLine:
     @classmethod
     def of(cls, life: GearLife) -> FleetLine:
         counts = len(life.inspections), len(life.repairs)
-        latest = life.latest
-        if latest is None:
-            return cls(*life.key, *counts, life.warnings, Advice.of([life]))
-        result = latest.result
+        line = cls(*life.key, *counts, life.warnings, Advice.of([life]))
+        if life.latest is None:
+            return line
+        kept, found = life.worst or (life.latest, None)
+        line = replace(
+            line,
+            record_id=kept.record.record_id,
+            inspection_date=kept.record.day or None,
+            gear_landings=kept.inspection.gear_landings,
+        )
+        if found is None:
+            return line
         # A plan that was made before a repair says nothing of the work that is left.
-        done = any("" < latest.record.day < record.day for record in life.repairs)
-        plan = () if done else result.get("plan", ())
-        return cls(
-            *life.key,
-            *counts,
-            life.warnings,
-            Advice.of([life]),
-            latest.record.record_id,
-            latest.record.day or None,
-            latest.inspection.gear_landings,
-            result.get("verdict"),
-            latest.worst_joint,
-            result.get("predicted_displacement_in"),
-            result.get("margin_in"),
-            "Repaired since then: check again" if done else _in_brief(latest),
-            sum(step["minutes"] for step in plan),
-            tuple(n for step in plan if step["action"] == Action.RESTORE for n in step["joints"]),
+        done = life.is_repaired_since(kept)
+        plan = () if done else found.plan.steps
+        return replace(
+            line,
+            verdict=found.verdict.value,
+            worst_joint=found.worst_joint,
+            predicted_displacement_in=found.predicted_displacement_in,
+            margin_in=found.margin_in,
+            next_action="Repaired since then: check again" if done else found.in_brief,
+            minutes=sum(step.minutes for step in plan),
+            restore=tuple(n for s in plan if s.action is Action.RESTORE for n in s.joints),
         )
 
     def forecast(self, ahead: Forecast) -> FleetLine:
@@ -99,17 +100,6 @@ class FleetLine:
         rank = order.index(self.verdict) if self.verdict in order else len(order)
         due = self.next_inspection_landings
         return rank, float("inf") if due is None else due, self.key
-
-
-def _in_brief(kept: KeptInspection) -> str | None:
-    """Say the next action as the check of today says it; None if the inspection was not judged."""
-    step = kept.result.get("next_action")
-    end = kept.result.get("end")
-    if step is None or end is None:
-        return None if step is None else str(step["text"])
-    retracted = kept.inspection.outcome is Outcome.RETRACTED
-    action = Action(step["action"])
-    return in_brief(action, step["joints"], End(end), step["text"], retracted=retracted)
 
 
 class Order(StrEnum):

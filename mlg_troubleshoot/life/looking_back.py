@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearLife, life_of
+from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.life.folding import GearLife, lives_of
+from mlg_troubleshoot.life.since_repairs import key_of
 from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_from
 
 # Inspections that stand side by side on a page.
@@ -37,10 +39,10 @@ class Advice:
                 kept = next(
                     (k for k in life.inspections if k.record.record_id == record.record_id), None
                 )
-                if joint is not None and kept is not None and kept.result:
-                    advised = (kept.result.get("next_action") or {}).get("joints") or ()
+                said = None if kept is None else life.judged.get(kept.record.digest)
+                if joint is not None and said is not None:
                     outcomes += 1
-                    right += joint in (kept.worst_joint, *advised)
+                    right += joint in (said.worst_joint, *said.plan.steps[0].joints)
         return cls(right, outcomes)
 
     @classmethod
@@ -93,10 +95,11 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[PastInsp
         (
             kept.inspection,
             (kept.record.day, kept.record.seq),
-            kept.result.get("predicted_displacement_in"),
-            kept.result.get("verdict"),
+            None if said is None else said.predicted_displacement_in,
+            None if said is None else said.verdict.value,
         )
         for kept in life.inspections
+        for said in (life.judged.get(kept.record.digest),)
     ]
     if now is not None:
         found = now.inspection
@@ -125,19 +128,24 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[PastInsp
     return steps[-_SIDE_BY_SIDE:]
 
 
-def seen_before(judgements: Sequence[Judgement], store: Store) -> list[list[PastInspection]]:
+def seen_before(
+    judgements: Sequence[Judgement], store: Store, gear: Gear, table: IndexTable
+) -> list[list[PastInspection]]:
     """What each judged gear was like before, side by side with what it is now; empty for one that
     is new.
     """
-    known = set(store.gears())
+    from mlg_troubleshoot.life.judged import judge_lives
 
-    def of(judgement: Judgement) -> list[PastInspection]:
-        if isinstance(judgement, Rejected):
-            return []
-        key = (judgement.inspection.tail_no, judgement.inspection.side.value)
-        return side_by_side(life_of(store, *key), judgement) if key in known else []
-
-    return [of(judgement) for judgement in judgements]
+    now = [None if isinstance(each, Rejected) else each for each in judgements]
+    keys = {key_of(each.inspection) for each in now if each is not None}
+    known = judge_lives(lives_of(store, keys).values(), gear, table, every=True)
+    lives = {life.key: life for life in known}
+    return [
+        []
+        if each is None or key_of(each.inspection) not in lives
+        else side_by_side(lives[key_of(each.inspection)], each)
+        for each in now
+    ]
 
 
 def expected_of(store: Store, gear: Gear) -> Fleet | None:

@@ -163,11 +163,13 @@ def _untried(row: Inspection, before: Inspection | None) -> Inspection:
 
 
 def _kept(life: GearLife) -> Iterator[Repair]:
+    from mlg_troubleshoot.life.folding import moment_of_repair
+
     for record in life.repairs:
-        if record.day:
+        at = moment_of_repair(record)
+        if at is not None:
             joints = frozenset(int(n) for n in record.body.get("joints", ()))
-            day = date.fromisoformat(record.day)
-            yield Repair(day, joints, not joints, "the store keeps")
+            yield Repair(at, joints, not joints, "the store keeps")
 
 
 def _may_be_later(repair: Repair, row: Inspection, place: int, *, entered_now: bool) -> bool:

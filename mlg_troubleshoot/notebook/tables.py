@@ -13,11 +13,12 @@ from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.diagnosis import Diagnosis
 from mlg_troubleshoot.diagnosis.causes import Catalogue
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.geometry.mechanism import Point
 from mlg_troubleshoot.life.folding import lives
-from mlg_troubleshoot.life.landings_left import FleetLine
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.records.frames import frame_of, label_of
 from mlg_troubleshoot.records.headers import Joints
@@ -34,7 +35,7 @@ from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.surveying.result import SurveyResult
 from mlg_troubleshoot.workflows.check import CheckResult
 from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
-from mlg_troubleshoot.workflows.history import Lives
+from mlg_troubleshoot.workflows.history import Lives, show_fleet
 
 # The list that a result's table is of, the first one that it has.
 _MAIN = ("inspections", "gears", "causes", "joints", "also_possible")
@@ -191,9 +192,8 @@ def _index(result: CheckResult) -> pd.Index[Any]:
 
 def store_frame(store: Store, of: str) -> pd.DataFrame:
     """The inspections of a store that stand, or one line per gear in it."""
-    found = lives(store).values()
     if of == "lives":
-        return _frame(fleet_as_json([*map(FleetLine.of, found)], {})["gears"])
-    rows = [kept.inspection for life in found for kept in life.inspections]
+        return to_frame(show_fleet(store, load_gear(DEFAULT_GEAR), ahead=False, whole=False))
+    rows = [kept.inspection for life in lives(store).values() for kept in life.inspections]
     numbers = {joint for row in rows for joint in row.clearance_in}
     return frame_of(rows, Joints(tuple(sorted(numbers))))

@@ -95,16 +95,15 @@ _MISSING_CONVENTION = (
         " TOTAL_PLAY is the dial reading."
     ),
 )
-_MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
 _FIELDS = frozenset(each.name for each in fields(Inspection))
 
 
-def place_in_file(record_id: str) -> str:
-    """Row and content of an id that was made for a row, whatever its file was called; empty for any
-    other id.
-    """
-    made = _MADE_FROM_A_ROW.search(record_id)
-    return "" if made is None else made[0]
+_MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
+
+
+def is_made_for_row(record_id: str) -> bool:
+    """Whether an id was made for a row of a table that states none."""
+    return _MADE_FROM_A_ROW.search(record_id) is not None
 
 
 # A clearance of which only an end was found; a no-go gauge did not enter, a go gauge did.

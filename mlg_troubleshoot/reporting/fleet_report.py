@@ -49,7 +49,11 @@ def fleet_document(
         share = worst / line.margin_in if worst is not None and line.margin_in else None
         due = line.next_inspection_landings
         places.append(GearInPicture(life.name, line.verdict, share, due))
-        cases = [kept.result.get("predicted_displacement_in") for kept in life.inspections]
+        cases = [
+            None if said is None else said.predicted_displacement_in
+            for kept in life.inspections
+            for said in (life.judged.get(kept.record.digest),)
+        ]
         lines.append((line, cases, f"{safe_stem('life', *line.key)}.html"))
     context = {
         **head("Fleet", "Fleet", gear, provenance, lengths),

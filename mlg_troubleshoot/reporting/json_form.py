@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 _JOINT = tuple(CheckedJoint.__annotations__)
 _OF_JOINT = attrgetter(*_JOINT[:-1], "alike")
-# What the geometry says of a joint of every gear, and so is not kept with each assessment.
-_OF_GEOMETRY = ("name", "first_order", "total_order", "plunger_amplification", "acts_like")
 
 
 def plain(value: Any) -> Any:
@@ -93,18 +91,6 @@ def check_as_json(
         **_tail(problems, warnings),
     }
     return cast("dict[str, Any]", plain(whole))
-
-
-def kept_as_json(assessment: Assessment) -> dict[str, Any]:
-    """An assessment as a store keeps it: as in the form of a check, without what the geometry's
-    hash says already.
-    """
-    joints = [_joint(finding) for finding in assessment.joints]
-    kept = [{n: each for n, each in j.items() if n not in _OF_GEOMETRY} for j in joints]
-    # What the gear did is kept with the inspection; words follow from what is kept.
-    whole = _assessment(assessment, kept)
-    said = {n: each for n, each in whole.items() if n not in ("outcome", "in_brief")}
-    return cast("dict[str, Any]", plain(said))
 
 
 class CheckText:
@@ -175,12 +161,12 @@ def assessment_as_json(a: Assessment) -> dict[str, Any]:
     return cast("dict[str, Any]", plain(_assessment(a)))
 
 
-def _assessment(a: Assessment, joints: list[dict[str, Any]] | None = None) -> dict[str, Any]:
-    """One gear of a check; `joints` as they are kept, else all that is known of each."""
+def _assessment(a: Assessment) -> dict[str, Any]:
+    """One gear of a check."""
     said = [a.measured_statement] if a.measured_statement else []
     own = {
         "measured_displacement_in": a.inspection.measured_displacement_in,
-        "joints": [_joint(finding) for finding in a.joints] if joints is None else joints,
+        "joints": [_joint(finding) for finding in a.joints],
         "warnings": [*said, *a.warnings],
     }
     return filled(CheckedInspection, a, **_course(a.inspection, a), **own)

@@ -61,7 +61,12 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
         ahead,
         tail_no=tail_no,
         side=side,
-        events=[_event(record, counts=record.digest in counting) for record in life.records],
+        events=[
+            _event(record, life, counts=record.digest in counting)
+            for record in life.records
+            # What older programs kept of a verdict.
+            if record.kind is not RecordKind.ASSESSMENT
+        ],
         joints=[
             {
                 "joint": number,
@@ -77,7 +82,7 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
     )
 
 
-def _event(record: Record, *, counts: bool) -> dict[str, Any]:
+def _event(record: Record, life: GearLife, *, counts: bool) -> dict[str, Any]:
     body = record.body
     inspection = body.get("inspection", {})
     event = {
@@ -87,14 +92,15 @@ def _event(record: Record, *, counts: bool) -> dict[str, Any]:
         "gear_landings": body.get("landings", inspection.get("gear_landings")),
         "hash": record.digest,
     }
-    if record.kind is RecordKind.ASSESSMENT:
-        result = body["result"]
-        by = ("program_version", "geometry_sha256", "extension")
-        for name in ("verdict", "predicted_displacement_in", "margin_in"):
-            event[name] = result.get(name)
-        return event | {name: body.get(name) for name in by}
     if record.kind in (RecordKind.INSPECTION, RecordKind.CORRECTION):
         event |= {"counts": counts, "supersedes": body.get("supersedes")}
+        said = life.judged.get(record.digest)
+        if said is not None:
+            event |= {
+                "verdict": said.verdict.value,
+                "predicted_displacement_in": said.predicted_displacement_in,
+                "margin_in": said.margin_in,
+            }
         return event | {"clearance_in": inspection.get("clearance_in", {})}
     return event | {name: value for name, value in body.items() if name != "landings"}
 

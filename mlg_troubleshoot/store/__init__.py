@@ -9,12 +9,14 @@ from mlg_troubleshoot.store.database import (
     Store,
     StoreError,
     files_of,
+    kept_otherwise,
     own_file,
     packed,
 )
 from mlg_troubleshoot.store.drafts import Draft, Drafts
 from mlg_troubleshoot.store.inspections import (
     RETIRED,
+    content_of,
     inspection_from,
     inspection_record,
     same_inspection,
@@ -31,9 +33,11 @@ __all__ = [
     "RecordKind",
     "Store",
     "StoreError",
+    "content_of",
     "files_of",
     "inspection_from",
     "inspection_record",
+    "kept_otherwise",
     "own_file",
     "packed",
     "same_inspection",

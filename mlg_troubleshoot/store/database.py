@@ -16,7 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from functools import partial, reduce
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from sys import intern
@@ -42,8 +42,6 @@ _PATIENCE_S = 120
 # Any number that other programs on the same server hardly use for their advisory locks. [1]
 _ADVISORY_LOCK = 0x6D6C675F73746F72
 _AT_ONCE = 500
-# Raw records that a server sends at once: 10 MB. [1]
-_RAW_AT_ONCE = 40_000
 # The content of a record, packed and unpacked. [bytes]
 MOST_BYTES = 1_000_000
 # How many of the newest records are walked before another is added: 0.1 s and 6 MB from a server;
@@ -123,15 +121,6 @@ _BOUNDED = sql.case(
     (sql.func.length(_records.c.body) <= MOST_BYTES, _records.c.body), else_=None
 ).label("body")
 _COLUMNS = [_BOUNDED if column.name == "body" else column for column in _records.c]
-# What a record is known by, as bytes whatever another program wrote there.
-_MARKED = (
-    _records.c.seq,
-    reduce(lambda texts, name: texts + "\n" + _records.c[name], _TEXTS[1:], _records.c.kind + ""),
-    *(
-        sql.func.coalesce(sql.cast(column, sql.LargeBinary), b"")
-        for column in (_records.c.hash, _BOUNDED)
-    ),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,6 +247,19 @@ def files_of(place: str | Path | None) -> tuple[Path, ...]:
         ()
         if file is None
         else tuple(Path(f"{file}{end}") for end in ("", "-journal", "-wal", "-shm"))
+    )
+
+
+def kept_otherwise(records: Sequence[Record]) -> StoreError:
+    """Refuse what stands already with other content."""
+    named = ", ".join(
+        f"{r.record_id} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in records[:5]
+    )
+    more = f" and {len(records) - 5} more" if len(records) > 5 else ""
+    return StoreError(
+        f"kept already with other content: {named}{more}; nothing of this was kept",
+        "If the new one is right: mlg history correct RECORD FILE, where FILE may be this table. If"
+        " it is another inspection, give it its own record_id or date.",
     )
 
 
@@ -573,15 +575,7 @@ class Store:
                     connection.execute(_records.insert(), rows)
                 added += len(rows)
             if others:
-                named = ", ".join(
-                    f"{r.record_id} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in others[:5]
-                )
-                more = f" and {len(others) - 5} more" if len(others) > 5 else ""
-                raise StoreError(
-                    f"kept already with other content: {named}{more}; nothing of this was kept",
-                    "If the new one is right: mlg history correct RECORD FILE, where FILE may be"
-                    " this table. If it is another inspection, give it its own record_id or date.",
-                )
+                raise kept_otherwise(others)
         return Added(added, total - added)
 
     def known(self, identities: Sequence[bytes]) -> dict[bytes, Record]:
@@ -599,41 +593,17 @@ class Store:
                 known[bytes(row.identity)] = self._record(row)
         return known
 
-    def gears(self, after: int = 0) -> list[tuple[str, str]]:
-        """Tail and side of every gear that has a record after a number; `StoreError` where they
-        cannot be read.
-        """
+    def gears(self) -> list[tuple[str, str]]:
+        """Tail and side of every gear that has a record; `StoreError` where they cannot be read."""
         pairs = sql.select(_records.c.tail_no, _records.c.side).distinct()
         with self.transaction(writing=False) as connection:
             if not self._ready:
                 return []
-            # The index alone is faster than with a condition that is always true.
-            rows = connection.execute(pairs.where(_records.c.seq > after) if after else pairs)
-            found = [(row.tail_no, row.side) for row in rows]
+            found = [(row.tail_no, row.side) for row in connection.execute(pairs)]
         if any(type(text) is not str for key in found for text in key):
             # Reading the records names the one that is damaged.
             self.all()
         return sorted(found)
-
-    def count(self) -> int:
-        """Number of records, which is that of the newest one."""
-        with self.transaction(writing=False) as connection:
-            newest = sql.select(sql.func.max(_records.c.seq))
-            return int(connection.scalar(newest) or 0) if self._ready else 0
-
-    def raw(self, after: int, up_to: int) -> Iterator[bytes]:
-        """All that stands in the records after a number, up to another, which are not unpacked."""
-        wanted = sql.select(*_MARKED).where(_records.c.seq <= up_to).order_by(_records.c.seq)
-        last = after if after < up_to else None
-        with self.transaction(writing=False) as connection:
-            while self._ready and last is not None:
-                following = wanted.where(_records.c.seq > last).limit(_RAW_AT_ONCE)
-                # Rows of the driver: those of SQLAlchemy take twice as long.
-                rows = connection.execute(following).cursor
-                last = None
-                while block := rows.fetchmany(_AT_ONCE):
-                    yield b"".join([b"%d %a %b%b" % tuple(row) for row in block])
-                    last = block[-1][0]
 
     def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:
         """All records of a gear, or of both gears of an aircraft, in the order of the chain."""

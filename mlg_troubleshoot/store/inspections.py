@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from datetime import date, datetime
 from enum import Enum
+from hashlib import sha256
 from typing import Any
 
 from mlg_troubleshoot.decision.columns import COLUMNS, Holds
@@ -14,7 +15,7 @@ from mlg_troubleshoot.store.database import Record, RecordKind, packed
 from mlg_troubleshoot.units import LengthUnit
 
 # What says where and how an inspection was entered, not what was found.
-_NOT_CONTENT = ("source", "warnings", "entered", "unit_question")
+_NOT_CONTENT = ("record_id", "source", "warnings", "entered", "unit_question")
 _BY_JOINT = tuple(column.joint_fills for column in COLUMNS if column.joint_fills)
 
 _FIELDS = tuple(
@@ -97,14 +98,15 @@ def inspection_from(record: Record) -> Inspection:
     return Inspection(**{"clearance_in": {}, "other_columns": other, **read})
 
 
-def same_inspection(one: Record, two: Record, but: str = "") -> bool:
-    """Tell whether two records say the same was found, wherever it was entered, whatever they say
-    in one of their fields.
+def content_of(record: Record, *, with_day: bool = True) -> bytes:
+    """Hash of what was found at which gear and, unless it is left out, on which day; wherever it
+    was entered and whatever it is called.
     """
+    left_out = {*_NOT_CONTENT, *(() if with_day else ("inspection_date",))}
+    found = record.body.get("inspection", record.body)
+    return sha256(packed({n: v for n, v in found.items() if n not in left_out})).digest()
 
-    def content(record: Record) -> dict[str, Any]:
-        inspection = record.body.get("inspection", {})
-        beside = {*_NOT_CONTENT, but}
-        return {name: value for name, value in inspection.items() if name not in beside}
 
-    return content(one) == content(two)
+def same_inspection(one: Record, two: Record) -> bool:
+    """Whether two records say that the same was found."""
+    return content_of(one) == content_of(two)

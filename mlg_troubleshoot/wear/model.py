@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -99,27 +99,6 @@ class WearModel(Result):
     def of(self, paths: Iterable[WearPath]) -> WearModel:
         """The same population, asked about other units of it."""
         return replace(self, paths=_by_unit(paths))
-
-    def learnt(self) -> dict[str, Any]:
-        """What was learnt of the population as plain values, without the paths."""
-        fields = self.draws.__dataclass_fields__
-        return {
-            "kinds": dict(self.kinds),
-            "scale": asdict(self.scale),
-            "draws": {name: getattr(self.draws, name).ravel().tolist() for name in fields},
-            "seed": self.seed,
-            "simulated": self.simulated,
-        }
-
-    @classmethod
-    def from_learnt(cls, learnt: Mapping[str, Any], paths: Iterable[WearPath]) -> WearModel:
-        """The model that `learnt` described, asked about these paths."""
-        scale = Scale(**learnt["scale"])
-        columns = {name: np.array(of)[:, None] for name, of in learnt["draws"].items()}
-        draws = Draws(**columns)
-        return cls(
-            _by_unit(paths), learnt["kinds"], scale, draws, learnt["seed"], learnt["simulated"]
-        )
 
     def forecast(
         self,

@@ -50,5 +50,5 @@ def forecast(
     checked = check_files([inspections], options)
     with TemporaryDirectory() as folder:
         store = Store(Path(folder) / "inspections.sqlite")
-        keep(checked, options, store)
+        keep(checked, store)
         return show_fleet(store, known, ahead=True, problems=checked.problems)

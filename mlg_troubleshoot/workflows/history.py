@@ -32,14 +32,14 @@ from mlg_troubleshoot.records.gate import NOBODY, judge_text
 from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.store import Added, Broken, Record, RecordKind, Store, StoreError, packed
 from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
-    from mlg_troubleshoot.life.remembered import Remembered
     from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.wear import WearModel
 
-# Gears that are read and forecast together: their unpacked contents are 5 MB. [1]
+# Gears that are read, judged and forecast together: their unpacked contents are 5 MB. [1]
 _AT_ONCE = 100
 # An exported chain, which is judged in 5 s, and its longest line. [bytes, characters]
 _MOST_BYTES = 120_000_000
@@ -111,66 +111,51 @@ def show_fleet(
     progress: StageProgress = lambda _name, _done, _total: None,
     problems: tuple[Problem, ...] = (),
 ) -> Lives:
-    """Every gear, with its forecast if asked for; `whole`, with all of its records."""
-    from mlg_troubleshoot.life.remembered import Remembered
+    """Every gear, judged by the model of today, with its forecast if asked for; `whole`, with all
+    of its records, each judged as it was found.
+    """
+    from mlg_troubleshoot.life.forecast import forecast
+    from mlg_troubleshoot.life.judged import judge_lives
 
-    remembered = Remembered(store, gear)
     progress("Reading the store", 0, None)
     keys = store.gears()
-    model = _taught(store, gear, keys, remembered, progress) if ahead else None
+    table = load_index_table(gear)
+    model = _taught(store, gear, keys, progress) if ahead else None
     doing = "Looking ahead" if ahead else "Reading the store"
     found: list[GearLife] = []
-    try:
-        # What was unpacked of one part is let go before the next one.
-        for first in range(0, len(keys), _AT_ONCE):
-            progress(doing, first, len(keys))
-            asked = keys[first : first + _AT_ONCE]
-            lacking = {key for key in asked if not remembered.is_known(key, model)}
-            part = lives_of(store, asked if whole else lacking).values()
-            remembered.look([life for life in part if life.key in lacking], model)
-            found += part if whole else ()
-    finally:
-        # Also what was done until somebody lost patience.
-        remembered.save()
+    lines: list[FleetLine] = []
+    forecasts: dict[GearKey, Forecast] = {}
+    # What was unpacked of one part is let go before the next one.
+    for first in range(0, len(keys), _AT_ONCE):
+        progress(doing, first, len(keys))
+        part = lives_of(store, keys[first : first + _AT_ONCE]).values()
+        judged = judge_lives(part, gear, table, every=whole)
+        forecasts |= forecast(judged, model, gear)
+        lines += map(FleetLine.of, judged)
+        found += judged if whole else ()
     progress(doing, len(keys), len(keys))
-    return Lives(
-        gear,
-        tuple(found),
-        tuple(map(remembered.line, keys)),
-        {key: remembered.forecast(key, model) for key in keys},
-        model,
-        problems,
-    )
+    return Lives(gear, tuple(found), tuple(lines), forecasts, model, problems)
 
 
 def _taught(
-    store: Store,
-    gear: Gear,
-    keys: Sequence[GearKey],
-    remembered: Remembered,
-    progress: StageProgress,
+    store: Store, gear: Gear, keys: Sequence[GearKey], progress: StageProgress
 ) -> WearModel | None:
     """How joints wear, from as many gears as are needed of a large fleet."""
-    from mlg_troubleshoot.life.forecast import (
-        TEACHERS,
-        fit_fleet,
-        taught_up_to,
-        teachers_first,
-    )
+    from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
+    from mlg_troubleshoot.wear import fit_wear
 
     learning = partial(progress, "Learning how joints wear")
     learning(0, None)
     order = teachers_first(keys)
-    up_to = taught_up_to(store, len(keys))
     parts = (order[first : first + TEACHERS] for first in range(0, len(order), TEACHERS))
     taught = (
         found[key]
         for part in parts
-        for found in (lives_of(store, part, up_to),)
+        for found in (lives_of(store, part),)
         for key in part
         if key in found
     )
-    return fit_fleet(taught, gear, partial(remembered.fit, progress=learning))
+    return fit_fleet(taught, gear, partial(fit_wear, progress=learning))
 
 
 def show_lives(
@@ -184,17 +169,18 @@ def show_lives(
 ) -> Lives:
     """The lives of one aircraft's gears, or of one of them."""
     from mlg_troubleshoot.life.forecast import forecast
-    from mlg_troubleshoot.life.remembered import Remembered
+    from mlg_troubleshoot.life.judged import judge_lives
 
     tail, meant = key_of(tail, "LH" if side is None else side)
     keys = store.gears()
     wanted = [key for key in keys if key == (tail, meant if side else key[1])]
     if not wanted:
         life_of(store, tail, meant)
-    model = _taught(store, gear, keys, Remembered(store, gear), progress) if ahead else None
+    model = _taught(store, gear, keys, progress) if ahead else None
     if ahead:
         progress("Looking ahead", 0, None)
-    found = tuple(lives_of(store, wanted).values())
+    known = lives_of(store, wanted).values()
+    found = tuple(judge_lives(known, gear, load_index_table(gear), every=True))
     lines = tuple(map(FleetLine.of, found))
     return Lives(gear, found, lines, forecast(found, model, gear), model)
 

@@ -1,10 +1,10 @@
-"""Keep what a check found: inspections with their assessments, and corrections."""
+"""Keep what a check judged: inspections with the repairs that they state, and corrections."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from datetime import datetime
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
@@ -14,26 +14,26 @@ from mlg_troubleshoot.decision.inspection import (
     plain_tail,
     surely_later,
 )
-from mlg_troubleshoot.decision.judge_rows import AT_ONCE
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearKey, find, life_of, warnings_of
+from mlg_troubleshoot.life.folding import find, is_readable, life_of, warnings_of
 from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
 from mlg_troubleshoot.parallel import Progress
-from mlg_troubleshoot.records.rows import place_in_file
+from mlg_troubleshoot.records.rows import is_made_for_row
 from mlg_troubleshoot.store import (
     Record,
     RecordKind,
     Store,
     StoreError,
+    content_of,
     inspection_from,
     inspection_record,
+    kept_otherwise,
     packed,
     same_inspection,
 )
-from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult
+from mlg_troubleshoot.workflows.check import CheckResult
 
-_ENTERED = (RecordKind.INSPECTION, RecordKind.CORRECTION, RecordKind.ASSESSMENT)
+_ENTERED = (RecordKind.INSPECTION, RecordKind.CORRECTION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,74 +47,95 @@ class Kept:
     warnings: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class JudgedEntry:
-    """An inspection that was judged, and its assessment as it is kept."""
-
-    inspection: Inspection
-    assessment: bytes
-
-
-def entries(by: Mapping[str, Any], judgements: Iterable[Judgement]) -> list[JudgedEntry]:
+def inspections_of(judgements: Iterable[Judgement]) -> list[Inspection]:
     """What is kept of judgements; nothing of a row that was not judged."""
-    return [
-        JudgedEntry(j.inspection, packed_assessment(by, j))
-        for j in judgements
-        if isinstance(j, Assessment)
-    ]
+    return [j.inspection for j in judgements if isinstance(j, Assessment)]
+
+
+class _KnownContents:
+    """What a store and the rows before say of the gears of a call: an inspection is known by its
+    gear, its day and what was found, and by its id where each of two states one.
+    """
+
+    def __init__(self, store: Store, tails: set[str]) -> None:
+        self._contents: dict[bytes, list[Record]] = {}
+        self._without_day: dict[bytes, list[Record]] = {}
+        # What each id of a gear stands for on each day, and those that stand without a day.
+        self._by_id: dict[tuple[str, ...], Record] = {}
+        self._undated: dict[tuple[str, ...], Record] = {}
+        for record in store.of_aircraft(tails):
+            if record.kind in _ENTERED and is_readable(record):
+                self.add(record)
+
+    def add(self, record: Record) -> None:
+        self._contents.setdefault(content_of(record), []).append(record)
+        self._without_day.setdefault(content_of(record, with_day=False), []).append(record)
+        whose = record.record_id, record.tail_no, record.side
+        self._undated.pop(whose, None)
+        if not record.day:
+            self._undated[whose] = record
+        if record.kind is RecordKind.INSPECTION:
+            self._by_id[*whose, record.day] = record
+
+    def __contains__(self, record: Record) -> bool:
+        return any(_may_be_one(each, record) for each in self._contents.get(content_of(record), ()))
+
+    def otherwise(self, record: Record) -> Record | None:
+        """The record that stands for the same inspection with other content: under its id on its
+        day or without one, or the same findings under its id on another day or without one.
+        """
+        whose = record.record_id, record.tail_no, record.side
+        same = self._by_id.get((*whose, record.day)) or self._undated.get(whose)
+        alike = self._without_day.get(content_of(record, with_day=False), ())
+        moved = (
+            each
+            for each in alike
+            if each.record_id == record.record_id or (not each.day and _may_be_one(each, record))
+        )
+        return same or next(moved, None)
+
+
+def _may_be_one(one: Record, other: Record) -> bool:
+    """Whether the ids of two records do not state that they are two inspections."""
+    ids = one.record_id, other.record_id
+    return ids[0] == ids[1] or any(map(is_made_for_row, ids))
 
 
 def keep(
     result: CheckResult,
-    options: CheckOptions,
     store: Store,
     same_tail: Callable[[str, str], bool] | None = None,
     progress: Progress = lambda _done, _total: None,
-    judged: Sequence[JudgedEntry] | None = None,
+    judged: Sequence[Inspection] | None = None,
 ) -> Kept:
-    """Add the judged inspections of a check and their assessments, all or none.
+    """Add the judged inspections of a check and the repairs that they state, all or none.
 
     ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they
-    are refused. ``judged``: the entries of a result that does not hold its judgements.
+    are refused. ``judged``: the inspections of a result that does not hold its judgements.
     """
-    by = judged_by(result.gear, options)
     if judged is None:
-        judged = entries(by, result.judgements)
-    tails = _settled_tails((entry.inspection.tail_no for entry in judged), store, same_tail)
-
-    def written() -> Iterator[Inspection]:
-        for entry in judged:
-            tail = entry.inspection.tail_no
-            yield (
-                replace(entry.inspection, tail_no=tails[tail])
-                if tail in tails
-                else (entry.inspection)
-            )
-
+        judged = inspections_of(result.judgements)
+    tails = _settled_tails((row.tail_no for row in judged), store, same_tail)
+    rows = [replace(r, tail_no=tails.get(r.tail_no, r.tail_no)) for r in judged]
+    known = _KnownContents(store, {row.tail_no for row in rows})
     records: list[Record] = []
-    first: dict[bytes, bytes] = {}
-    stood = done = 0
-    made_records = map(inspection_record, _under_first_ids(written(), store))
-    each = zip(judged, written(), _under_first_days(made_records, store), strict=True)
-    while block := list(islice(each, AT_ONCE)):
-        known = store.known([record.identity_hash for _entry, _row, record in block])
-        stood += len(known.keys() - first.keys())
-        first.update({i: kept.packed for i, kept in known.items() if i not in first})
-        for entry, row, record in block:
+    others: list[Record] = []
+    new = 0
+    for done, row in enumerate(rows, 1):
+        record = inspection_record(row)
+        if record not in known:
+            other = known.otherwise(record)
+            others += [other] if other else []
+            known.add(record)
             # Before what was read after it.
-            records += _repairs_of(row, store)
-            # Wherever an inspection was entered again, it is the first entry that was assessed.
-            of = first.setdefault(record.identity_hash, record.packed)
-            records += [record, assessment_record(by, entry.assessment, record, of)]
-            done += 1
-            progress(done, len(judged))
-    store.add(
-        records,
-        lambda kept, new: new.kind is not RecordKind.INSPECTION or _agrees(store, kept, new),
-    )
-    gears = {(record.tail_no, record.side) for record in records}
-    new = len(first) - stood
-    return Kept(new, len(judged) - new, tuple(warnings_of(store, gears)))
+            records += [*_repairs_of(row, store), record]
+            new += 1
+        progress(done, len(rows))
+    if others:
+        raise kept_otherwise(others)
+    store.add(records, lambda _kept, record: record.kind is not RecordKind.INSPECTION)
+    gears = {key_of(row) for row in rows}
+    return Kept(new, len(rows) - new, tuple(warnings_of(store, gears)))
 
 
 def under_a_free_id(made: Inspection, store: Store) -> Inspection:
@@ -142,7 +163,9 @@ def _repairs_of(row: Inspection, store: Store) -> list[Record]:
     known = [
         record for record in store.of_gear(*key_of(row)) if record.day == repair.day.isoformat()
     ]
-    body = {"landings": None, "work_order": None}
+    body: dict[str, Any] = {"landings": None, "work_order": None, "stated_by": row.record_id}
+    if isinstance(repair.at, datetime):
+        body["at"] = repair.at.isoformat()
     kinds = {RecordKind.REPAIR: sorted(repair.joints), RecordKind.RERIG: repair.rerigged}
     return [
         Record(kind, "", *key_of(row), repair.day.isoformat(), packed(body | more))
@@ -172,7 +195,7 @@ def row_of(store: Store, record_id: str, result: CheckResult) -> tuple[Record, C
     return wrong, replace(result, judgements=tuple(own), problems=tuple(problems))
 
 
-def correct(store: Store, wrong: Record, result: CheckResult, options: CheckOptions) -> Record:
+def correct(store: Store, wrong: Record, result: CheckResult) -> Record:
     """Append the right inspection for a wrong one; the wrong one stays readable in the chain."""
     judged = [j for j in result.judgements if isinstance(j, Assessment)]
     if len(judged) != 1 or len(result.judgements) != 1:
@@ -181,7 +204,7 @@ def correct(store: Store, wrong: Record, result: CheckResult, options: CheckOpti
             f" {wrong.side}, and the file has {len(judged)}",
             "Give a file with the corrected row alone, or a table in which it has this record_id.",
         )
-    return supersede(store, wrong, result, options)
+    return supersede(store, wrong, result)
 
 
 def is_same(kept: Record, result: CheckResult) -> bool:
@@ -192,7 +215,7 @@ def is_same(kept: Record, result: CheckResult) -> bool:
     )
 
 
-def supersede(store: Store, wrong: Record, result: CheckResult, options: CheckOptions) -> Record:
+def supersede(store: Store, wrong: Record, result: CheckResult) -> Record:
     """Append what takes the place of a kept inspection, with the repair that it states; one that
     only the former stated is void.
     """
@@ -206,9 +229,7 @@ def supersede(store: Store, wrong: Record, result: CheckResult, options: CheckOp
         )
     record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.digest)
     repairs = [*_repairs_taken_back(store, wrong, right), *_repairs_of(right, store)]
-    by = judged_by(result.gear, options)
-    judgement = assessment_record(by, packed_assessment(by, judged), record, record.packed)
-    store.add([*repairs, record, judgement])
+    store.add([*repairs, record])
     return record
 
 
@@ -247,111 +268,6 @@ def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[
         for repair in life.repairs
         if min((seq for seq in entered if seq > repair.seq), default=0) in stating
     ]
-
-
-def judged_by(gear: Gear, options: CheckOptions) -> dict[str, Any]:
-    """What an assessment was made with."""
-    from mlg_troubleshoot.reporting.provenance import program_version
-
-    return {
-        "program_version": program_version(),
-        "geometry_sha256": gear.geometry_sha256,
-        "extension": None if options.extension is None else options.extension.describe(),
-    }
-
-
-def packed_assessment(by: Mapping[str, Any], assessment: Assessment) -> bytes:
-    from mlg_troubleshoot.reporting.json_form import kept_as_json
-
-    return packed({**by, "result": kept_as_json(assessment)})
-
-
-def assessment_record(by: Mapping[str, Any], body: bytes, of: Record, first: bytes) -> Record:
-    """An assessment as a record: of an inspection, which is known by its first entry."""
-    identity = (of.identity_hash.hex(), *map(str, by.values()), first.hex())
-    return replace(of, kind=RecordKind.ASSESSMENT, packed=body, identity=identity)
-
-
-def _under_first_ids(inspections: Iterable[Inspection], store: Store) -> Iterator[Inspection]:
-    """The same row of a renamed file has another made id: it is the inspection that was kept
-    first.
-    """
-    gears: set[GearKey] = set()
-    first: dict[tuple[str, ...], Record] = {}
-    for inspection in inspections:
-        row = place_in_file(inspection.record_id)
-        key = (inspection.tail_no, inspection.side.value)
-        if not row:
-            yield inspection
-            continue
-        if key not in gears:
-            gears.add(key)
-            for kept in store.of_gear(*key):
-                if kept.kind is RecordKind.INSPECTION:
-                    first.setdefault((*key, kept.day, place_in_file(kept.record_id)), kept)
-        record = inspection_record(inspection)
-        kept = first.setdefault((*key, record.day, row), record)
-        renamed = replace(inspection, record_id=kept.record_id)
-        yield renamed if same_inspection(kept, inspection_record(renamed)) else inspection
-
-
-def _under_first_days(records: Iterable[Record], store: Store) -> Iterator[Record]:
-    """A record is a kept one of its id, with its day corrected, if that one has none, or if it says
-    what that one says, or what that was corrected to.
-    """
-    every = iter(records)
-    gears = set(store.gears())
-    ids: dict[GearKey, set[str]] = {}
-    while block := list(islice(every, AT_ONCE)):
-        known = store.known([record.identity_hash for record in block])
-        for record in block:
-            key = record.tail_no, record.side
-            if record.identity_hash in known or key not in gears:
-                yield record
-                continue
-            if key not in ids:
-                ids[key] = {kept.record_id for kept in store.of_gear(*key)}
-            first = _redated(store, record) if record.record_id in ids[key] else None
-            yield (
-                record
-                if first is None
-                else replace(record, identity=(record.record_id, *key, first.day))
-            )
-
-
-def _redated(store: Store, record: Record) -> Record | None:
-    """The first entry of the inspection that a record is with another day."""
-    own = _versions_by_id(store, (record.tail_no, record.side)).get(record.record_id, [])
-    redated = (
-        versions[0]
-        for versions in own
-        if not versions[-1].day
-        or any(same_inspection(each, record, "inspection_date") for each in versions)
-    )
-    return next(redated, None)
-
-
-def _versions_by_id(store: Store, key: GearKey) -> dict[str, list[list[Record]]]:
-    """Each kept inspection of a gear, from its first entry to what it was last corrected to."""
-    life = life_of(store, *key)
-    found: dict[str, list[list[Record]]] = {}
-    for each in life.inspections:
-        versions = life.versions(each.record)
-        found.setdefault(versions[0].record_id, []).append(versions)
-    return found
-
-
-def _agrees(store: Store, kept: Record, new: Record) -> bool:
-    """The same as kept, or as what the kept one was corrected to."""
-    if same_inspection(kept, new):
-        return True
-    every = _versions_by_id(store, (kept.tail_no, kept.side)).get(kept.record_id, [])
-    return any(
-        same_inspection(each, new)
-        for versions in every
-        if versions[0].digest == kept.digest
-        for each in versions
-    )
 
 
 def _settled_tails(

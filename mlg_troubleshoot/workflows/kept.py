@@ -14,7 +14,6 @@ import msgspec
 from msgspec import Meta
 
 from mlg_troubleshoot.datafile import Table, refusal
-from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.columns import (
     COLUMNS,
     CONVENTION,
@@ -42,8 +41,6 @@ _HASH = Annotated[
     str,
     Meta(pattern="^[0-9a-f]{64}$", extra_json_schema={"description": "the hash of a record"}),
 ]
-# Of the program's own making: no more than a number.
-_NUMBER = Annotated[float, Meta(ge=-(10**12), le=10**12)]
 _PLAIN: dict[Holds, Any] = {Holds.YES_NO: bool}
 # What is read of a text must be what stands there.
 _READ: dict[Holds, tuple[str, Callable[[str], str]]] = {
@@ -109,20 +106,11 @@ class KeptGate:
             kw_only=True,
         )
         joints = _MANY[self._joint, ...]
-        finding = _table({"joint": self._joint, "rank": _NUMBER})
-        result = _table(
-            {},
-            verdict=Verdict | None,
-            predicted_displacement_in=_NUMBER | None,
-            margin_in=_NUMBER | None,
-            joints=_MANY[finding, ...],
-            next_action=_table({}, joints=joints) | None,
-        )
         work = {"landings": columns[LANDINGS.filled] | None, WORK_ORDER.name: str | None}
         self._of_kind: dict[RecordKind, Any] = {
             RecordKind.INSPECTION: _table({"inspection": inspection}),
             RecordKind.CORRECTION: _table({"supersedes": _HASH, "inspection": inspection}),
-            RecordKind.ASSESSMENT: _table({"result": result}),
+            RecordKind.ASSESSMENT: _table({"result": dict}),
             RecordKind.REPAIR: _table({"joints": joints}, **work),
             RecordKind.RERIG: _table({}, **work),
             RecordKind.OUTCOME: _table({"of": _HASH, "found": str, "joint": self._joint | None}),

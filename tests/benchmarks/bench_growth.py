@@ -11,14 +11,12 @@ import argparse
 import math
 import os
 import sys
-import tempfile
 from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
 
 import numpy as np
 
-from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.reporting.figures import Axis, Canvas, Plot, Series
 from mlg_troubleshoot.store import Store
 from tests.docs_examples import PICTURES, standing_alone
@@ -54,7 +52,7 @@ def store_of(inspections: int, folder: Path) -> Path:
     file = folder / f"kept-{inspections}.sqlite"
     if not file.exists():
         drawn = bench_store.lives(inspections // VISITS, VISITS, np.random.default_rng(1))
-        Store(file).add(bench_store.records(drawn, load_gear()))
+        Store(file).add(bench_store.records(drawn))
     return file
 
 
@@ -64,10 +62,7 @@ def measured(folder: Path) -> Costs:
     costs: Costs = {}
 
     def measure(name: str, size: int, *command: str) -> None:
-        # Nothing is remembered from the command before.
-        with tempfile.TemporaryDirectory() as cache:
-            own = {**environment, "XDG_CACHE_HOME": cache}
-            taken = run(ROOT, ["-m", "mlg_troubleshoot", *command, "--quiet"], own)
+        taken = run(ROOT, ["-m", "mlg_troubleshoot", *command, "--quiet"], environment)
         costs.setdefault(name, {})[size] = taken
         print(f"| {name} | {size:,} | {taken[0]:.1f} s | {taken[1]:.0f} MiB |", flush=True)
 

@@ -37,10 +37,10 @@ _RAW = tomllib.loads(
         encoding="utf-8"
     )
 )
-AREA = [joint["area"] for joint in _RAW["joints"].values()]
-AREA_MIN = {name: float(area["access_min"]) for name, area in _RAW["areas"].items()}
-READ_MIN = [float(joint["access_min"]) for joint in _RAW["joints"].values()]
-RESTORE_MIN = [float(joint["restore_min"]) for joint in _RAW["joints"].values()]
+AREA = [joint["area"] for joint in _RAW["joints"]]
+AREA_MIN = {area["name"]: float(area["access_min"]) for area in _RAW["areas"]}
+READ_MIN = [float(joint["access_min"]) for joint in _RAW["joints"]]
+RESTORE_MIN = [float(joint["restore_min"]) for joint in _RAW["joints"]]
 PLUNGER_MIN = float(_RAW["plunger"]["read_min"])
 RIGGING_MIN = float(_RAW["rigging_check"]["minutes"])
 RETRACT_MIN = float(_RAW["repair"]["retraction_min"])
@@ -293,7 +293,7 @@ class Hangar:
         (folder / "kept.sqlite").unlink(missing_ok=True)
         self.store = Store(folder / "kept.sqlite")
         options = CheckOptions(advice=False)
-        keep(check_files([folder / "row.csv"], options), options, self.store)
+        keep(check_files([folder / "row.csv"], options), self.store)
         return self
 
     def judged(self, gears: Sequence[Gear], folder: Path) -> list[dict[str, Any]]:

@@ -9,7 +9,7 @@ from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
-from mlg_troubleshoot.reporting.json_form import check_as_json, kept_as_json
+from mlg_troubleshoot.reporting.json_form import check_as_json
 from tests.decision.conftest import Judge, every_joint
 
 INSPECTION = {
@@ -152,9 +152,3 @@ def test_with_advice_the_posterior_names_groups_and_intervals(gear: Gear, judge:
     (row,) = check_as_json(gear, [judged], [], [])["inspections"]
     assert row["posterior"]["groups"][0]["joints"] == [3, 5]
     assert [interval["joint"] for interval in row["posterior"]["intervals"]] == list(range(1, 11))
-
-
-def test_what_the_gear_did_is_kept_with_the_inspection_and_not_again_with_its_judgement(
-    judge: Judge,
-) -> None:
-    assert "outcome" not in kept_as_json(judge(every_joint(0.001)))

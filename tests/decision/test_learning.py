@@ -93,7 +93,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     rows += [f"R{k},N{k % 10},LH,RADIAL,2026-03-{k + 1:02},0.004" for k in range(11)]
     (folder / "fleet.csv").write_text("\n".join(rows), encoding="utf-8")
     found, options = Store(folder / "kept.sqlite"), CheckOptions()
-    keep(check_files([folder / "fleet.csv"], options), options, found)
+    keep(check_files([folder / "fleet.csv"], options), found)
     return found
 
 
@@ -112,7 +112,7 @@ def test_a_few_gears_are_not_a_fleet(gear: Gear, tmp_path: Path) -> None:
     rows += [f"R{k},N{k},LH,RADIAL,0.004" for k in range(9)]
     (tmp_path / "few.csv").write_text("\n".join(rows), encoding="utf-8")
     few, options = Store(tmp_path / "kept.sqlite"), CheckOptions()
-    keep(check_files([tmp_path / "few.csv"], options), options, few)
+    keep(check_files([tmp_path / "few.csv"], options), few)
     assert expected_of(few, gear) is None
 
 

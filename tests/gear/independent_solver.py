@@ -152,15 +152,25 @@ def read_linkages(gear_file: Path, ensemble_file: Path) -> dict[str, LoopClosure
     """The ten linkages from the numbers of the two files alone."""
     reference = tomllib.loads(gear_file.read_text(encoding="utf-8"))
     members = tomllib.loads(ensemble_file.read_text(encoding="utf-8"))["members"]
-    linkages = {}
-    for name, m in {"A": reference, **members}.items():
-        plane = m["planes"]["link_assembly"]
-        places = m["ground"] | m["moving"] | plane["ground"] | plane["moving"]
-        linkages[name] = LoopClosure(
-            {n: tuple(at) for n, at in places.items()},
+    points = {p["name"]: tuple(p["at"]) for p in reference["points"]}
+    plane = reference["planes"][1]
+    axis = reference["steps"][-1]["axis_deg"]
+    linkages = {
+        "A": LoopClosure(
+            points,
             plane["hinge_direction_deg"],
             plane["dihedral_deg"],
-            m["guides_deg"]["10"],
-            m["input"]["travel"][1],
+            axis,
+            reference["input"]["range"][1],
+        )
+    }
+    for name, m in members.items():
+        plane = m["planes"]["link_assembly"]
+        linkages[name] = LoopClosure(
+            {n: tuple(at) for n, at in m["points"].items()},
+            plane["hinge_direction_deg"],
+            plane["dihedral_deg"],
+            m["steps"]["10"]["axis_deg"],
+            m["range"][1],
         )
     return linkages

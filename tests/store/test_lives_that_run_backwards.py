@@ -7,10 +7,10 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import date, timedelta
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,15 +18,16 @@ import pytest
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import life_of, lives
-from mlg_troubleshoot.life.forecast import Forecast, departures, fit_fleet, forecast
+from mlg_troubleshoot.life.forecast import Forecast, fit_fleet, forecast
+from mlg_troubleshoot.life.judged import judge_lives
 from mlg_troubleshoot.life.landings_left import FleetLine
 from mlg_troubleshoot.life.looking_back import side_by_side
 from mlg_troubleshoot.life.unrecorded_work import suggestions
 from mlg_troubleshoot.life.wear_paths import wear_paths
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
-from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_record, packed
+from mlg_troubleshoot.store import Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
-from mlg_troubleshoot.wear import WearModel, WearPath
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 from tests.cli.conftest import mlg, row
 
 View = Callable[[], Mapping[str, Any]]
@@ -356,9 +357,10 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Views:
     lives = {tail: mlg("history", tail, "LH", "--json", *place).json for tail in ("N0", "N4")}
     texts = {}
     for command in (("fleet",), ("history", "N4", "LH")):
-        texts[command[0]] = re.sub(
-            r"\s+", " ", mlg(*command, "--report", folder / command[0], *place).out
-        )
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("COLUMNS", "200")
+            shown = mlg(*command, "--report", folder / command[0], *place).out
+        texts[command[0]] = re.sub(r"\s+", " ", shown)
         (page,) = (folder / command[0]).glob("fleet.html" if len(command) == 1 else "*life*.html")
         texts[f"page of {command[0]}"] = words_of(page)
     return Views(lines, lives, texts)
@@ -433,88 +435,16 @@ def test_landings_are_left_to_the_margin_that_the_last_inspection_states(tmp_pat
 # Last inspections that do not fit the wear of their gear.
 
 
-@dataclass(frozen=True)
-class Steady:
-    """A forecast that every joint reads as it did last, with a standard deviation of 0.001 in."""
-
-    paths: Mapping[str, Sequence[WearPath]] = field(default_factory=dict)
-
-    def of(self, paths: Sequence[WearPath]) -> Steady:
-        return Steady({path.unit: [path] for path in paths})
-
-    def scores(self, units: Sequence[str]) -> np.ndarray:
-        return np.array([np.diff(self.paths[unit][-1].value)[-1] / 0.001 for unit in units])
-
-
-def suggested(*gears: tuple[float, float], tails: str = "AA", days: str = "11") -> list[str]:
-    """What is suggested of gears, each of its aircraft, by what joint 3 read at first and on its
-    day of February.
-    """
-    own = [
-        [
-            replace(
-                inspection(n, f"2024-0{n + 1}-0{day}", 400.0 * n),
-                tail_no=tail,
-                side=side,
-                record_id=f"{tail} {side} {n}",
-                clearance_in={3: worn_in},
-            )
-            for n, worn_in in enumerate(read)
-        ]
-        for side, read, tail, day in zip(Side, gears, tails, days, strict=False)
-    ]
-    add(own)
-    model = cast(WearModel, Steady())
-    gear, found = load_gear("hawker-800xp"), lives(Store())
-    scores = departures([*found.values()], model, gear)
-    forecasts = {key: Forecast(departures=of) for key, of in zip(found, scores, strict=True)}
-    lines = map(FleetLine.of, found.values())
-    return suggestions(lines, forecasts, lambda _keys: found, model, gear)
-
-
 @pytest.mark.parametrize(("deviations", "told"), [(3.0, 0), (5.0, 1)])
 def test_a_reading_five_standard_deviations_tighter_is_taken_for_a_restoration_and_three_are_not(
     deviations: float, told: int
 ) -> None:
-    found = suggested((0.006, 0.006 - 0.001 * deviations))
-    assert len([words for words in found if "#3 read much tighter than before" in words]) == told
-
-
-@pytest.mark.parametrize(("deviations", "told"), [(2.5, 0), (3.5, 1)])
-def test_two_gears_are_exchanged_where_that_is_e_to_the_8_times_as_likely(
-    deviations: float, told: int
-) -> None:
-    # On both gears together the exchange gains the square of the deviation in the log likelihood.
-    apart = 0.001 * deviations
-    found = suggested((0.003, 0.003 + apart), (0.003 + apart, 0.003))
-    assert len([words for words in found if "were they exchanged?" in words]) == told
-
-
-@pytest.mark.parametrize(
-    ("tails", "days", "told"), [("AA", "12", 1), ("AB", "11", 1), ("AB", "12", 0)]
-)
-def test_gears_are_exchanged_on_one_aircraft_or_on_the_sheets_of_one_day(
-    tails: str, days: str, told: int
-) -> None:
-    found = suggested((0.003, 0.0065), (0.0065, 0.003), tails=tails, days=days)
-    assert len([words for words in found if "were they exchanged?" in words]) == told
+    key = ("A", "LH")
+    found = suggestions([key], {key: Forecast(departures={3: -deviations, 4: deviations})})
+    assert len([words for words in found if "#3 read much tighter" in words]) == told
 
 
 # A gear that is outside its margin or has a joint over its limit is due now.
-
-
-def assessment(of: Record, verdict: str, basis: str = "PREDICTED") -> Record:
-    result = {
-        "verdict": verdict,
-        "basis": basis,
-        "joints": [],
-        "predicted_displacement_in": 0.04,
-        "margin_in": 0.03,
-    }
-    body = {"result": result, "program_version": "0", "geometry_sha256": "0", "extension": None}
-    return replace(
-        of, kind=RecordKind.ASSESSMENT, packed=packed(body), identity=(of.identity_hash.hex(),)
-    )
 
 
 def shown(told: Mapping[str, Any]) -> list[float]:
@@ -537,14 +467,15 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
             clearances[int(rng.integers(1, 11))] = 0.0076 + 0.01 * float(rng.random())
         unknown = rng.random() < 0.2
         own[-1] = replace(
-            last, clearance_in=clearances, gear_landings=None if unknown else last.gear_landings
+            last,
+            clearance_in=clearances,
+            gear_landings=None if unknown else last.gear_landings,
+            readings_in=(0.06,) if outside else (),
         )
-        for each in own:
-            records.append(inspection_record(each))
-            verdict = "OUTSIDE_MARGIN" if outside and each is own[-1] else "WITHIN_MARGIN"
-            records.append(assessment(records[-1], verdict, "MEASURED" if n % 2 else "PREDICTED"))
+        records += map(inspection_record, own)
     Store().add(records)
-    gear, found = load_gear(), list(lives(Store()).values())
+    gear = load_gear()
+    found = judge_lives(lives(Store()).values(), gear, load_index_table(gear))
     model = fit_fleet(found[:5], gear)
     lines = [*map(FleetLine.of, found)]
     fleet = fleet_as_json(lines, forecast(found, model, gear))["gears"]

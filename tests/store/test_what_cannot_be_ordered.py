@@ -17,13 +17,22 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.ranking import latest_of_each_gear, listed
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
+from mlg_troubleshoot.workflows.history import show_fleet
+from mlg_troubleshoot.workflows.keep import keep
 from tests.cli.conftest import mlg, row
 
 from .places import table
 
 SOUND = {f"clearance_{n}_in": "0.0011" for n in range(1, 11)}
 FAR, WORN = "0.06", "0.0121"
+# What comes next on a gear with which nothing is the matter.
+FINE = (
+    "Done: no further action on the joints",
+    "Go on with fault isolation: within its margin",
+)
 REPAIRED = {"restored_joints": "6", "repair_date": "2026-01-05"}
 
 
@@ -274,3 +283,25 @@ def test_no_gear_that_is_outside_is_missing_from_the_screen(tmp_path: Path) -> N
         last = [r for r in own if not any(surely_later(o.inspected, r.inspected) for o in own)]
         if any(is_bad(own, own.index(r)) for r in last):
             assert own[0].cells["tail_no"] in tails
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_no_gear_that_is_outside_is_fine_in_the_fleet_that_keeps_it(
+    seed: int, tmp_path: Path, gear: Gear
+) -> None:
+    drawn = list(gears(200, 11 + seed))
+    store = Store(tmp_path / "store.sqlite")
+    keep(judged(tmp_path, drawn), store)
+    lines = {line.tail_no: line for line in show_fleet(store, gear, ahead=False).lines}
+    for own in drawn:
+        last = [r for r in own if not any(surely_later(o.inspected, r.inspected) for o in own)]
+        every = [o.repaired for o in own if o.repaired is not None]
+        stands = [
+            r
+            for r in last
+            if is_bad(own, own.index(r))
+            and (r.repaired is not None or not any(surely_later(o, r.inspected) for o in every))
+        ]
+        if stands:
+            found = lines[own[0].cells["tail_no"]]
+            assert found.verdict != "WITHIN_MARGIN" or found.next_action not in FINE

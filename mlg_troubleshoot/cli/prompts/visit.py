@@ -4,7 +4,6 @@ for.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from datetime import date
@@ -19,7 +18,6 @@ from mlg_troubleshoot.cli.prompts.answers import (
     JointAnswer,
     parse_reading,
 )
-from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.columns import (
     BY_NAME,
     DATE,
@@ -29,13 +27,15 @@ from mlg_troubleshoot.decision.columns import (
     RIGGING_CHECKED,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side, plain_tail
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife, KeptInspection, lives
-from mlg_troubleshoot.life.since_repairs import since_repairs
+from mlg_troubleshoot.life.judged import since_kept_repairs
 from mlg_troubleshoot.store import Record, Store, inspection_from
-from mlg_troubleshoot.units import Length, LengthUnit, Sentence, parse_length
+from mlg_troubleshoot.units import LengthUnit, Sentence, parse_length
+from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
 _ASKS = {
@@ -44,7 +44,6 @@ _ASKS = {
     Action.RESTORE: RESTORED_JOINTS.name,
     Action.RETRACT: OUTCOME.name,
 }
-_LENGTH = re.compile(r"([+-]?\d\.\d+) in\b")
 _WITH_JOINTS = (Action.MEASURE, Action.MEASURE_AGAIN)
 
 
@@ -130,17 +129,17 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear) -> Visit | None:
     stood = latest.inspection
     if not set(stood.clearance_in) <= set(gear.joint_numbers):
         return None
-    (row,) = since_repairs([stood], gear, {life.key: life})
-    if not isinstance(row, Inspection):
-        raise TypeError("an inspection is not an invalid row")
+    row = since_kept_repairs(latest, life, gear)
     restored = tuple(sorted(set(row.restored_joints) - set(stood.restored_joints)))
-    step: Mapping[str, Any] = latest.result.get("next_action") or {}
-    action = Action(step["action"]) if step else None
-    asked = _ASKS.get(action) if action else None
-    joints = tuple(step.get("joints", ()))
-    todo = joints if action in _WITH_JOINTS else () if asked is None else (asked,)
-    said = _with_lengths(str(step.get("text", "")))
-    question = latest.result.get("open_question")
+    # What was found before a repair is what was last said of the gear.
+    counts = stood if life.is_repaired_since(latest) else row
+    (found,) = assess([counts], gear, load_index_table(gear))
+    step = found.next_action
+    action = step.action
+    asked = _ASKS.get(action)
+    todo = step.joints if action in _WITH_JOINTS else () if asked is None else (asked,)
+    said = Sentence.of("{}", step.text)
+    question = found.plan.open_question
     if restored:
         names = ", ".join(f"#{joint}" for joint in restored)
         action = Action.MEASURE
@@ -148,31 +147,19 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear) -> Visit | None:
         said = Sentence(f"Restored since, as the records say: {names}. Enter the new clearances.")
     versions = life.versions(latest.record)
     standing = _not_undone([answers_of(inspection_from(v), gear, "") for v in versions])
-    verdict = latest.result.get("verdict")
     return Visit(
         latest.record,
         row,
         answers_of(row, gear, latest.record.digest),
         _read_on(versions),
-        Verdict(verdict).words if verdict else "not judged",
+        found.verdict.words,
         said,
         action,
         todo,
-        joints,
+        step.joints,
         replace(standing[-2], continues=latest.record.digest) if len(standing) > 1 else None,
-        _with_lengths(question) if question and not restored else None,
+        Sentence.of("{}", question) if question and not restored else None,
     )
-
-
-def _with_lengths(kept: str) -> Sentence:
-    """A sentence as it is kept, in inches, that can be said in the unit of its reader again."""
-    parts = [
-        Length(float(each), len(each.partition(".")[2]), sign=each[0] in "+-")
-        if place % 2
-        else each
-        for place, each in enumerate(_LENGTH.split(kept))
-    ]
-    return Sentence.of("{}" * len(parts), *parts)
 
 
 def _not_undone(versions: list[Answers]) -> list[Answers]:
