@@ -210,7 +210,15 @@ def parse_length(text: str) -> WrittenLength:
         )
     written = match["unit"]
     unit = LengthUnit.parse(written) if written else None
-    return WrittenLength(float(match["number"]), unit, text.strip())
+    value = float(match["number"])
+    if vanishes(match["number"], value):
+        raise UsageError(f"{text.strip()!r} is too small to be a length", "Check the exponent.")
+    return WrittenLength(value, unit, text.strip())
+
+
+def vanishes(text: str, value: float) -> bool:
+    """Whether a number that is not zero was read as zero, as ``1e-400`` is."""
+    return value == 0.0 and re.search(r"[1-9]", text.lower().partition("e")[0]) is not None
 
 
 @dataclass(frozen=True, slots=True)

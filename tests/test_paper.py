@@ -98,7 +98,7 @@ class TestSection3Modelling:
         mechanism = gear.reference.mechanism
         at = {name: mechanism.reference_in_space(name) for name in ("3", "4", "5")}
         lengths = np.linalg.norm(at["5"] - at["3"]), np.linalg.norm(at["5"] - at["4"])
-        sign = mechanism.step("5").sign  # type: ignore[union-attr]
+        sign = np.sign(mechanism.side(mechanism.step("5")))  # type: ignore[arg-type]
         located = locate_joint(at["3"], at["4"], *lengths, np.array([0.0, 0.0, sign]))
         assert located == pytest.approx(at["5"], abs=1e-12)
 

@@ -382,7 +382,8 @@ def _believed(
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
     exceeds = 1.0 - inside(sums, cases.margin_in)
-    usually = float(unread.exceeds @ (cases.fleet.levels or PRIOR_OF_LEVELS))
+    # Wear alone never reaches a margin that is wide enough: a division needs some chance even then.
+    usually = max(float(unread.exceeds @ (cases.fleet.levels or PRIOR_OF_LEVELS)), 1e-9)
     return _Believed(unread, fits, likely, worn, waves, sums, exceeds, usually, by_share)
 
 

@@ -5,6 +5,7 @@ inches.
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -54,9 +55,16 @@ _SIDES = {
 }
 
 
+# Cyrillic and Greek letters that look like Latin ones, in lower case, and O for 0.
+_LOOK_ALIKE = str.maketrans("авекмнорстухѕіјαβεζηικμνορτυχo", "abekmh0pctyxsijabezhikmn0ptyx0")
+
+
 def plain_tail(tail: str) -> str:
-    """A tail number without what people write differently: case, blanks and dashes, O for 0."""
-    return re.sub(r"[\s_‐-―−-]+", "", tail).casefold().replace("o", "0")
+    """A tail number without what looks alike or is not seen: case, blanks and dashes, O for 0,
+    letters of other widths and alphabets, fillers.
+    """
+    text = unicodedata.normalize("NFKC", tail).casefold()
+    return re.sub(r"[\W_\u1160\u115f]+", "", text).translate(_LOOK_ALIKE)
 
 
 class Outcome(StrEnum):

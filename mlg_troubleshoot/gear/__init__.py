@@ -8,6 +8,7 @@ __all__ = [
     "gauges",
     "gear",
     "gear_file",
+    "gear_tables",
     "model",
 ]
 

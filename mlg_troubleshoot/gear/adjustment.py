@@ -46,9 +46,7 @@ class Adjustment:
 
     def numbers(self, model: LinkageModel) -> dict[str, Array]:
         """New values of the changed numbers of one linkage, by name, shape (n,). [in, rad or 1]"""
-        nominal = dict(
-            zip(model.kernel.parameter_names, model.kernel.parameters.tolist(), strict=True)
-        )
+        nominal = model.kernel.numbers()
         return {
             name: (
                 nominal[name] * np.asarray(self.scaled.get(name, 1.0))

@@ -10,7 +10,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Linkage
-from mlg_troubleshoot.geometry.mechanism import Dyad, Guided, Mechanism, Point, Slider, Step
+from mlg_troubleshoot.geometry.mechanism import Crank, Guided, Mechanism, Point, Slider
 
 
 class DesignSpace:
@@ -109,7 +109,7 @@ class DesignSpace:
             "y": self.held.y + reach * np.sin(turn),
         }
         m = self.mechanism
-        mechanism = replace(
+        return replace(
             m,
             points=tuple(replace(p, **places.get(p.name, {})) for p in m.points),
             planes=tuple(
@@ -132,14 +132,6 @@ class DesignSpace:
                 self.given.stroke[0] + x["extension"] if self.moves_reference else m.reference_input
             ),
         )
-        steps: list[Step] = []
-        for step in mechanism.steps:
-            if isinstance(step, (Dyad, Slider)):
-                sign: Any = np.where(mechanism.side(step) >= 0.0, 1.0, -1.0)
-                steps.append(replace(step, sign=sign))
-            else:
-                steps.append(step)
-        return replace(mechanism, steps=tuple(steps))
 
     def linkage(self, vector: Array, name: str = "N") -> Linkage:
         """The linkage of one vector, in plain numbers."""
@@ -177,24 +169,33 @@ def _direction(start: Point, end: Point) -> float:
 def member_values(linkage: Linkage) -> dict[str, Any]:
     """A linkage as a member of an ensemble file."""
     m = linkage.mechanism
-    steps: dict[str, Any] = {}
-    for step in m.steps:
-        if isinstance(step, (Dyad, Slider)):
-            steps[step.joint] = {"sign": int(step.sign)}
-        if isinstance(step, Slider):
-            steps[step.joint]["axis_deg"] = float(np.degrees(step.axis))
-    planes = {
-        p.name: {
-            "hinge_direction_deg": float(np.degrees(p.hinge_direction)),
-            "dihedral_deg": float(np.degrees(p.dihedral)),
-        }
-        for p in m.planes
-        if p.parent is not None
+    is_crank = any(isinstance(step, Crank) for step in m.steps)
+    start, end, drawn_at = (
+        float(np.degrees(value)) if is_crank else value
+        for value in (*linkage.stroke, m.reference_input)
+    )
+
+    def points(plane: str) -> dict[str, Any]:
+        placed: dict[str, Any] = {}
+        for p in m.points:
+            if p.plane == plane:
+                placed.setdefault("ground" if p.fixed else "moving", {})[p.name] = [p.x, p.y]
+        return placed
+
+    base, *hinged = m.planes
+    values: dict[str, Any] = {
+        "input": {"travel": [start, end], **({"drawn_at": drawn_at} if drawn_at else {})},
+        "guides_deg": {
+            s.joint: float(np.degrees(s.axis)) for s in m.steps if isinstance(s, Slider)
+        },
+        **points(base.name),
+        "planes": {
+            p.name: {
+                "hinge_direction_deg": float(np.degrees(p.hinge_direction)),
+                "dihedral_deg": float(np.degrees(p.dihedral)),
+                **points(p.name),
+            }
+            for p in hinged
+        },
     }
-    return {
-        "range": list(linkage.stroke),
-        "reference": m.reference_input,
-        **({"planes": planes} if planes else {}),
-        "points": {p.name: [p.x, p.y] for p in m.points},
-        "steps": steps,
-    }
+    return {key: part for key, part in values.items() if part}

@@ -88,12 +88,14 @@ class Discrepancies(Table):
     wear_shift: the number that wear of a part outside the joints shifts.
     contact: pairs of neighbouring joints.
     tilt: links that end float tilts.
+    source: where this is from, by the key of a source.
     """
 
     elastic: tuple[str, ...] = ()
     wear_shift: str | None = None
     contact: tuple[tuple[Whole, Whole], ...] = ()
     tilt: tuple[TiltedLink, ...] = ()
+    source: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,361 +5,57 @@ it is run.
 from __future__ import annotations
 
 import hashlib
-import json
-from collections.abc import Mapping
-from copy import deepcopy
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
-from mlg_troubleshoot.datafile import (
-    DataFile,
-    Name,
-    Number,
-    Pair,
-    RefusedValueError,
-    Sibling,
-    Table,
-    decode,
-    read_toml,
-    walk,
-)
+from mlg_troubleshoot.datafile import DataFile, decode, read_toml, walk
 from mlg_troubleshoot.errors import GearFileError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
+from mlg_troubleshoot.gear.assembly import Assembly, guides_of
 from mlg_troubleshoot.gear.gear import (
     Area,
     Discrepancies,
     Gear,
     JointSpec,
     Linkage,
-    RetractionCycle,
     Source,
     Sourced,
     SourceKind,
 )
-from mlg_troubleshoot.gear.model import Calibration
-from mlg_troubleshoot.geometry.mechanism import (
-    Crank,
-    Dyad,
-    Guided,
-    Lever,
-    Mechanism,
-    Output,
-    Plane,
-    Point,
-    Slider,
-    Slot,
-    Step,
+from mlg_troubleshoot.gear.gear_tables import (
+    CalibrationTable,
+    EnsembleFile,
+    GearFile,
+    SourcedTable,
 )
+from mlg_troubleshoot.gear.model import Calibration
+from mlg_troubleshoot.geometry.mechanism import Mechanism
 from mlg_troubleshoot.geometry.program import write_program
 
 _DATA = Path(str(files("mlg_troubleshoot.gear"))) / "data"
-# What a gear file need not state and what is assumed for it, by the names of a gear: its table and
-# key, the number and its unit.
-_ASSUMED = {
-    "plunger_reading": ("plunger", "read_min", 12.0, "min"),
-    "rigging_check": ("rigging_check", "minutes", 30.0, "min"),
-    "retraction": ("repair", "retraction_min", 15.0, "min"),
-    "second_repair_chance": ("repair", "second_repair_chance", 0.02, "1"),
-    "horizon": ("forecast", "horizon_landings", 20_000.0, "landings"),
-    "accepted_chance": ("forecast", "accepted_chance", 0.05, "1"),
+_OLD = 'docs/how-to/own-gear.md, "Gear files of 0.2.0", shows the old and the new way to write it.'
+# What a workshop need not state and what is assumed for it, by the names of a gear: the key, the
+# number and its unit.
+_WORKSHOP = {
+    "plunger_reading": ("read_plunger_min", 12.0, "min"),
+    "rigging_check": ("check_rigging_min", 30.0, "min"),
+    "retraction": ("trial_retraction_min", 15.0, "min"),
+    "second_repair_chance": ("second_repair_chance", 0.02, "1"),
+    "horizon": ("horizon_landings", 20_000.0, "landings"),
+    "accepted_chance": ("accepted_chance", 0.05, "1"),
 }
+# What is assumed of a joint: a new part without clearance, and the time to measure and restore it.
+_ACCESS_MIN = 10.0
 _RESTORE_MIN = 120.0
-
-# Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
-# overflow.
-Coordinate = Annotated[float, Meta(ge=-10_000, le=10_000)]
-Length = Annotated[float, Meta(gt=0, le=10_000)]
-Angle = Annotated[float, Meta(ge=-720, le=720)]
-Minutes = Annotated[float, Meta(gt=0, le=100_000)]
-LinkNumber = Annotated[int, Meta(ge=1, le=999)]
-
-
-def _need_source(table: Table, key: str, *numbers: float | None) -> None:
-    if getattr(table, key) is None and any(number is not None for number in numbers):
-        raise RefusedValueError(key, "a text")
-
-
-class InputTable(Table):
-    """The input of a linkage, in inches or radians."""
-
-    name: str
-    range: tuple[Coordinate, Coordinate]
-    reference: Coordinate
-    source: str
-
-    def __post_init__(self) -> None:
-        if self.range[0] == self.range[1]:
-            raise RefusedValueError("range", "two different numbers")
-
-
-class PlaneTable(Table):
-    """A plane; one with a parent is hinged to it."""
-
-    name: Name
-    parent: Name | None = None
-    hinge_point: Name | None = None
-    hinge_direction_deg: Angle | None = None
-    dihedral_deg: Angle | None = None
-    source: str | None = None
-
-    def __post_init__(self) -> None:
-        for key, expected in (
-            ("hinge_point", "the name of a point"),
-            ("hinge_direction_deg", "a number"),
-            ("dihedral_deg", "a number"),
-            ("source", "a text"),
-        ):
-            if (getattr(self, key) is None) != (self.parent is None):
-                raise RefusedValueError(key, expected if self.parent else "it with a parent only")
-
-    def plane(self) -> Plane:
-        direction = self.hinge_direction_deg or 0.0
-        dihedral = self.dihedral_deg or 0.0
-        turned = float(np.radians(direction)), float(np.radians(dihedral))
-        return Plane(self.name, self.parent, self.hinge_point or "", *turned)
-
-
-class PointTable(Table):
-    """A point of a linkage, in inches."""
-
-    name: Name
-    plane: Name
-    at: tuple[Coordinate, Coordinate]
-    source: str
-    fixed: bool = False
-    virtual_link: LinkNumber | None = None
-
-
-class StepTable(Table, tag_field="type"):
-    """How a joint is located; virtual_links: those of the joints at both ends."""
-
-    joint: Name
-    source: str
-    virtual_links: tuple[LinkNumber, ...] = ()
-
-
-class CrankTable(StepTable, tag="crank", kw_only=True):
-    pivot: Name
-
-
-class LeverTable(StepTable, tag="lever", kw_only=True):
-    pivot: Name
-    follows: Name
-
-
-class SlotTable(StepTable, tag="slot", kw_only=True):
-    pivot: Name
-    pin: Name
-
-
-class SignedTable(StepTable, kw_only=True):
-    """A step with two solutions, of which the sign takes one."""
-
-    upstream: Name
-    sign: Number
-
-    def __post_init__(self) -> None:
-        if self.sign not in (1.0, -1.0):
-            raise RefusedValueError("sign", "+1 or -1")
-
-
-class DyadTable(SignedTable, tag="dyad", kw_only=True):
-    downstream: Name
-    driven: bool = False
-
-
-class SliderTable(SignedTable, tag="slider", kw_only=True):
-    axis_deg: Angle
-
-
-class GuideTable(StepTable, tag="guide", kw_only=True):
-    upstream: Name
-    line: tuple[Name, Name | Angle]
-    across: Name | Angle | None = None
-    driven: bool = False
-
-    def __post_init__(self) -> None:
-        if self.driven and self.across is not None:
-            raise RefusedValueError("across", "no second line of a driven point")
-
-
-class OutputTable(Table):
-    """What a linkage is for."""
-
-    kind: Literal["position", "angle"]
-    joint: Name
-    pivot: Name | None = None
-
-
-class CalibrationTable(Table):
-    """The plunger at Down Lock and its travel, in inches."""
-
-    down_lock: Coordinate
-    travel: Length
-    down_lock_range: tuple[Coordinate, Coordinate]
-    source: str
-
-    def __post_init__(self) -> None:
-        if self.down_lock_range[0] > self.down_lock_range[1]:
-            raise RefusedValueError("down_lock_range", "two numbers, the smaller one first")
-
-
-class GeometryTable(Table):
-    """What the hash of a geometry is made of."""
-
-    input: InputTable
-    planes: tuple[PlaneTable, ...]
-    points: tuple[PointTable, ...]
-    steps: tuple[CrankTable | DyadTable | LeverTable | SlotTable | SliderTable | GuideTable, ...]
-    output: OutputTable
-    calibration: CalibrationTable | None = None
-
-
-class LengthTable(Table):
-    """One length with its source, in inches."""
-
-    value: Length
-    source: str
-
-
-class EntryTable(Table):
-    """Radial clearances that no reading may exceed, and above which it is asked again."""
-
-    hard_limit: Length
-    confirm_above: Length
-    source: str
-
-
-class WorkshopTable(Table):
-    """What a workshop decides, and need not state; a number that is stated has a source."""
-
-    def __post_init__(self) -> None:
-        numbers = (name for name in self.__struct_fields__ if name != "source")
-        _need_source(self, "source", *(getattr(self, name) for name in numbers))
-
-
-class PlungerTable(WorkshopTable):
-    """How long it takes to read the plunger."""
-
-    read_min: Minutes | None = None
-    source: str | None = None
-
-
-class RiggingCheckTable(WorkshopTable):
-    """How long it takes to check rigging and lock roller."""
-
-    minutes: Minutes | None = None
-    source: str | None = None
-
-
-class RepairTable(WorkshopTable):
-    """Which chance of a second repair is accepted, and how long a trial retraction takes."""
-
-    second_repair_chance: Annotated[float, Meta(gt=0, le=0.5)] | None = None
-    retraction_min: Minutes | None = None
-    source: str | None = None
-
-
-class ForecastTable(WorkshopTable):
-    """How far forecasts look ahead, and which chance is accepted."""
-
-    horizon_landings: Annotated[float, Meta(gt=0, le=1e6)] | None = None
-    accepted_chance: Annotated[float, Meta(gt=0, le=0.5)] | None = None
-    source: str | None = None
-
-
-class JointTable(Table):
-    """A joint; lengths are radial, in inches, times in minutes."""
-
-    number: LinkNumber
-    name: Name
-    location: str
-    limit: Length
-    limit_source: str
-    new_part: Annotated[float, Meta(ge=0, le=1e4)]
-    new_part_source: str
-    access_min: Minutes
-    access_source: str
-    area: Name
-    restore_min: Minutes | None = None
-    restore_source: str | None = None
-    point: Name | None = None
-    critical: bool = False
-
-    def __post_init__(self) -> None:
-        _need_source(self, "restore_source", self.restore_min)
-
-
-class AreaTable(Table):
-    """An area that is opened once for all joints in it."""
-
-    name: Name
-    description: str
-    access_min: Annotated[float, Meta(ge=0, le=1e5)]
-    source: str
-
-
-class DiscrepancyTable(Discrepancies, kw_only=True):
-    """Where a diagnosis may change the model, with the source of that."""
-
-    source: str
-
-
-class GearFile(GeometryTable, kw_only=True):
-    """A gear file: numbers name their source by its key in ``sources``."""
-
-    schema: Literal[1]
-    id: Name
-    name: Name
-    provenance: str
-    sources: dict[Name, Source]
-    margin: LengthTable
-    bearing_span: LengthTable
-    entry: EntryTable
-    joints: tuple[JointTable, ...]
-    areas: tuple[AreaTable, ...]
-    ensemble: Sibling | None = None
-    indices: Sibling | None = None
-    plunger: PlungerTable = PlungerTable()
-    rigging_check: RiggingCheckTable = RiggingCheckTable()
-    repair: RepairTable = RepairTable()
-    forecast: ForecastTable = ForecastTable()
-    diagnosis: DiscrepancyTable | None = None
-    cycle: RetractionCycle | None = None
-
-
-class MemberTable(Table):
-    """A linkage of the ensemble, by the numbers in which it differs from the gear file."""
-
-    range: Pair
-    reference: Number
-    points: dict[Name, Pair]
-    steps: dict[Name, dict[Name, Number]]
-    planes: dict[Name, dict[Name, Number]] = msgspec.field(default_factory=dict)
-
-
-class EnsembleFile(Table):
-    """Further linkages that reproduce the published numbers."""
-
-    source: str
-    members: dict[Name, MemberTable]
-
-
-_GEOMETRY_KEYS = ("input", "planes", "points", "steps", "output", "calibration")
-_STEPS: dict[type[StepTable], type[Step]] = {
-    CrankTable: Crank,
-    DyadTable: Dyad,
-    LeverTable: Lever,
-    SlotTable: Slot,
-    SliderTable: Slider,
-    GuideTable: Guided,
-}
+_BEARING_SPAN_IN = 1.0
+# A reading above twice the largest limit is asked again, one above five times is refused. [1]
+_CONFIRM_ABOVE = 2
+_HARD_LIMIT = 5
 
 
 def shipped_gears() -> tuple[str, ...]:
@@ -412,53 +108,63 @@ def _shipped(name: str) -> Gear:
     return _read(_DATA / f"{name}.toml")
 
 
+def read_gear_file(path: Path) -> DataFile[GearFile]:
+    """Read a gear file, its sources checked; one of 0.2.0 is refused."""
+    values = read_toml(path, dict[str, Any]).values
+    if values.get("schema") == 1:
+        raise GearFileError(f"{path.name}: is written as 0.2.0 read it (schema = 1)", _OLD)
+    file = DataFile(path, values, decode(path, values, GearFile))
+    for place, value in walk(values):
+        named = "source_of" in place[-2:-1] or place[-1:] == ("source",)
+        if named and place[0] != "cycle" and value not in file.content.sources:
+            raise file.fail(place, f"one of the sources {', '.join(file.content.sources)}")
+    return file
+
+
 def _read(path: Path) -> Gear:
-    file = read_toml(path, GearFile)
-    _check_sources(file)
-    found = file.content
-    numbers = _Numbers(found.sources)
-    _add_numbers(found, numbers)
+    file = read_gear_file(path)
+    form = file.content
+    numbers = _Numbers(form)
+    _add_geometry(form, numbers)
     surely = {SourceKind.MEASURED, SourceKind.TECHNICAL_ORDER}
     linkage_known = {number.kind for number in numbers.found} <= surely
-    reference = linkage_of(found, "A")
-    members: dict[str, dict[str, Any]] = {}
-    ensemble_path = path
-    if found.ensemble is not None:
-        ensemble_path = path.with_name(found.ensemble)
-        members = _members(file.values, ensemble_path)
-    calibration, down_lock_range = _calibration(found.calibration, numbers)
-    entry = found.entry
-    indices_file = path.with_name(found.indices or f"{path.stem}-indices.json")
-    gear = Gear(
-        id=found.id,
-        name=found.name,
-        provenance=found.provenance,
+    reference = _linkage(file, "A")
+    ensemble_path = path if form.ensemble is None else path.with_name(form.ensemble)
+    members = () if form.ensemble is None else _members(file, ensemble_path)
+    calibration, down_lock_range = _calibration(form.calibration, numbers)
+    indices_file = path.with_name(form.indices or f"{path.stem}-indices.json")
+    largest = max(joint.limit for joint in form.joints.values())
+    areas = [
+        Area(name, area.description, numbers.of(area, "access_min", "min"))
+        for name, area in form.areas.items()
+    ] or [Area("all", "the linkage", numbers.assumed(0.0, "min"))]
+    return Gear(
+        id=form.id or form.name,
+        name=form.name,
+        provenance=form.provenance or form.sources[form.source].text.strip().partition("\n")[0],
         reference=reference,
-        ensemble=(
-            reference,
-            *(
-                linkage_of(decode(ensemble_path, member, GeometryTable), name)
-                for name, member in members.items()
-            ),
+        ensemble=(reference, *members),
+        joints=tuple(
+            _joint(file, number, point, areas, numbers)
+            for number, point in enumerate(form.joints, start=1)
         ),
-        joints=tuple(_joint(joint, numbers) for joint in found.joints),
-        areas=tuple(
-            Area(a.name, a.description, numbers.add(a.access_min, "min", a.source))
-            for a in found.areas
-        ),
-        **_of_the_workshop(found, numbers),
+        areas=tuple(areas),
+        **{
+            name: numbers.of(form.workshop, key, unit, assumed)
+            for name, (key, assumed, unit) in _WORKSHOP.items()
+        },
         calibration=calibration,
-        margin=numbers.add(found.margin.value, "in", found.margin.source),
-        bearing_span=numbers.add(found.bearing_span.value, "in", found.bearing_span.source),
-        hard_limit=numbers.add(entry.hard_limit, "in", entry.source),
-        confirm_above=numbers.add(entry.confirm_above, "in", entry.source),
+        margin=numbers.of(form, "margin", "in"),
+        bearing_span=numbers.of(form, "bearing_span", "in", _BEARING_SPAN_IN),
+        hard_limit=numbers.of(form, "hard_limit", "in", _HARD_LIMIT * largest),
+        confirm_above=numbers.of(form, "confirm_above", "in", _CONFIRM_ABOVE * largest),
         down_lock_range=down_lock_range,
         discrepancies=_discrepancies(file, reference.mechanism),
-        cycle=found.cycle,
+        cycle=form.cycle,
         numbers=tuple(numbers.found),
         linkage_known=linkage_known,
-        geometry_sha256=_sha256({k: file.values.get(k) for k in _GEOMETRY_KEYS}),
-        ensemble_sha256=_sha256(members),
+        geometry_sha256=_sha256(_geometry(reference), calibration, down_lock_range),
+        ensemble_sha256=_sha256(*map(_geometry, members)),
         path=path,
         indices_file=indices_file,
         files=tuple(
@@ -467,135 +173,95 @@ def _read(path: Path) -> Gear:
             )
         ),
     )
-    _check_joints(gear, path)
-    return gear
 
 
-def _of_the_workshop(found: GearFile, numbers: _Numbers) -> dict[str, Sourced]:
-    """What a workshop decides, by the names of a gear; what the file does not state is assumed."""
-    read = {name: (getattr(found, table), *rest) for name, (table, *rest) in _ASSUMED.items()}
-    return {
-        name: numbers.or_assumed(getattr(table, key), table.source, assumed, unit)
-        for name, (table, key, assumed, unit) in read.items()
-    }
+def _linkage(file: DataFile[GearFile], name: str) -> Linkage:
+    drive = file.content.input
+    start, end = map(drive.in_units, drive.travel)
+    return Linkage(name, Assembly(file).mechanism(), (start, end))
 
 
-def _sha256(value: Any) -> str:
-    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+def _geometry(linkage: Linkage) -> tuple[object, ...]:
+    m = linkage.mechanism
+    return m.planes, m.points, m.steps, m.output, m.reference_input, linkage.stroke
 
 
-def _check_sources(file: DataFile[GearFile]) -> None:
-    """Refuse a source that is not described; that of the cycle stands in words."""
-    known = file.content.sources
-    for place, value in walk(file.values):
-        names_one = str(place[-1:]).endswith("source',)") and place[0] != "cycle"
-        if names_one and value not in known:
-            raise file.fail(place, f"one of the sources {', '.join(known)}")
+def _sha256(*parts: object) -> str:
+    return hashlib.sha256(msgspec.json.encode(parts, order="deterministic")).hexdigest()
 
 
 class _Numbers:
     """Gathers numbers with their sources."""
 
-    def __init__(self, sources: dict[str, Source]) -> None:
-        self.sources = sources
+    def __init__(self, form: GearFile) -> None:
+        self.form = form
         self.found: list[Sourced] = []
 
-    def add(self, value: float, unit: str, source: str | Source) -> Sourced:
-        known = source if isinstance(source, Source) else self.sources[source]
-        number = Sourced(float(value), unit, known.kind, known.text)
+    def add(self, value: float, unit: str, source: Source) -> Sourced:
+        number = Sourced(float(value), unit, source.kind, source.text)
         self.found.append(number)
         return number
 
-    def or_assumed(
-        self, value: float | None, source: str | None, assumed: float, unit: str
-    ) -> Sourced:
-        """Add a number that a gear file need not state: it is then assumed, and says so."""
-        if value is not None and source is not None:
-            return self.add(value, unit, source)
-        shown = f"{assumed:g}{'' if unit == '1' else f' {unit}'}"
+    def assumed(self, value: float, unit: str) -> Sourced:
+        """Add a number that a gear file need not state, and does not: it says so."""
+        shown = f"{value:g}{'' if unit == '1' else f' {unit}'}"
         text = f"Not stated in the gear file: {shown} is assumed by the authors of this tool."
-        return self.add(assumed, unit, Source(kind=SourceKind.ASSUMED, text=text))
+        return self.add(value, unit, Source(kind=SourceKind.ASSUMED, text=text))
+
+    def source(self, table: SourcedTable, key: str = "") -> Source:
+        own = table.source or self.form.source
+        return self.form.sources[table.source_of.get(key, own)]
+
+    def of(self, table: SourcedTable, key: str, unit: str, assumed: float = 0.0) -> Sourced:
+        """Add the number of a table, or what is assumed for it."""
+        value = getattr(table, key)
+        if value is None:
+            return self.assumed(assumed, unit)
+        return self.add(value, unit, self.source(table, key))
 
 
-def _add_numbers(table: GeometryTable, numbers: _Numbers) -> None:
+def _add_geometry(form: GearFile, numbers: _Numbers) -> None:
     """Add the numbers of a linkage with their sources."""
-    for value in (*table.input.range, table.input.reference):
-        numbers.add(value, "in", table.input.source)
-    for plane in table.planes:
-        for angle in (plane.hinge_direction_deg, plane.dihedral_deg):
-            if angle is not None and plane.source is not None:
-                numbers.add(angle, "deg", plane.source)
-    for point in table.points:
-        for value in point.at:
-            numbers.add(value, "in", point.source)
-    for step in table.steps:
-        if isinstance(step, SliderTable):
-            numbers.add(step.axis_deg, "deg", step.source)
-        if isinstance(step, GuideTable):
-            for to in (step.line[1], step.across):
+    drive = form.input
+    for value in (*drive.travel, drive.drawn_at):
+        numbers.add(value, "deg" if drive.crank else "in", numbers.source(drive))
+    for plane in form.planes.values():
+        for key in ("hinge_direction_deg", "dihedral_deg"):
+            numbers.of(plane, key, "deg")
+    for table in form.in_planes.values():
+        for name, at in (table.ground | table.moving).items():
+            source = numbers.source(table, name)
+            for value in at:
+                numbers.add(value, "in", source)
+            for _, to in guides_of(form, name) if name in table.moving else ():
                 if isinstance(to, float):
-                    numbers.add(to, "deg", step.source)
+                    numbers.add(to, "deg", source)
 
 
-def linkage_of(table: GeometryTable, name: str) -> Linkage:
-    """The linkage that the tables of a gear file describe."""
-    drive = table.input
-    points = (
-        Point(each.name, each.plane, *each.at, each.fixed, each.virtual_link)
-        for each in table.points
-    )
-    read = table.output
-    mechanism = Mechanism(
-        tuple(plane.plane() for plane in table.planes),
-        tuple(points),
-        tuple(map(_step, table.steps)),
-        Output(read.kind, read.joint, read.pivot or ""),
-        drive.reference,
-    )
-    return Linkage(name, mechanism, drive.range)
+def _members(file: DataFile[GearFile], path: Path) -> tuple[Linkage, ...]:
+    """The members of the ensemble: the reference with their own values in place."""
+    read = read_toml(path, EnsembleFile)
+    known = {place for place, _ in walk(file.values)}
+    linkages = []
+    for name, changes in read.content.members.items():
+        for place, _ in walk(changes):
+            if place not in known:
+                raise read.fail(("members", name, *place), "a key of the gear file")
+        values = with_changes(file.values, changes)
+        member = path.with_name(f"{path.name}, member {name}")
+        content = decode(member, values, GearFile)
+        linkages.append(_linkage(DataFile(member, values, content), name))
+    return tuple(linkages)
 
 
-def _step(table: StepTable) -> Step:
-    values = msgspec.structs.asdict(table)
-    del values["source"]
-    if isinstance(table, SliderTable):
-        values["axis"] = float(np.radians(values.pop("axis_deg")))
-    if isinstance(table, GuideTable):
-        start, to = table.line
-        values.update(line=(start, _towards(to)), across=_towards(table.across))
-    return _STEPS[type(table)](**values)
-
-
-def _towards(to: str | float | None) -> Any:
-    """A point that a line leads to, or its direction. [rad]"""
-    return float(np.radians(to)) if isinstance(to, float) else to
-
-
-def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
-    """Each member of the ensemble as a full description: the reference with its own numbers in
-    place.
-    """
-    file = read_toml(path, EnsembleFile)
-    full = {}
-    for name, member in file.content.members.items():
-        geometry = {key: raw.get(key) for key in _GEOMETRY_KEYS}
-        new: dict[str, Any] = deepcopy(geometry)
-        new["input"].update(range=list(member.range), reference=member.reference)
-        changes: dict[str, Mapping[str, Mapping[str, object]]] = {
-            "points": {point: {"at": list(at)} for point, at in member.points.items()},
-            "planes": member.planes,
-            "steps": member.steps,
-        }
-        for part, of_names in changes.items():
-            key = "joint" if part == "steps" else "name"
-            entries = {entry.get(key): entry for entry in new[part]}
-            for name_of, change in of_names.items():
-                if name_of not in entries:
-                    place = ("members", name, part, name_of)
-                    raise file.fail(place, f"a {key} of the gear file")
-                entries[name_of].update(change)
-        full[name] = new
-    return full
+def with_changes(values: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Values with other ones in place, table by table."""
+    tables = {
+        key: with_changes(values[key], part)
+        for key, part in changes.items()
+        if isinstance(part, dict) and isinstance(values.get(key), dict)
+    }
+    return {**values, **changes, **tables}
 
 
 def _calibration(
@@ -603,58 +269,42 @@ def _calibration(
 ) -> tuple[Calibration, tuple[float, float]]:
     if table is None:
         return Calibration(), (-np.inf, np.inf)
-    for value in (table.down_lock, table.travel, *table.down_lock_range):
-        numbers.add(value, "in", table.source)
+    numbers.of(table, "down_lock", "in")
+    numbers.of(table, "travel", "in")
+    for value in table.down_lock_range:
+        numbers.add(value, "in", numbers.source(table, "down_lock_range"))
     return Calibration(table.down_lock, table.travel), table.down_lock_range
 
 
-def _joint(table: JointTable, numbers: _Numbers) -> JointSpec:
+def _joint(
+    file: DataFile[GearFile], number: int, point: str, areas: list[Area], numbers: _Numbers
+) -> JointSpec:
+    form = file.content
+    joint = form.joints[point]
+    known = [area.name for area in areas]
+    area = joint.area or known[0]
+    if area not in known:
+        raise file.fail(("joints", point, "area"), f"one of the areas {', '.join(known)}")
+    links = " and ".join(link for link, ends in form.links.items() if point in ends)
     return JointSpec(
-        number=table.number,
-        point=table.point or str(table.number),
-        name=table.name,
-        location=table.location,
-        limit=numbers.add(table.limit, "in", table.limit_source),
-        new_part=numbers.add(table.new_part, "in", table.new_part_source),
-        access=numbers.add(table.access_min, "min", table.access_source),
-        restore=numbers.or_assumed(table.restore_min, table.restore_source, _RESTORE_MIN, "min"),
-        area=table.area,
-        critical=table.critical,
+        number=number,
+        point=point,
+        name=joint.name or point,
+        location=joint.location or f"pin of {links}",
+        limit=numbers.of(joint, "limit", "in"),
+        new_part=numbers.of(joint, "new_part", "in"),
+        access=numbers.of(joint, "access_min", "min", _ACCESS_MIN),
+        restore=numbers.of(joint, "restore_min", "min", _RESTORE_MIN),
+        area=area,
+        critical=joint.critical,
     )
 
 
 def _discrepancies(file: DataFile[GearFile], mechanism: Mechanism) -> Discrepancies:
     found = file.content.diagnosis
-    if found is None:
-        return Discrepancies()
     known = write_program(mechanism).parameters
     for name in (*found.elastic, *(t.length for t in found.tilt), found.wear_shift or ""):
         if name and name not in known:
             place = ("diagnosis", "elastic, tilt or wear_shift")
             raise file.fail(place, f"a number of the linkage instead of {name!r}")
     return found
-
-
-def _check_joints(gear: Gear, path: Path) -> None:
-    links = gear.reference.mechanism.virtual_links
-    if tuple(sorted(gear.joint_numbers)) != links or gear.joint_numbers != links:
-        raise GearFileError(
-            f"{path.name}: joints {list(gear.joint_numbers)} and virtual links {list(links)}"
-            " differ",
-            "Describe each virtual link of the steps as one joint, in ascending order.",
-        )
-    areas = {area.name for area in gear.areas}
-    points = {point.name for point in gear.reference.mechanism.points}
-    for joint in gear.joints:
-        if joint.point not in points:
-            raise GearFileError(
-                f"{path.name}: joint {joint.number} is at point {joint.point!r}, which has no"
-                " coordinates",
-                "Name one of the points of the linkage.",
-            )
-        if joint.area not in areas:
-            raise GearFileError(
-                f"{path.name}: joint {joint.number} lies in area {joint.area!r}, which is not"
-                " described",
-                f"Use one of {', '.join(sorted(areas))}, or add the area.",
-            )

@@ -100,10 +100,11 @@ class LinkageModel:
         """The linkage's numbers with some changed by name, for the kernel; arrays broadcast with
         the virtual links.
         """
-        values: list[Any] = self.kernel.parameters.tolist()
-        for name, value in changed.items():
-            values[self.kernel.parameter_index(name)] = value
-        return values
+        values = self.kernel.numbers()
+        for name in changed:
+            if name not in values:
+                raise KeyError(f"{name!r} is not a number of this mechanism")
+        return list({**values, **changed}.values())
 
     def displacement(self, links: Sequence[Any], changed: Mapping[str, Any] | None = None) -> Array:
         """Displacement of the plunger at mid-position by clearances, from where it stands without.

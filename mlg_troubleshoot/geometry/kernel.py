@@ -49,11 +49,9 @@ class Kernel:
         coordinates = tuple(name for pair in self._program.joints.values() for name in pair)
         return _function(self._program, coordinates)
 
-    def parameter_index(self, name: str) -> int:
-        try:
-            return self.parameter_names.index(name)
-        except ValueError:
-            raise KeyError(f"{name!r} is not a number of this mechanism") from None
+    def numbers(self) -> dict[str, float]:
+        """The numbers of the mechanism by name. [in, rad or 1]"""
+        return dict(zip(self.parameter_names, self.parameters.tolist(), strict=True))
 
     def output(
         self,
@@ -69,9 +67,18 @@ class Kernel:
           rad or 1]
         Returns: output; NaN where the mechanism does not close. [in or rad]
         """
+        return self._solved(self._output, position, links, parameters)[0]
+
+    def _solved(
+        self,
+        formulas: Callable[..., tuple[Any, ...]],
+        position: Array | float,
+        links: Sequence[Array | float],
+        parameters: Sequence[Any] | None,
+    ) -> list[Array]:
+        numbers = self.parameters.tolist() if parameters is None else parameters
         with np.errstate(invalid="ignore", divide="ignore"):
-            numbers = self.parameters.tolist() if parameters is None else parameters
-            return np.asarray(self._output(position, links, numbers)[0])
+            return [np.asarray(value) for value in formulas(position, links, numbers)]
 
     def positions(
         self,
@@ -82,9 +89,7 @@ class Kernel:
         """x and y of every point in its own plane, of one with a virtual link at its downstream
         link. [in]
         """
-        with np.errstate(invalid="ignore", divide="ignore"):
-            numbers = self.parameters.tolist() if parameters is None else parameters
-            values = map(np.asarray, self._places(position, links, numbers))
+        values = iter(self._solved(self._places, position, links, parameters))
         # x and y of each point follow each other.
         named = zip(self._program.joints, values, values, strict=True)
         return {joint: (x, y) for joint, x, y in named}
@@ -111,12 +116,10 @@ class Kernel:
                 self._loop = _compiled_loop(body, layout)
             self._loop(float(position), clearance, unit, self.parameters, result)
             return result
-        numbers = self.parameters.tolist()
-        with np.errstate(invalid="ignore", divide="ignore"):
-            for start in range(0, clearance.shape[1], CHUNK):
-                part = clearance[:, start : start + CHUNK]
-                links = [part[j] * unit[j, axis] for j in range(len(unit)) for axis in (0, 1)]
-                result[start : start + CHUNK] = self._output(position, links, numbers)[0]
+        for start in range(0, clearance.shape[1], CHUNK):
+            part = clearance[:, start : start + CHUNK]
+            links = [part[j] * unit[j, axis] for j in range(len(unit)) for axis in (0, 1)]
+            result[start : start + CHUNK] = self.output(position, links)
         return result
 
 

@@ -8,7 +8,6 @@ else. This module knows no aircraft; a joint's clearance is a *virtual link* wit
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -73,8 +72,6 @@ class Dyad:
         The joint.
     upstream, downstream : str
         The joints at the other ends; the downstream one is a fixed pivot or located before.
-    sign : float
-        +1 if the joint lies to the left of the line from upstream to downstream, else −1. [1]
     virtual_links : tuple of int
         Virtual links at the two ends of the upstream link: both displace it in parallel (A**, Fig.
         8b).
@@ -85,7 +82,6 @@ class Dyad:
     joint: str
     upstream: str
     downstream: str
-    sign: float
     virtual_links: tuple[int, ...] = ()
     driven: bool = False
 
@@ -119,14 +115,12 @@ class Slider:
     """A link whose far end slides on an axis.
 
     axis: direction of the axis in the joint's plane; the axis passes through the joint's reference
-    position. [rad] sign: +1 if the joint lies ahead, along the axis, of the foot of the upstream
-    joint, else −1. [1]
+    position. [rad]
     """
 
     joint: str
     upstream: str
     axis: float
-    sign: float
     virtual_links: tuple[int, ...] = ()
 
 
@@ -178,7 +172,8 @@ class Output:
 
 @dataclass(frozen=True, slots=True)
 class Mechanism:
-    """Planes, points and steps of one mechanism at its reference position.
+    """Planes, points and steps of one mechanism at its reference position, each step after those
+    that it needs.
 
     Attributes
     ----------
@@ -196,8 +191,7 @@ class Mechanism:
     Raises
     ------
     MechanismError
-        If a plane, point, step or the output refers to what is not there, a point is located never
-        or twice, or a virtual link is used twice.
+        If a plane is hinged to what is not there, or a name is none.
     """
 
     planes: tuple[Plane, ...]
@@ -206,66 +200,27 @@ class Mechanism:
     output: Output
     reference_input: float
     virtual_links: tuple[int, ...] = field(init=False)
-    _frames: dict[str, tuple[Array, Array]] = field(
-        init=False, repr=False, compare=False, default_factory=dict
-    )
-    _places: dict[str, Array] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __post_init__(self) -> None:
+        points = {(point.name, point.plane) for point in self.points}
         names = [point.name for point in self.points]
         for name in (*names, *(plane.name for plane in self.planes)):
             if not is_name(name):
                 remedy = f"Give names of 1 to {LONGEST_NAME} printable characters."
                 raise MechanismError(f"{name[:60]!r} cannot be the name of a part.", remedy)
-        used = [point.virtual_link for point in self.points if point.virtual_link is not None]
-        used += [number for step in self.steps for number in step.virtual_links]
-        if len(set(used)) != len(used):
-            raise MechanismError(f"A virtual link is used twice: {sorted(used)}.")
-        for fault in (*self._misplaced(names), *self._unlocated(names)):
-            raise MechanismError(fault)
-        object.__setattr__(self, "virtual_links", tuple(sorted(used)))
-
-    def _misplaced(self, names: list[str]) -> Iterator[str]:
-        """Planes and points that refer to what is not there, or stand twice."""
         planes: set[str] = set()
         for plane in self.planes:
-            if plane.parent is not None and plane.parent not in planes:
-                yield f"Plane {plane.name!r} is hinged to {plane.parent!r}, not defined before it."
-            if plane.parent is not None and plane.hinge_point not in names:
-                yield (
-                    f"Plane {plane.name!r} is hinged at {plane.hinge_point!r}, which has no"
-                    " coordinates."
-                )
+            if plane.parent is not None:
+                hinged = f"Plane {plane.name!r} is hinged"
+                if plane.parent not in planes:
+                    raise MechanismError(f"{hinged} to {plane.parent!r}, not defined before it.")
+                if (plane.hinge_point, plane.parent) not in points:
+                    where = f"which is not a point of {plane.parent!r}"
+                    raise MechanismError(f"{hinged} at {plane.hinge_point!r}, {where}.")
             planes.add(plane.name)
-        for name in names:
-            if names.count(name) > 1:
-                yield f"Point {name!r} is defined {names.count(name)} times."
-        for point in self.points:
-            if point.plane not in planes:
-                yield f"Point {point.name!r} lies in plane {point.plane!r}, which is not defined."
-
-    def _unlocated(self, names: list[str]) -> Iterator[str]:
-        """Points that are located never or twice."""
-        known = {point.name for point in self.points if point.fixed}
-        for step in self.steps:
-            for needed in needs(step):
-                if needed not in known:
-                    yield (
-                        f"Step {step.joint!r} needs {needed!r}, which is neither fixed nor located"
-                        " before it."
-                    )
-            if step.joint not in names:
-                yield f"Step {step.joint!r} locates a point that has no coordinates."
-            if step.joint in known:
-                yield f"Step {step.joint!r} locates a point that is fixed or located before it."
-            known.add(step.joint)
-        for name in names:
-            if name not in known:
-                yield f"Point {name!r} is neither fixed nor located by a step."
-        if self.output.joint not in known:
-            yield f"The output reads {self.output.joint!r}, which no step locates."
-        if self.output.kind == "angle" and self.output.pivot not in known:
-            yield f"The output is an angle about {self.output.pivot!r}, which no step locates."
+        used = [point.virtual_link for point in self.points if point.virtual_link is not None]
+        used += [number for step in self.steps for number in step.virtual_links]
+        object.__setattr__(self, "virtual_links", tuple(sorted(used)))
 
     def point(self, name: str) -> Point:
         return next(point for point in self.points if point.name == name)
@@ -296,20 +251,10 @@ class Mechanism:
         Returns origin, shape (..., 3): origin. [in]
         Returns axes, shape (..., 3, 3): rows are the two axes in the plane and its normal. [1]
         """
-        if plane not in self._frames:
-            self._frames[plane] = self._frame(plane)
-        return self._frames[plane]
-
-    def _frame(self, plane: str) -> tuple[Array, Array]:
         found = next(p for p in self.planes if p.name == plane)
         if found.parent is None:
             return np.zeros(3), np.eye(3)
-        origin, axes = self.frame(found.parent)
-        hinge = self.point(found.hinge_point)
-        if hinge.plane != found.parent:
-            raise MechanismError(
-                f"Plane {plane!r} is hinged at {hinge.name!r}, which is not in {found.parent!r}."
-            )
+        _, axes = self.frame(found.parent)
         x = axes[..., 0, :]
         y = axes[..., 1, :]
         normal = axes[..., 2, :]
@@ -322,18 +267,14 @@ class Mechanism:
         new = np.broadcast_arrays(
             first, turned * flat + tilted * normal, turned * normal - tilted * flat
         )
-        hinge_in_space = origin + _column(hinge.x) * x + _column(hinge.y) * y
-        return hinge_in_space, np.stack(new, axis=-2)
+        return self.reference_in_space(found.hinge_point), np.stack(new, axis=-2)
 
     def reference_in_space(self, name: str) -> Array:
         """Reference position of a point in the frame of the base plane, shape (..., 3). [in]"""
-        if name not in self._places:
-            point = self.point(name)
-            origin, axes = self.frame(point.plane)
-            along_x = _column(point.x) * axes[..., 0, :]
-            along_y = _column(point.y) * axes[..., 1, :]
-            self._places[name] = origin + along_x + along_y
-        return self._places[name]
+        point = self.point(name)
+        origin, axes = self.frame(point.plane)
+        place = origin + _column(point.x) * axes[..., 0, :] + _column(point.y) * axes[..., 1, :]
+        return np.asarray(place)
 
     def seen_in_plane(self, plane: str, start: str, end: str) -> tuple[Any, Any]:
         """Vector from one reference position to another, along the two axes of a plane. [in]"""
@@ -343,8 +284,8 @@ class Mechanism:
         return first, (across * axes[..., 1, :]).sum(axis=-1)
 
     def side(self, step: Dyad | Slider) -> Any:
-        """How far the coordinates put a joint to the side that its branch sign names: the sign is
-        that of this.
+        """How far the coordinates put a joint to the left of the line from upstream to downstream,
+        or ahead of the upstream joint along its axis: the sign of this tells two solutions apart.
         """
         plane = self.point(step.joint).plane
         arm = self.seen_in_plane(plane, step.upstream, step.joint)

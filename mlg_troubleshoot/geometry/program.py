@@ -83,6 +83,8 @@ class Program:
 
 
 _NAME = re.compile(r"\b[a-z]\w*\b")
+# Twice the area of a triangle whose corners are in line. [in²]
+_IN_LINE = 1e-9
 
 
 class _Writer:
@@ -156,13 +158,16 @@ class _Writer:
     def length(self, a: str, b: str) -> str:
         return self.parameter(f"length.{a}-{b}", self.distance(a, b))
 
-    def same_side(self, step: Dyad | Slider) -> None:
-        """Refuse a branch sign that would put the joint elsewhere than its coordinates do."""
-        if np.any(self.mechanism.side(step) * step.sign < 0.0):
+    def sign(self, step: Dyad | Slider) -> str:
+        """Which of two solutions the coordinates show; in line a dyad may snap to either side."""
+        side = self.mechanism.side(step)
+        if isinstance(step, Dyad) and np.ndim(side) == 0 and abs(side) < _IN_LINE:
             raise MechanismError(
-                f"Step {step.joint!r} has the sign {step.sign:+.0f}, but its coordinates lie on the"
-                " other side."
+                f"{step.joint!r} is in line with {step.upstream!r} and {step.downstream!r}: it may"
+                " snap to either side.",
+                "Give the points in a position off that line.",
             )
+        return self.parameter(f"sign.{step.joint}", np.where(side >= 0.0, 1.0, -1.0)[()])
 
 
 def write_program(mechanism: Mechanism) -> Program:
@@ -216,8 +221,7 @@ def _dyad(w: _Writer, step: Dyad) -> None:
     first = w.length(step.upstream, step.joint)
     second = w.length(step.joint, step.downstream)
     plane = w.mechanism.point(step.joint).plane
-    w.same_side(step)
-    sign = w.parameter(f"sign.{step.joint}", step.sign)
+    sign = w.sign(step)
     seen, height = w.seen_from(step.upstream, plane)
     start = w.shifted(seen, step.virtual_links)
     w.starts[step.joint, step.upstream] = start
@@ -296,8 +300,7 @@ def _slot(w: _Writer, step: Slot) -> None:
 def _slider(w: _Writer, step: Slider) -> None:
     joint = w.mechanism.point(step.joint)
     length = w.length(step.upstream, step.joint)
-    w.same_side(step)
-    sign = w.parameter(f"sign.{step.joint}", step.sign)
+    sign = w.sign(step)
     axis = w.parameter(f"slider.{step.joint}.axis", step.axis)
     ox = w.parameter(f"slider.{step.joint}.x", joint.x)
     oy = w.parameter(f"slider.{step.joint}.y", joint.y)

@@ -33,8 +33,8 @@ Growth = Annotated[float, Meta(ge=0, le=1_000_000)]
 Rank = Annotated[int, Meta(ge=1, le=MOST_ENTRIES)]
 # First-order indices closer than this are one rank: both ends of a link differ by less.
 _SAME_RANK = 1e-4
-_RENEWED = "The next check of an inspection computes it again."
-_NO_TABLE = "Move the file away: the next check of an inspection computes the table again."
+_KEPT = "mlg study --write-table keeps it."
+_NO_TABLE = "Move the file away: a check then computes the table itself."
 
 
 class StaleTableError(GearFileError):
@@ -149,7 +149,7 @@ def read_index_table(gear: Gear) -> IndexTable:
     """
     path = gear.indices_file
     if not path.exists():
-        raise StaleTableError(f"{path.name}: the table of indices is missing", _RENEWED)
+        raise StaleTableError(f"{path.name}: the table of indices is missing", _KEPT)
     try:
         state = path.stat()
         table = _read_once(path, state.st_mtime_ns, state.st_size)
@@ -163,7 +163,7 @@ def read_index_table(gear: Gear) -> IndexTable:
         if found != wanted:
             raise StaleTableError(
                 f"{path.name}: was computed for another {what}: {found[:16]}, not {wanted[:16]}",
-                _RENEWED,
+                _KEPT,
             )
     limits = tuple((entry.joint, entry.limit_in) for entry in table.joints)
     wanted_limits = tuple((joint.number, joint.limit.value) for joint in gear.joints)
@@ -171,7 +171,7 @@ def read_index_table(gear: Gear) -> IndexTable:
         gone = sorted(set(limits) ^ set(wanted_limits))
         named = ", ".join(f"joint {number} at {limit:g} in" for number, limit in gone)
         raise StaleTableError(
-            f"{path.name}: was computed for other joints or limits: {named}", _RENEWED
+            f"{path.name}: was computed for other joints or limits: {named}", _KEPT
         )
     return table
 
@@ -187,5 +187,17 @@ def _text(values: Mapping[str, Any]) -> str:
 
 
 def write_index_table(table: IndexTable, path: Path) -> None:
-    """Write a table of indices, whole or not at all."""
-    write_text(path, _text(msgspec.to_builtins(table)))
+    """Write a table of indices, whole or not at all: over such a table only, through no link."""
+    if path.is_symlink():
+        raise GearFileError(f"{path.name}: is a link, which no table replaces", "Remove the link.")
+    if path.exists():
+        read_json(path, IndexTable, "")
+    try:
+        text = _text(msgspec.to_builtins(table))
+    except ValueError:
+        raise GearFileError(
+            f"{path.name}: {table.failed} samples do not close at these limits: some indices are"
+            " not known",
+            "Check the limits and the points of the gear file.",
+        ) from None
+    write_text(path, text)

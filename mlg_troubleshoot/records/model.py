@@ -265,6 +265,7 @@ class ReadResult:
     layouts: tuple[SheetLayout, ...] = ()
     files: tuple[FileRead, ...] = ()
     unread: tuple[str, ...] = ()
+    unread_sheets: tuple[str, ...] = ()
 
     @property
     def inputs_sha256(self) -> dict[str, str]:
@@ -273,8 +274,10 @@ class ReadResult:
 
     @property
     def unread_files(self) -> tuple[str, ...]:
-        """The files that no row came from."""
-        return tuple(file.name for file in self.files if not file.rows)
+        """The files that no row came from, and the sheets of others that hold inspections and were
+        left out.
+        """
+        return (*(file.name for file in self.files if not file.rows), *self.unread_sheets)
 
     @property
     def inspections(self) -> tuple[Inspection, ...]:

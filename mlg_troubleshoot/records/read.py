@@ -75,6 +75,14 @@ class _Candidate:
     form: Form | None
     has_rows: bool
     has_cells: bool
+    is_instructions: bool
+    # A header stands too far below to be looked for.
+    is_late: bool
+
+    def is_filled(self, options: ReadOptions) -> bool:
+        """Whether it holds an inspection."""
+        is_form = self.form is not None and not self.form.is_untouched(options)
+        return self.has_rows or is_form or self.is_late
 
 
 def read_many(
@@ -167,6 +175,7 @@ def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -
         found.problems[:] = [replace(refusal.problem, file=label)]
     found.notes[:] = [f"{label}: {note}" for note in found.notes]
     found.unread[:] = [f"{label}: {note}" for note in found.unread]
+    found.unread_sheets[:] = [f"{label}, {sheet}" for sheet in found.unread_sheets]
     return FileRead(label, kind, digest, len(found.rows)), found
 
 
@@ -279,12 +288,12 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     peeked = list(islice(rows, _PEEKED_ROWS))
     first = next((cell for _, cells in peeked[:1] for cell in cells if cell is not None), None)
     is_instructions = isinstance(first, str) and first.strip().lower().startswith(_INSTRUCTIONS)
-    header = None if is_instructions else find_header(peeked, options, sheet.merged)
-    form = None if is_instructions or header is not None else find_form(peeked, options)
+    header = find_header(peeked, options, sheet.merged)
+    form = None if header is not None else find_form(peeked, options)
     has_rows = header is not None and any(number > header.row for number, _ in peeked)
-    return _Candidate(
-        sheet, chain(peeked, rows), header, form, has_rows, bool(peeked) and not is_instructions
-    )
+    is_late = header is None and any(header_score(cells, options) for _, cells in peeked)
+    every = chain(peeked, rows)
+    return _Candidate(sheet, every, header, form, has_rows, bool(peeked), is_instructions, is_late)
 
 
 def _read_book(
@@ -330,14 +339,21 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
     if options.sheet is not None and options.sheet != "*":
         return [_named(book, options.sheet, options, found)]
     visible = [sheet for sheet in book.sheets if not sheet.hidden]
-    candidates = [_candidate(sheet, options) for sheet in visible]
+    every = [_candidate(sheet, options) for sheet in book.sheets]
+    candidates = [c for c in every if not (c.sheet.hidden or c.is_instructions)]
     tables = [c for c in candidates if c.header is not None]
     filled = [c for c in tables if c.has_rows]
     forms = [c for c in candidates if c.form is not None and not c.form.is_untouched(options)]
     chosen = [c for c in candidates if c in filled or c in forms]
+    left = [c.sheet.name for c in every if c not in chosen and c.is_filled(options)]
+    found.unread_sheets += [f"sheet {name!r}" for name in left] if chosen else []
     hidden = ", ".join(repr(sheet.name) for sheet in book.sheets if sheet.hidden)
     if hidden:
         found.notes.append(f"hidden sheets were not read: {hidden}")
+    instructions = [c.sheet.name for c in every if c.is_instructions and c.is_filled(options)]
+    if instructions:
+        names = ", ".join(map(repr, instructions))
+        found.notes.append(f"instructions by their first cell, not read: sheet {names}")
     filled_otherwise = [
         c.sheet.name for c in candidates if c.header is None and c.form is None and c.has_cells
     ]
@@ -486,6 +502,7 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         layouts,
         tuple(file for file, _ in results),
         tuple(note for _, found in results for note in found.unread),
+        tuple(sheet for _, found in results for sheet in found.unread_sheets),
     )
 
 

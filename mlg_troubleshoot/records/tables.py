@@ -49,6 +49,7 @@ class Collected:
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
+    unread_sheets: list[str] = field(default_factory=list)
     layouts: list[SheetLayout] = field(default_factory=list)
     invalid_content: dict[RowSource, int] = field(default_factory=dict)
 

@@ -26,7 +26,7 @@ from mlg_troubleshoot.records.cells import (
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings, written_day
 from mlg_troubleshoot.records.headers import tidy
-from mlg_troubleshoot.units import MINUS, ClearanceConvention, LengthUnit, parse_length
+from mlg_troubleshoot.units import MINUS, ClearanceConvention, LengthUnit, parse_length, vanishes
 
 
 class CellFaultError(Exception):
@@ -304,7 +304,7 @@ def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[
             raise _comma_fault(text, expected)
     if _NOT_FINITE.fullmatch(text):
         raise CellFaultError("not_finite", expected)
-    if not _PLAIN.fullmatch(text):
+    if not _PLAIN.fullmatch(text) or vanishes(text, float(text)):
         raise CellFaultError("not_a_number", expected)
     return float(text)
 

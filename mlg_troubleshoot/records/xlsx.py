@@ -60,6 +60,7 @@ from mlg_troubleshoot.records.zipguard import (
     outside_limits,
     too_large,
 )
+from mlg_troubleshoot.units import vanishes
 
 _MERGE = re.compile(rb'<(?:\w+:)?mergeCell\s[^<>]*?ref="([A-Z]{1,3}\d{1,7}:[A-Z]{1,3}\d{1,7})"')
 _TEXT_TAG, _PHONETIC_TAG, _STRING_TAG = (
@@ -285,6 +286,8 @@ class _Rows(WorkSheetParser):
             return None if kind == "str" else OddCell(OddKind.NO_VALUE, NO_VALUE_TEXT)
         if kind == "n":
             number = float(value)
+            if vanishes(value, number):
+                return value
             shown = self._formats.get(style) if style else None
             if shown is None:
                 return number

@@ -71,7 +71,7 @@ def _kinds(name: str) -> list[Any]:
 
     if name in FILES:
         from mlg_troubleshoot.diagnosis.extension import ExtensionFile
-        from mlg_troubleshoot.gear.gear_file import EnsembleFile, GearFile
+        from mlg_troubleshoot.gear.gear_tables import EnsembleFile, GearFile
         from mlg_troubleshoot.indices.index_table import IndexTable
         from mlg_troubleshoot.paper.targets import TargetsFile
         from mlg_troubleshoot.workflows.beliefs_file import BeliefsFile

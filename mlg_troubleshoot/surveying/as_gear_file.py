@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from mlg_troubleshoot.gear.design import member_values
+from mlg_troubleshoot.gear.gear_file import with_changes
+from mlg_troubleshoot.geometry.mechanism import Dyad, Slider
 from mlg_troubleshoot.surveying.survey import Survey
 from mlg_troubleshoot.units import Length, Sentence
 
@@ -32,21 +34,15 @@ def surveyed_values(before: Mapping[str, Any], found: Survey, source: str) -> di
     """The values of a gear file with the surveyed numbers in them, each with a source that says its
     uncertainty.
     """
-    values = deepcopy(dict(before))
     linkage = found.linkage
     mode = found.modes[0]
     new = member_values(linkage.linkage(np.round(mode.vector, _DECIMALS), "A"))
+    values = with_changes(deepcopy(dict(before)), new)
     deviations = np.std(found.draws, axis=0)
     spread = dict(zip(linkage.names, deviations, strict=True))
     sources = values["sources"]
 
-    def put(
-        entry: dict[str, Any],
-        numbers: dict[str, Any],
-        what: str,
-        *parts: tuple[str, str, float, str],
-    ) -> None:
-        entry.update(numbers)
+    def source_of(what: str, *parts: tuple[str, str, float, str]) -> str:
         known = [
             f"{label} ± {spread[name] * scale:.2g} {unit}"
             for name, label, scale, unit in parts
@@ -56,50 +52,38 @@ def surveyed_values(before: Mapping[str, Any], found: Survey, source: str) -> di
             f"Survey {source}: {what}, standard uncertainty"
             f" {', '.join(known) or 'none: held in place'}."
         )
-        entry["source"] = f"survey_{len(sources)}"
-        sources[entry["source"]] = {"kind": "measured", "text": text}
+        key = f"survey_{len(sources)}"
+        sources[key] = {"kind": "measured", "text": text}
+        return key
 
     turned = float(np.degrees(1.0))
-    stroke = {"range": new["range"], "reference": new["reference"]}
-    put(
-        values["input"],
-        stroke,
-        "actuator extension",
-        ("extension", "extension", 1.0, linkage.driven_in),
-    )
-    for plane in values["planes"]:
-        if plane["name"] in new.get("planes", {}):
-            name = plane["name"]
-            parts = (
-                (f"{name}.direction", "hinge", turned, "°"),
-                (f"{name}.dihedral", "dihedral", turned, "°"),
-            )
-            put(plane, new["planes"][name], f"plane {name}", *parts)
-    for point in values["points"]:
-        name = point["name"]
+    stroke = ("extension", "extension", 1.0, linkage.driven_in)
+    values["input"]["source"] = source_of("actuator extension", stroke)
+    for name, plane in values.get("planes", {}).items():
+        parts = (
+            (f"{name}.direction", "hinge", turned, "°"),
+            (f"{name}.dihedral", "dihedral", turned, "°"),
+        )
+        plane["source"] = source_of(f"plane {name}", *parts)
+    for point in linkage.space.mechanism.points:
+        name = point.name
+        own = values.get("planes", {}).get(point.plane, values).setdefault("source_of", {})
         axes = [(f"{name}.{axis}", axis, 1.0, "in") for axis in ("x", "y", "r")]
-        put(point, {"at": new["points"][name]}, f"point {name}", *axes)
-    for step in values["steps"]:
-        step.update(new["steps"].get(step["joint"], {}))
-        if "axis_deg" in step:
-            put(
-                step, {}, f"axis of {step['joint']}", (f"{step['joint']}.axis", "axis", turned, "°")
-            )
+        guide = (f"{name}.axis", "axis", turned, "°")
+        own[name] = source_of(f"point {name}", *axes, guide)
     if linkage.travel is not None:
-        old = sources[values["calibration"]["source"]]["text"]
-        travel = {"travel": float(round(mode.vector[-1], _DECIMALS))}
-        put(
-            values["calibration"],
-            travel,
-            f"travel; the rest as before: {old}",
-            ("travel", "travel", 1.0, "in"),
+        calibration = values["calibration"]
+        old = sources[calibration.get("source", values["source"])]["text"]
+        calibration["travel"] = float(round(mode.vector[-1], _DECIMALS))
+        calibration["source"] = source_of(
+            f"travel; the rest as before: {old}", ("travel", "travel", 1.0, "in")
         )
     return values
 
 
 def assemblies(found: Survey) -> tuple[str, ...]:
     """Both assemblies, or both shapes of one assembly, where the survey allows two."""
-    steps = [s for s in found.linkage.space.mechanism.steps if hasattr(s, "sign")]
+    steps = [s for s in found.linkage.space.mechanism.steps if isinstance(s, (Dyad, Slider))]
     modes = [mode for mode in found.modes if mode.weight >= _WORTH_NAMING]
     places = [
         f"joint {s.joint} on the {{}} of the line between its links' other ends" for s in steps

@@ -503,7 +503,8 @@ class Fitting:
     def _sides(self, point: Array) -> tuple[int, ...]:
         space = self.linkage.space
         m = space.assembled(point[: len(space.names)])
-        signs = [int(s.sign) for s in m.steps if isinstance(s, (Dyad, Slider))]
+        sides = (m.side(s) for s in m.steps if isinstance(s, (Dyad, Slider)))
+        signs = [1 if side >= 0.0 else -1 for side in sides]
         for crank in (s for s in m.steps if isinstance(s, Crank)):
             plane = m.point(crank.joint).plane
             other = next(

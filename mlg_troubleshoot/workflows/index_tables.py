@@ -1,4 +1,4 @@
-"""The table of indices of a gear, computed again when the geometry changed."""
+"""The table of indices of a gear, computed where the one in its file does not fit."""
 
 from __future__ import annotations
 
@@ -6,23 +6,22 @@ import warnings
 from collections.abc import Callable
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.index_table import (
-    IndexTable,
-    StaleTableError,
-    read_index_table,
-    write_index_table,
-)
+from mlg_troubleshoot.indices.index_table import IndexTable, StaleTableError, read_index_table
+
+# Tables that were computed by this process: nothing is written that nobody asked for.
+_COMPUTED: dict[Gear, IndexTable] = {}
 
 
 def load_index_table(gear: Gear, say: Callable[[str], object] | None = None) -> IndexTable:
-    """Load the table of indices of a gear; one of another geometry is computed again and written.
+    """Load the table of indices of a gear; where there is none of its geometry it is computed, and
+    not written.
 
     Parameters
     ----------
     gear : Gear
         The gear.
     say : callable or None
-        Takes what is said of a table that was computed again; None warns.
+        Takes what is said of a table that was computed; None warns.
 
     Returns
     -------
@@ -33,18 +32,17 @@ def load_index_table(gear: Gear, say: Callable[[str], object] | None = None) -> 
     ------
     GearFileError
         If the table is not one.
-    OutputError
-        If a table that no longer fits cannot be written again.
     """
     try:
         return read_index_table(gear)
     except StaleTableError as stale:
-        from mlg_troubleshoot.paper.study import StudyOptions, run_study
+        if gear not in _COMPUTED:
+            from mlg_troubleshoot.paper.study import StudyOptions, run_study
 
-        write_index_table(run_study(gear, StudyOptions()).table, gear.indices_file)
-        said = f"{stale.message}. It was computed again: {gear.indices_file}"
-        if say is None:
-            warnings.warn(said, stacklevel=2)
-        else:
-            say(said)
-    return read_index_table(gear)
+            _COMPUTED[gear] = run_study(gear, StudyOptions()).table
+            said = f"{stale.message}. It was computed for this run. {stale.remedy}"
+            if say is None:
+                warnings.warn(said, stacklevel=2)
+            else:
+                say(said)
+        return _COMPUTED[gear]

@@ -11,11 +11,11 @@ import numpy as np
 import tomli_w
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.datafile import LONGEST_NAME, is_name, read_toml
+from mlg_troubleshoot.datafile import LONGEST_NAME, is_name
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import GearFile, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear, read_gear_file
 from mlg_troubleshoot.indices.index_table import write_index_table
 from mlg_troubleshoot.outputs import claim_outputs, write_text
 from mlg_troubleshoot.paper.targets import targets_file
@@ -216,7 +216,7 @@ def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
 
     ensemble, indices = _beside(path)
     names = {"id": path.stem, "ensemble": ensemble.name, "indices": indices.name}
-    before = read_toml(gear.path, GearFile).values
+    before = read_gear_file(gear.path).values
     values = {**surveyed_values(before, found, source), **names}
     values["provenance"] = f"surveyed ({len(found.read)} readings, {source})"
     drawn = {

@@ -74,8 +74,8 @@ def chain() -> Mechanism:
     points += tuple(Point(j, "plane", located[j].real, located[j].imag) for j in ("C", "H", "K"))
     steps = (
         Crank("B", "A"),
-        *(Dyad(j, start, end, 1.0, (k + 1,)) for k, (j, start, end, _, _) in enumerate(DYADS)),
-        Slider("K", "H", 0.0, 1.0, (3,)),
+        *(Dyad(j, start, end, (k + 1,)) for k, (j, start, end, _, _) in enumerate(DYADS)),
+        Slider("K", "H", 0.0, (3,)),
     )
     return Mechanism((Plane("plane"),), points, steps, Output("position", "K"), 0.5)
 

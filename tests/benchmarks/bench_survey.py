@@ -55,22 +55,12 @@ def numbers_of_the_ten() -> np.ndarray:
     members = tomllib.loads((GEAR.path.parent / reference["ensemble"]).read_text(encoding="utf-8"))[
         "members"
     ]
-    plane = reference["planes"][1]
-    own = {
-        "points": {p["name"]: p["at"] for p in reference["points"]},
-        "planes": {"link_assembly": plane},
-        "steps": {"10": reference["steps"][-1]},
-        "range": reference["input"]["range"],
-    }
     rows = []
-    for m in (own, *members.values()):
+    for m in (reference, *members.values()):
         turned = m["planes"]["link_assembly"]
-        angles = [
-            turned["hinge_direction_deg"],
-            turned["dihedral_deg"],
-            m["steps"]["10"]["axis_deg"],
-        ]
-        rows.append([c for p in POINTS for c in m["points"][p]] + angles + [m["range"][1]])
+        places = m["ground"] | m["moving"] | turned["ground"] | turned["moving"]
+        angles = [turned["hinge_direction_deg"], turned["dihedral_deg"], m["guides_deg"]["10"]]
+        rows.append([c for p in POINTS for c in places[p]] + angles + [m["input"]["travel"][1]])
     found = np.array(rows)
     for column in (-4, -3, -2):
         found[:, column] -= 360.0 * np.round((found[:, column] - found[0, column]) / 360.0)

@@ -100,16 +100,10 @@ def test_no_file_of_a_gear_is_replaced(
 
 
 def test_a_study_may_write_its_table_again_but_not_over_the_gear(own_gear: Path) -> None:
-    text = own_gear.read_text(encoding="utf-8").replace(
-        '"hawker-800xp-indices.json"', '"mine.toml"'
-    )
-    own_gear.write_text(text, encoding="utf-8")
-    kept(
-        mlg("study", "--gear", own_gear, "--write-table", "--force"),
-        own_gear,
-        text.encode(),
-        "--write-table",
-    )
+    text = own_gear.read_text(encoding="utf-8").replace("hawker-800xp-indices.json", "mine.json")
+    gear = own_gear.with_name("mine.json")
+    gear.write_text(text, encoding="utf-8")
+    kept(mlg("study", "--gear", gear, "--write-table"), gear, text.encode(), "--write-table")
 
 
 def test_a_report_does_not_replace_an_input_of_its_name(measured: Path) -> None:

@@ -37,10 +37,10 @@ _RAW = tomllib.loads(
         encoding="utf-8"
     )
 )
-AREA = [joint["area"] for joint in _RAW["joints"]]
-AREA_MIN = {area["name"]: float(area["access_min"]) for area in _RAW["areas"]}
-READ_MIN = [float(joint["access_min"]) for joint in _RAW["joints"]]
-RESTORE_MIN = [float(joint["restore_min"]) for joint in _RAW["joints"]]
+AREA = [joint["area"] for joint in _RAW["joints"].values()]
+AREA_MIN = {name: float(area["access_min"]) for name, area in _RAW["areas"].items()}
+READ_MIN = [float(joint["access_min"]) for joint in _RAW["joints"].values()]
+RESTORE_MIN = [float(joint["restore_min"]) for joint in _RAW["joints"].values()]
 PLUNGER_MIN = float(_RAW["plunger"]["read_min"])
 RIGGING_MIN = float(_RAW["rigging_check"]["minutes"])
 RETRACT_MIN = float(_RAW["repair"]["retraction_min"])

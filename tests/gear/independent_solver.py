@@ -152,25 +152,15 @@ def read_linkages(gear_file: Path, ensemble_file: Path) -> dict[str, LoopClosure
     """The ten linkages from the numbers of the two files alone."""
     reference = tomllib.loads(gear_file.read_text(encoding="utf-8"))
     members = tomllib.loads(ensemble_file.read_text(encoding="utf-8"))["members"]
-    points = {p["name"]: tuple(p["at"]) for p in reference["points"]}
-    plane = reference["planes"][1]
-    axis = reference["steps"][-1]["axis_deg"]
-    linkages = {
-        "A": LoopClosure(
-            points,
-            plane["hinge_direction_deg"],
-            plane["dihedral_deg"],
-            axis,
-            reference["input"]["range"][1],
-        )
-    }
-    for name, m in members.items():
+    linkages = {}
+    for name, m in {"A": reference, **members}.items():
         plane = m["planes"]["link_assembly"]
+        places = m["ground"] | m["moving"] | plane["ground"] | plane["moving"]
         linkages[name] = LoopClosure(
-            {n: tuple(at) for n, at in m["points"].items()},
+            {n: tuple(at) for n, at in places.items()},
             plane["hinge_direction_deg"],
             plane["dihedral_deg"],
-            m["steps"]["10"]["axis_deg"],
-            m["range"][1],
+            m["guides_deg"]["10"],
+            m["input"]["travel"][1],
         )
     return linkages

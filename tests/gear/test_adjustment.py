@@ -40,7 +40,7 @@ def test_a_rate_factor_multiplies_both_senses_and_not_the_offset(gear: Gear) -> 
 
 
 def test_a_changed_number_is_added_to_its_nominal_value(gear: Gear) -> None:
-    nominal = gear.model.kernel.parameters[gear.model.kernel.parameter_index(LINK)]
+    nominal = gear.model.kernel.parameters[gear.model.kernel.parameter_names.index(LINK)]
     numbers = Adjustment(CLEARANCE, changed={LINK: np.array([0.0, 0.01, -0.01])}).numbers(
         gear.model
     )
@@ -48,7 +48,7 @@ def test_a_changed_number_is_added_to_its_nominal_value(gear: Gear) -> None:
 
 
 def test_a_scaled_number_is_multiplied_and_then_changed(gear: Gear) -> None:
-    nominal = gear.model.kernel.parameters[gear.model.kernel.parameter_index(LINK)]
+    nominal = gear.model.kernel.parameters[gear.model.kernel.parameter_names.index(LINK)]
     both = Adjustment(CLEARANCE, changed={LINK: np.full(3, 0.01)}, scaled={LINK: np.full(3, 0.999)})
     assert both.numbers(gear.model)[LINK] == pytest.approx(np.full(3, 0.999 * nominal + 0.01))
 

@@ -60,7 +60,8 @@ def best_by_differential_evolution(
     def lost(points: np.ndarray) -> np.ndarray:
         directions = points[:-1].T
         links = links_from(np.broadcast_to(clearance, directions.shape), directions)
-        moved = sense * model.displacement(links, None, points[-1])
+        tight = model.kernel.output(points[-1], model.kernel.no_clearance())
+        moved = sense * model.rate * (model.kernel.output(points[-1], links) - tight)
         return np.where(np.isfinite(moved), -moved, 1e3)
 
     found = differential_evolution(

@@ -7,7 +7,6 @@ dynamic simulation, not a measurement. Its offsets overshoot the clearance by up
 from __future__ import annotations
 
 import csv
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
-from mlg_troubleshoot.gear.short_form import read_short_form
 
 HERE = Path(__file__).parent
 CLEARANCE, OVERSHOOT = 0.005, 2.1e-7
@@ -73,8 +71,3 @@ def test_every_simulated_state_lies_within_the_worst_case(gear: Gear) -> None:
         worst = worst_case(model, np.full((1, 3), CLEARANCE + OVERSHOOT))
         moved = state["rocker_rad"] - model.mid
         assert worst.under_in[0] <= moved <= worst.over_in[0]
-
-
-def test_the_shipped_file_is_what_its_short_form_gives(gear: Gear) -> None:
-    short = HERE.parents[1] / "docs" / "how-to" / "data" / "four-bar-three-pins.toml"
-    assert tomllib.loads(gear.path.read_text("utf-8")) == read_short_form(short).values

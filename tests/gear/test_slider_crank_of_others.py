@@ -18,7 +18,6 @@ import tomli_w
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
-from mlg_troubleshoot.gear.short_form import short_form
 
 CRANK, ROD, CLEARANCE = 0.153, 0.306, 0.001
 FILE = Path(__file__).parent / "data" / "slider-crank-loose-guide.csv"
@@ -30,7 +29,9 @@ DRAWN = 0.7
 FORM = {
     "name": "slider-crank",
     "margin": 0.001,
-    "source": {"kind": "assumed", "text": "siconos-tutorials, SliderCrank"},
+    "schema": 2,
+    "source": "siconos",
+    "sources": {"siconos": {"kind": "assumed", "text": "siconos-tutorials, SliderCrank"}},
     "ground": {"O": [0.0, 0.0]},
     "moving": {
         "A": [CRANK * math.cos(DRAWN), CRANK * math.sin(DRAWN)],
@@ -43,14 +44,14 @@ FORM = {
     "guides_deg": {"C": 0.0},
     "input": {"crank": "crank", "travel": [-10.0, 0.0]},
     "output": {"position_of": "C"},
-    "joints": {"C": CLEARANCE},
+    "joints": {"C": {"limit": CLEARANCE}},
 }
 
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> LinkageModel:
     file = tmp_path_factory.mktemp("gear") / "slider-crank.toml"
-    file.write_text(tomli_w.dumps(short_form(FORM).values))
+    file.write_text(tomli_w.dumps(FORM))
     return load_gear(file).model
 
 

@@ -66,7 +66,7 @@ def test_a_rod_out_of_the_plane_of_its_slider_keeps_its_length() -> None:
             Point("A", "base", 1.0, 0.0),
             Point("B", "tilted", 1.0, 0.5),
         ),
-        steps=(Crank("A", "O"), Slider("B", "A", 0.0, 1.0)),
+        steps=(Crank("A", "O"), Slider("B", "A", 0.0)),
         output=Output("position", "B"),
         reference_input=0.0,
     )

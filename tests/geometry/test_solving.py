@@ -234,7 +234,8 @@ def test_a_sample_that_does_not_close_is_nan_and_its_neighbours_are_not(gear: Ge
 
 
 def test_numbers_of_the_mechanism_can_differ_row_by_row(gear: Gear) -> None:
-    nominal = float(gear.model.kernel.parameters[gear.model.kernel.parameter_index("length.3-5")])
+    kernel = gear.model.kernel
+    nominal = float(kernel.parameters[kernel.parameter_names.index("length.3-5")])
     changed = {"length.3-5": nominal + np.array([0.0, 0.01])}
     moved_by = gear.model.displacement(gear.model.kernel.no_clearance(), changed)
     link = gear.model.displacement(links_from(np.eye(10)[2] * 0.01, np.zeros(10)))

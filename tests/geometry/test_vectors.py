@@ -101,7 +101,7 @@ def test_the_solver_locates_a_dyad_where_equation_six_does(
             Point("B", "tilted", *b, fixed=True),
             Point("C", "tilted", *c),
         ),
-        (Dyad("C", "A", "B", sign),),
+        (Dyad("C", "A", "B"),),
         Output("angle", "C", "B"),
         0.0,
     )

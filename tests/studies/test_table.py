@@ -50,7 +50,7 @@ def test_a_table_of_another_geometry_is_refused(elsewhere: Gear, what: str) -> N
     _changed(elsewhere, **{what: "0" * 64})
     with pytest.raises(GearFileError, match="another") as caught:
         read_index_table(elsewhere)
-    assert "computes it again" in caught.value.remedy
+    assert "--write-table keeps it" in caught.value.remedy
 
 
 def test_a_table_for_other_limits_is_refused(elsewhere: Gear) -> None:
@@ -64,7 +64,7 @@ def test_a_table_for_other_limits_is_refused(elsewhere: Gear) -> None:
 def test_a_missing_table_says_that_it_will_be_made(gear: Gear, tmp_path: Path) -> None:
     with pytest.raises(GearFileError, match="missing") as caught:
         read_index_table(replace(gear, indices_file=tmp_path / "none.json"))
-    assert "computes it again" in caught.value.remedy
+    assert "--write-table keeps it" in caught.value.remedy
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"schema_version": 99}', '{"schema_version": 1}'])

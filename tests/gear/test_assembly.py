@@ -1,4 +1,4 @@
-"""A gear from nothing: what a short form becomes, and what is said when something is wrong."""
+"""From points and links to a mechanism, and what is said when something is wrong."""
 
 from __future__ import annotations
 
@@ -16,19 +16,26 @@ from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.gear.short_form import read_short_form, short_form
+from mlg_troubleshoot.geometry.mechanism import Dyad, Guided, Lever, Slider, Slot, needs
 from mlg_troubleshoot.indices.amplification import amplification
 
+
+def limits(*points: str, limit: float = 0.01) -> dict[str, Any]:
+    return {point: {"limit": limit} for point in points}
+
+
 FOUR_BAR: dict[str, Any] = {
+    "schema": 2,
     "name": "four-bar",
     "margin": 0.005,
-    "source": {"kind": "assumed", "text": "textbook"},
+    "source": "textbook",
+    "sources": {"textbook": {"kind": "measured", "text": "textbook"}},
     "ground": {"O2": [0.0, 0.0], "O4": [6.0, 0.0]},
     "moving": {"A": [2.0, 0.0], "B": [0.0, 6.708203932499369]},
     "links": {"crank": ["O2", "A"], "coupler": ["A", "B"], "rocker": ["O4", "B"]},
     "input": {"crank": "crank", "travel": [0.0, 30.0]},
     "output": {"angle_of": "rocker"},
-    "joints": {"O2": 0.01, "A": 0.01, "B": 0.01, "O4": 0.01},
+    "joints": limits("O2", "A", "B", "O4"),
 }
 ACTUATOR = {
     "ground": {"F": [-3.0, -2.0], "E": [0.0, 0.0], "Q": [3.0, 2.5]},
@@ -43,7 +50,7 @@ ACTUATOR = {
     "guides_deg": {"C": -20.0},
     "input": {"actuator": "jack", "travel": [-0.2, 0.0]},
     "output": {"position_of": "C"},
-    "joints": {"1": 0.01, "2": 0.01, "3": 0.01, "C": 0.01},
+    "joints": limits("1", "2", "3", "C"),
 }
 
 
@@ -55,7 +62,7 @@ RAM: dict[str, Any] = {
     "guides_deg": {"R": math.degrees(math.atan2(4.0, 3.0))},
     "input": {"actuator": "ram", "travel": [-0.5, 0.2]},
     "output": {"angle_of": "rocker"},
-    "joints": {"R": 0.01, "P": 0.01, "D": 0.01},
+    "joints": limits("R", "P", "D"),
 }
 PIN = [math.cos(1.0), math.sin(1.0)]
 # A Scotch yoke: the pin of the crank runs in the slot of a yoke that slides.
@@ -67,7 +74,7 @@ YOKE: dict[str, Any] = {
     "guides": {"Y": [["A", 90.0]]},
     "input": {"crank": "crank", "travel": [-20.0, 0.0]},
     "output": {"position_of": "Y"},
-    "joints": {"A": 0.005},
+    "joints": limits("A", limit=0.005),
 }
 # A rod that slides on the coupler of the four-bar, C beside its line.
 SLIDING_ROD: dict[str, Any] = {
@@ -77,7 +84,7 @@ SLIDING_ROD: dict[str, Any] = {
     "guides": {"C": [["A", "B"]]},
     "input": {"crank": "crank", "travel": [-10.0, 0.0]},
     "output": {"angle_of": "rod"},
-    "joints": {"A": 0.01, "B": 0.01, "C": 0.01, "E": 0.01},
+    "joints": limits("A", "B", "C", "E"),
 }
 
 
@@ -87,11 +94,13 @@ def changed(**parts: Any) -> dict[str, Any]:
 
 def gear_of(form: dict[str, Any], folder: Path) -> Gear:
     file = folder / "gear.toml"
-    file.write_text(tomli_w.dumps(short_form(form).values))
+    file.write_text(tomli_w.dumps(form))
     return load_gear(file)
 
 
-def test_a_short_four_bar_predicts_as_the_one_that_is_written_in_full(tmp_path: Path) -> None:
+def test_a_four_bar_without_what_is_assumed_predicts_as_the_one_that_states_it(
+    tmp_path: Path,
+) -> None:
     full = load_gear(Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml")
     clearance = np.array([[0.004, 0.01, 0.002, 0.007]])
     found, wanted = (worst_case(g.model, clearance) for g in (gear_of(FOUR_BAR, tmp_path), full))
@@ -99,19 +108,31 @@ def test_a_short_four_bar_predicts_as_the_one_that_is_written_in_full(tmp_path: 
     assert found.under_in[0] == pytest.approx(wanted.under_in[0], rel=1e-12)
 
 
-def test_each_part_is_understood_in_the_words_of_the_field() -> None:
-    assert short_form(changed(**ACTUATOR)).steps == (
-        "1: dyad RRR: jack from F, bellcrank from E",
-        "2: rigid on bellcrank with E and 1",
-        "3: lever about Q, turned by pin 2 in its slot",
-        "C: dyad RRP: rod from 3, guide at -20°",
-    )
+def located(gear: Gear) -> dict[str, tuple[Any, ...]]:
+    """How each point is located, and from which ones."""
+    return {step.joint: (type(step), *needs(step)) for step in gear.reference.mechanism.steps}
 
 
-def test_the_order_in_which_points_are_written_does_not_matter() -> None:
+def test_the_gear_file_on_the_page_is_a_whole_one(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "own-gear.md").read_text("utf-8")
+    (tmp_path / "gear.toml").write_text(page.split("```toml\n")[1].split("```")[0])
+    gear = load_gear(tmp_path / "gear.toml")
+    assert gear.joint_numbers == (1, 2, 3)
+    assert gear.model.plunger_amplification() == pytest.approx(1.0, abs=1.0)
+
+
+def test_each_part_is_understood_in_the_terms_of_the_field(tmp_path: Path) -> None:
+    assert located(gear_of(changed(**ACTUATOR), tmp_path)) == {
+        "1": (Dyad, "F", "E"),
+        "2": (Lever, "1", "E"),
+        "3": (Slot, "2", "Q"),
+        "C": (Slider, "3"),
+    }
+
+
+def test_the_order_in_which_points_are_written_does_not_matter(tmp_path: Path) -> None:
     backwards = changed(**ACTUATOR) | {"moving": dict(reversed(ACTUATOR["moving"].items()))}
-    steps = short_form(backwards).values["steps"]
-    assert [step["joint"] for step in steps] == ["1", "2", "3", "C"]
+    assert list(located(gear_of(backwards, tmp_path))) == ["1", "2", "3", "C"]
 
 
 def test_the_actuator_keeps_the_length_that_it_is_driven_to(tmp_path: Path) -> None:
@@ -129,20 +150,8 @@ def test_an_actuator_on_a_guide_extends_along_it(tmp_path: Path) -> None:
     assert y == pytest.approx(0.8 * (0.5 + extended), abs=1e-15)
 
 
-def test_an_actuator_on_a_guide_is_said_to_be_extended_by_the_input() -> None:
-    assert short_form(changed(**RAM)).steps[0] == "R: ram from F at 53.1301°, extended by the input"
-
-
 def test_a_gear_with_an_actuator_on_a_guide_is_drawn(tmp_path: Path) -> None:
     assert gear_of(changed(**RAM), tmp_path).plot()._repr_svg_().startswith("<svg")
-
-
-def test_a_driven_point_of_a_gear_file_has_no_second_line(tmp_path: Path) -> None:
-    values = short_form(changed(**RAM)).values
-    values["steps"][0]["across"] = 10.0
-    (tmp_path / "gear.toml").write_text(tomli_w.dumps(values))
-    with pytest.raises(GearFileError, match=r"steps\[R\]\.across: expected no second line"):
-        load_gear(tmp_path / "gear.toml")
 
 
 def test_clearance_of_a_lever_is_at_the_link_that_it_moves(tmp_path: Path) -> None:
@@ -151,21 +160,17 @@ def test_clearance_of_a_lever_is_at_the_link_that_it_moves(tmp_path: Path) -> No
     assert links == {"1": (1,), "2": (), "3": (2,), "C": (3, 4)}
 
 
-def test_what_is_not_stated_is_assumed_and_named() -> None:
-    assert any("10 min" in text for text in short_form(FOUR_BAR).assumed)
-
-
-@pytest.mark.parametrize(("key", "times"), [("confirm_above", 2), ("hard_limit", 5)])
+@pytest.mark.parametrize(("name", "times"), [("confirm_above", 2), ("hard_limit", 5)])
 def test_readings_are_asked_again_and_refused_at_multiples_of_the_largest_limit(
-    key: str, times: int
+    name: str, times: int, tmp_path: Path
 ) -> None:
-    form = changed(joints={**FOUR_BAR["joints"], next(iter(FOUR_BAR["joints"])): 0.02})
-    assert short_form(form).values["entry"][key] == times * 0.02
+    gear = gear_of(changed(joints=limits("A", "B") | limits("O2", limit=0.02)), tmp_path)
+    assert getattr(gear, name).value == times * 0.02
+    assert "assumed by the authors" in getattr(gear, name).source
 
 
 def test_an_assumed_number_is_not_counted_as_a_given_one(tmp_path: Path) -> None:
-    given = changed(source={"kind": "measured", "text": "bench"})
-    kinds = [str(n.kind) for n in gear_of(given, tmp_path).numbers]
+    kinds = [str(n.kind) for n in gear_of(FOUR_BAR, tmp_path).numbers]
     assert "assumed" in kinds and "measured" in kinds
 
 
@@ -191,21 +196,13 @@ def test_an_assumed_number_is_not_counted_as_a_given_one(tmp_path: Path) -> None
         ),
         ({"input": {"crank": "crank", "travel": [1, 1]}}, r"input\.travel: expected two different"),
         ({"input": {"travel": [0, 1]}}, r"input\.crank: expected the name of a link"),
-        ({"output": {"position_of": "B"}}, r"output\.position_of: expected a point with a guide"),
         ({"output": {"angle_of": "B"}}, r"output\.angle_of: expected one of the links"),
         ({"output": {}}, r"output\.angle_of: expected a link here"),
         ({"joints": {}}, "joints: expected at least one point"),
-        ({"joints": {"Z": 0.01}}, r"joints\.Z"),
-        ({"joints": {"A": -1.0}}, r"joints\.A: expected a number above 0"),
-        (
-            {"moving": FOUR_BAR["moving"] | {"O2": [0, 0]}},
-            r"moving\.O2: expected a point that is not",
-        ),
-        (
-            {"moving": FOUR_BAR["moving"] | {"B": [8.0, 0.0]}},
-            r"moving\.B.*off the line from A to O4",
-        ),
+        ({"joints": limits("Z")}, r"joints\.Z"),
+        ({"joints": limits("A", limit=-1.0)}, r"joints\.A\.limit: expected a number above 0"),
         ({"moving": FOUR_BAR["moving"] | {"B": [1e300, 0.0]}}, r"moving\.B"),
+        ({"moving": FOUR_BAR["moving"] | {"O2": [0, 0]}}, r"moving\.O2: expected a point that has"),
         ({"guides_deg": {"O2": 0.0}}, r"guides_deg\.O2: expected a moving point"),
         ({"slots": {"crank": "nobody"}}, r"slots\.crank: expected one of the points"),
         ({"slots": {"nobody": "A"}}, r"slots\.nobody: expected one of the links"),
@@ -227,17 +224,30 @@ def test_what_is_wrong_is_named_with_key_and_what_was_expected(
     file = tmp_path / "mine.toml"
     file.write_text(tomli_w.dumps(changed(**parts)))
     with pytest.raises(GearFileError, match=words) as caught:
-        read_short_form(file)
+        load_gear(file)
     assert caught.value.message.startswith("mine.toml") and caught.value.remedy
 
 
-def test_a_linkage_that_does_not_close_over_its_travel_is_refused() -> None:
-    wide = changed(input={"crank": "crank", "travel": [0.0, 30.0]})
-    wide["ground"]["O4"] = [13.0, 0.0]
-    wide["moving"]["B"] = [7.0, 4.9]
-    wide["input"]["travel"] = [0.0, 180.0]
-    with pytest.raises(MechanismError, match="closes over only"):
-        short_form(wide).closes()
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ({"moving": FOUR_BAR["moving"] | {"B": [8.0, 0.0]}}, "'B' is in line with 'A' and 'O4'"),
+        ({"output": {"position_of": "B"}}, "position of 'B', which is not a slider"),
+        (
+            {"input": {"crank": "crank", "travel": [0.0, 180.0]}}
+            | {
+                "ground": {"O2": [0.0, 0.0], "O4": [13.0, 0.0]},
+                "moving": {"A": [2.0, 0.0], "B": [7.0, 4.9]},
+            },
+            "closes over only",
+        ),
+    ],
+)
+def test_a_linkage_that_cannot_move_is_refused(
+    parts: dict[str, Any], words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(MechanismError, match=words):
+        _ = gear_of(changed(**parts), tmp_path).model
 
 
 def test_a_yoke_on_a_guide_and_a_pin_moves_as_the_cosine_of_the_crank(tmp_path: Path) -> None:
@@ -286,20 +296,21 @@ def test_the_amplification_of_a_sliding_rod_is_the_derivative_of_its_angle(
     assert found.local_plunger == pytest.approx(found.exact, rel=1e-6)
 
 
-def test_guides_are_named_as_dyads() -> None:
-    said = [*short_form(changed(**YOKE)).steps, *short_form(changed(**SLIDING_ROD)).steps]
-    assert "Y: dyad RPP: guide at 0°, guide at 90° through A" in said
-    assert "C: dyad RRP: rod from E, guide from A to B" in said
+def test_guides_are_understood_as_dyads(tmp_path: Path) -> None:
+    yoke = gear_of(changed(**YOKE), tmp_path).reference.mechanism.step("Y")
+    rod = gear_of(changed(**SLIDING_ROD), tmp_path).reference.mechanism.step("C")
+    assert yoke == Guided("Y", "A", ("O", 0.0), math.radians(90.0), (1,))
+    assert rod == Guided("C", "E", ("A", "B"), virtual_links=(3,))
 
 
-def test_a_third_guide_of_a_point_is_refused() -> None:
+def test_a_third_guide_of_a_point_is_refused(tmp_path: Path) -> None:
     with pytest.raises(GearFileError, match=r"guides_deg\.Y: .* at most two guides"):
-        short_form(changed(**YOKE | {"guides": {"Y": [["A", 90.0], ["O", "A"]]}}))
+        gear_of(changed(**YOKE | {"guides": {"Y": [["A", 90.0], ["O", "A"]]}}), tmp_path)
 
 
-def test_a_guide_of_an_unknown_point_is_refused() -> None:
+def test_a_guide_of_an_unknown_point_is_refused(tmp_path: Path) -> None:
     with pytest.raises(GearFileError, match=r"guides\.Y\[1\]: expected one of the points O, A, Y"):
-        short_form(changed(**YOKE | {"guides": {"Y": [["nobody", 90.0]]}}))
+        gear_of(changed(**YOKE | {"guides": {"Y": [["nobody", 90.0]]}}), tmp_path)
 
 
 def test_a_linkage_whose_guide_moves_is_not_surveyed(tmp_path: Path) -> None:
