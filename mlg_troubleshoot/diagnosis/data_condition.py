@@ -1,7 +1,8 @@
 """The condition of the data: how the readings were written down, before anything is made of them.
 
 Nothing here knows what the model predicts wrongly. Rows that stand twice, were copied from an
-earlier sheet, or hold limits in place of readings tell nothing further and are set aside.
+earlier sheet, or hold limits in place of readings tell nothing further and are set aside. What is
+rounded, cut off or blank is said; its values stand as they were written.
 """
 
 from __future__ import annotations
@@ -10,19 +11,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import pdtrc
+from scipy.special import ndtri, pdtrc
 
-from mlg_troubleshoot.arrays import Array, Mask, Places, numbered
+from mlg_troubleshoot.arrays import Array, Mask, numbered
+from mlg_troubleshoot.decision.columns import LANDINGS
 from mlg_troubleshoot.decision.sentences import LEAST_ALIKE
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import gears_of, visits
-from mlg_troubleshoot.diagnosis.written import (
-    BY_CHANCE,
-    LEAST_ROWS,
-    blanks_by_wear,
-    piles,
+from mlg_troubleshoot.diagnosis.wear import (
+    EXCEPTIONS,
+    LEAST_VALUES,
+    gears_of,
+    read_in,
     step_of,
     steps_of,
+    visits,
 )
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
@@ -30,6 +32,30 @@ from mlg_troubleshoot.gear.gear import Gear
 
 # Share of clearances that are known to be cut off, from which their effects are. [1]
 _MANY_CUT = 0.1
+# With fewer rows nothing is said of them. [1]
+LEAST_ROWS = 5
+# Chance of a false statement about the data of a table. [1]
+BY_CHANCE = 0.001
+# Values before the last one that lead to it, and the chance that one is more frequent by so much;
+# it is twenty times there at all in few sound tables. [1]
+_LED_BY = 3
+_PILED_BY_CHANCE = 0.01
+# What rows that are set aside hold, and what to record next time.
+_ASIDE = {
+    "copied": (
+        "all clearances are those of the gear's inspection before: the rows are not used",
+        "every joint anew at each inspection; blank what was not read",
+    ),
+    "duplicate": ("the rows stand twice: each counts once", "each inspection once"),
+    "limit_written": (
+        "every cell holds the joint's limit, not a reading: the rows are not used",
+        "the value read; <0.004 where only a limit gauge was tried",
+    ),
+    "identical_cells": (
+        "all joints have one value, hardly a reading of each: the rows are not used",
+        "the value read at each joint",
+    ),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,25 +102,27 @@ def data_condition(table: DiagnosisTable, gear: Gear) -> tuple[tuple[DataConditi
     tuple of DataCondition, ndarray of bool of shape (n,)
         What was seen, and the rows that tell nothing further.
     """
+    values = table.clearance_in
     twice = _duplicates(table)
-    copies = _copies(table)
     equal = _identical(table)
-    limits = equal & _at_limits(table, gear)
+    limits = equal & ~np.any(np.abs(values - gear.limits_in) > 1e-7, axis=1)
     # Where most rows are like that it is how the gears are, not how one was written.
     doubtful = equal & ~limits & ~twice & bool(2 * equal.sum() < len(table))
-    aside = (twice, copies & ~twice & ~equal, limits & ~twice, doubtful)
+    each = (_copies(table) & ~twice & ~equal, twice, limits & ~twice, doubtful)
+    aside = np.any(each, axis=0)
     found = (
-        *_rounded(table, ~np.any(aside, axis=0)),
-        *_piled(table),
+        *_rounded(table, ~aside),
+        *_ends(table.take(~equal)),
         *_blanks(table),
-        *_of_rows("copied", table, aside[1]),
-        *_of_rows("duplicate", table, twice),
-        *_of_rows("limit_written", table, aside[2]),
-        *_of_rows("identical_cells", table, doubtful),
+        *(
+            DataCondition(kind, _listed(table, rows), float(np.mean(rows)), *said)
+            for rows, (kind, said) in zip(each, _ASIDE.items(), strict=True)
+            if rows.any()
+        ),
         *_selected(table, gear),
         *_falls(table),
     )
-    return found, np.any(aside, axis=0)
+    return found, aside
 
 
 def doubt_of(found: tuple[DataCondition, ...]) -> str:
@@ -116,34 +144,11 @@ def doubt_of(found: tuple[DataCondition, ...]) -> str:
     return f"Causes of joints, of scale, of wear and of rigging are not named: {'; '.join(cut)}."
 
 
-_SAID = {
-    "copied": (
-        "all clearances are those of the gear's inspection before: the rows are not used",
-        "every joint anew at each inspection; blank what was not read",
-    ),
-    "duplicate": ("the rows stand twice: each counts once", "each inspection once"),
-    "limit_written": (
-        "every cell holds the joint's limit, not a reading: the rows are not used",
-        "the value read; <0.004 where only a limit gauge was tried",
-    ),
-    "identical_cells": (
-        "all joints have one value, hardly a reading of each: the rows are not used",
-        "the value read at each joint",
-    ),
-}
-
-
-def _of_rows(kind: str, table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
-    if rows.any():
-        yield DataCondition(kind, _listed(table, rows), float(np.mean(rows)), *_SAID[kind])
-
-
 def _listed(table: DiagnosisTable, rows: Mask) -> str:
     """Name rows: by who wrote them if one did, and by their numbers."""
-    several = rows.sum() > 1
-    people = set(table.people[rows]) - {""}
-    whose = f" of technician {people.pop()}" if len(people) == 1 and several else ""
-    return f"row{'s' if several else ''} {first_few([str(n) for n in table.row[rows]])}{whose}"
+    people = {*table.people[rows]} - {""}
+    whose = f" of technician {people.pop()}" if len(people) == 1 and rows.sum() > 1 else ""
+    return f"row{'s' * bool(rows.sum() > 1)} {first_few([*map(str, table.row[rows])])}{whose}"
 
 
 def first_few(names: list[str]) -> str:
@@ -156,99 +161,67 @@ def _duplicates(table: DiagnosisTable) -> Mask:
     """Rows that say what an earlier one says, but for their identity, shape (n,)."""
     texts = [numbered(t) for t in table.factors.values()]
     parts = [table.clearance_in, table.readings_in, *table.quantities.values(), *texts]
-    whole = np.column_stack([np.nan_to_num(part, nan=-1.0) for part in parts])
-    _rows, first = np.unique(whole, axis=0, return_index=True)
+    whole = np.nan_to_num(np.column_stack(parts), nan=-1.0)
     again = np.ones(len(table), bool)
-    again[first] = False
+    again[np.unique(whole, axis=0, return_index=True)[1]] = False
     # A row that says hardly anything is not known to stand twice.
-    read = np.isfinite(table.clearance_in).sum(axis=1) + np.isfinite(table.readings_in).sum(axis=1)
+    read = np.isfinite(np.hstack([table.clearance_in, table.readings_in])).sum(axis=1)
     return np.asarray(again & (read >= LEAST_ALIKE))
-
-
-def _before(table: DiagnosisTable) -> Places:
-    """The gear's inspection before each row's, -1 for the first, shape (n,)."""
-    found = np.full(len(table), -1)
-    for rows in visits(table).values():
-        found[rows[1:]] = rows[:-1]
-    return found
 
 
 def _copies(table: DiagnosisTable) -> Mask:
     """Rows whose clearances are those of the gear's inspection before, more than chance allows."""
-    before = _before(table)
-    values = table.clearance_in
-    later = before >= 0
+    values = np.nan_to_num(table.clearance_in)
+    before = np.full(values.shape, np.inf)
+    for rows in visits(table).values():
+        before[rows[1:]] = values[rows[:-1]]
     # The least value may stand for all that are smaller.
-    least = np.min(values[values > 0.0], initial=np.inf)
-    both = (values > least) & (values[before] > 0.0) & later[:, None]
-    same = both & (values == values[before])
-    count = both.sum(axis=1)
-    full = (same.sum(axis=1) == count) & (count >= LEAST_ALIKE)
-    full &= ~np.any(np.nan_to_num(values) != np.nan_to_num(values[before]), axis=1)
-    others = both & ~full[:, None]
-    usual = (same & others).sum(axis=0) / np.maximum(others.sum(axis=0), 1)
-    by_chance = np.prod(np.where(both, usual, 1.0), axis=1)
-    expected = float(np.sum(by_chance[later & (count > 0)]))
-    return np.asarray(full & (pdtrc(full.sum() - 1, expected) < BY_CHANCE))
+    read = (values > np.min(values[values > 0.0], initial=np.inf)) & np.isfinite(before)
+    count = read.sum(axis=1)
+    same = (values == before).all(axis=1) & (count >= LEAST_ALIKE)
+    others = read & ~same[:, None]
+    usual = np.sum(others & (values == before)) / max(others.sum(), 1)
+    by_chance = float(np.sum(usual ** count[count > 0]))
+    return np.asarray(same & (pdtrc(same.sum() - 1, by_chance) < BY_CHANCE))
 
 
 def _identical(table: DiagnosisTable) -> Mask:
     """Rows in which many joints were read and all have one value that is not zero, more than chance
-    allows of the values of the other rows. What is below an end of a gauge has no value of its own.
+    allows of the values of the other rows.
     """
-    values = table.clearance_in
-    known = np.isfinite(values)
-    if table.below is not None:
-        known &= ~table.below
-    low = np.where(known, values, np.inf).min(axis=1)
-    count = known.sum(axis=1)
-    same = (np.where(known, values, -np.inf).max(axis=1) == low) & (low > 0.0)
-    same &= count >= LEAST_ALIKE
-    _found, often = np.unique(values[known & ~same[:, None]], return_counts=True)
-    alike = float(np.sum((often / max(often.sum(), 1)) ** 2))
+    values = read_in(table)
+    count = np.isfinite(values).sum(axis=1)
+    first = np.nanmax(values, axis=1, initial=0.0)
+    same = ~np.any(values != first[:, None], axis=1, where=np.isfinite(values))
+    same &= (first > 0.0) & (count >= LEAST_ALIKE)
+    others = values[~same]
+    often = np.unique(others[np.isfinite(others)], return_counts=True)[1]
+    alike = np.sum((often / max(often.sum(), 1)) ** 2)
     return np.asarray(same & (len(values) * alike ** np.maximum(count - 1.0, 0.0) < BY_CHANCE))
-
-
-def _at_limits(table: DiagnosisTable, gear: Gear) -> Mask:
-    """Rows in which every value read is its joint's limit."""
-    away = np.abs(table.clearance_in - gear.limits_in) > 1e-7
-    return np.asarray(~(away & np.isfinite(table.clearance_in)).any(axis=1))
-
-
-def _too_coarse(values: Array, step: float) -> bool:
-    """Tell whether what rounding takes away depends on the values: it does where the step is larger
-    than twice their standard deviation (Sheppard's corrections), that of the rounding taken out.
-    """
-    spread = float(np.nanvar(values)) - step**2 / 12.0
-    return bool(step**2 > 4.0 * spread)
 
 
 def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     """Values on a step of twice their standard uncertainty or more: half a step is as large."""
-    people = table.people
-    least = 2.0 * float(np.median(table.gauge_u_in))
-    each = steps_of(table.take(rows))
-    steps = {str(p): float(s) for p, s in zip(people[rows], each, strict=True) if s >= least}
-    people_read = set(people[rows].tolist())
-    for step in sorted(set(steps.values())):
-        own = sorted(p for p, s in steps.items() if s == step)
-        where = f"clearances, to {step:.4g} in"
-        if len(own) < len(people_read):
-            where += f", technician {', '.join(own)}"
-        rounded = np.isin(people, own) & rows
-        share = float(np.mean(rounded[rows]))
+    used = table.take(rows)
+    known = used.plunger_gauge_u_in
+    plunger = 2.0 * (DEFAULT_PLUNGER_U_IN if known is None else np.nanmedian(known))
+    steps = steps_of(used)
+    for step in np.unique(steps[steps >= 2.0 * np.median(table.gauge_u_in)]).tolist():
+        who = {*used.people[steps == step]}
+        some = f", technician {', '.join(sorted(who))}" if {*used.people} - who else ""
+        share = float(np.mean(steps == step))
+        # What rounding takes away depends on the values where the step is larger than twice their
+        # standard deviation, that of the rounding taken out (Sheppard's corrections).
+        spread = np.nanvar(used.clearance_in[steps == step]) - step**2 / 12.0
         yield DataCondition(
             "rounded",
-            where,
+            f"clearances, to {step:.4g} in{some}",
             share,
             f"each is known to ± {0.5 * step:.4g} in only; small effects of joints are not seen",
             "the value as the gauge shows it, to 0.0005 in",
-            share > _MANY_CUT and _too_coarse(table.clearance_in[rounded], step),
+            bool(share > _MANY_CUT and step**2 > 4.0 * spread),
         )
-    plunger = table.readings_in[rows]
-    known = table.plunger_gauge_u_in
-    least = 2.0 * (DEFAULT_PLUNGER_U_IN if known is None else float(np.nanmedian(known)))
-    if (step := step_of(plunger)) >= least:
+    if (step := step_of(used.readings_in)) >= plunger:
         yield DataCondition(
             "rounded",
             f"plunger readings, to {step:.4g} in",
@@ -258,111 +231,148 @@ def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
         )
 
 
-def _piled(table: DiagnosisTable) -> Iterator[DataCondition]:
+def _ends(table: DiagnosisTable) -> Iterator[DataCondition]:
     """The least or the largest value stands for what lies beyond it."""
+    values = read_in(table)
     if table.below is not None:
+        share = float(np.mean(table.below[np.isfinite(table.clearance_in)]))
         yield DataCondition(
             "censored",
             "clearances below an end of the gauge",
-            share := float(table.below.sum() / np.isfinite(table.clearance_in).sum()),
+            share,
             "half of the end stands for each, and anything up to it is as likely",
             "the value, with a gauge that reaches further",
             share > _MANY_CUT,
         )
-    share_of = {-1: "some of them are less", 1: "some of them are more"}
-    for pile in piles(table.take(~_identical(table))):
-        value = f"{pile.value:.4g}"
-        if pile.end:
-            effect = f"{share_of[pile.end]} than this: it is where the gauge or the sheet ends"
-        else:
-            effect = (
-                f"{pile.lower:.0%} of what is less is written so, as with a limit gauge: each may"
-                " be anything up to it"
-            )
+    found, counts = np.unique(np.round(values[np.isfinite(values)], 7), return_counts=True)
+    small = np.any(found < 2.0 * np.median(table.gauge_u_in))
+    for place, way, sign, beyond in ((0, -1, "<", "less"), (-1, 1, ">", "more")):
+        if (way < 0 and small) or not _more_than_led_to(counts[::way].astype(float)):
+            continue
+        share = float(counts[place] / counts.sum())
         yield DataCondition(
             "censored",
-            f"clearances of {value} in",
-            pile.share,
-            effect,
-            f"{'>' if pile.end > 0 else '<'}{value} where no value was read",
-            pile.share > _MANY_CUT,
+            f"clearances of {found[place]:.4g} in",
+            share,
+            f"some of them are {beyond} than this: it is where the gauge or the sheet ends",
+            f"{sign}{found[place]:.4g} where no value was read",
+            share > _MANY_CUT,
         )
+
+
+def _more_than_led_to(counts: Array) -> bool:
+    """Tell whether the last of successive values is more frequent than those before it lead to.
+
+    The logarithm of the counts of a unimodal distribution bends downwards, so the line through the
+    three before lies above the last one. Where people prefer some values (heaping), others lie
+    above their line as far, and nothing is said.
+    """
+    if len(counts) < _LED_BY + 2 or counts[-1] < LEAST_VALUES:
+        return False
+    surely = np.zeros(len(counts))
+    for place in range(_LED_BY, len(counts)):
+        before = counts[place - _LED_BY : place]
+        line, covariance = np.polyfit(
+            np.arange(-_LED_BY, 0), np.log(before), 1, w=np.sqrt(before), cov="unscaled"
+        )
+        error = np.sqrt(1.0 / counts[place] + covariance[1, 1])
+        surely[place] = np.log(counts[place]) - line[1] + ndtri(_PILED_BY_CHANCE) * error
+    return bool(surely[-1] > max(0.0, float(surely[:-1].max())))
 
 
 def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
-    """Blanks that depend on what would have been read."""
-    read = np.isfinite(table.clearance_in)
-    for habit in blanks_by_wear(table):
-        if habit.below_in is None:
-            what = "joints were read until the first that is worn"
-            effect = "what the blanks add is estimated from the wear of other gears"
-            record = "every joint, also after a worn one"
-        else:
-            what = "worn joints were written, sound ones were not"
-            effect = f"each blank stands for less than {habit.below_in:.4g} in"
-            record = "every joint that was read, also the sound ones"
-        whose = f" of technician {habit.whose}" if habit.whose else ""
-        share = float(habit.cells.sum() / (read.sum() + habit.cells.sum()))
-        yield DataCondition(
-            "blank_not_at_random",
-            f"blank clearances{whose}: {what}",
-            share,
-            effect,
-            record,
-            # What others read of the same joints says what the blanks hide.
-            doubtful=not habit.whose and share > _MANY_CUT,
-        )
+    """Blanks that depend on what would have been read: the habit of all rows, else those of single
+    technicians.
+    """
+    people = table.people
+    whole = [*_habit(table, "", np.ones(len(table), bool))]
+    own = np.unique(people[people != ""]).tolist()
+    yield from whole or (c for one in own for c in _habit(table, one, people == one))
+
+
+def _habit(table: DiagnosisTable, whose: str, rows: Mask) -> Iterator[DataCondition]:
+    known = np.isfinite(table.clearance_in)
+    read = rows & known.any(axis=1)
+    seen = known[read].any(axis=0)
+    values = table.clearance_in[read][:, seen]
+    blank = np.isnan(values)
+    partly = blank.any(axis=1)
+    if partly.sum() < LEAST_ROWS:
+        return
+    # Read in order until one is worn: that one is the largest.
+    last = np.sum(~blank, axis=1) - 1
+    stopped = partly & ~np.any(np.diff(blank.astype(int), axis=1) < 0, axis=1)
+    stopped &= values[np.arange(len(values)), last] >= np.nanmax(values, axis=1)
+    share = float(blank.sum() / (known.sum() + blank.sum()))
+    least = np.nanmin(values)
+    if stopped.sum() >= (1.0 - 2.0 * EXCEPTIONS) * partly.sum():
+        what = "joints were read until the first that is worn"
+        effect = "what the blanks add is estimated from the wear of other gears"
+        record = "every joint, also after a worn one"
+    elif least > 2.0 * np.median(table.gauge_u_in) and _fewer_as_worn(table, rows):
+        what = "worn joints were written, sound ones were not"
+        effect = f"each blank stands for less than {least:.4g} in"
+        record = "every joint that was read, also the sound ones"
+    else:
+        return
+    where = f"blank clearances{f' of technician {whose}' * bool(whose)}: {what}"
+    # What others read of the same joints says what the blanks hide.
+    doubtful = not whose and share > _MANY_CUT
+    yield DataCondition("blank_not_at_random", where, share, effect, record, doubtful)
+
+
+def _fewer_as_worn(table: DiagnosisTable, rows: Mask) -> bool:
+    """Rows with fewer landings have more blanks."""
+    landings = table.numbers(LANDINGS.variable)
+    known = rows & np.isfinite(landings)
+    blanks = np.isnan(table.clearance_in[known]).sum(axis=1)
+    if len(blanks) < LEAST_ROWS or not np.ptp(blanks) or not np.ptp(landings[known]):
+        return False
+    # Only where it is needed: the import of scipy.stats takes as long as a diagnosis.
+    from scipy.stats import spearmanr
+
+    return bool(spearmanr(landings[known], blanks, alternative="less").pvalue < BY_CHANCE)
 
 
 def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
     """Whether the plunger was read depends on the displacement that is predicted."""
-    use = np.isfinite(table.clearance_in).any(axis=1)
-    read = np.isfinite(table.readings_in[use]).any(axis=1)
-    if min(read.sum(), (~read).sum()) < 2 * LEAST_ROWS:
+    read = np.isfinite(table.readings_in).any(axis=1)
+    over = worst_case(gear.model, np.nan_to_num(table.clearance_in)).over_in
+    use = np.isfinite(table.clearance_in).any(axis=1) & np.isfinite(over)
+    one = over[use & read]
+    other = over[use & ~read]
+    if min(len(one), len(other)) < 2 * LEAST_ROWS:
         return
-    over = worst_case(gear.model, np.nan_to_num(table.clearance_in[use])).over_in
-    known = np.isfinite(over)
     from scipy.stats import mannwhitneyu
 
-    one = over[known & read]
-    other = over[known & ~read]
     if mannwhitneyu(one, other).pvalue < BY_CHANCE:
         more = "more" if np.median(one) > np.median(other) else "less"
         yield DataCondition(
             "selected",
             f"plunger readings: of gears that are {more} worn",
-            float(np.mean(read)),
+            len(one) / (len(one) + len(other)),
             "the mean misfit is that of the gears chosen, not of the fleet",
             "the plunger at every inspection, also of gears that retract",
         )
 
 
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
     """Landings of a gear that fall over time: at overhauls, where its wear begins anew, or not."""
-    landings = table.numbers("gear_landings")
-    if "day" not in table.quantities:
-        return
-    order = visits(table)
+    landings = table.numbers(LANDINGS.variable)
     numbers = gears_of(table)
-    fell: list[str] = []
-    renewed: list[int] = []
-    pooled = gears = 0
+    order = visits(table) if "day" in table.quantities else {}
+    fell: dict[str, int] = {}
+    renewed: dict[str, int] = {}
     for name, rows in order.items():
         known = rows[np.isfinite(landings[rows])]
         falls = np.diff(landings[known]) < 0.0
         anew = falls & (np.diff(numbers[known]) != 0)
-        renewed += [int(anew.sum())] * bool(anew.any())
-        pooled += (count := int(falls.sum() - anew.sum()))
-        fell += [name] * (count > 0)
-        gears += int(falls.any())
-    if not gears:
+        for found, count in ((fell, falls.sum() - anew.sum()), (renewed, anew.sum())):
+            found.update({name: int(count)} if count else {})
+    if not fell and not renewed:
         return
-    named = f"gear{'s' * (len(fell) > 1)} {first_few(fell)}: {_counted(pooled, 'time')}"
-    at = f"at {_counted(sum(renewed), 'overhaul')} of {_counted(len(renewed), 'gear')}"
+    named = f"gear{'s' * (len(fell) > 1)} {first_few([*fell])}: {_counted(fell, 'time')}"
+    at = f"at {_counted(renewed, 'overhaul')} of {len(renewed)} gear{'s' * (len(renewed) > 1)}"
     slip = (
         "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"
         " before and after is taken as one"
@@ -370,7 +380,12 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
     yield DataCondition(
         "landings_fall",
         ", and ".join([named] * bool(fell) + [at] * bool(renewed)),
-        gears / len(order),
+        len({*fell, *renewed}) / len(order),
         slip if fell else "the wear of a gear begins anew there",
         "landings since overhaul, and the date of the overhaul",
     )
+
+
+def _counted(found: dict[str, int], noun: str) -> str:
+    count = sum(found.values())
+    return f"{count} {noun}{'s' * (count > 1)}"

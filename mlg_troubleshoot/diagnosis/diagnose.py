@@ -17,7 +17,7 @@ from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, offered
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
-from mlg_troubleshoot.diagnosis.data_condition import DataCondition, first_few
+from mlg_troubleshoot.diagnosis.data_condition import BY_CHANCE, DataCondition, first_few
 from mlg_troubleshoot.diagnosis.explain import (
     Finding,
     MisfitProblem,
@@ -41,7 +41,6 @@ from mlg_troubleshoot.diagnosis.noise import (
 from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import visits
-from mlg_troubleshoot.diagnosis.written import BY_CHANCE
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gear import Discrepancies

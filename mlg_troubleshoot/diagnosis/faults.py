@@ -24,7 +24,6 @@ from mlg_troubleshoot.diagnosis.noise import FREEDOM, robust_scale, student
 from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import fleet_history, inspection_of
-from mlg_troubleshoot.diagnosis.written import steps_of
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.model import LinkageModel
@@ -475,6 +474,5 @@ def _usual(table: DiagnosisTable, trusted: Mask) -> _Usual:
     """
     known = replace(table, clearance_in=np.where(trusted[:, None], table.clearance_in, np.nan))
     history = fleet_history(known)[0]
-    rounding = steps_of(table)[:, None] ** 2 / 12.0
-    variance = history.unsure_in2 + history.scatter_in2 + history.reading_in2 + rounding
+    variance = history.unsure_in2 + history.scatter_in2 + history.reading_in2
     return _Usual(history.expected_in, np.sqrt(variance + _LEAST_SPREAD_IN**2))

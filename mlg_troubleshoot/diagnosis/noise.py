@@ -77,8 +77,7 @@ class Rows:
         What joints that nobody read may add or take away in all rows together, each at one
         standard deviation. [in]
     unknown_in : ndarray, shape (n, k)
-        What is not known of wear that nobody read, and of digits that may be cut off, each at one
-        standard deviation. [in]
+        What is not known of wear where none was read, each at one standard deviation. [in]
     drawn_in : ndarray, shape (n,)
         Prediction from the readings as they are, minus the prediction with all readings shrunk
         to their expectation. [in]

@@ -21,7 +21,6 @@ from mlg_troubleshoot.diagnosis.wear import (
     likely_clearances,
     wear_of_gears,
 )
-from mlg_troubleshoot.diagnosis.written import cut_off
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gear import Discrepancies
@@ -60,7 +59,7 @@ def _scene(
     model: LinkageModel, table: DiagnosisTable, where: Discrepancies, worn: LikelyClearances
 ) -> tuple[Scene, Rows]:
     clearance = worn.likely_in
-    as_read = np.where(np.isfinite(table.clearance_in), worn.shown_in, clearance)
+    as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, clearance)
     read = worst_of_sense(model, as_read)[0]
     scene = scene_at(model, table, where, clearance)
     slopes = np.empty_like(clearance)
@@ -73,9 +72,9 @@ def _scene(
         np.sqrt(np.sum((slopes * u) ** 2, axis=1)) for u in (worn.u_row_in, worn.u_gear_in)
     )
     fleet_in = slopes * worn.u_fleet_in
-    unknown = np.sum(slopes, axis=1, keepdims=True) * cut_off(table)
+    unknown = np.empty((len(table), 0))
     if not np.nan_to_num(table.clearance_in).any():
-        unknown = np.hstack([wear_of_gears(table, slopes * worn.u_gear_in), unknown])
+        unknown = wear_of_gears(table, slopes * worn.u_gear_in)
         shared_in = np.zeros(len(table))
     rows = Rows(
         scene.over_in,

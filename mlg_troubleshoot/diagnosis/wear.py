@@ -16,8 +16,8 @@ from scipy.sparse import csr_array
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, numbered
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.written import Written, written
 from mlg_troubleshoot.misfit.covariance import FAR
+from mlg_troubleshoot.units import MM_PER_IN
 
 # Set in 2026 on simulated wear (tests/diagnosis/test_wear.py and the study's tuning seeds); not
 # re-tuned.
@@ -25,8 +25,6 @@ _ROUNDS = 25
 # The split between errors of reading and scatter of wear is left alone until the lines have
 # settled.
 _SETTLED = 3
-# What an interval tells of its place, over what a point would, at least: computing only. [1]
-_LEAST_TOLD = 0.02
 # A gear's joint scatters as if it were worn at least this share of the fleet's mean. [1]
 _LEAST_LEVEL = 0.25
 # No joint is tighter, and no reading surer, than this for the purpose. [in]
@@ -55,6 +53,17 @@ GEARS_TOGETHER = FLEET_TOGETHER / 2
 # Where landings fall in a larger share of visits they do not follow the dates: half of them would
 # fall by chance. [1]
 _MOST_FALLS = 1 / 3
+# Share of rows that show a habit, and of values on a step, that may be exceptions. [1]
+EXCEPTIONS = 0.05
+# With fewer values nothing is said of them. [1]
+LEAST_VALUES = 20
+# Steps to which people round, inches and millimetres; half an inch's where diameters are read. [in]
+_STEPS_IN = (
+    *(n / 20000 for n in (2, 5, 10, 20, 40, 50, 100, 200)),
+    *(n / 20 / MM_PER_IN for n in (0.1, 0.2, 1, 2, 4)),
+)
+# A value is a multiple of a step within this share of it. [1]
+_ON_STEP = 0.02
 # How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the
 # others: the share of its variance that is the gear's. [1]
 OWN_GEAR = GEARS_APART**2 / (JOINTS_APART**2 + GEARS_APART**2 + ROWS_APART**2)
@@ -73,16 +82,12 @@ class WearHistory:
     unsure_in2, shape (n, ...): variance of the expectation. [in²]
     scatter_in2, shape (n, ...): variance of the true clearance about it. [in²]
     reading_in2, shape (n, ...): variance of a reading about the true clearance. [in²]
-    shown_in, shape (n, ...): what the gauge most likely showed, by what was written. [in]
-    written_in2, shape (n, ...): variance of that. [in²]
     """
 
     expected_in: Array
     unsure_in2: Array
     scatter_in2: Array
     reading_in2: Array
-    shown_in: Array
-    written_in2: Array
 
 
 @dataclass(frozen=True)
@@ -97,8 +102,6 @@ class LikelyClearances:
     u_row_in, u_gear_in, u_fleet_in : ndarray, shape (n, n_joints)
         Standard uncertainty of what was not read: of each row, common to a gear's rows, common to
         all rows. Where no wear was read, that of the gear is all that is supposed. [in]
-    shown_in : ndarray, shape (n, n_joints)
-        What the gauge most likely showed. [in]
     together : ndarray, shape (n, k)
         Further changes of `u_fleet_in`, of all joints that nobody read alike. [1]
     """
@@ -107,7 +110,6 @@ class LikelyClearances:
     u_row_in: Array
     u_gear_in: Array
     u_fleet_in: Array
-    shown_in: Array
     together: Array
 
 
@@ -127,7 +129,7 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
         none = np.zeros_like(readings)
         unread = np.where(np.isfinite(readings), 0.0, unread_in)
         return LikelyClearances(
-            landed_share(table)[:, None] * unread, none, unread, none, readings, none[:, :0]
+            landed_share(table)[:, None] * unread, none, unread, none, none[:, :0]
         )
     history, kilo, landed = fleet_history(table)
     known = np.isfinite(readings)
@@ -137,14 +139,12 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     both = history.scatter_in2 + noise
     known_wear = landed[:, None] & (both > 0.0)
     trust = np.divide(history.scatter_in2, both, out=np.ones_like(both), where=known_wear)
-    told = np.isfinite(history.shown_in)
-    read = np.where(told, history.shown_in, history.expected_in)
+    read = np.where(known, readings, history.expected_in)
     drawn = history.expected_in + trust * (read - history.expected_in)
     # A reading is never overruled by more than its own uncertainty makes likely.
     reach = FAR * np.sqrt(noise)
     likely = np.clip(drawn, read - reach, read + reach)
-    variance = np.where(told, trust * noise + trust**2 * history.written_in2, history.scatter_in2)
-    spread = np.where(known, 0.0, np.sqrt(variance))
+    spread = np.where(known, 0.0, np.sqrt(history.scatter_in2))
     shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))
     common = np.zeros_like(readings)
     together = np.empty((len(readings), 0))
@@ -170,7 +170,7 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
             np.hstack([FOLLOWS * further, bent - np.mean(bent), BENT * np.mean(worn) / line])
             / JOINTS_APART
         )
-    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, read, together)
+    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, together)
 
 
 def gears_of(table: DiagnosisTable) -> Places:
@@ -241,6 +241,32 @@ def inspection_of(table: DiagnosisTable) -> Places:
     return np.unique(whole, axis=0, return_inverse=True)[1].ravel()
 
 
+def read_in(table: DiagnosisTable) -> Array:
+    """Clearances, NaN where only an end was read. [in]"""
+    return np.where(False if table.below is None else table.below, np.nan, table.clearance_in)
+
+
+def steps_of(table: DiagnosisTable) -> Array:
+    """Step on which the clearances of each row's technician lie, 0 if on none, shape (n,). [in]"""
+    values = read_in(table)
+    found = np.full(len(table), step_of(values))
+    for person in np.unique(table.people):
+        own = table.people == person
+        if np.count_nonzero(np.nan_to_num(values[own])) >= LEAST_VALUES:
+            found[own] = step_of(values[own])
+    return found
+
+
+def step_of(values: Array) -> float:
+    """The coarsest step that nearly all values lie on, 0 if they are too few or on none. [in]"""
+    values = values[np.isfinite(values) & (values != 0.0)]
+    if len(values) < LEAST_VALUES:
+        return 0.0
+    over = values[:, None] / _STEPS_IN
+    on = np.mean(np.abs(over - np.rint(over)) > _ON_STEP, axis=0) <= EXCEPTIONS
+    return float(np.max(_STEPS_IN, where=on, initial=0.0))
+
+
 def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
     """What wear may add or lack where none was read, each column at one standard deviation: (n, k).
     [in]
@@ -266,43 +292,30 @@ def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
 
 
 def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
-    """Expect every joint in each row, of what was written as intervals; the landings, and which are
-    known.
-    """
-    says = written(table)
-    # A blank may stand for anything below some value: what matters is its interval.
-    blank = np.isnan(table.clearance_in) & np.isfinite(says.high)
-    readings = np.where(blank, 0.5 * says.high, table.clearance_in)
+    """Expect every joint in each row; the landings, and which are known."""
+    readings = table.clearance_in
     gears = gears_of(table)
     kilo, landed = landings_of(table.numbers("gear_landings"), gears)
     worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
     dated = np.where(landed[:, None], readings, np.nan)[:, worn]
     dated = np.where(np.isfinite(dated).any(axis=0), dated, readings[:, worn])
-    declared = np.broadcast_to(table.gauge_u_in[:, None] ** 2, dated.shape)
-    own = wear_history(dated, gears, kilo, declared, says.take(worn))
+    # Rounding to a step is an error that is even over it.
+    each = table.gauge_u_in**2 + steps_of(table) ** 2 / 12.0
+    declared = np.broadcast_to(each[:, None], dated.shape)
+    own = wear_history(dated, gears, kilo, declared)
     every = {f.name: np.zeros(readings.shape) for f in fields(own)}
-    every["shown_in"] = readings.copy()
     for name, values in every.items():
         values[:, worn] = getattr(own, name)
-    unsaid = np.isfinite(readings[:, worn]) & ~np.isfinite(dated)
-    every["shown_in"][:, worn] = np.where(unsaid, readings[:, worn], own.shown_in)
     return WearHistory(**every), kilo, landed
 
 
-def wear_history(
-    reading_in: Array,
-    gears: Places,
-    kilo: Array,
-    reading_in2: Array,
-    says: Written | None = None,
-) -> WearHistory:
+def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Array) -> WearHistory:
     """Expect joints in each row from what was read of them, of its gear and of the fleet; each
     joint on its own.
 
     reading_in, shape (n,) or (n, n_joints): readings, NaN if not read. [in]
     gears, kilo, shape (n,): gear of each row, and its landings in thousands.
     reading_in2: variance of each reading as declared, of the same shape. [in²]
-    says: intervals of what the gauge showed, where readings were rounded.
     """
     shape = reading_in.shape
     # Joints run along the last axis; a row that lacks a joint has no weight in it.
@@ -310,7 +323,6 @@ def wear_history(
     known = np.isfinite(y)
     x = kilo[:, None]
     y = np.where(known, y, 0.0)
-    left = np.zeros(y.shape)
     here = known.astype(float)
     declared = np.maximum(reading_in2.reshape(y.shape), _TIGHT_IN**2)
     by_gear = csr_array((np.ones(len(gears)), (gears, np.arange(len(gears)))))
@@ -328,21 +340,14 @@ def wear_history(
     seen = (read > 0.0) / (read > 0.0).sum(axis=0)
     enough = many.sum(axis=0) >= _LEAST_ROWS
     lines = unsure = np.empty(0)
-    fitted = y
     for step in range(_ROUNDS):
         variance = share * declared + scatter * level**2
-        # An interval tells of its place as a point does that is as uncertain as it leaves it.
-        told_of = np.maximum(1.0 - left / variance, _LEAST_TOLD)
-        point = fitted + (y - fitted) / told_of
-        lines, unsure = _lines(by_gear, x, point, here * far * told_of / variance, fleet, spread)
+        lines, unsure = _lines(by_gear, x, y, here * far / variance, fleet, spread)
         fleet = np.sum(seen * lines, axis=1)
         a, b = lines - fleet[:, None]
         spread = np.sum(seen * (unsure + np.array([a * a, a * b, b * b])), axis=1) + least_spread
         fitted = lines[0][gears] + lines[1][gears] * x
-        if says is not None:
-            moments = says.moments(fitted, share * declared + scatter * level**2)
-            y, left = (np.where(known, moment, 0.0) for moment in moments)
-        square = (y - fitted) ** 2 + _variance(unsure, gears, x) + left
+        square = (y - fitted) ** 2 + _variance(unsure, gears, x)
         far = np.minimum(1.0, FAR * np.sqrt(variance / np.maximum(square, 1e-30)))
         square = square * far**2
         worn = scatter * level**2
@@ -364,8 +369,6 @@ def wear_history(
         _variance(unsure, gears, x),
         scatter * np.maximum(expected, least) ** 2,
         share * reading_in2.reshape(y.shape),
-        np.where(known, y, np.nan),
-        left,
     )
     return WearHistory(*(values.reshape(shape) for values in found))
 
