@@ -154,7 +154,6 @@ class SuspectCell(TypedDict):
         "mm_as_in",
         "factor_10",
         "swapped_joints",
-        "swapped_side",
         "implausible",
         "restored_joint",
     ]

@@ -1,4 +1,4 @@
-"""Data faults: a cell in the wrong unit, a slipped decimal point, two joints or two sides swapped;
+"""Data faults: a cell in the wrong unit, a slipped decimal point, two joints swapped;
 clearances of before a repair beside a displacement of after it.
 
 Each row has one posterior over what was meant: as written, or one entry error. It weighs how often
@@ -21,7 +21,6 @@ from scipy.special import gammaln, logsumexp
 from mlg_troubleshoot.arrays import Array, Mask, Places, log_sum
 from mlg_troubleshoot.diagnosis.causes.base import Scene
 from mlg_troubleshoot.diagnosis.noise import FREEDOM, robust_scale, student
-from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import fleet_history, inspection_of
 from mlg_troubleshoot.gear.directions import worst_of_sense
@@ -72,7 +71,7 @@ class DataFault:
     column : str
         Column of the cell.
     kind : str
-        One of mm_as_in, factor_10, swapped_joints, swapped_side, implausible and restored_joint.
+        One of mm_as_in, factor_10, swapped_joints, implausible and restored_joint.
     value : str
         What was written.
     suggested : str or None
@@ -356,12 +355,6 @@ def screen_faults(
             readings[place] = cells[clearance.shape[1] :]
     usable = np.asarray(np.isfinite(readings).any(axis=1))
     repaired = replace(table, clearance_in=clearance, readings_in=readings)
-    side = repaired.texts("side").copy()
-    for row, own, other in swapped_sides(repaired, Beliefs().odds + np.log(_KINDS / _WRONG)):
-        faults.append(DataFault.at(table, row, "side", "swapped_side", own, other))
-        side[row] = other
-    if "side" in repaired.factors:
-        repaired = replace(repaired, factors={**repaired.factors, "side": side})
     return repaired, tuple(faults), usable
 
 

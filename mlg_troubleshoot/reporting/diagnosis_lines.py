@@ -17,7 +17,6 @@ _KINDS = {
     "mm_as_in": "millimetres entered as inches",
     "factor_10": "misplaced decimal point",
     "swapped_joints": "two joints swapped",
-    "swapped_side": "left and right swapped",
     "implausible": "implausible",
     "restored_joint": "joint restored between its reading and the plunger's",
     "other_convention": "the other convention",

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis import DiagnosisTable, diagnose
 from mlg_troubleshoot.diagnosis.faults import screen_faults
-from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
@@ -182,20 +181,6 @@ def test_a_row_without_explanation_is_implausible_and_not_used(
     assert not usable[ROW]
 
 
-def test_a_side_that_was_swapped_is_found_by_its_landings(gear: Gear) -> None:
-    table = fleet(gear.model)
-    day = table.quantities["day"]
-    landings = np.where(table.factors["side"] == "LH", 200.0, 2000.0) + 1.1 * day
-    side = table.factors["side"].copy()
-    side[ROW] = "RH" if side[ROW] == "LH" else "LH"
-    wrong = replace(
-        table,
-        quantities={**table.quantities, "gear_landings": landings},
-        factors={**table.factors, "side": side},
-    )
-    assert faults(gear, wrong) == [(ROW, "side", "swapped_side")]
-
-
 def worn_by_landings(gear: Gear) -> DiagnosisTable:
     """A fleet of few inspections a gear, in which joint 5 wears twice as fast as the others."""
     plain = fleet(gear.model, tails=30)
@@ -234,73 +219,6 @@ def test_one_of_two_readings_that_cannot_be_is_not_used(gear: Gear, sound: Diagn
     assert faults(gear, replace(sound, readings_in=values)) == [
         (ROW, "plunger_displacement_2_in", "implausible")
     ]
-
-
-def paired(gear: Gear, day_of_visit: list[float]) -> DiagnosisTable:
-    """Five aircraft inspected on both sides at each visit; right-hand gears have 1,500 landings
-    more.
-    """
-    visits = len(day_of_visit)
-    rows = 10 * visits
-    plain = fleet(gear.model, rows=rows, tails=5)
-    day = np.repeat(day_of_visit, 10)
-    side = np.tile(np.repeat(["LH", "RH"], 5), visits)
-    landings = np.where(side == "LH", 200.0, 1700.0) + 1.1 * day
-    return replace(
-        plain,
-        quantities={**plain.quantities, "day": day, "gear_landings": landings},
-        factors={**plain.factors, "side": side},
-    )
-
-
-def with_side(table: DiagnosisTable, row: int, side: str) -> DiagnosisTable:
-    """The table with another side written in one row."""
-    sides = table.factors["side"].copy()
-    sides[row] = side
-    return replace(table, factors={**table.factors, "side": sides})
-
-
-def test_two_visits_are_enough_to_find_a_swapped_side_by_its_landings(gear: Gear) -> None:
-    wrong = with_side(paired(gear, [10.0, 300.0]), 17, "LH")
-    assert faults(gear, wrong) == [(17, "side", "swapped_side")]
-
-
-def test_a_gear_read_twice_on_one_of_two_visits_is_not_a_swapped_side(gear: Gear) -> None:
-    table = paired(gear, [10.0, 300.0])
-    landings = table.quantities["gear_landings"].copy()
-    landings[17] = landings[12]
-    again = replace(table, quantities={**table.quantities, "gear_landings": landings})
-    assert faults(gear, with_side(again, 17, "LH")) == []
-
-
-def test_a_gear_inspected_twice_on_its_day_is_not_a_swapped_side_where_aircraft_come_in_pairs(
-    gear: Gear,
-) -> None:
-    table = paired(gear, [10.0, 150.0, 300.0])
-    landings = table.quantities["gear_landings"].copy()
-    landings[17] = landings[12]
-    again = replace(table, quantities={**table.quantities, "gear_landings": landings})
-    assert faults(gear, with_side(again, 17, "LH")) == []
-
-
-def test_landings_that_begin_anew_are_not_those_of_the_other_side(gear: Gear) -> None:
-    table = paired(gear, [10.0, 150.0, 300.0, 450.0])
-    landings = table.quantities["gear_landings"].copy()
-    landings[37] = 695.0
-    anew = replace(table, quantities={**table.quantities, "gear_landings": landings})
-    assert faults(gear, anew) == []
-
-
-def test_gears_of_one_aircraft_that_are_overhauled_together_are_not_on_the_wrong_side(
-    gear: Gear,
-) -> None:
-    table = paired(gear, [10.0, 150.0, 300.0, 450.0, 460.0])
-    day = table.quantities["day"]
-    alike = 200.0 + 1.1 * day - np.where(day > 400.0, 600.0, 0.0)
-    both = replace(table, quantities={**table.quantities, "gear_landings": alike})
-    # Of one aircraft each gear lacks one of the two visits after the overhaul.
-    rows = np.delete(np.arange(len(both)), [35, 40])
-    assert swapped_sides(both.take(rows), 7.0) == []
 
 
 def test_a_row_in_millimetres_is_found_in_its_clearances(gear: Gear, sound: DiagnosisTable) -> None:
