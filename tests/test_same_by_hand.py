@@ -71,9 +71,10 @@ def by_flags(row: pd.DataFrame) -> Came:
     convention = ClearanceConvention.parse(cells["clearance_convention"])
     options = CheckOptions(unit=LengthUnit.parse(unit_of(row)), convention=convention, advice=False)
     try:
-        read = from_flags(Flags(given, {name: cells[name] for name in TYPED}), options)
+        given += [f"{name}={cells[name]}" for name in (TYPED[0], *TYPED[3:]) if cells[name]]
+        read = from_flags(Flags(given, cells["tail_no"], cells["side"]), options)
     except UsageError as error:
-        refused = re.findall(r"--(set '\d+|\w+)[^:]*: expected ([^;]*)", error.message)
+        refused = re.findall(r"--(?:set ')?(\w+)[^:]*: expected ([^;]*)", error.message)
         return {place(flag): expected for flag, expected in refused}
     return came_of(check_inspection(read, options))
 

@@ -66,7 +66,7 @@ def test_the_contract_names_eight_outputs_and_the_verification() -> None:
         (("check", FLEET), b""),
         (("check", "-"), BAD_ROWS),
         (("check", "-"), b""),
-        ((*HAND, "--convention", "RADIAL", "--set", "3=0.013in", "--measured", "0.04in"), b""),
+        ((*HAND, "--convention", "RADIAL", "--set", "3=0.013in", "--set", "plunger=0.04in"), b""),
         ((*HAND, "--convention", "RADIAL", *(f"--set={n}=0.05in" for n in range(1, 11))), b""),
     ],
     ids=["failure", "fleet", "bad rows", "nothing", "by hand", "does not close"],

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.decision.columns import (
-    CLEARANCE,
     CONVENTION,
-    OUTCOME,
     RECORD_ID,
     SIDE,
     TAIL_NO,
@@ -22,7 +20,6 @@ from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 
 if TYPE_CHECKING:
@@ -36,74 +33,61 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.store import Store
 
 
-def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
-    from mlg_troubleshoot.records import made_record_id
+def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = None) -> Inspection:
+    """Let the judge of table rows judge the flags; a refusal names the flag. An id that was made
+    is free in the store.
+    """
+    from mlg_troubleshoot.records import ReadOptions, admit, headers, made_record_id
 
-    needed = (
-        ("--tail", flags.typed.get(TAIL_NO.name)),
-        ("--side", flags.typed.get(SIDE.name)),
-        ("--convention", declared.convention),
-    )
-    missing = [flag for flag, value in needed if value is None]
+    options = ReadOptions.of(load_gear(declared.gear), declared)
+    own = {TAIL_NO.name: ("--tail", flags.tail), SIDE.name: ("--side", flags.side)}
+    values = {column: text for column, (_, text) in own.items() if text is not None}
+    labels = {column: f"{own[column][0]} {text!r}" for column, text in values.items()}
+    for pair in flags.values or ():
+        name, sign, text = pair.partition("=")
+        if not sign or not text.strip():
+            raise UsageError(
+                f"--set {pair!r} is not COLUMN=VALUE",
+                "Write for example --set 3=0.013in or --set outcome=FAILED.",
+            )
+        column = headers.column_named(name, options.joints)
+        if column in values:
+            raise UsageError(f"--set gives {column} twice", "Give each column once.")
+        values[column] = text
+        labels[column] = f"--set {pair!r}"
+    known = {*values, *([CONVENTION.name] if declared.convention else [])}
+    needed = {TAIL_NO.name: "--tail", SIDE.name: "--side", CONVENTION.name: "--convention"}
+    missing = [flag for column, flag in needed.items() if column not in known]
     if missing:
         raise UsageError(
             f"--set needs {', '.join(missing)}",
             "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention"
             " RADIAL, DIAMETRAL or TOTAL_PLAY): it has no default.",
         )
-    values = {RECORD_ID.name: "-", **flags.typed}
-    labels = {}
-    for text in flags.values or ():
-        name, sign, written = text.partition("=")
-        number = name.strip().lstrip("#")
-        if not sign or not number.isdecimal() or not written.strip():
-            raise UsageError(
-                f"--set {text!r} is not JOINT=VALUE", "Write for example --set 3=0.013in."
-            )
-        column = CLEARANCE.header(int(number))
-        if column in values:
-            raise UsageError(f"--set gives joint {int(number)} twice", "Give each joint once.")
-        values[column] = written
-        labels[column] = f"--set {text!r}"
-    read = _judged(values, labels, flags, declared)
-    made = made_record_id(read.tail_no, read.side, datetime.now())
-    return replace(read, record_id=flags.typed.get(RECORD_ID.name) or made)
+    read = admit({RECORD_ID.name: "-", **values}, options, labels)
+    if RECORD_ID.name in values:
+        return read
+    read = replace(read, record_id=made_record_id(read.tail_no, read.side, datetime.now()))
+    if place is None:
+        return read
+    from mlg_troubleshoot.workflows.keep import under_a_free_id
 
-
-def _judged(
-    values: Mapping[str, object],
-    labels: Mapping[str, str],
-    flags: Flags,
-    declared: task.CheckOptions,
-) -> Inspection:
-    """Let the judge of table rows judge the flags; a refusal names the flag."""
-    from mlg_troubleshoot.records import ReadOptions, admit
-
-    options = ReadOptions.of(load_gear(declared.gear), declared)
-    return admit(values, options, {**flags.labels(), **labels})
+    return under_a_free_id(read, place)
 
 
 def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
-    """What the flags answer already of the questions on a terminal, judged as a row would be."""
-    from mlg_troubleshoot.cli.prompts.answers import LENGTHS, REST, Answers
-    from mlg_troubleshoot.records.gate import NOBODY
+    """What the flags answer already of the questions on a terminal."""
+    from mlg_troubleshoot.cli.prompts.answers import Answers
+    from mlg_troubleshoot.records.gate import judge_text
 
-    typed = flags.typed
-    unit = declared.unit or LengthUnit.INCH
-    judged = _judged({**NOBODY, CONVENTION.name: "RADIAL", **typed}, {}, flags, declared)
-    with_unit = {
-        name: text if text[-1:].isalpha() else f"{text} {unit}"
-        for name, text in typed.items()
-        if name in LENGTHS
-    }
+    if flags.tail is not None:
+        judge_text("--tail", flags.tail, "Give the tail number.")
     return Answers(
-        tail_no=typed.get(TAIL_NO.name),
-        side=judged.side if SIDE.name in typed else None,
+        tail_no=flags.tail,
+        side=declared.side,
         unit=declared.unit,
         convention=declared.convention,
-        record_id=typed.get(RECORD_ID.name),
-        todo=tuple(asked for asked in REST if asked not in typed),
-    ).with_more(**{**typed, **with_unit, OUTCOME.name: judged.outcome})
+    )
 
 
 def unfinished(store: SessionStore, terminal: RichTerminal, gear: Gear, flags: Flags) -> Session:
@@ -115,10 +99,9 @@ def unfinished(store: SessionStore, terminal: RichTerminal, gear: Gear, flags: F
     found, damaged = store.unfinished(gear.id)
     for message in damaged:
         output.say(message)
-    tail, side = (flags.typed.get(column.name) for column in (TAIL_NO, SIDE))
-    asked = Answers(tail_no=tail, side=Side.spelt(side or ""))
+    asked = Answers(tail_no=flags.tail, side=Side.spelt(flags.side or ""))
     named = (each for each in found if not contradictions(each.answers, asked))
-    saved = next(named, None) or (None if tail else store.latest())
+    saved = next(named, None) or (None if flags.tail else store.latest())
     if saved is None:
         raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
     others = tuple(each for each in found if each.answers.joints and each.id != saved.id)

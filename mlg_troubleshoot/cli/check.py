@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -11,68 +10,42 @@ import typer
 
 from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.options import ReportFormat
-from mlg_troubleshoot.decision.columns import (
-    DATE,
-    LANDINGS,
-    MARGIN,
-    OUTCOME,
-    PLUNGER_DISPLACEMENT,
-    RECORD_ID,
-    SIDE,
-    TAIL_NO,
-)
 
 EPILOG = (
     "Example: [b]mlg check inspections.xlsx --report out[/b] · one gear by hand: [b]mlg check[/b] ·"
     " scripted: [b]mlg check --tail N123 --side LH --convention RADIAL --set 3=0.013in --set"
     " 5=0.007in[/b]"
 )
-# Flags of one gear entered by hand: what each gives to its column as it is typed, and its help.
-_OF_ONE_GEAR: options.ColumnFlags = {
-    TAIL_NO.name: ("--tail", None, "Tail number, with --set or the prompts."),
-    SIDE.name: ("--side", "LH|RH", "Side of the gear; with FILE, used where no column gives it."),
-    RECORD_ID.name: ("--record-id", None, "Identifier of the record."),
-    OUTCOME.name: ("--outcome", "RETRACTED|FAILED", "Outcome of the retraction."),
-    PLUNGER_DISPLACEMENT.name: (
-        "--measured",
-        "VALUE",
-        "Measured plunger displacement at mid-position, e.g. 0.041in.",
-    ),
-    MARGIN.name: ("--margin", "VALUE", "This gear's own margin, e.g. 0.028in."),
-    DATE.name: ("--date", "DATE", "Date of the inspection, e.g. 2026-03-04."),
-    LANDINGS.name: ("--landings", "N", "Landings since overhaul."),
-    "restored_joints": ("--restored", "JOINTS", "Joints restored since, e.g. 3,5."),
-    "repair_date": ("--repair-date", "DATE", "Date of that repair, e.g. '2026-03-04 14:30'."),
-    "plunger_date": ("--plunger-date", "DATE", "Date of the plunger reading."),
-    "outcome_date": ("--outcome-date", "DATE", "Date of the outcome."),
-    "rigging_checked": (
-        "--rigging-checked",
-        "no|yes|corrected",
-        "Rigging and lock roller: checked (yes) or corrected.",
-    ),
-    "measured_again": ("--measured-again", "JOINTS", "Joints measured again with another gauge."),
-    "cannot_reach": ("--cannot-reach", "JOINTS", "Joints out of reach today, e.g. 4."),
-    "no_spare": ("--no-spare", "JOINTS", "Joints without a spare part, e.g. 3."),
-}
 
 
 @dataclass(frozen=True, slots=True)
 class Flags:
-    """What the flags say of one gear, as it was typed: clearances by joint, the rest by column."""
+    """One gear that is entered by flags."""
 
     panel: ClassVar = "One gear by hand"
 
     values: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="JOINT=VALUE", help="One clearance, e.g. 3=0.013in."),
+        typer.Option(
+            "--set",
+            metavar="COLUMN=VALUE",
+            help=(
+                "A value of any column, e.g. 3=0.013in, plunger=0.041in, outcome=FAILED,"
+                " landings=4000, restored=3,5; may repeat."
+            ),
+        ),
     ] = None
-    typed: Annotated[Mapping[str, str], _OF_ONE_GEAR] = field(default_factory=dict)
-
-    def labels(self) -> dict[str, str]:
-        """What a refusal calls each column."""
-        return {
-            column: f"{_OF_ONE_GEAR[column][0]} {text!r}" for column, text in self.typed.items()
-        }
+    tail: Annotated[
+        str | None, typer.Option("--tail", help="Tail number, with --set or the prompts.")
+    ] = None
+    side: Annotated[
+        str | None,
+        typer.Option(
+            "--side",
+            metavar="LH|RH",
+            help="Side of the gear; with FILE, used where no column gives it.",
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,6 @@ from mlg_troubleshoot.cli import by_hand, options, output
 from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
-from mlg_troubleshoot.decision.columns import RECORD_ID, SIDE
 from mlg_troubleshoot.decision.inspection import Inspection, RowSource, Side
 from mlg_troubleshoot.decision.ranking import Listed, listed
 from mlg_troubleshoot.errors import UsageError
@@ -81,9 +80,8 @@ class Run:
             outputs,
             store=wanted.store,
         )
-        typed_side = flags.typed.get(SIDE.name) if files else None
         self._asked = task.CheckOptions(
-            side=None if typed_side is None else Side.parse(typed_side),
+            side=None if flags.side is None else Side.parse(flags.side),
             **tables.declared(),
             extension=load_model_extension(extensions, tables.gear, causes),
             workers=wanted.workers or os.cpu_count() or 1,
@@ -99,11 +97,7 @@ class Run:
             return self._check_files()
         if self._asks:
             return self._ask().exit_code
-        typed = by_hand.from_flags(self._flags, self._asked)
-        if self._place is not None and RECORD_ID.name not in self._flags.typed:
-            from mlg_troubleshoot.workflows.keep import under_a_free_id
-
-            typed = under_a_free_id(typed, self._place)
+        typed = by_hand.from_flags(self._flags, self._asked, self._place)
         result = task.check_inspection(typed, self._asked, self._place)
         self._publish(result, LengthUnit.INCH)
         self._keep(result)
@@ -111,11 +105,9 @@ class Run:
 
     def _check_files(self) -> int:
         # The side of a FILE is that of a table without a column of sides.
-        if self._flags.values or self._flags.typed.keys() - {SIDE.name}:
+        if self._flags.values or self._flags.tail is not None:
             raise UsageError(
-                "--set, --tail, --record-id, --outcome, --measured, --margin and the flags"
-                " of repairs and of the day (--restored … --minutes) describe one gear entered by"
-                " hand, and a FILE was given as well",
+                "--set and --tail describe one gear entered by hand, and a FILE was given as well",
                 "Give either a FILE or the values of one gear.",
             )
         wanted = self._wanted
@@ -184,7 +176,7 @@ class Run:
         if not output.can_ask():
             raise UsageError(
                 "nothing to check: no FILE was given, and this is not a terminal to ask on",
-                "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and"
+                "Pass a FILE, - for standard input, or --set COLUMN=VALUE with --tail, --side and"
                 " --convention.",
             )
 
@@ -279,7 +271,8 @@ class Run:
             both = task.before_and_after(result.judgements)
             if both is not None:
                 batch.show_before_and_after(*both, screen)
-        notes.show_unread(result.unread_files, screen)
+        if lines or result.judgements:
+            notes.show_unread(result.unread_files, screen)
 
     def _annotate(
         self, read: ReadResult, said: Mapping[RowSource, task.Annotated], out: Path

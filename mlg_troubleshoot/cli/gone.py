@@ -7,9 +7,27 @@ from itertools import pairwise, takewhile
 
 from mlg_troubleshoot.errors import UsageError
 
+# Columns that had a flag of their own in `mlg check`, as they are set now.
+_COLUMNS = {
+    "record-id": "record_id=ID",
+    "outcome": "outcome=FAILED",
+    "measured": "plunger=0.041in",
+    "margin": "margin=0.028in",
+    "date": "date=2026-03-04",
+    "landings": "landings=4000",
+    "restored": "restored=3,5",
+    "repair-date": "repair_date=2026-03-04",
+    "plunger-date": "plunger_date=2026-03-04",
+    "outcome-date": "outcome_date=2026-03-04",
+    "rigging-checked": "rigging_checked=yes",
+    "measured-again": "measured_again=3",
+    "cannot-reach": "cannot_reach=4",
+    "no-spare": "no_spare=3",
+}
 # A command as it is typed after `mlg`, an option after the command that had it or, if several had
 # it, alone. What follows completes "… is gone since 0.2.0: ".
 GONE = {
+    **{f"check --{flag}": f"--set {pair}" for flag, pair in _COLUMNS.items()},
     "doctor": "mlg gear verify tries the model, and a report that cannot be written says why",
     "check --scheduler": "CheckOptions(executor=client.get_executor()) judges on a Dask cluster",
     "study --scheduler": "StudyOptions(executor=client.get_executor()) computes on a Dask cluster",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
@@ -174,9 +174,6 @@ Place = Annotated[
         help="Store of the records; else a file of your own.",
     ),
 ]
-# The flag of a column, what it takes and its help.
-ColumnFlags = Mapping[str, tuple[str, str | None, str]]
-
 
 NoForecast = Annotated[
     bool, typer.Option("--no-forecast", help="Records only, without a forecast: faster.")
@@ -305,12 +302,11 @@ def _in_panel(hint: Any, panel: str | None) -> Any:
 
 def flat(command: Callable[..., None]) -> Callable[..., None]:
     """Let a command take options as dataclasses: on the command line each field of one is an
-    option, and a field with flags of columns is one option per column.
+    option.
     """
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
     shown: list[Parameter] = []
-    columns: dict[str, ColumnFlags] = {}
 
     def show(name: str, default: Any, hint: Any) -> None:
         shown.append(Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hint))
@@ -322,21 +318,11 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
         own = get_type_hints(groups[name], include_extras=True)
         # What all commands share stands last.
         for each in sorted(fields(groups[name]), key=lambda each: each in fields(OutputOptions)):
-            (flags, *_) = getattr(own[each.name], "__metadata__", ((),))
             panel = _panel(groups[name], each.name)
-            if not isinstance(flags, Mapping):
-                show(each.name, each.default, _in_panel(own[each.name], panel))
-                continue
-            columns[each.name] = flags
-            for column, (flag, takes, said) in flags.items():
-                option = typer.Option(flag, metavar=takes, help=said, rich_help_panel=panel)
-                show(column, None, Annotated[str | None, option])
+            show(each.name, each.default, _in_panel(own[each.name], panel))
 
     @wraps(command)
     def run(**given: Any) -> None:
-        for name, flags in columns.items():
-            typed = {column: given.pop(column) for column in flags}
-            given[name] = {column: text for column, text in typed.items() if text is not None}
         for name, group in groups.items():
             given[name] = group(**{each.name: given.pop(each.name) for each in fields(group)})
         command(**given)

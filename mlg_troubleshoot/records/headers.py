@@ -14,8 +14,11 @@ from mlg_troubleshoot.decision.columns import (
     BY_NAME,
     CLEARANCE,
     COLUMNS,
+    DATE,
     JOINT,
+    LANDINGS,
     PLUNGER_DISPLACEMENT,
+    RESTORED_JOINTS,
     SIDE,
     UNIT,
     Column,
@@ -110,6 +113,13 @@ class Recognition:
 
 
 UNKNOWN = Recognition()
+# Short names at a command; some would say too little above a column.
+_SHORT = {
+    "plunger": PLUNGER_DISPLACEMENT.name,
+    "landings": LANDINGS.name,
+    "date": DATE.name,
+    "restored": RESTORED_JOINTS.name,
+}
 
 _FOREIGN_UNITS = frozenset(
     (
@@ -474,6 +484,21 @@ def parse_target(name: str, joints: Joints) -> Field | None:
             f"{nearest(text, _columns_like(text, joints))}",
         )
     return field
+
+
+def column_named(name: str, joints: Joints) -> str:
+    """The header of the column that a person names by its own or a short name, or by its joint."""
+    text = name.strip().lstrip("#")
+    if text.isdecimal():
+        return CLEARANCE.header(int(text))
+    found = recognise(_SHORT.get(text.lower(), text), joints)
+    if found.field is None:
+        text = _snake(found.nearest or text)
+        raise UsageError(
+            f"--set: {name!r} is not a column of the inspection table",
+            f"Give a joint or a column.{nearest(text, [*_SHORT, *_columns_like(text, joints)])}",
+        )
+    return found.field.name
 
 
 def _columns_like(text: str, joints: Joints) -> list[str]:

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 DATA = ROOT / "inspection_data"
 FAILURE = DATA / "failure_case.csv"
 FLEET = DATA / "fleet_batch.csv"
-HAND = ("check", "--tail", "N123", "--side", "LH", "--record-id", "R1")
+HAND = ("check", "--tail", "N123", "--side", "LH", "--set", "record_id=R1")
 
 
 @dataclass(frozen=True)

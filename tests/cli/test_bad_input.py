@@ -25,7 +25,7 @@ def refused(found: Run, code: int, *said: str) -> None:
 
 
 def test_nothing_in_says_what_to_pass() -> None:
-    refused(mlg("check"), 2, "nothing to check", "--set JOINT=VALUE", "standard input")
+    refused(mlg("check"), 2, "nothing to check", "--set COLUMN=VALUE", "standard input")
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
@@ -148,10 +148,14 @@ def test_an_invalid_row_carries_no_number(table: Table) -> None:
         ("3=0,013in", "decimal point"),
         ("3=0.33in", "a clearance from 0 to 0.05 in"),
         ("3=1/64in", "Fractions"),
-        ("3", "is not JOINT=VALUE"),
-        ("x=0.001in", "is not JOINT=VALUE"),
+        ("3", "is not COLUMN=VALUE"),
+        ("3=0.001in=x", "0.001in=x"),
+        ("plunger=0.041", "unit is missing"),
+        ("plunger=4in", "plunger displacement from -0.5 to 0.5 in"),
+        ("outcome=STUCK", "RETRACTED or FAILED"),
+        ("margin=0in", "a margin above 0"),
         ("11=0.001in", "has no joint 11"),
-        ("3=", "is not JOINT=VALUE"),
+        ("3=", "is not COLUMN=VALUE"),
     ],
 )
 def test_a_bad_value_on_the_command_line_is_refused_with_its_option(value: str, said: str) -> None:
@@ -159,7 +163,46 @@ def test_a_bad_value_on_the_command_line_is_refused_with_its_option(value: str, 
 
 
 def test_a_joint_given_twice_is_refused() -> None:
-    refused(mlg(*ONE_VALUE, "3=0.001in", "--set", "3=0.002in"), 2, "joint 3 twice")
+    for again in ("3=0.002in", "#3=0.002in", "clearance_3=0.002in"):
+        refused(mlg(*ONE_VALUE, "3=0.001in", "--set", again), 2, "clearance_3 twice")
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [("outcom", "outcome"), ("plungr", "plunger"), ("clearance3x", "clearance_3")],
+)
+def test_a_name_that_is_not_a_column_is_refused_with_the_nearest(name: str, near: str) -> None:
+    found = mlg(*ONE_VALUE, "3=0.001in", "--set", f"{name}=1")
+    refused(found, 2, f"{name!r} is not a column", near)
+
+
+@pytest.mark.parametrize(
+    ("pair", "key", "value"),
+    [
+        ("plunger=0.012in", "measured_displacement_in", 0.012),
+        ("plunger_displacement_mm=0.3", "measured_displacement_in", 0.3 / 25.4),
+        ("Plunger displacement=12thou", "measured_displacement_in", 0.012),
+        ("margin=0.028in", "margin_in", 0.028),
+        ("outcome=FAILED", "outcome", "FAILED"),
+        ("record_id=mine", "record_id", "mine"),
+    ],
+)
+def test_every_column_is_set_by_its_name_or_a_short_one(pair: str, key: str, value: object) -> None:
+    found = mlg(*HAND[:5], *ONE_VALUE[-3:], "3=0.001in", "--set", pair, "--json")
+    assert found.one[key] == (pytest.approx(value) if isinstance(value, float) else value)
+
+
+@pytest.mark.parametrize("restored", ["restored=3,5", "restored_joints=3 5"])
+def test_what_was_restored_is_set_as_well(restored: str) -> None:
+    day = ("--set", restored, "--set", "repair_date=2026-03-04", "--set", "landings=4000")
+    found = mlg(*ONE_VALUE, "3=0.001in", *day, "--set", "date=2026-03-05", "--json")
+    assert found.json["problems"] == []
+
+
+def test_convention_and_gear_are_set_as_columns_as_well() -> None:
+    whole = ("tail_no=N123", "side=LH", "clearance_convention=RADIAL", "3=0.001in")
+    found = mlg("check", *(word for pair in whole for word in ("--set", pair)), "--json")
+    assert found.one["tail_no"] == "N123"
 
 
 def test_an_empty_tail_number_is_refused() -> None:
@@ -175,10 +218,6 @@ def test_an_empty_tail_number_is_refused() -> None:
         ("--side", "BOTH", "LH or RH"),
         ("--convention", "RADIUS", "RADIAL"),
         ("--unit", "furlong", "in, thou or mm"),
-        ("--outcome", "STUCK", "RETRACTED or FAILED"),
-        ("--measured", "0.041", "unit is missing"),
-        ("--measured", "4in", "plunger displacement from -0.5 to 0.5 in"),
-        ("--margin", "0in", "a margin above 0"),
         ("--gear", "a380", "there is no gear 'a380'"),
     ],
 )

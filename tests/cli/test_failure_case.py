@@ -72,7 +72,7 @@ def test_the_workbook_says_what_the_csv_says(failure_json: Run) -> None:
 def test_on_the_command_line_every_unit_and_convention_gives_the_same(
     readings: tuple[str, ...], failure_json: Run
 ) -> None:
-    found = mlg(*HAND, "--outcome", "FAILED", *readings, "--json")
+    found = mlg(*HAND, "--set", "outcome=FAILED", *readings, "--json")
     expected = failure_json.one
     assert found.code == 1
     assert found.one["verdict"] == expected["verdict"]

@@ -78,9 +78,9 @@ def test_a_file_name_acts_on_neither_stream(command: str, tmp_path: Path) -> Non
     [
         ("--tail", HOSTILE),
         ("--side", HOSTILE),
-        ("--outcome", HOSTILE),
-        ("--measured", HOSTILE),
         ("--set", HOSTILE),
+        ("--set", f"outcome={HOSTILE}"),
+        ("--set", f"{HOSTILE}=1"),
         ("--convention", HOSTILE),
         ("--unit", HOSTILE),
         ("--gear", HOSTILE),

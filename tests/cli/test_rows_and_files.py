@@ -80,7 +80,7 @@ def test_a_gears_own_margin_decides_about_it(table: Table) -> None:
 
 
 def test_a_measured_displacement_beyond_the_margin_is_said_first() -> None:
-    found = mlg(*HAND, "--convention", "RADIAL", "--set", "3=0.001in", "--measured", "-0.041in")
+    found = mlg(*HAND, "--convention", "RADIAL", "--set", "3=0.001in", "--set", "plunger=-0.041in")
     below_the_verdict = found.out[found.out.index("OUTSIDE MARGIN, MEASURED") :].splitlines()[1]
     assert below_the_verdict.startswith(
         "│ MEASURED: the plunger stands 0.0410 in short of mid-position"
@@ -89,7 +89,7 @@ def test_a_measured_displacement_beyond_the_margin_is_said_first() -> None:
 
 def test_a_margin_can_be_given_by_hand() -> None:
     found = mlg(
-        *HAND, "--convention", "RADIAL", "--set", "3=0.001in", "--margin", "0.028in", "--json"
+        *HAND, "--convention", "RADIAL", "--set", "3=0.001in", "--set", "margin=0.028in", "--json"
     )
     assert found.one["margin_in"] == 0.028
 

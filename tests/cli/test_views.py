@@ -52,8 +52,8 @@ def test_every_joint_is_named(shown: Run, width: int) -> None:
 
 
 def test_one_further_note_is_one_note() -> None:
-    worn = ["--set", "2=.0081in", "--set", "3=.0082in", "--measured", "-.005in"]
-    whose = ["--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--outcome", "FAILED"]
+    worn = ["--set", "2=.0081in", "--set", "3=.0082in", "--set", "plunger=-.005in"]
+    whose = ["--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--set", "outcome=FAILED"]
     assert "1 more note; " in mlg("check", *whose, *worn).out
 
 

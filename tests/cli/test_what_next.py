@@ -10,7 +10,17 @@ import pytest
 
 from tests.cli.conftest import FAILURE, mlg
 
-HAND = ("check", "--tail", "N123", "--side", "LH", "--record-id", "R1", "--convention", "RADIAL")
+HAND = (
+    "check",
+    "--tail",
+    "N123",
+    "--side",
+    "LH",
+    "--set",
+    "record_id=R1",
+    "--convention",
+    "RADIAL",
+)
 
 
 def said(*arguments: object) -> str:
@@ -28,7 +38,7 @@ def incomplete() -> str:
 @pytest.fixture(scope="module")
 def explained() -> str:
     """A gear whose plunger stands off, two joints measured."""
-    return said(*HAND, "--set", "2=0.001in", "--set", "4=0.001in", "--measured", "0.028in")
+    return said(*HAND, "--set", "2=0.001in", "--set", "4=0.001in", "--set", "plunger=0.028in")
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +91,7 @@ def test_that_it_may_not_be_clearance_at_all_has_its_own_share(explained: str) -
     assert re.search(r"rigging or lock roller moved the plunger: [\d.<]+ ?[\d.]* %", explained)
 
 
-DAY = ("--outcome", "FAILED", "--measured", "0.036in")
+DAY = ("--set", "outcome=FAILED", "--set", "plunger=0.036in")
 WORN = tuple(
     flag
     for joint in range(1, 11)
@@ -90,18 +100,20 @@ WORN = tuple(
 
 
 def test_flags_of_the_day_bind_next_and_say_what_stays_open() -> None:
-    shown = said(*HAND, *WORN, *DAY, "--no-spare", "3")
+    shown = said(*HAND, *WORN, *DAY, "--set", "no_spare=3")
     assert "OPEN: #3 is over the limit and cannot be restored today." in shown
 
 
 def test_a_repair_by_flags_leads_to_the_plunger_and_the_retraction() -> None:
     restored = tuple("3=0.0005in" if flag == "3=0.013in" else flag for flag in WORN)
-    shown = said(*HAND, *restored, *DAY, "--restored", "3", "--repair-date", "2026-03-04 08:00")
+    shown = said(
+        *HAND, *restored, *DAY, "--set", "restored=3", "--set", "repair_date=2026-03-04 08:00"
+    )
     assert "NEXT (12 min): Read the plunger displacement at mid-position." in shown
     assert "retract the gear (15 min)" in shown
 
 
 def test_a_joint_that_a_flag_of_the_day_names_must_exist() -> None:
-    run = mlg(*HAND, *WORN, "--cannot-reach", "14")
+    run = mlg(*HAND, *WORN, "--set", "cannot_reach=14")
     assert run.code == 2
-    assert "--cannot-reach '14'" in run.err
+    assert "--set 'cannot_reach=14'" in run.err

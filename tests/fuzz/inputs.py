@@ -51,7 +51,7 @@ def name(desk: Desk) -> Case:
     """Hostile names as flags."""
     tail, record = map(typed, desk.rng.sample(HOSTILE, 2))
     flags = ("--side", "LH", "--convention", "RADIAL", "--set", f"3={desk.rng.choice(NUMBERS)}in")
-    return Case("name", [["check", f"--tail={tail}", f"--record-id={record}", *flags]])
+    return Case("name", [["check", f"--tail={tail}", f"--set=record_id={record}", *flags]])
 
 
 def gear(desk: Desk) -> Case:

@@ -321,7 +321,7 @@ def test_resume_lists_the_unfinished_entries_of_other_gears(
 ) -> None:
     broken_off(visit, *GEAR, "t", "t", "8")
     broken_off(visit, "N2", "r", "t", "t", "8")
-    flags = Flags(typed={"tail_no": "N1", "side": "LH"})
+    flags = Flags(tail="N1", side="LH")
     screen = visit(*PLAY[1:], *ENTERS, "", resume=True, flags=flags).screen
     assert "Unfinished: N2 RH" in screen
     assert len(life(store).inspections) == 1
@@ -332,7 +332,7 @@ def test_resume_of_a_named_gear_finds_its_entry_that_has_no_reading_yet(
 ) -> None:
     broken_off(visit, "N2", "r", "t", "t", "8")
     broken_off(visit, "N1")
-    flags = Flags(typed={"tail_no": "N1", "side": "LH"})
+    flags = Flags(tail="N1", side="LH")
     visit("t", "t", *PLAY, *ENTERS, "", resume=True, flags=flags)
     assert len(life(store).inspections) == 1
 
@@ -414,14 +414,6 @@ def test_what_is_said_of_a_reading_at_a_prompt_is_not_about_files(visit: Visit, 
     assert "is not accepted" in screen
     assert "--decimal-comma" not in screen
     assert "leave it blank" not in screen
-
-
-def test_landings_and_date_that_flags_give_are_not_asked(visit: Visit, store: SessionStore) -> None:
-    given = {"gear_landings": "2100", "inspection_date": "2026-03-01"}
-    flags = Flags(typed={"tail_no": "N1", "side": "LH", **given})
-    visit("t", "t", *PLAY, *ENTERS[:-2], "", flags=flags)
-    found = life(store).inspections[-1].inspection
-    assert (found.gear_landings, str(found.inspection_date)) == (2100.0, "2026-03-01")
 
 
 def test_done_of_a_gear_that_needed_no_repair_speaks_of_none(visit: Visit) -> None:

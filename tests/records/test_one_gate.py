@@ -111,9 +111,7 @@ def by_cell(gear: Gear, value: object, margin: str, convention: Convention) -> F
 
 
 def by_flag(gear: Gear, value: str, margin: str, convention: Convention) -> Found:
-    flags = Flags(
-        [f"3={value}"], {"tail_no": "N1", "side": "LH", "record_id": "R1", "margin": margin}
-    )
+    flags = Flags([f"3={value}", "record_id=R1", f"margin={margin}"], "N1", "LH")
     asked = CheckOptions(unit=LengthUnit.INCH, convention=convention)
     try:
         row = from_flags(flags, asked)

@@ -212,7 +212,7 @@ def test_two_entries_of_one_gear_within_a_second_are_both_kept(
 
 
 def test_an_id_that_was_typed_stays_as_it_is(place: Path) -> None:
-    typed = (*BY_HAND, "--side", "LH", "--record-id", "mine")
+    typed = (*BY_HAND, "--side", "LH", "--set", "record_id=mine")
     assert mlg(*typed, "--set", "4=0.001in").code in (0, 1)
     refused = mlg(*typed, "--set", "4=0.002in")
     assert refused.code == 5
