@@ -60,7 +60,7 @@ class TermTable(Table):
     words: str = ""
     parameter: str = ""
     target: str | None = None
-    setting: dict[Name, str | Number | Whole | tuple[Whole, ...] | dict[Name, Number | str]] = (
+    setting: dict[Name, str | Number | Whole | tuple[Whole, ...] | dict[Name, Number]] = (
         msgspec.field(default_factory=dict)
     )
 

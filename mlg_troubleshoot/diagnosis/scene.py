@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -87,9 +86,7 @@ def _scene(
         np.nan_to_num(read - scene.over_in),
         *small_trends(table),
     )
-    misfit = scene.expected_in
-    noise = build_noise(misfit, rows) if np.isfinite(misfit).all() else None
-    return replace(scene, noise=noise), rows
+    return scene, rows
 
 
 def scene_at(

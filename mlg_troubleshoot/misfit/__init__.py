@@ -14,6 +14,5 @@ __all__ = [
     "posterior",
     "simulation",
     "simulation_result",
-    "steps",
     "verdict",
 ]

@@ -102,7 +102,7 @@ class ResidualAxis:
     marked_label: str = ""
 
 
-def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) -> ResidualAxis:
+def against_cause(residuals: Residuals, candidate: Candidate) -> ResidualAxis:
     """Choose what to draw residuals against: the column that the cause lives on, else the
     prediction.
     """
@@ -118,9 +118,8 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
         )
     if "column" in setting:
         return against_column(residuals, setting["column"])
-    dated = "steps" in setting or ("since" in setting and {"tail", "value"} & set(setting))
-    if dated and "day" in table.quantities:
-        return _over_time(residuals, candidate, effect_in)
+    if "tail" in setting and "day" in table.quantities:
+        return _over_time(residuals, candidate)
     for need in candidate.cause.needs:
         if need == AXIAL_FLOAT.variable and table.axial_float_in is not None:
             widest = np.argmax(np.nansum(table.axial_float_in**2, axis=0))
@@ -130,16 +129,14 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
     return against_column(residuals, "predicted")
 
 
-def _over_time(residuals: Residuals, candidate: Candidate, effect_in: Array) -> ResidualAxis:
-    """The days, with the rows of the cause marked: of an aircraft all, else those that it moves."""
+def _over_time(residuals: Residuals, candidate: Candidate) -> ResidualAxis:
+    """The days, with the rows of an aircraft or of its gear marked."""
     table = residuals.diagnosis.used
     setting = candidate.setting
-    rows = effect_in != 0.0
-    if "tail" in setting:
-        rows = table.factors["tail_no"] == setting["tail"]
-        if "side" in setting:
-            rows = rows & (table.factors["side"] == setting["side"])
-    label = short(candidate.target or "all gauges", _MARKED)
+    rows = table.factors["tail_no"] == setting["tail"]
+    if "side" in setting:
+        rows = rows & (table.factors["side"] == setting["side"])
+    label = short(str(candidate.target), _MARKED)
     return ResidualAxis(
         _day_label(residuals), table.quantities["day"], marked=rows, marked_label=label
     )

@@ -128,7 +128,7 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
     if d.causes:
         pairs = []
         for cause in d.causes:
-            column = drawn.against_cause(residuals, cause.candidate, cause.effect_in)
+            column = drawn.against_cause(residuals, cause.candidate)
             left = drawn.residual_plot(residuals, column, "before")
             right = drawn.residual_plot(residuals, column, "with the extension", after=True)
             pairs.append((left, right, cause_words(cause)))
@@ -138,7 +138,7 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
         panels = [
             drawn.residual_plot(
                 residuals,
-                drawn.against_cause(residuals, c.candidate, c.effect_in),
+                drawn.against_cause(residuals, c.candidate),
                 f"{name_words(c.candidate.cause.name)} {c.candidate.target or ''}".strip(),
             )
             for c in d.also_possible[:_MOST_PANELS]

@@ -33,8 +33,6 @@ NEEDS = {
     "date_step": ("day",),
     "gauge_bias": ("gauge_id",),
     "technician_bias": ("technician_id",),
-    "gauge_drift": ("gauge_id", "day"),
-    "technician_learning": ("technician_id", "day"),
     "modification": (),
     "side_difference": ("side",),
     "calibration_rate": (),
@@ -44,9 +42,10 @@ NEEDS = {
     "load_directions": (),
     "geometry": (),
 }
-# What a fleet with nothing wrong has candidates of: no group in doubt, and all-joint effects are
-# fitted together.
-SINGLE = [name for name in NEEDS if name not in {"convention_slip", "load_directions", "geometry"}]
+# What a fleet with nothing wrong has candidates of: no group in doubt, no column of its own, and
+# all-joint effects are fitted together.
+NONE_THERE = {"convention_slip", "modification", "load_directions", "geometry"}
+SINGLE = [name for name in NEEDS if name not in NONE_THERE]
 ONE_SIGN = {
     "out_of_plane_tilt": 1,
     "direction_not_worst_case": -1,

@@ -44,17 +44,11 @@ STRETCH = term("elastic_compliance", 2e-6, length="length.F-1")
 RATE = term("calibration_rate", 0.05)
 GAUGE = term("gauge_bias", 0.004, "gauge G-1", value="G-1")
 RIGGED = term("rigging_offset", -0.01, "tail N1", tail="N1", day=12.0, since="2024-03-05")
-DRIFT = term("gauge_drift", 0.004, "gauge G-1", value="G-1", day=12.0, since="2023-11-05")
-ALL_DRIFT = term("gauge_drift", 0.004, value=None, day=12.0, since="2023-11-05")
 HABIT = term(
     *("approach_hysteresis", 0.004, "technician T-1"),
     **{"value": "T-1", "shares": {"EXTENDING": 1.0}},
 )
-LEARNING = term(
-    *("technician_learning", 0.004, "technician T-1"),
-    **{"value": "T-1", "day": 3.0, "since": "2024-02-01", "learning_days": 60.0},
-)
-MODIFIED = term("modification", 0.004, "tails N1,N2,N3", steps={"N1": "2024-03-05", "N2": 9.0})
+MODIFIED = term("modification", 0.004, "base B1", column="base", value="B1")
 CONTACT = term("joint_contact", 0.8, "joints 3,5", pair=(3, 5), room_in=None)
 
 
@@ -93,7 +87,7 @@ def offset_of(gear: Gear, terms: tuple[Term, ...], **changes: object) -> float:
 
 @pytest.mark.parametrize(
     "saved",
-    [STRETCH, RATE, GAUGE, RIGGED, DRIFT, ALL_DRIFT, HABIT, LEARNING, MODIFIED, CONTACT],
+    [STRETCH, RATE, GAUGE, RIGGED, HABIT, MODIFIED, CONTACT],
     ids=lambda t: f"{t.candidate.cause.name} {t.candidate.target}",
 )
 def test_a_term_comes_back_from_its_file_as_it_was(saved: Term, gear: Gear, tmp_path: Path) -> None:
@@ -110,7 +104,7 @@ def test_a_term_comes_back_from_its_file_as_it_was(saved: Term, gear: Gear, tmp_
 
 
 def test_a_term_that_came_back_predicts_the_same(gear: Gear, tmp_path: Path) -> None:
-    terms = (STRETCH, RATE, GAUGE, RIGGED, ALL_DRIFT, HABIT, CONTACT)
+    terms = (STRETCH, RATE, GAUGE, RIGGED, HABIT, CONTACT)
     write_extension(extension(gear, *terms), tmp_path / "e.toml")
     assert offset_of(gear, load_extension([tmp_path / "e.toml"], gear).terms) == offset_of(
         gear, terms

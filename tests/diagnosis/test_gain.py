@@ -167,8 +167,6 @@ def test_a_cause_whose_column_is_missing_is_not_testable(gear: Gear, plain: Diag
         "date_step": "day",
         "gauge_bias": "gauge_id",
         "technician_bias": "technician_id",
-        "gauge_drift": "gauge_id",
-        "technician_learning": "technician_id",
         "side_difference": "side",
         "approach_hysteresis": "approach",
     }

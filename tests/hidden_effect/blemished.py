@@ -139,30 +139,18 @@ def judged(
     true = {t[0]: [u for u in due if u[0] == t[0]] for t in due}
 
     def hit(name: tuple[str, str | None]) -> bool:
-        return any(study._same(name, t) or _some_of(name, t, 0.0) for t in truth.causes)
+        return any(study._same(name, t) for t in truth.causes)
 
-    def met(said: list[tuple[str, str | None]], least: float = 0.5) -> bool:
-        return all(
-            any(study._same(s, t) or _some_of(s, t, least) for s in said for t in of)
-            for of in true.values()
-        )
+    def met(said: list[tuple[str, str | None]]) -> bool:
+        return all(any(study._same(s, t) for s in said for t in of) for of in true.values())
 
     return {
         "verdict": verdict or "NO ANSWER",
         "right": bool(true) and met(named) and all(map(hit, named)),
-        "exact": bool(true) and met(named, 1.0) and all(map(hit, named)),
         "in_set": bool(true) and met(offered),
         "near": any(name in truth.near for name, _target in named),
         "wrong": any(not hit(n) and n[0] not in truth.near for n in named),
     }
-
-
-def _some_of(name: tuple[str, str | None], truth: tuple[str, str | None], least: float) -> bool:
-    """Aircraft that are named, if all of them are true and at least a share of the true ones."""
-    ours, theirs = str(name[1]), str(truth[1])
-    of_aircraft = name[0] == truth[0] and all(t.startswith("tails ") for t in (ours, theirs))
-    said, true = (set(text.removeprefix("tails ").split(",")) for text in (ours, theirs))
-    return of_aircraft and said <= true and len(said) >= least * len(true)
 
 
 def _worse(record: Record) -> bool:
@@ -183,13 +171,12 @@ def summarise(records: list[Record]) -> dict[str, dict[str, float | int]]:
         return study._rate(sum(map(hit, rows)), len(rows))
 
     alone = [r for r in records if r["beside"] is None]
-    listed = ("hyst", "drift_all", "drift_one", "learn", "modification", "modification_col")
+    listed = ("hyst", "modification_col")
     mild = [r for r in alone if r["form"] == "mild"]
     strong = [r for r in alone if r["form"] == "strong" and r["case"] not in listed]
     worded = [r for r in alone if r["form"] == "strong" and BLEMISHES[r["case"]].kinds]
     both = [r for r in records if r["beside"] is not None]
-    modified = [r for r in alone if r["case"].startswith("modif") and r["form"] == "strong"]
-    creep = [r for r in alone if r["case"] in ("drift_one", "learn") and r["form"] == "strong"]
+    modified = [r for r in alone if r["case"] == "modification_col" and r["form"] == "strong"]
     return {
         "mild blemish: a cause named that is not there": rate(mild, lambda r: r["wrong"]),
         "mild blemish: any alarm": rate(
@@ -202,10 +189,8 @@ def summarise(records: list[Record]) -> dict[str, dict[str, float | int]]:
         "blemish with a cause at S = 14: right or in the set": rate(both, lambda r: r["in_set"]),
         "blemish with a cause at S = 14: wrong": rate(both, lambda r: r["wrong"]),
         "an extension that makes unseen rows worse": rate(records, _worse),
-        "modification of half the fleet: right": rate(modified, lambda r: r["right"]),
-        "modification of half the fleet: every aircraft": rate(modified, lambda r: r["exact"]),
-        "modification of half the fleet: wrong": rate(modified, lambda r: r["wrong"]),
-        "a gauge that creeps, a technician who learns: right": rate(creep, lambda r: r["right"]),
+        "modification in a column: right": rate(modified, lambda r: r["right"]),
+        "modification in a column: wrong": rate(modified, lambda r: r["wrong"]),
     }
 
 

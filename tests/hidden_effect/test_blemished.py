@@ -9,57 +9,41 @@ import pytest
 from .blemished import judged, summarise
 from .simulator import Truth
 
-MODIFIED = (("modification", "tails N101,N104"), ("modification", "mod_status POST"))
+ZEROS = (("modification", "base B1"), ("modification", "base B3"))
 
 
 def truth(*causes: tuple[str, str | None], near: tuple[str, ...] = ()) -> Truth:
-    return Truth("modification_col", "strong", (), causes, near, [], 1)
+    return Truth("zero_by_base", "strong", (), causes, near, [], 1)
 
 
 def said(*names: tuple[str, str | None]) -> list[dict[str, Any]]:
     return [{"cause": cause, "target": target} for cause, target in names]
 
 
-@pytest.mark.parametrize("name", MODIFIED)
-def test_either_target_of_a_modification_is_right(name: tuple[str, str]) -> None:
-    assert judged("NAMED", said(name), [], truth(*MODIFIED))["right"]
-
-
-def test_half_of_the_aircraft_and_no_other_is_right_but_not_exact() -> None:
-    found = judged("NAMED", said(("modification", "tails N104")), [], truth(*MODIFIED))
-    assert (found["right"], found["exact"], found["wrong"]) == (True, False, False)
-
-
-def test_less_than_half_of_the_aircraft_is_neither_right_nor_wrong() -> None:
-    hidden = truth(("modification", "tails N101,N104,N107"))
-    found = judged("NAMED", said(("modification", "tails N104")), [], hidden)
-    assert (found["right"], found["wrong"]) == (False, False)
-
-
-def test_an_aircraft_that_was_not_modified_is_wrong() -> None:
-    name = ("modification", "tails N101,N102,N104")
-    assert judged("NAMED", said(name), [], truth(*MODIFIED))["wrong"]
+@pytest.mark.parametrize("name", ZEROS)
+def test_either_of_two_bases_is_right(name: tuple[str, str]) -> None:
+    assert judged("NAMED", said(name), [], truth(*ZEROS))["right"]
 
 
 def test_a_name_beside_the_right_one_is_wrong() -> None:
-    names = said(MODIFIED[0], ("date_step", None))
-    found = judged("NAMED", names, [], truth(*MODIFIED))
+    names = said(ZEROS[0], ("date_step", None))
+    found = judged("NAMED", names, [], truth(*ZEROS))
     assert (found["right"], found["wrong"]) == (False, True)
 
 
 def test_a_cause_that_is_offered_is_in_the_set_and_not_right() -> None:
-    found = judged("AMBIGUOUS", [], said(MODIFIED[0], ("date_step", None)), truth(*MODIFIED))
+    found = judged("AMBIGUOUS", [], said(ZEROS[0], ("date_step", None)), truth(*ZEROS))
     assert (found["right"], found["in_set"], found["wrong"]) == (False, True, False)
 
 
 def test_a_name_that_is_partly_true_is_near_and_not_wrong() -> None:
-    hidden = truth(("gauge_drift", "gauge G-03"), near=("gauge_bias",))
+    hidden = truth(near=("gauge_bias",))
     found = judged("NAMED", said(("gauge_bias", "gauge G-03")), [], hidden)
     assert (found["right"], found["near"], found["wrong"]) == (False, True, False)
 
 
 def test_beside_a_blemish_only_the_listed_cause_is_asked_for() -> None:
-    hidden = truth(("gauge_drift", None), ("date_step", None))
+    hidden = truth(("convention_slip", "gauge G-03"), ("date_step", None))
     found = judged("NAMED", said(("date_step", None)), [], hidden, "date_step")
     assert (found["right"], found["wrong"]) == (True, False)
 

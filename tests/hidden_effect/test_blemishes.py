@@ -157,9 +157,8 @@ def test_a_quarter_of_the_rows_stands_twice() -> None:
 
 
 def test_a_creeping_gauge_leaves_the_rows_of_the_others() -> None:
-    name = drawn("drift_one")[1].causes[0][1]
-    other = np.array([f"gauge {gauge}" != name for gauge in column("drift_one", "gauge_id")])
-    assert not shift("drift_one")[other].any()
+    gauges = np.array(column("drift_one", "gauge_id"))
+    assert len(set(gauges[shift("drift_one") != 0.0])) == 1
 
 
 def test_all_gauges_creep_by_no_more_than_six_thou_and_a_step() -> None:
@@ -169,9 +168,9 @@ def test_all_gauges_creep_by_no_more_than_six_thou_and_a_step() -> None:
 
 
 def test_the_bias_of_a_learner_decays() -> None:
-    name = drawn("learn")[1].causes[0][1]
-    own = np.array([f"technician {t}" == name for t in column("learn", "technician_id")])
-    bias = shift("learn")[own]
+    people = np.array(column("learn", "technician_id"))
+    (person,) = set(people[shift("learn") != 0.0])
+    bias = shift("learn")[people == person]
     assert bias[:5].mean() > 3.0 * bias[-5:].mean()
 
 
@@ -185,22 +184,16 @@ def test_hysteresis_of_one_reader_is_of_one_reader() -> None:
 
 
 def test_a_modification_is_of_half_of_the_tails_each_from_a_date_of_its_own() -> None:
-    rows, truth = drawn("modification")
-    tails = str(truth.causes[0][1]).removeprefix("tails ").split(",")
+    rows = drawn("modification")[0]
     moved = shift("modification") > 0.002
     changed_tails = set(column("modification", "tail_no")[moved])
     assert len(changed_tails) <= len({row["tail_no"] for row in rows}) // 2
     first: dict[str, str] = {}
-    before: set[str] = set()
     for row, after in zip(rows, moved, strict=True):
         if after:
             first.setdefault(row["tail_no"], row["inspection_date"])
-        else:
-            before.add(row["tail_no"])
         assert after or row["tail_no"] not in first
     assert len(set(first.values())) > 1
-    # A tail without rows on both sides of its date shows no step.
-    assert set(tails) == changed_tails & before
 
 
 def test_the_column_of_the_modification_tells_its_rows() -> None:

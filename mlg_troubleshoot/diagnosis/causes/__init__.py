@@ -10,11 +10,6 @@ from traceback import walk_tb
 
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip
-from mlg_troubleshoot.diagnosis.causes.gradual import (
-    GaugeDrift,
-    Modification,
-    TechnicianLearning,
-)
 from mlg_troubleshoot.diagnosis.causes.linkage import (
     CalibrationRate,
     DirectionNotWorstCase,
@@ -29,6 +24,7 @@ from mlg_troubleshoot.diagnosis.causes.reading import (
     ApproachHysteresis,
     DateStep,
     GaugeBias,
+    Modification,
     RiggingOffset,
     SideDifference,
     TechnicianBias,
@@ -57,8 +53,6 @@ CATALOGUE = Catalogue(
         DateStep(),
         GaugeBias(),
         TechnicianBias(),
-        GaugeDrift(),
-        TechnicianLearning(),
         Modification(),
         SideDifference(),
         CalibrationRate(),

@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask
-from mlg_troubleshoot.diagnosis.noise import less_expected
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.covariance import NoiseModel
 
 
 @dataclass(frozen=True)
@@ -42,8 +40,6 @@ class Scene:
         Directions that give it. [rad]
     contribution_in : ndarray, shape (n, n_joints)
         What each joint's clearance adds to it, directions held. [in]
-    noise : NoiseModel, optional
-        What rows scatter where nothing is wrong; None where it is not known.
     """
 
     model: LinkageModel
@@ -54,12 +50,6 @@ class Scene:
     over_in: Array
     directions: Array
     contribution_in: Array
-    noise: NoiseModel | None = None
-
-    @property
-    def expected_in(self) -> Array:
-        """Misfit less what pins scatter. [in]"""
-        return less_expected(self.table.measured_in - self.over_in, self.over_in)
 
     def place(self, joint: int) -> int:
         """Return the column of a joint."""

@@ -124,6 +124,39 @@ class TechnicianBias(_Level):
     separates = "one gear measured by this technician and by another with the same gauge on one day"
 
 
+class Modification(RowShift):
+    """Rows that a column of the table's own sets apart are shifted: a modification, a base, a
+    shop.
+    """
+
+    name = "modification"
+    sentence = "Readings with {target} are shifted"
+    inspect = "What was changed on these gears, or is done otherwise there"
+    separates = "one gear measured right before and right after the change, by the same technician"
+
+    def is_distinct(self) -> bool:
+        """A column of the table's own does not follow the clearances."""
+        return True
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield each value of each column that only this table has; of two the one that came
+        later, for the other is the rest.
+        """
+        table = scene.table
+        days = table.quantities.get("day", table.row.astype(float))
+        for column in table.own_factors:
+            texts = table.factors[column]
+            found = [*levels(texts)]
+            if len({*texts} - {""}) == 2 and len(found) == 2:
+                found = [max(found, key=lambda value: float(np.nanmean(days[texts == value])))]
+            for value in found:
+                yield Candidate(self, f"{column} {value}", {"column": column, "value": value})
+
+    def rows(self, candidate: Candidate) -> Mapping[str, str]:
+        """Those with that value."""
+        return {candidate.setting["column"]: candidate.setting["value"]}
+
+
 class _Contrast(RowShift):
     """Rows of two kinds shifted against each other, or those of one kind alone."""
 

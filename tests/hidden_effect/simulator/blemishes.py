@@ -265,14 +265,14 @@ def _creep(scene: Scene) -> Array:
 
 def _drift_all(scene: Scene, state: State) -> Hidden:
     state.offset += scene.size(0.0015, 0.006) * _creep(scene)
-    return (("gauge_drift", None),)
+    return ()
 
 
 def _drift_one(scene: Scene, state: State) -> Hidden:
     gauge = scene.usual(scene.design.gauge)
     shape = _creep(scene) * (scene.design.gauge == gauge)
     state.offset += scene.to_strength(shape, CREEP) if scene.strong else 0.002 * shape
-    return (("gauge_drift", f"gauge {gauge}"),)
+    return ()
 
 
 def _learn(scene: Scene, state: State) -> Hidden:
@@ -281,7 +281,7 @@ def _learn(scene: Scene, state: State) -> Hidden:
     done = np.cumsum(own) / own.sum()
     shape = np.where(own, np.exp(-done / 0.25), 0.0)
     state.offset += scene.to_strength(shape, CREEP) if scene.strong else 0.002 * shape
-    return (("technician_learning", f"technician {person}"),)
+    return ()
 
 
 def _hysteresis(scene: Scene, state: State) -> Hidden:
@@ -296,10 +296,8 @@ def _hysteresis_of_one(scene: Scene, state: State) -> Hidden:
     return (("approach_hysteresis", f"technician {person}"),)
 
 
-def _modified(scene: Scene) -> tuple[Mask, Hidden]:
-    """Rows after the modification of half of the tails, each at its own date; true of the table is
-    that of the tails of which it has rows on both sides of the date.
-    """
+def _modified(scene: Scene) -> Mask:
+    """Rows after the modification of half of the tails, each at its own date."""
     design = scene.design
     tails = np.unique(design.tail[scene.seen].astype(str))
     chosen = np.sort(scene.rng.choice(tails, len(tails) // 2, replace=False))
@@ -307,25 +305,19 @@ def _modified(scene: Scene) -> tuple[Mask, Hidden]:
     for tail in chosen:
         own = design.tail == tail
         after |= own & (design.day >= np.quantile(design.day[own], scene.rng.uniform(0.3, 0.7)))
-    shown = [
-        str(tail)
-        for tail in chosen
-        if len(set(after[scene.seen & (design.tail == tail)].tolist())) == 2
-    ]
-    return after, (("modification", f"tails {','.join(shown)}"),)
+    return after
 
 
 def _modification(scene: Scene, state: State) -> Hidden:
-    after, hidden = _modified(scene)
-    state.offset += scene.size(0.0008, 0.004) * after
-    return hidden
+    state.offset += scene.size(0.0008, 0.004) * _modified(scene)
+    return ()
 
 
 def _modification_column(scene: Scene, state: State) -> Hidden:
-    after, hidden = _modified(scene)
+    after = _modified(scene)
     state.offset += scene.size(0.0008, 0.004) * after
     scene.columns["mod_status"] = np.where(after, "POST", "PRE").tolist()
-    return (*hidden, ("modification", "mod_status POST"))
+    return (("modification", "mod_status POST"),)
 
 
 def _season(scene: Scene, state: State) -> Hidden:

@@ -1,8 +1,7 @@
-"""What comes gradually, or to some gears only, is named as such."""
+"""What concerns some gears, bases or people only is named as such."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,13 +14,12 @@ from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.misfit.columns import EffectColumns
-from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
 from mlg_troubleshoot.units import DAYS_PER_YEAR
 from mlg_troubleshoot.units import ClearanceConvention as Convention
 from tests.cli.conftest import mlg
 from tests.hidden_effect.simulator import blemished_fleet, write_rows
 
-from .conftest import Array, fleet, scene_of
+from .conftest import Array, fleet
 
 BY_NAME = {cause.name: cause for cause in CATALOGUE}
 MODIFIED = {"N101": 150, "N104": 420, "N105": 240, "N108": 510}
@@ -32,16 +30,6 @@ def names(gear: Gear, table: DiagnosisTable) -> list[tuple[str, str | None]]:
         (c.candidate.cause.name, c.candidate.target)
         for c in diagnose(gear.model, table, gear.discrepancies).causes
     ]
-
-
-def creeping(table: DiagnosisTable, _over: Array) -> Array:
-    year = (table.quantities["day"] + 100.0) % 365.0 / 365.0
-    return 0.008 * year * (table.factors["gauge_id"] == "G-2")
-
-
-def learning(table: DiagnosisTable, _over: Array) -> Array:
-    own = table.factors["technician_id"] == "T-1"
-    return 0.01 * np.exp(-table.quantities["day"] / 150.0) * own
 
 
 def modified(table: DiagnosisTable, _over: Array) -> Array:
@@ -67,21 +55,6 @@ def test_a_season_of_any_phase_is_nearly_a_shape_of_the_bank(scene: Scene, phase
     assert along.max() > 0.97
 
 
-def test_a_gauge_that_creeps_is_named(gear: Gear) -> None:
-    assert names(gear, fleet(gear.model, creeping, rows=200)) == [("gauge_drift", "gauge G-2")]
-
-
-def test_a_creep_is_said_as_a_length_per_year(gear: Gear) -> None:
-    found = diagnose(gear.model, fleet(gear.model, creeping, rows=200), gear.discrepancies)
-    assert re.search(r"drift 0\.\d+ in per year", seven_lines(found)[3].text)
-
-
-def test_a_technician_who_learns_is_named(gear: Gear) -> None:
-    assert names(gear, fleet(gear.model, learning, rows=200)) == [
-        ("technician_learning", "technician T-1")
-    ]
-
-
 def test_lost_motion_in_the_rows_of_one_technician_is_named_with_the_technician(gear: Gear) -> None:
     table = fleet(gear.model, approaching, rows=200)
     assert names(gear, table) == [("approach_hysteresis", "technician T-2")]
@@ -94,35 +67,6 @@ def test_lost_motion_of_all_is_not_one_technicians(gear: Gear) -> None:
         return 0.004 * (table.factors["approach"] == "RETRACTING")
 
     assert names(gear, fleet(gear.model, of_all, rows=200)) == [("approach_hysteresis", None)]
-
-
-def test_aircraft_that_change_on_dates_of_their_own_are_named_together(gear: Gear) -> None:
-    assert names(gear, fleet(gear.model, modified, rows=200)) == [
-        ("modification", "tails N101,N104,N105,N108")
-    ]
-
-
-def test_aircraft_that_may_not_have_changed_are_not_named(tmp_path: Path) -> None:
-    named, changed = modified_aircraft(tmp_path, 5_900_017)
-    assert named < changed
-
-
-def test_aircraft_with_a_visit_or_two_count_as_well(tmp_path: Path) -> None:
-    named, changed = modified_aircraft(tmp_path, 5_900_008)
-    assert named <= changed
-
-
-def modified_aircraft(folder: Path, seed: int) -> tuple[set[str], set[str]]:
-    """The aircraft of a modified fleet that are named, and those that show their change."""
-    rows, truth = blemished_fleet("modification", "strong", seed)
-    write_rows(rows, folder / "fleet.csv")
-    (cause,) = mlg("diagnose", folder / "fleet.csv", "--json").json["causes"]
-    ((name, changed),) = truth.causes
-    assert cause["cause"] == name
-    named, shown = (
-        set(str(target).removeprefix("tails ").split(",")) for target in (cause["target"], changed)
-    )
-    return named, shown
 
 
 def test_a_column_of_the_tables_own_is_named_with_its_value(gear: Gear) -> None:
@@ -150,22 +94,6 @@ def test_a_step_of_all_aircraft_is_not_a_modification(gear: Gear) -> None:
         return 0.006 * (table.quantities["day"] >= 350)
 
     assert names(gear, fleet(gear.model, all_from, rows=200)) == [("date_step", None)]
-
-
-@pytest.mark.parametrize("name", ["gauge_drift", "technician_learning", "modification"])
-def test_a_gradual_cause_acts_on_the_same_dates_in_another_table(name: str, gear: Gear) -> None:
-    shift = {"gauge_drift": creeping, "technician_learning": learning, "modification": modified}
-    table = fleet(gear.model, shift[name], rows=200)
-    scene = scene_of(gear.model, table, gear.discrepancies)
-    candidate = next(c for c in BY_NAME[name].candidates(scene) if c.target is not None)
-    later = table.take(table.quantities["day"] >= 200)
-    days = later.quantities["day"] - 200
-    moved = replace(later, quantities={**later.quantities, "day": days}, first_day="2023-08-20")
-    other = replace(scene, table=moved, clearance_in=scene.clearance_in[-len(moved) :])
-    assert np.allclose(
-        candidate.cause.adjust(other, candidate, 0.01).offset_in,
-        candidate.cause.adjust(scene, candidate, 0.01).offset_in[table.quantities["day"] >= 200],
-    )
 
 
 def test_a_column_with_many_values_does_not_group_the_rows(gear: Gear) -> None:
