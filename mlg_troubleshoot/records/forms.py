@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -31,6 +32,7 @@ from mlg_troubleshoot.records.model import (
 from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow
 from mlg_troubleshoot.records.tables import Collected
+from mlg_troubleshoot.records.values import written_number
 
 FORM_TITLE = "MLG inspection form"
 # What an untouched copy of the form may hold: it says how to read, not what was found.
@@ -95,7 +97,11 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         if named is None:
             continue
         if named.column in (CLEARANCE, PLUNGER_DISPLACEMENT):
-            numbers |= {i for i, value in enumerate(cells) if i > column and _is_number(value)}
+            numbers |= {
+                i
+                for i, value in enumerate(cells)
+                if (_is_number(value) if i > column else _is_fraction(value))
+            }
         for i, value in enumerate(cells):
             is_side = isinstance(value, str) and Side.spelt(value)
             if i > column and value is not None and (named.column is not SIDE or is_side):
@@ -113,6 +119,12 @@ def _field(cell: Cell, options: ReadOptions) -> Field | None:
 def _is_number(cell: Cell) -> bool:
     """Whether a cell may be a reading: a number, or a text that begins with one."""
     return cell is not None and (not isinstance(cell, str) or _NUMBER.match(cell) is not None)
+
+
+def _is_fraction(cell: Cell) -> bool:
+    """Whether a cell in front of a label may be a reading, not the number of its line."""
+    number = math.nan if cell is None else written_number(cell, decimal_comma=True)[0]
+    return number % 1.0 > 0.0
 
 
 def _is_line(label: str, options: ReadOptions) -> bool:

@@ -383,7 +383,7 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
         return tables[:1]
     if any(c.form is not None for c in candidates):
         return []
-    raise _nothing_found(book, candidates, options)
+    raise _nothing_found(every)
 
 
 def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) -> _Candidate:
@@ -405,11 +405,9 @@ def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) 
     return candidate
 
 
-def _nothing_found(
-    book: Workbook, candidates: Sequence[_Candidate], options: ReadOptions
-) -> FileRefusedError:
-    hidden = [_candidate(sheet, options) for sheet in book.sheets if sheet.hidden]
-    name = next((c.sheet.name for c in hidden if c.header is not None or c.form is not None), None)
+def _nothing_found(every: Sequence[_Candidate]) -> FileRefusedError:
+    hidden = [c for c in every if c.sheet.hidden and (c.header is not None or c.form is not None)]
+    name = next((c.sheet.name for c in hidden), None)
     if name is not None:
         return FileRefusedError(
             "sheet_hidden",
@@ -418,9 +416,10 @@ def _nothing_found(
             f'Unhide the sheet, or name it: --sheet "{name}".',
             sheet=name,
         )
-    if len(candidates) == 1:
-        return _no_header(candidates[0])
-    names = ", ".join(repr(c.sheet.name) for c in candidates)
+    visible = [c for c in every if not c.sheet.hidden]
+    if len(visible) == 1:
+        return _no_header(visible[0])
+    names = ", ".join(repr(c.sheet.name) for c in visible)
     return FileRefusedError(
         "header_missing", f"no sheet holds a table of inspections (sheets: {names})"
     )

@@ -86,6 +86,16 @@ def test_the_columns_are_named_with_the_remedy() -> None:
     assert "Delete the columns" in problem.remedy
 
 
+def test_readings_in_front_of_the_joints_are_a_column_and_numbers_of_lines_are_not() -> None:
+    lines = [[1, "Tail", "N1"], [2, "Side", "LH"], [3, "Convention", "RADIAL"]]
+    joints = [[4, "J3 (in)", 0.001], [5, "J5 (in)", 0.001]]
+    options = ReadOptions.of(GEAR)
+    assert read_many([workbook([*lines, *joints])], options).problems == ()
+    joints = [["0.013 in", "J3 (in)", 0.001], [0.021, "J5 (in)", 0.001]]
+    (problem,) = read_many([workbook([*lines, *joints])], options).problems
+    assert "columns A, C" in str(problem.value)
+
+
 def test_words_next_to_a_reading_are_not_a_second_column() -> None:
     lines = [["Tail", "N1"], ["Side", "LH"], ["Convention", "RADIAL"]]
     lines += [["J3 (in)", 0.001, "ok"], ["J5 (in)", 0.001, "bush no. 2"]]
