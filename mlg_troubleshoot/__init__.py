@@ -21,7 +21,7 @@ load_gear, Gear          a shipped gear, or a gear file of your own
 predict                  worst displacement of the plunger, for one gear or a batch
 Inspection, check        one inspection or a DataFrame, and what the decision rule says about it
 read_inspections         a table as the reader of files understands it, as a DataFrame
-check_files              whole tables: CSV, xlsx, xls, ods
+check_files              whole tables: CSV, xlsx, xls
 write_reports            printable reports of a checked table
 diagnose, diagnose_files measured against predicted: cause, extension, gain
 diagnose_simulation      the same question for a simulation of yours

@@ -18,7 +18,13 @@ from mlg_troubleshoot.errors import (
     TroubleshootError,
 )
 
-_CANNOT_WRITE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
+# What helps where the system refuses something.
+_REMEDIES = {
+    errno.EMFILE: "Let this program open more files: ulimit -n 256",
+    errno.ENFILE: "Close other programs: this computer has no room for more open files.",
+    errno.ENAMETOOLONG: "Give it a shorter name.",
+}
+_REMEDY = "Make room, or write to another place that you may read and write."
 # Some releases of typer carry their own click: what it says about usage is found through a name
 # that typer exports.
 _UsageMessage: type[typer.BadParameter] = typer.BadParameter.__mro__[2]
@@ -68,9 +74,9 @@ def _explain(error: Exception) -> ExitCode:
     if isinstance(error, _UsageMessage):
         say(f"Error: {error.format_message()}\nWhat to do: See the options with --help.")
         return ExitCode.USAGE
-    if isinstance(error, OSError) and error.errno in _CANNOT_WRITE:
+    if isinstance(error, OSError) and error.errno is not None:
         say(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}")
-        say("What to do: Make room, or write to another place.")
+        say(f"What to do: {_REMEDIES.get(error.errno, _REMEDY)}")
         try:
             # What is still to be written to stdout is written now or dropped: the interpreter must
             # not fail on it.

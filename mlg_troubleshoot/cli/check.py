@@ -128,7 +128,7 @@ def check(
         list[str] | None,
         typer.Argument(
             metavar="[FILE|-]...",
-            help="Inspection tables (CSV, xlsx, xls, ods), folders, or - for stdin.",
+            help="Inspection tables (CSV, xlsx, xls), folders, or - for stdin.",
         ),
     ] = None,
     flags: Flags,

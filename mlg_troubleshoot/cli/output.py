@@ -11,6 +11,7 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from mlg_troubleshoot.errors import OutputError
+from mlg_troubleshoot.errors import ExitCode, OutputError
 from mlg_troubleshoot.units import LengthUnit, said_in
 from mlg_troubleshoot.visible import visible
 
@@ -65,8 +66,17 @@ def to_ascii(text: str) -> str:
 def prepare_streams() -> None:
     """Let stdout and stderr degrade to what they can show; no character ends a run.
 
-    Python turns a C locale into UTF-8 for itself, so for a terminal the locale is asked.
+    Python turns a C locale into UTF-8 for itself, so for a terminal the locale is asked. A stream
+    that is closed is opened on nothing, so that no other file takes its number; without stdout the
+    run ends.
     """
+    closed = [name for name in ("stdin", "stdout", "stderr") if getattr(sys, name) is None]
+    for name in closed:
+        place = os.open(os.devnull, os.O_RDONLY if name == "stdin" else os.O_WRONLY)
+        setattr(sys, name, os.fdopen(place, "r" if name == "stdin" else "w"))
+    if "stdout" in closed:
+        say("Error: standard output is closed.\nWhat to do: Send it to a file or another program.")
+        raise SystemExit(ExitCode.NOT_WRITTEN)
     codecs.register_error(_PLAIN, _shown_instead)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -256,7 +266,9 @@ def joint(number: int | None) -> str:
 
 
 def say(message: str) -> None:
-    print(visible(message), file=sys.stderr, flush=True)
+    """Write a message to stderr; one that cannot be written changes no result."""
+    with suppress(OSError):
+        print(visible(message), file=sys.stderr, flush=True)
 
 
 def say_written(written: Iterable[WrittenReport], *, quiet: bool = False) -> None:

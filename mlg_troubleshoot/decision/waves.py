@@ -19,7 +19,7 @@ from mlg_troubleshoot.decision.priors import PRIORS
 # density. [in, 1/in, in]
 HALF_IN = 0.18
 _TERMS = 104
-_PLACES = 145
+_PLACES = 577
 FREQUENCIES = np.pi * np.arange(1, _TERMS + 1) / HALF_IN
 # Lanczos factors: without them a series that ends rings far from a narrow peak, where all that is
 # left of a gear whose plunger is far out may stand. [1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 import warnings
@@ -26,7 +27,7 @@ from mlg_troubleshoot.decision.columns import CLEARANCE, IDENTITY, RECORD_ID
 from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.errors import OutputError, Problem, UsageError
 from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.records.cells import column_letters, writable
+from mlg_troubleshoot.records.cells import MAX_ROWS, column_letters, writable
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
 from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.template import BOLD, HEADER_FILL
@@ -64,7 +65,18 @@ def annotate_workbook(
     ``over_limit`` gives for a row its joints over their limit, each with that limit. [in]
     """
     label = writable(str(source))
-    data = _load(source, out)
+    data, judged = _load(source, out)
+    if hashlib.sha256(data).hexdigest() != result.inputs_sha256.get(label):
+        raise OutputError(
+            f"{source} is no longer the workbook that was judged", "Check the workbook again."
+        )
+    covered = sum(sheet.covered() for sheet in judged.sheets)
+    if covered > MAX_ROWS:
+        raise OutputError(
+            f"merged cells and links of {source} cover {covered} cells, at most {MAX_ROWS} can be"
+            " copied",
+            "Split the merged cells and delete the links that span whole sheets.",
+        )
     buffer = io.BytesIO()
     try:
         # What the library drops is said below, in the user's words.
@@ -72,7 +84,8 @@ def annotate_workbook(
             warnings.simplefilter("ignore")
             macros = Path(out).suffix.lower() == ".xlsm"
             book = load_workbook(io.BytesIO(data), keep_vba=macros, rich_text=True)
-            _annotate(book, label, result, verdicts, over_limit)
+            widths = {sheet.name: sheet.width() for sheet in judged.sheets}
+            _annotate(book, label, result, verdicts, over_limit, widths)
             ExcelWriter(book, package).save()
     except (
         BadZipFile,
@@ -94,13 +107,19 @@ def annotate_workbook(
 
 
 def _annotate(
-    book: Workbook, label: str, result: ReadResult, verdicts: VerdictColumns, over_limit: OverLimit
+    book: Workbook,
+    label: str,
+    result: ReadResult,
+    verdicts: VerdictColumns,
+    over_limit: OverLimit,
+    widths: Mapping[str | None, int],
 ) -> None:
     for layout in result.layouts:
         if layout.file != label or layout.sheet not in book.sheetnames:
             continue
         sheet = book[layout.sheet]
-        free = _free_column(sheet, layout)
+        # The first column, counted from 1, with nothing in it or to the right of it.
+        free = max(widths[layout.sheet], layout.width) + 1
         for problem in result.problems:
             if problem.file == label and problem.sheet == layout.sheet:
                 _mark(sheet, layout, problem)
@@ -149,7 +168,7 @@ def _beside_cells(package: bytes) -> Counter[str]:
     return held
 
 
-def _load(source: str | Path, out: str | Path) -> bytes:
+def _load(source: str | Path, out: str | Path) -> tuple[bytes, XlsxFile]:
     path = Path(source)
     if Path(out).resolve() == path.resolve():
         raise UsageError(
@@ -157,29 +176,19 @@ def _load(source: str | Path, out: str | Path) -> bytes:
         )
     try:
         data = path.read_bytes()
-        if not data.startswith(b"PK") or b"opendocument" in data[:200]:
+        if not data.startswith(b"PK"):
             raise UsageError(
                 f"{source} is not an .xlsx workbook, so it cannot be annotated",
                 "Save it as .xlsx first, or use --csv for the results.",
             )
         # The same guard as in reading: nothing dangerous reaches the library that writes.
-        XlsxFile(data)
+        return data, XlsxFile(data)
     except FileRefusedError as refusal:
         raise UsageError(f"{source}: {refusal}", refusal.problem.remedy) from None
     except OSError as error:
         raise UsageError(
             f"{source} cannot be opened: {error.strerror}", "Check the path."
         ) from None
-    return data
-
-
-def _free_column(sheet: Worksheet, layout: SheetLayout) -> int:
-    """Return the first column, counted from 1, with nothing in it or to the right of it."""
-    used = max(
-        (cell.column for row in sheet.iter_rows() for cell in row if cell.value is not None),
-        default=0,
-    )
-    return int(max(used, layout.width)) + 1
 
 
 def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:

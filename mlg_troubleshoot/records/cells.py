@@ -211,12 +211,8 @@ def _sections(pieces: list[re.Match[str]]) -> tuple[tuple[str, ...], bool]:
         sections[-1] += literal
     if len(sections) > 1 and is_of_texts:
         sections.pop()
-    return tuple(map(str.strip, sections)), has_words(words)
-
-
-def has_words(text: str) -> bool:
-    """Whether a text holds letters or signs of units."""
-    return any(c.isalpha() or c in _UNIT_MARKS for c in text)
+    has_words = any(c.isalpha() or c in _UNIT_MARKS for c in words)
+    return tuple(map(str.strip, sections)), has_words
 
 
 def date_cell(serial: float, *, epoch_1904: bool) -> OddCell:

@@ -167,7 +167,7 @@ def read_form(
         )
     labels = [CellPlace.at(row, form.label_column, label) for row, label, _ in form.lines]
     values = [CellPlace.at(row, form.value_column, label) for row, label, _ in form.lines]
-    table = TableInHand(options, file, sheet, out.problems.append, options.decimal_comma)
+    table = TableInHand(options, file, sheet, out.tell, options.decimal_comma)
     first = form.lines[0][0]
     columns = ColumnReader(table).place([label for _, label, _ in form.lines], first, places=labels)
     reader = RowReader(columns.placed, table)

@@ -43,10 +43,17 @@ STDIN_NAME = "-"
 _NAMED = 8
 _PEEKED_ROWS = 120
 _INSTRUCTIONS = "instructions"
-_SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods"))
+# What is packed as a workbook is and cannot be read, by its suffix.
+_OTHER_PACKED = {
+    ".ods": "an OpenDocument spreadsheet (.ods)",
+    ".numbers": "a document of Apple Numbers (.numbers)",
+    ".docx": "a text document (.docx)",
+    ".zip": "a packed folder (.zip)",
+}
+_SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods", ".numbers"))
 
 _OLE_MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-_WORKBOOK_NAMES = frozenset((".xlsx", ".xlsm", ".xls", ".ods", ".xlsb", ".xltx", ".xltm"))
+_WORKBOOK_NAMES = frozenset((".xlsx", ".xlsm", ".xls", ".xlsb", ".xltx", ".xltm"))
 _OTHERS: tuple[tuple[bytes, str], ...] = (
     (b"%PDF", "a PDF document"),
     (b"\x89PNG", "a picture (PNG)"),
@@ -181,9 +188,12 @@ def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -
 
 def _read_frame(frame: pd.DataFrame, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
     sheet = FrameSheet(frame)
-    found = read_table(
-        sheet, sheet.header, sheet.rows(), options, file=FRAME, delimiter=None, tick=ticker
-    )
+    try:
+        found = read_table(
+            sheet, sheet.header, sheet.rows(), options, file=FRAME, delimiter=None, tick=ticker
+        )
+    except FileRefusedError as refusal:
+        found = Collected(problems=[replace(refusal.problem, file=FRAME)])
     if not found.rows and not found.problems:
         found.problems.append(
             replace(FileRefusedError("no_rows", "it is empty").problem, file=FRAME)
@@ -274,10 +284,10 @@ def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
         from mlg_troubleshoot.records.xls import xls_book
 
         return xls_book(data)
-    if b"opendocument.spreadsheet" in data[:200]:
-        from mlg_troubleshoot.records.ods import ods_book
-
-        return ods_book(data)
+    suffix = ".ods" if b"opendocument.spreadsheet" in data[:200] else Path(label).suffix.lower()
+    if suffix in _OTHER_PACKED:
+        remedy = "Save it as .xlsx or .csv and read that."
+        raise FileRefusedError("file_kind", _OTHER_PACKED[suffix], remedy=remedy)
     from mlg_troubleshoot.records.xlsx import XlsxFile
 
     return XlsxFile(data)

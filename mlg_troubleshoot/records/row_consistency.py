@@ -49,7 +49,9 @@ def settle_duplicates(
                 rows[place] = replace(row, warnings=(*row.warnings, note))
             continue
         for place, row in zip(places, found, strict=True):
-            others = [where(other.source) for other in found if other is not row]
+            others = [where(other.source) for other in found[:4] if other is not row][:3]
+            if len(found) > len(others) + 1:
+                others[-1] += f" and {len(found) - 1 - len(others)} more"
             header, cell = cell_of(row.source, layouts, RECORD_ID)
             problems.append(_problem(record_id, row.source, others, header, cell))
             rows[place] = to_correct(row, header)
@@ -89,7 +91,7 @@ def cell_of(
 def _problem(
     record_id: str, source: RowSource, others: list[str], header: str, cell: str | None
 ) -> Problem:
-    shown = ", ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
+    shown = ", ".join(others)
     expected = f"a record id that no other inspection of the file has; {shown} also has it"
     remedy = "Keep the right row, or give each inspection its own record id."
     place = source.file, source.sheet, source.row, header, cell

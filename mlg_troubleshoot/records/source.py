@@ -135,7 +135,7 @@ class Sheet(ABC):
 class Workbook:
     """A file with one or more tables of cells.
 
-    kind: ``csv``, ``xlsx``, ``xlsm``, ``xls`` or ``ods``.
+    kind: ``csv``, ``xlsx``, ``xlsm`` or ``xls``.
     delimiter: what separates the fields of a CSV file.
     """
 

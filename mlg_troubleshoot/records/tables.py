@@ -28,9 +28,11 @@ from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header, heade
 from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
-from mlg_troubleshoot.records.source import FileRefusedError, MergedRange, NumberedRow, Sheet
+from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet
 from mlg_troubleshoot.units import ClearanceConvention
 
+# So many in one table are one mistake: they would take memory and help nobody.
+MAX_PROBLEMS = 20_000
 _PROGRESS_ROWS = 500
 # Rows by which a column is known that holds sides, whatever its header says.
 _LOOKED_AT = 50
@@ -53,6 +55,19 @@ class Collected:
     layouts: list[SheetLayout] = field(default_factory=list)
     invalid_content: dict[RowSource, int] = field(default_factory=dict)
 
+    def tell(self, problem: Problem) -> None:
+        """Take a problem; a table that has far too many of them is refused, with the first."""
+        self.problems.append(problem)
+        if len(self.problems) > MAX_PROBLEMS:
+            first = self.problems[0]
+            raise FileRefusedError(
+                "problems_many",
+                f"more than {MAX_PROBLEMS} problems up to row {problem.row}; the first in"
+                f" {first.cell or f'row {first.row}'}: {first.value or 'nothing'}",
+                first.expected,
+                first.remedy,
+            )
+
 
 def read_table(
     sheet: Sheet,
@@ -69,7 +84,7 @@ def read_table(
     first = list(islice(rows, _LOOKED_AT))
     rows = chain(first, rows)
     options, side, said = _sides(sheet.name, header, first, options, file)
-    in_hand = TableInHand(options, file, sheet.name, out.problems.append, comma, side)
+    in_hand = TableInHand(options, file, sheet.name, out.tell, comma, side)
     columns = ColumnReader(in_hand).place(header.texts, header.row, units=header.units)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
     taken = 0
@@ -199,8 +214,7 @@ class _Table:
             if p.field.column is not RECORD_ID or columns.is_long
         ]
         self._above: dict[int, tuple[int, Filled]] = {}
-        self._last_rows: dict[tuple[int, int], int] = {}
-        self._merged: Sequence[MergedRange] | None = None
+        self._last_rows: dict[tuple[int, int], int] | None = None
         self._filled_in = 0
         self._repeated = 0
         self._aside: list[tuple[int, str, Cells]] = []
@@ -266,11 +280,10 @@ class _Table:
 
     def _last_row(self, top: int, index: int) -> int:
         """The last row of the merged cells that begin in a row and a column; 0 if none do."""
-        if self._merged is None:
-            self._merged = self._sheet.merged()
-        # An ods tells them row by row.
-        for first, left, last, _right in islice(self._merged, len(self._last_rows), None):
-            self._last_rows[first, left] = last
+        if self._last_rows is None:
+            self._last_rows = {
+                (first, left): last for first, left, last, _right in self._sheet.merged()
+            }
         return self._last_rows.get((top, index), 0)
 
     def _begins_again(self, number: int, cells: Cells) -> FileRefusedError | None:

@@ -66,6 +66,9 @@ _MERGE = re.compile(rb'<(?:\w+:)?mergeCell\s[^<>]*?ref="([A-Z]{1,3}\d{1,7}:[A-Z]
 _TEXT_TAG, _PHONETIC_TAG, _STRING_TAG = (
     f"{{{SHEET_MAIN_NS}}}{name}" for name in ("t", "rPh", "si")
 )
+_SPANNING = tuple(f"{{{SHEET_MAIN_NS}}}{name}" for name in ("mergeCell", "hyperlink"))
+_EXCEL_ROWS = 1 << 20
+_EXCEL_COLUMNS = 1 << 14
 _TRUE = ("1", "true", "on")
 # "Strict Open XML", which Excel offers, differs from what openpyxl knows in the names of two
 # vocabularies.
@@ -204,6 +207,25 @@ class XlsxSheet(Sheet):
     def _read(self) -> Iterator[NumberedRow]:
         with damage(f"sheet {self.name!r} cannot be read"):
             yield from (row for row in _Rows(self).parse() if row[1])
+
+    def covered(self) -> int:
+        """Return how many cells its merged cells and links cover."""
+        stream = Stream(self.book.archive, self.part)
+        cells = 0
+        with damage(f"sheet {self.name!r} cannot be read"):
+            for _, element in iterparse(stream):
+                if element.tag in _SPANNING:
+                    left, top, right, bottom = range_boundaries(element.get("ref", ""))
+                    wide = (right or _EXCEL_COLUMNS) - (left or 1) + 1
+                    cells += wide * ((bottom or _EXCEL_ROWS) - (top or 1) + 1)
+                if element.tag in (*_SPANNING, ROW_TAG):
+                    element.clear()
+                    stream.end_item()
+        return cells
+
+    def width(self) -> int:
+        """Return the number of columns up to the last with something in it."""
+        return max((len(cells) for _, cells in self.rows()), default=0)
 
     def elements(self) -> Iterator[Element]:
         stream = Stream(self.book.archive, self.part)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -10,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
+from tests.cli.conftest import FAILURE, FLEET, ROOT, Run, Table, mlg, row
 
 COMMAND = (sys.executable, "-m", "mlg_troubleshoot")
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs pipes of POSIX")
@@ -90,3 +93,75 @@ def test_a_full_disk_behind_stdout_exits_5(more: tuple[str, ...]) -> None:
         )
     assert done.returncode == 5
     assert b"cannot be written: No space left on device" in done.stderr
+
+
+def in_a_shell(line: str, folder: Path) -> tuple[int, str, str]:
+    """Run a line of a shell in which ``mlg`` stands for the program."""
+    program = " ".join(map(shlex.quote, COMMAND))
+    done = subprocess.run(
+        ["/bin/sh", "-c", line.replace("mlg", program).replace("FILE", shlex.quote(str(FAILURE)))],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "MLG_STORE": "kept.sqlite"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+@needs_posix
+@pytest.mark.parametrize(
+    ("line", "code", "words"),
+    [
+        ("mlg check FILE 2>&-", 1, ""),
+        ("mlg check nope.csv 2>&-", 3, ""),
+        ("mlg check - <&-", 3, "the file is empty"),
+        ("mlg check <&-", 2, "nothing to check"),
+        ("mlg check FILE >&-", 5, "standard output is closed"),
+        ("mlg check FILE --json >&-", 5, "standard output is closed"),
+        ("mlg template new.xlsx >&-", 5, "standard output is closed"),
+        ("mlg check FILE <&- >&- 2>&-", 5, ""),
+        ("mlg check FILE --keep --report r --format html <&- 2>&-", 1, ""),
+        ("ulimit -n 5; mlg check FILE --report r", 5, "ulimit -n 256"),
+        ("ulimit -n 8; mlg check FILE --report r", 5, "ulimit -n 256"),
+    ],
+)
+def test_a_stream_or_a_file_that_cannot_be_opened_ends_no_run_without_words(
+    line: str, code: int, words: str, tmp_path: Path
+) -> None:
+    found, _, err = in_a_shell(line, tmp_path)
+    assert (found, "Internal error" in err, words in err) == (code, False, True)
+
+
+@needs_posix
+def test_no_file_takes_the_place_of_a_closed_stream(tmp_path: Path) -> None:
+    line = "mlg check FILE --keep --csv out.csv <&- 2>&-"
+    assert in_a_shell(line, tmp_path)[0] == 1
+    assert in_a_shell("mlg history verify", tmp_path)[0] == 0
+    assert (tmp_path / "out.csv").read_text("utf-8").startswith("record_id,")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("mlg check FILE 2>/dev/full", 1),
+        ("mlg check nope.csv 2>/dev/full", 5),
+        ("mlg check FILE >/dev/full", 5),
+        ("mlg check FILE --json >/dev/full", 5),
+    ],
+)
+def test_a_full_stream_ends_as_documented(line: str, code: int, tmp_path: Path) -> None:
+    assert in_a_shell(line, tmp_path)[0] == code
+
+
+def test_a_gear_file_with_a_name_that_no_file_can_have_ends_with_words(tmp_path: Path) -> None:
+    shipped = ROOT / "mlg_troubleshoot" / "gear" / "data"
+    for file in shipped.glob("hawker*"):
+        shutil.copy(file, tmp_path)
+    gear = tmp_path / "hawker-800xp.toml"
+    text = gear.read_text(encoding="utf-8").replace("hawker-800xp-indices.json", "x" * 300)
+    gear.write_text(text, encoding="utf-8")
+    found = mlg("check", FAILURE, "--gear", gear)
+    assert (found.code, "shorter name" in found.err) == (5, True)

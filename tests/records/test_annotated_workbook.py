@@ -18,6 +18,7 @@ from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.annotate import annotate_workbook
+from tests.records.conftest import rows_xml
 from tests.records.reading import read_inspections
 
 HEADER = (
@@ -291,3 +292,39 @@ def test_what_the_copy_cannot_take_over_is_said(book, tmp_path):
         "1 of the pictures of the workbook",
         "1 of the drawn shapes of the workbook",
     ]
+
+
+@pytest.mark.parametrize(
+    "after",
+    [
+        "<mergeCells><mergeCell ref='A1:XFD1048576'/></mergeCells>",
+        '<mergeCells count="1"><mergeCell ref="B2:XFD1048576"/></mergeCells>',
+        '<hyperlinks><hyperlink ref="A1:XFD1048576" location="Inspections!A1"/></hyperlinks>',
+        '<hyperlinks><hyperlink ref="A:XFD" location="Inspections!A1"/></hyperlinks>',
+    ],
+)
+def test_a_range_over_a_whole_sheet_is_refused_before_it_costs_memory(tmp_path, package, after):
+    path = tmp_path / "t.xlsx"
+    path.write_bytes(package(after=after))
+    result = read_inspections(path, ReadOptions())
+    with pytest.raises(OutputError, match="merged cells and links"):
+        annotate_workbook(path, tmp_path / "o.xlsx", result, {})
+
+
+def test_an_empty_cell_far_outside_does_not_cost_memory(tmp_path, package):
+    path, out = tmp_path / "t.xlsx", tmp_path / "o.xlsx"
+    far = '<row r="1048576"><c r="XFD1048576" s="0"/></row>'
+    path.write_bytes(package(rows_xml([HEADER, ROWS[0][:6]]) + far))
+    result = read_inspections(path, ReadOptions())
+    annotate_workbook(path, out, result, {result.rows[0].source: {"verdict": "x"}})
+    assert openpyxl.load_workbook(out).worksheets[0]["H1"].value == "verdict"
+
+
+def test_a_workbook_that_was_replaced_after_it_was_judged_is_refused(tmp_path, xlsx):
+    path, out = tmp_path / "t.xlsx", tmp_path / "o.xlsx"
+    path.write_bytes(xlsx())
+    result = read_inspections(path, ReadOptions())
+    path.write_bytes(xlsx(change=lambda book: book.worksheets[0].insert_rows(2)))
+    with pytest.raises(OutputError, match="no longer the workbook that was judged"):
+        annotate_workbook(path, out, result, {})
+    assert not out.exists()

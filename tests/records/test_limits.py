@@ -12,11 +12,21 @@ import time
 from pathlib import Path
 
 import openpyxl
+import pandas as pd
 import pytest
 
 from mlg_troubleshoot import datafile
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.records import ReadOptions, cells, csvfile, read, read_many, xls, zipguard
+from mlg_troubleshoot.records import (
+    ReadOptions,
+    cells,
+    csvfile,
+    read,
+    read_many,
+    tables,
+    xls,
+    zipguard,
+)
 from mlg_troubleshoot.records.annotate import annotate_workbook
 from mlg_troubleshoot.reporting import pdf
 from tests.machine import SLOWER
@@ -63,6 +73,33 @@ def test_a_stray_quotation_mark_in_every_row_is_named_within_10_s() -> None:
     problems, seconds, _ = map(float, done.stdout.split())
     assert problems >= 1
     assert seconds < 10 * SLOWER
+
+
+def test_thousands_of_rows_of_one_record_id_are_each_named_in_linear_time() -> None:
+    rows = [f"R1,N{n},LH,RADIAL,0.013,0.00{n % 9}" for n in range(16_000)]
+    # Lines as an old Macintosh ends them.
+    data = "\r".join([HEADER.strip(), *rows]).encode()
+    start = time.process_time()
+    result = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv")
+    assert time.process_time() - start < 10 * SLOWER
+    assert [p.row for p in result.problems] == list(range(2, 16_002))
+    assert "row 3 of t.csv, row 4 of t.csv, row 5 of t.csv and 15996 more" in (
+        result.problems[0].expected
+    )
+
+
+@pytest.mark.parametrize("rows", [6_000, 99_000])
+def test_a_table_of_problems_only_is_refused_with_the_first_of_them(rows: int) -> None:
+    data = (HEADER + ",,,,,x\n" * rows).encode()
+    (problem,) = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv").problems
+    assert problem.code == "problems_many"
+    assert "the first in A2" in str(problem.value)
+
+
+def test_a_frame_of_problems_only_is_refused() -> None:
+    frame = pd.DataFrame({"tail_no": [None] * 9_000, "clearance_3_in": 9.0})
+    (problem,) = read_many([frame], ReadOptions()).problems
+    assert problem.code == "problems_many"
 
 
 @pytest.fixture
@@ -172,6 +209,7 @@ def test_the_page_on_trust_states_the_limits_that_hold() -> None:
             " or merged ranges"
         ),
         f"{cells.MAX_ROWS:,} rows × {cells.MAX_COLUMNS} columns",
+        f"| problems of one table | {tables.MAX_PROBLEMS:,} |",
         (
             f"{datafile.MOST_BYTES // 10**6} MB, {datafile.LONGEST_LINE:,} characters per line,"
             f" {datafile.DEEPEST} levels"

@@ -44,7 +44,7 @@ def test_a_pattern_stands_for_what_it_matches(folder):
 
 
 def test_a_pattern_that_matches_nothing_is_a_problem(folder):
-    assert [p.code for p in read_many([str(folder / "*.ods")], ReadOptions()).problems] == [
+    assert [p.code for p in read_many([str(folder / "*.tsv")], ReadOptions()).problems] == [
         "file_not_found"
     ]
 

@@ -839,7 +839,7 @@ def test_41_macros_are_ignored_and_said(read, package):
     assert any("macros" in note and "ignored" in note for note in result.notes)
 
 
-@pytest.mark.parametrize("name", ["sample.xls", "sample.ods", "sample.xlsx"])
+@pytest.mark.parametrize("name", ["sample.xls", "sample.xlsx"])
 def test_42_files_written_by_libreoffice_are_read(read, samples, name):
     result = read((samples / name).read_bytes(), name)
     assert [(r.record_id, r.tail_no) for r in result.inspections] == [("R1", "007"), ("R4", "N3")]
@@ -857,11 +857,9 @@ def test_42_files_written_by_libreoffice_are_read(read, samples, name):
     assert any("1 hidden or filtered row" in note for note in result.notes)
 
 
-@pytest.mark.parametrize("name", ["sample.ods", "sample.xlsx"])
-def test_42_results_of_formulas_are_counted_where_the_file_marks_them(read, samples, name):
-    (told,) = (
-        note for note in read((samples / name).read_bytes(), name).notes if "formulas" in note
-    )
+def test_42_results_of_formulas_are_counted_where_the_file_marks_them(read, samples):
+    data = (samples / "sample.xlsx").read_bytes()
+    (told,) = (note for note in read(data, "t.xlsx").notes if "formulas" in note)
     assert told.endswith("column E (1), F (3), H (2)")
 
 

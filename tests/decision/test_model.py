@@ -1,0 +1,140 @@
+"""What is believed of a gear that failed, against plain draws from docs/reference/models.md.
+
+Nothing of `decision.causes` is used to draw: the equations stand here a second time, term by term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.causes import believed
+from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.priors import PRIORS
+from mlg_troubleshoot.decision.second_order import responses
+from mlg_troubleshoot.gear.gear import Gear
+from tests.decision.conftest import inspected
+
+PLUNGER_U_IN, GAUGE_U_IN, MARGIN_IN = 0.002, 0.0005, 0.030
+# Centres of fifty cells of wear, from nothing to twice the limit. [1]
+CENTRES = (np.arange(50) + 0.5) * 0.04
+
+
+def wear_by_level() -> Array:
+    """(2), chance of each cell: the six common levels, then each joint its own."""
+    found = []
+    for level, worn_out in zip(
+        np.geomspace(*PRIORS.levels, 6), np.geomspace(*PRIORS.worn_out, 6), strict=True
+    ):
+        usual = np.where(CENTRES < 1.0, np.exp(-CENTRES / level), 0.0)
+        beyond = np.where(CENTRES > 1.0, 1.0, 0.0)
+        found.append((1.0 - worn_out) * usual / usual.sum() + worn_out * beyond / beyond.sum())
+    return np.array([*found, np.mean(found, axis=0)])
+
+
+def drawn_shares(rng: np.random.Generator, gear: Gear, read: Mapping[int, float], n: int) -> Array:
+    """(1) to (3), of readings within their limit."""
+    wear = wear_by_level()
+    prior = np.append(np.full(6, PRIORS.alike / 6), 1.0 - PRIORS.alike)
+    likely = prior.copy()
+    for joint, clearance in read.items():
+        share = clearance / gear.joint(joint).limit.value
+        likely *= [np.exp(np.interp(share, CENTRES, np.log(level))) for level in wear]
+    level = rng.choice(7, n, p=likely / likely.sum())
+    share = np.empty((n, len(gear.joints)))
+    for k in range(7):
+        of = level == k
+        cells = rng.choice(50, (int(of.sum()), share.shape[1]), p=wear[k])
+        share[of] = 0.04 * (cells + rng.random(cells.shape))
+    for joint, clearance in read.items():
+        seen = clearance + GAUGE_U_IN * rng.standard_normal(n)
+        share[:, joint - 1] = np.abs(seen) / gear.joint(joint).limit.value
+    return share
+
+
+def drawn_pins(rng: np.random.Generator, n: int, joints: int, held: Array) -> Array:
+    """(4), the cosines."""
+    free = np.cos(2.0 * np.pi * rng.random((n, joints)))
+    mean, spread = PRIORS.cosine
+    sign = rng.choice([-1.0, 1.0], n)[:, None]
+    return np.where(held[:, None], sign * (mean + spread * rng.standard_normal((n, joints))), free)
+
+
+def usual_chances(gear: Gear) -> tuple[Array, float]:
+    """How often a gear of which nothing is known leaves its margin, with free and with held pins;
+    how rarely work on it leaves every worn joint. [1]
+    """
+    rng = np.random.default_rng(77)
+    n = 400_000
+    share = drawn_shares(rng, gear, {}, n)
+    response = responses(gear)[0]
+    reach = response.amplification * gear.limits_in * share
+    out = []
+    for held in (False, True):
+        x = (reach * drawn_pins(rng, n, 10, np.full(n, held))).sum(axis=1)
+        x += PRIORS.linkage_u_in * rng.standard_normal(n)
+        out.append(np.mean(np.abs(x) > MARGIN_IN))
+    return np.array(out), float(np.mean(PRIORS.overlooked ** (share > 1.0).sum(axis=1)))
+
+
+def simulated(
+    gear: Gear, read: Mapping[int, float], y: float, n: int, seed: int
+) -> tuple[Array, float]:
+    """Chances of the causes (9), each draw weighed by the reading of the plunger (5) to (8); how
+    many draws they rest on.
+    """
+    rng = np.random.default_rng(seed)
+    response = responses(gear)[0]
+    reach = response.amplification * gear.limits_in
+    second = np.diag(response.curvature).reshape(-1, 2).sum(axis=1) / 4.0 * gear.limits_in**2
+    share = drawn_shares(rng, gear, read, n)
+    held = rng.random(n) < PRIORS.loaded
+    moved = reach * share * drawn_pins(rng, n, 10, held)
+    x = moved.sum(axis=1) + np.where(held, 0.0, share**2 @ second)
+    x += PRIORS.linkage_u_in * rng.standard_normal(n)
+    likely = np.exp(-0.5 * ((y - x) / PLUNGER_U_IN) ** 2)
+    often, overlooked = usual_chances(gear)
+    often = np.where(held, often[1], often[0])
+    out = np.abs(x) > MARGIN_IN
+    of_joints = likely * out / often
+    of_else = likely * ~out / (1.0 - often) / PRIORS.joints_for_one_elsewhere
+    even = 1.0 / (1.0 + (y / (PRIORS.offset * MARGIN_IN)) ** 8)
+    width = 2.0 * (PRIORS.offset - 1.0) * MARGIN_IN
+    density = even * norm.cdf((abs(y) - MARGIN_IN) / PLUNGER_U_IN) / width
+    left = PRIORS.overlooked ** (share > 1.0).sum(axis=1) / overlooked
+    of_rigging = left * density * PLUNGER_U_IN * np.sqrt(2.0 * np.pi)
+    of_rigging /= PRIORS.joints_for_one_misrigged
+    weight = of_joints + of_else + of_rigging
+    causes = np.array([of_joints.sum(), of_rigging.sum(), of_else.sum()]) / weight.sum()
+    return causes, float(of_joints.sum() ** 2 / np.sum(of_joints**2))
+
+
+@pytest.mark.parametrize(
+    ("read", "y"),
+    [
+        ({2: 0.0018, 3: 0.0011}, -0.0254),
+        ({}, 0.0245),
+        ({1: 0.005, 4: 0.0015}, 0.0511),
+        ({}, -0.0447),
+        ({3: 0.004, 4: 0.0013, 5: 0.0021}, 0.036),
+    ],
+)
+def test_the_chances_of_the_causes_are_those_of_plain_draws(
+    gear: Gear, read: dict[int, float], y: float
+) -> None:
+    row = inspected(
+        dict(read),
+        readings_in=(y,),
+        outcome=Outcome.FAILED,
+        plunger_gauge_u_in=PLUNGER_U_IN,
+        gauge_u_in=GAUGE_U_IN,
+    )
+    found = believed(Cases.of(gear, [row]))
+    truth, effective = simulated(gear, read, y, 400_000, 9)
+    said = [found.joints[0], found.rigging[0], found.elsewhere[0]]
+    assert said == pytest.approx(truth, abs=0.015 + 1.5 / np.sqrt(effective))
