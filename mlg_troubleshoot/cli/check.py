@@ -77,12 +77,6 @@ class CheckOutputs(options.OutputOptions):
     detail: Annotated[
         bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")
     ] = False
-    every: Annotated[
-        bool,
-        typer.Option(
-            "--all", help="In a batch, every inspection instead of the latest of each gear."
-        ),
-    ] = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +128,6 @@ def check(
     flags: Flags,
     tables: options.Tables,
     wanted: Wanted,
-    _version: options.Version = False,
 ) -> None:
     """Check gears: clearances in, verdict and ranked joints out.
 

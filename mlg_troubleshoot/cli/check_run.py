@@ -267,7 +267,7 @@ class Run:
         if len(lines) < _FEW and result.judgements:
             one_gear.show(result.judgements[0], result.gear, screen, detail=detail)
         elif lines:
-            batch.show(lines, result.gear, screen, every=self._wanted.every)
+            batch.show(lines, result.gear, screen)
             both = task.before_and_after(result.judgements)
             if both is not None:
                 batch.show_before_and_after(*both, screen)

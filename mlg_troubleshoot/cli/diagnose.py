@@ -57,7 +57,6 @@ def diagnose(
     ] = None,
     tables: options.Tables,
     shown: options.OutputOptions,
-    _version: options.Version = False,
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
 

@@ -32,7 +32,6 @@ def fleet(
     *,
     records: options.Records,
     no_forecast: options.NoForecast = False,
-    tail: Annotated[str | None, typer.Option("--tail", help="Only this aircraft.")] = None,
     only: Annotated[
         list[str] | None,
         typer.Option(
@@ -72,7 +71,7 @@ def fleet(
             progress=bar,
         )
         order = Order(sort)
-        found = everything.chosen(tail, only or (), order)
+        found = everything.chosen(only or (), order)
     compared = () if shown.quiet else [line.key for line in found.lines]
     for line in suggestions(compared, found.forecasts):
         output.say(f"Note: {line}")

@@ -19,7 +19,6 @@ def show(
     context: typer.Context,
     gear: options.Gear = DEFAULT_GEAR,
     as_json: options.Json = False,
-    _version: options.Version = False,
 ) -> None:
     """Show the model in use: identity, provenance, joints, coordinates, retraction cycle."""
     from mlg_troubleshoot.gear.gear_file import load_gear
@@ -37,9 +36,7 @@ def show(
         output.show_page("gear", output.console(), gear=known, kinds=kinds)
 
 
-def verify(
-    context: typer.Context, as_json: options.Json = False, _version: options.Version = False
-) -> None:
+def verify(context: typer.Context, as_json: options.Json = False) -> None:
     """Print every number of the paper and that of the model; exit 1 if a required one fails."""
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.paper import statements, verification

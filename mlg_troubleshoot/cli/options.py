@@ -117,13 +117,6 @@ ColumnMap = Annotated[
     ),
 ]
 DecimalComma = Annotated[bool, typer.Option("--decimal-comma", help="0,013 means 0.013.")]
-SmallReadingsTrue = Annotated[
-    bool,
-    typer.Option(
-        "--small-readings-true",
-        help="Readings below the play of new parts were checked: the unit is right.",
-    ),
-]
 Dates = Annotated[
     str | None,
     typer.Option(
@@ -240,7 +233,6 @@ class Tables:
     sheet: Sheet = None
     column_map: ColumnMap = None
     decimal_comma: DecimalComma = False
-    small_readings_true: SmallReadingsTrue = False
     dates: Dates = None
 
     @property

@@ -54,7 +54,6 @@ def survey(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
     wanted: options.OutputOptions,
-    _version: options.Version = False,
 ) -> None:
     """A geometry from measurements: your own gear in place of the reconstructed one.
 

@@ -24,7 +24,6 @@ def template(
     force: options.Force = False,
     page: options.Paper = options.PaperSize.A4,
     show: options.Show = None,
-    _version: options.Version = False,
 ) -> None:
     """Write an empty inspection workbook, or a one-page form (.pdf, .html) to fill in by hand."""
     from mlg_troubleshoot.cli.claims import claim

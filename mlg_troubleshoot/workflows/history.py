@@ -78,18 +78,9 @@ class Lives(Result):
     problems: tuple[Problem, ...] = ()
     order: Order = Order.WORST
 
-    def chosen(self, tail: str | None, verdicts: Collection[str], order: Order) -> Lives:
-        """The gears of one aircraft, and those of which the last verdict is one of these; all of
-        them where nothing is asked.
-        """
-        asked = None if tail is None else key_of(tail, "LH")[0]
-        if asked is not None and all(line.tail_no != asked for line in self.lines):
-            raise UsageError(f"no records of {asked}", "See which gears are kept: mlg history")
-        lines = tuple(
-            line
-            for line in self.lines
-            if asked in (None, line.tail_no) and (not verdicts or line.verdict in verdicts)
-        )
+    def chosen(self, verdicts: Collection[str], order: Order) -> Lives:
+        """The gears of which the last verdict is one of these; all of them where none is asked."""
+        lines = tuple(line for line in self.lines if not verdicts or line.verdict in verdicts)
         keys = {line.key for line in lines}
         lives = tuple(life for life in self.lives if life.key in keys)
         return replace(self, lives=lives, lines=lines, order=order)

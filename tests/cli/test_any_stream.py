@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.cli import output
-from tests.cli.conftest import DATA, FAILURE, FLEET, ROOT, mlg
+from tests.cli.conftest import DATA, FAILURE, FLEET, ROOT
 
 pexpect = pytest.importorskip("pexpect")
 FOUR_BAR = ROOT / "tests" / "geometry" / "data" / "four-bar.toml"
@@ -131,9 +131,3 @@ def test_json_holds_every_character_on_a_stream_that_cannot(
     monkeypatch.setattr(sys, "stdout", plain)
     output.write_json({"tail": "Größe–1\udcff"})
     assert json.loads(plain.buffer.getvalue()) == {"tail": "Größe–1\udcff"}
-
-
-@pytest.mark.parametrize("command", ["check", "diagnose", "study", "gear", "template"])
-def test_every_command_shows_the_version(command: str) -> None:
-    found = mlg(command, "--version")
-    assert (found.code, found.out.split()[0]) == (0, "mlg")

@@ -110,13 +110,6 @@ def test_a_batch_has_one_line_for_each_gear_with_its_latest_inspection(fleet: Ru
     assert len(lines) == len(latest)
 
 
-@WIDTHS
-def test_all_shows_every_inspection_of_a_batch(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    lines = at_width(monkeypatch, width, "check", FLEET, "--all").out.splitlines()
-    verdicts = [line for line in lines if VERDICT_LINE.match(line)]
-    assert len(verdicts) == len(FLEET.read_text(encoding="utf-8").splitlines()) - 1
-
-
 def test_tail_and_side_are_never_cut_for_width(
     table: Table, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -326,8 +326,6 @@ def test_a_batch_says_which_of_several_inspections_of_a_day_it_shows(tmp_path, d
 
 def test_joints_over_their_limit_are_counted_over_the_batch(mixed):
     assert "Joints over their limit (number of gears): #10 (1)." in mlg("check", mixed).out
-    every = mlg("check", mixed, "--all").out
-    assert "Joints over their limit (number of inspections): #10 (1)." in every
 
 
 def test_each_problem_is_told_with_place_value_and_remedy(mixed):

@@ -73,7 +73,7 @@ def test_the_refusal_names_a_cell_of_a_small_reading(gear, tmp_path):
 
 def test_the_refusal_says_how_to_confirm_true_readings(gear):
     _, (problem,) = judged(gear, WORN_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE)
-    assert "--small-readings-true" in problem.remedy
+    assert "small_readings_true" in problem.remedy
     assert "small_readings_true" in problem.remedy
 
 
@@ -191,7 +191,7 @@ def test_one_small_reading_among_others_is_a_warning_that_says_the_same(gear):
     (warning,) = [text for text in row.warnings if "play of new parts" in text]
     assert "#3" in warning
     assert "was it read in inches, not in millimetres?" in warning
-    assert "--small-readings-true" in warning
+    assert "small_readings_true" in warning
 
 
 def test_two_readings_are_too_few_to_refuse_a_row_but_do_not_clear_it(gear):
@@ -284,7 +284,7 @@ def test_flags_take_small_readings_that_are_confirmed():
     given = [f"--set={n}={value}" for n, value in enumerate(WORN_IN, 1)]
     run = mlg(
         *("check", "--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--unit", "mm"),
-        *("--small-readings-true", "--json", *given),
+        *("--set", "small_readings_true=yes", "--json", *given),
     )
     assert run.json["inspections"][0]["verdict"] == "WITHIN_MARGIN"
 

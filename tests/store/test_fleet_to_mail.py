@@ -41,15 +41,6 @@ def names(found: list[dict[str, object]]) -> list[str]:
     return [f"{gear['tail_no']} {gear['side']}" for gear in found]
 
 
-def test_one_aircraft_is_shown_alone(store: Path) -> None:
-    assert names(gears(store, "--tail", "N777", "--no-forecast")) == ["N777 LH"]
-
-
-def test_an_aircraft_that_is_not_kept_is_refused(store: Path) -> None:
-    found = mlg("fleet", "--store", store, "--tail", "N9", "--no-forecast")
-    assert (found.code, "no records of N9" in found.err) == (2, True)
-
-
 def test_only_gears_with_a_verdict_are_shown(store: Path) -> None:
     assert names(gears(store, "--only", "OUTSIDE_MARGIN", "--no-forecast")) == ["N123 RH"]
 

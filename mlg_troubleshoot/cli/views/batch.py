@@ -11,23 +11,21 @@ from rich.text import Text
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, word
 from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, Cell
 from mlg_troubleshoot.decision.assessment import Assessment, Verdict
-from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear, worst_first
+from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.visible import visible
 
 
-def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: bool) -> None:
-    """Show a batch: how many of each verdict, worst gears first, the latest inspection of each or
-    every one.
-    """
+def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole) -> None:
+    """Show a batch: how many of each verdict, worst gears first, the latest inspection of each."""
     counts = Counter(line.verdict for line in lines)
     said = " · ".join(
         f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v]
     )
     screen.print(f"{len(lines)} inspections: {said}")
     latest, earlier = latest_of_each_gear(lines)
-    if earlier and not every:
+    if earlier:
         known = {(line.tail_no, line.side) for line in lines if line.tail_no and line.side}
         gears = "1 gear" if len(known) == 1 else f"{len(known)} gears"
         alone = any(lines[place].day is None for place in latest)
@@ -35,13 +33,12 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
         worst = ", of several on one day the worst" if max(days.values()) > 1 else ""
         also = ", and every row that is undated or invalid" if alone else ""
         screen.print(
-            f"{gears}, the latest inspection of each{worst}{also}; --all shows every inspection."
+            f"{gears}, the latest inspection of each{worst}{also}; --csv or --json lists every one."
         )
-    places = worst_first(lines, (*latest, *earlier)) if every else latest
-    ordered = [lines[place] for place in places]
+    ordered = [lines[place] for place in latest]
     headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance>", "next"]
     wide = screen.width >= WIDE
-    if wide or every or any(line.day is None for line in ordered):
+    if wide or any(line.day is None for line in ordered):
         headings.insert(5, "record")
     if wide:
         headings.insert(-2, f"margin {screen.unit}")
@@ -54,8 +51,7 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole, *, every: boo
     worn = Counter(joint for line in ordered for joint in line.over_limit)
     if worn:
         joints = ", ".join(f"#{joint} ({count})" for joint, count in sorted(worn.items()))
-        rows_are = "inspections" if every else "gears"
-        screen.print(f"Joints over their limit (number of {rows_are}): {joints}.")
+        screen.print(f"Joints over their limit (number of gears): {joints}.")
     screen.print(
         f"Model: {gear.name}, geometry {gear.provenance}. 'worst' is the displacement"
         " in the worst directions, a bound; 'chance' is of exceeding the margin with random"
