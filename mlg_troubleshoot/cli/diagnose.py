@@ -121,6 +121,9 @@ def diagnose(
 def _unwritten(diagnosis: Diagnosis) -> str:
     if diagnosis.gain is not None and not diagnosis.gain.better:
         return "No extension written: held-out aircraft are not predicted better with it."
+    far = [cause.candidate.cause.name for cause in diagnosis.causes if not cause.is_plausible]
+    if far:
+        return f"No extension written: {', '.join(far)} would be larger than is plausible."
     return (
         f"No extension written: the verdict is {diagnosis.verdict}, no cause of the model is named"
         " alone."

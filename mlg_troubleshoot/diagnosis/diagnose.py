@@ -115,10 +115,13 @@ class NamedCause(Term):
         """True if the model can be extended by it: it is about the gear, some joint's share of it
         is known, and its size is plausible.
         """
-        cause = self.candidate.cause
         factors = self.candidate.setting.get("factors", True)
-        plausible = cause.is_plausible(self.candidate, self.value, ())
-        return cause.extends and bool(factors) and plausible
+        return self.candidate.cause.extends and bool(factors) and self.is_plausible
+
+    @property
+    def is_plausible(self) -> bool:
+        """True if an extension may have its size."""
+        return self.candidate.cause.is_plausible(self.candidate, self.value, ())
 
     @property
     def parameters(self) -> dict[str, float | str]:

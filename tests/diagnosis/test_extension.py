@@ -23,6 +23,7 @@ from mlg_troubleshoot.diagnosis import (
     table_from_inspections,
     write_extension,
 )
+from mlg_troubleshoot.diagnosis.diagnose import NamedCause
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.errors import GearFileError, OutputError, TroubleshootError
 from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
@@ -368,3 +369,12 @@ def test_an_extension_describes_itself_in_words(gear: Gear) -> None:
 
 def test_a_scene_knows_where_a_joint_stands(scene: Scene) -> None:
     assert scene.place(3) == 2
+
+
+def test_a_cause_that_is_larger_than_plausible_is_no_term(gear: Gear) -> None:
+    none = np.zeros(3)
+    sizes = {
+        value: NamedCause(term("calibration_rate", value).candidate, value, (0, 1), none, 1.0, 1.0)
+        for value in (0.1, 0.2)
+    }
+    assert [(c.is_plausible, c.predicts) for c in sizes.values()] == [(True, True), (False, False)]

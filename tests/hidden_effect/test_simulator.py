@@ -176,7 +176,9 @@ def _gears() -> physics.Gears:
     return physics.Gears(linkage.load("A"), design, np.zeros((30, 10)))
 
 
-@pytest.mark.parametrize("part", ["actuator", "short_link", "rod", "twist", "rate_error", "offset"])
+@pytest.mark.parametrize(
+    "part", ["actuator", "short_link", "rod", "stroke", "twist", "rate_error", "offset"]
+)
 def test_every_part_of_the_state_reaches_the_reading(part: str) -> None:
     gears = _gears()
     state = gears.sound()

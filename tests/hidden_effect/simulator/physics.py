@@ -43,6 +43,8 @@ class State:
         Strain of each distance in the order of ``linkage.LENGTHS``, (n, 11) [-].
     actuator, short_link, rod : Array
         Change of length of the actuator, link 3-5 and link 9-10, each (n,) [in].
+    stroke : Array
+        Change of the actuator's extension at which the reading is taken, (n,) [in].
     tilt : Array
         Out-of-plane tilt of links 3-5, 6-7, 9-10 and of the locking lever, (n, 4) [rad].
     twist : Array
@@ -63,6 +65,7 @@ class State:
     actuator: Array
     short_link: Array
     rod: Array
+    stroke: Array
     tilt: Array
     twist: Array
     rate_error: Array
@@ -98,6 +101,7 @@ class State:
             actuator=-_RESIDUAL_STRETCH * (design.pressure - CALIBRATION_PRESSURE_PSI),
             short_link=np.zeros(n),
             rod=np.zeros(n),
+            stroke=np.zeros(n),
             tilt=np.zeros((n, 4)),
             twist=np.zeros(n),
             rate_error=np.zeros(n),
@@ -170,7 +174,7 @@ class Gears:
         """
         build = linkage.Build.nominal(self.geometry, self.design.rows)
         build.lengths *= 1.0 + state.parts
-        build.length("F1")[:] += state.actuator
+        build.length("F1")[:] += state.actuator + state.stroke
         build.length("35")[:] += state.short_link
         build.length("910")[:] += state.rod
         build.spread[:] = state.airframe
