@@ -8,7 +8,6 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli import output
-from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.decision.columns import (
     CONVENTION,
     RECORD_ID,
@@ -23,6 +22,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.workflows import check as task
 
 if TYPE_CHECKING:
+    from mlg_troubleshoot.cli.check import Flags
     from mlg_troubleshoot.cli.prompts import (
         Answers,
         RichTerminal,

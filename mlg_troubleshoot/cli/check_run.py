@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 import typer
 
 from mlg_troubleshoot.cli import by_hand, options, output
-from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
 from mlg_troubleshoot.decision.inspection import Inspection, RowSource, Side
@@ -30,6 +29,7 @@ from mlg_troubleshoot.workflows.diagnose import load_model_extension
 from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 if TYPE_CHECKING:
+    from mlg_troubleshoot.cli.check import Flags, Wanted
     from mlg_troubleshoot.decision.assessment import Judgement
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.json_form import CheckText
