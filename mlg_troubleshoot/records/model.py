@@ -280,5 +280,11 @@ class ReadResult:
         return (*(file.name for file in self.files if not file.rows), *self.unread_sheets)
 
     @property
+    def of_tables(self) -> dict[str, Any]:
+        """What a `TableResult` tells of what was read, by its fields."""
+        told = ("problems", "notes", "unread", "unread_files", "inputs_sha256")
+        return {name: getattr(self, name) for name in told}
+
+    @property
     def inspections(self) -> tuple[Inspection, ...]:
         return tuple(row for row in self.rows if isinstance(row, Inspection))

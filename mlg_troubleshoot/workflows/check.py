@@ -165,16 +165,7 @@ def check_files(
     rows = list(read.rows)
     if outputs is not None:
         read = replace(read, rows=())
-    found = CheckResult(
-        gear=gear,
-        judgements=(),
-        problems=read.problems,
-        notes=read.notes,
-        unread=read.unread,
-        unread_files=read.unread_files,
-        inputs_sha256=read.inputs_sha256,
-        read=read,
-    )
+    found = CheckResult(gear=gear, judgements=(), read=read, **read.of_tables)
     return _judge(found, rows, options, on_judged, store, outputs)
 
 

@@ -172,11 +172,7 @@ def diagnose_files(
         gear=gear,
         diagnosis=diagnosis,
         extension=extension,
-        problems=read.problems,
-        notes=notes,
-        unread=read.unread,
-        unread_files=read.unread_files,
-        inputs_sha256=read.inputs_sha256,
+        **{**read.of_tables, "notes": notes},
     )
 
 
