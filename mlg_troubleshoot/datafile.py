@@ -21,7 +21,6 @@ from typing import (
     Annotated,
     Any,
     Generic,
-    Literal,
     TypeVar,
     Union,
     get_args,
@@ -31,6 +30,7 @@ from typing import (
 
 import msgspec
 from msgspec import Meta, inspect
+from msgspec.structs import fields
 
 from mlg_troubleshoot.errors import GearFileError
 
@@ -214,7 +214,7 @@ def _error(path: Path, values: Any, place: Place, expected: str) -> GearFileErro
 def _label(entry: Any, index: int) -> str | int:
     """Return what an entry of a list calls itself, or which one it is."""
     named = entry if isinstance(entry, dict) else {}
-    label = named.get("name", named.get("joint", named.get("number")))
+    label = named.get("name", named.get("joint"))
     is_shown = is_name(label) if isinstance(label, str) else isinstance(label, int)
     return str(label) if is_shown else index + 1
 
@@ -275,18 +275,8 @@ def _fields(value: Any, kind: Any) -> dict[str, tuple[Any, bool]]:
     structs = _structs(kind)
     if not structs or not isinstance(value, dict):
         return {}
-    fields: dict[str, tuple[Any, bool]] = {}
-    tag = structs[0].__struct_config__.tag_field
-    if tag is not None:
-        # Among several kinds of table its own word for itself says which it is.
-        tags = tuple(each.__struct_config__.tag for each in structs)
-        fields[tag] = (Literal[tags], True)
-        structs = [each for each in structs if each.__struct_config__.tag == value.get(tag)]
-    for struct in structs[:1]:
-        hints = get_type_hints(struct, include_extras=True)
-        for field in msgspec.structs.fields(struct):
-            fields[field.name] = (hints[field.name], field.required)
-    return fields
+    hints = get_type_hints(structs[0], include_extras=True)
+    return {field.name: (hints[field.name], field.required) for field in fields(structs[0])}
 
 
 def _parts(value: Any, kind: Any) -> Iterator[tuple[str | int, Any, Any]]:

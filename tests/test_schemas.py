@@ -279,7 +279,7 @@ def test_an_extension_that_was_written_fits_the_schema_of_its_kind(tmp_path: Pat
 
 def test_a_gear_file_that_is_refused_does_not_fit_its_schema(gear: Gear) -> None:
     spoilt = as_read(gear.path)
-    spoilt["joints"][0]["limit"] = 0
+    spoilt["joints"]["1"]["limit"] = 0
     assert complain("gear-file", spoilt) != []
 
 

@@ -191,7 +191,7 @@ class Mechanism:
     Raises
     ------
     MechanismError
-        If a plane is hinged to what is not there, or a name is none.
+        If a plane is hinged to what is not there, or a name cannot be shown.
     """
 
     planes: tuple[Plane, ...]
@@ -285,7 +285,7 @@ class Mechanism:
 
     def side(self, step: Dyad | Slider) -> Any:
         """How far the coordinates put a joint to the left of the line from upstream to downstream,
-        or ahead of the upstream joint along its axis: the sign of this tells two solutions apart.
+        or ahead of the upstream joint along its axis: the sign of this names one of two solutions.
         """
         plane = self.point(step.joint).plane
         arm = self.seen_in_plane(plane, step.upstream, step.joint)
