@@ -62,11 +62,6 @@ class Run:
             raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
         if wanted.formats and wanted.report is None:
             output.say("Note: --format is for reports: without --report DIR none is written.")
-        if wanted.causes and not wanted.extension:
-            raise UsageError(
-                "--causes was given without the extension that its causes are for",
-                "Give --extension EXT.toml as well, or leave out --causes.",
-            )
         extensions = wanted.extension or ()
         causes = wanted.causes or ()
         self._files = files
@@ -80,6 +75,11 @@ class Run:
             outputs,
             store=wanted.store,
         )
+        if wanted.causes and not wanted.extension:
+            raise UsageError(
+                "--causes was given without the extension that its causes are for",
+                "Give --extension EXT.toml as well, or leave out --causes.",
+            )
         self._asked = task.CheckOptions(
             side=None if flags.side is None else Side.parse(flags.side),
             **tables.declared(),
