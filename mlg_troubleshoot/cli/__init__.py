@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import signal
+import sys
 
 # New objects after which the collector looks for cycles: a command makes many that stay, and ends
 # soon. A large fleet's second call takes a tenth longer with Python's own 700. [1]
@@ -15,6 +17,8 @@ def main() -> None:
     from mlg_troubleshoot.cli.output import prepare_streams
 
     gc.set_threshold(_NEW_OBJECTS)
+    # What is half written goes as it does with Ctrl-C: the exit code is that of a shell.
+    signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(128 + number))
     prepare_streams()
     app(prog_name="mlg")
 

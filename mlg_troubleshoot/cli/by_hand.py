@@ -125,20 +125,31 @@ def kept_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
 
 
 def continued(
-    read: Inspection, continues: str, visit: Visit | None
+    read: Inspection, answers: Answers, visit: Visit | None, gear: Gear
 ) -> tuple[Inspection, Visit | None]:
-    """An entry that continues a kept inspection, and that inspection; if it was changed meanwhile,
-    the entry is a new inspection.
-    """
-    if visit is not None and visit.record.digest == continues:
-        return visit.completed(read), visit
-    from mlg_troubleshoot.records import made_record_id
+    """An entry that continues a kept inspection, and that inspection.
 
+    What another window changed meanwhile stands next to what was typed here; where what it
+    continues is no longer kept the entry is a new inspection.
+    """
+    if visit is not None and visit.record.digest == answers.continues:
+        return visit.completed(read), visit
+    begun = None if visit is None else visit.versions.get(answers.continues)
+    if visit is None or begun is None:
+        from mlg_troubleshoot.records import made_record_id
+
+        output.say(
+            "Note: the inspection that this entry continues is no longer kept: the entry is kept as"
+            " a new inspection."
+        )
+        made = made_record_id(read.tail_no, read.side, datetime.now())
+        return replace(read, record_id=made), None
     output.say(
-        "Note: the inspection that this entry continues was changed meanwhile: the entry is kept"
-        " as a new inspection."
+        "Note: the inspection that this entry continues was changed meanwhile: what was entered"
+        " there stands next to what was entered here."
     )
-    return replace(read, record_id=made_record_id(read.tail_no, read.side, datetime.now())), None
+    merged = visit.answers.with_changes(begun, answers)
+    return visit.completed(merged.inspection(gear, visit.record.record_id)), visit
 
 
 def advice_for(

@@ -186,7 +186,7 @@ class Run:
             SessionStore,
             ask_inspection,
         )
-        from mlg_troubleshoot.workflows.keep import take_back_repair
+        from mlg_troubleshoot.workflows.keep import take_back_repair, under_a_free_id
 
         wanted = self._wanted
         gear = load_gear(self._asked.gear)
@@ -206,7 +206,9 @@ class Run:
             before = None
             if visit is None and answers.continues:
                 before = find(inspection.tail_no, inspection.side)
-                inspection, before = by_hand.continued(inspection, answers.continues, before)
+                inspection, before = by_hand.continued(inspection, answers, before, gear)
+            elif visit is None and answers.record_id is None and self._place is not None:
+                inspection = under_a_free_id(inspection, self._place)
             if before is not None:
                 take_back_repair(self._records.kept, before.record, inspection)
             unit = answers.unit or self._asked.unit or LengthUnit.INCH

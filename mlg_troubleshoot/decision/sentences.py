@@ -155,7 +155,8 @@ def look_again(inspection: Inspection) -> str:
     if day is None:
         return f"Look again {by} or {_AGAIN_MONTHS} months, whichever comes first."
     month = day.month + _AGAIN_MONTHS
-    until = date(day.year + (month - 1) // 12, (month - 1) % 12 + 1, min(day.day, 28))
+    year = min(day.year + (month - 1) // 12, date.max.year)
+    until = date(year, (month - 1) % 12 + 1, min(day.day, 28))
     return f"Look again {by} or by {until.isoformat()}, whichever comes first."
 
 

@@ -98,6 +98,7 @@ _MISSING_CONVENTION = (
 _FIELDS = frozenset(each.name for each in fields(Inspection))
 
 
+_A_DAY = timedelta(days=1)
 _MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
 
 
@@ -226,7 +227,7 @@ class RowReader:
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
         # Somewhere it is tomorrow already.
-        self._latest = date.today() + timedelta(days=1)
+        self._latest = min(date.today(), date.max - _A_DAY) + _A_DAY
         # Which orders fit the dates that are written as numbers, and the dates of rows that wait
         # for the others.
         self._date_orders = set(DateOrder)

@@ -11,6 +11,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import signal
+import threading
 import zlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -287,6 +289,7 @@ class Store:
             str(place) if place is not None else os.environ.get("MLG_STORE") or own_file()
         )
         self.judge = judge
+        self._patience_s = patience_s
         self._postgres = self._at.file is None
         wait = {"connect_timeout" if self._postgres else "timeout": patience_s}
         try:
@@ -342,16 +345,17 @@ class Store:
                 self.file.parent.mkdir(parents=True, exist_ok=True)
             # Reading does not make a file.
             engine = self._engine if writing or not self.is_new else sql.create_engine("sqlite://")
-            with engine.connect() as connection:
-                if self._postgres:
-                    if writing:
-                        connection.execute(
-                            sql.select(sql.func.pg_advisory_xact_lock(_ADVISORY_LOCK))
-                        )
-                else:
+            with _held_interrupt(hold=writing) as end, engine.connect() as connection:
+                if self._postgres and writing:
+                    limit = sql.func.set_config("lock_timeout", f"{self._patience_s}s", True)
+                    connection.execute(sql.select(limit))
+                    lock = sql.func.pg_advisory_xact_lock(_ADVISORY_LOCK)
+                    connection.execute(sql.select(lock))
+                elif not self._postgres:
                     connection.exec_driver_sql("BEGIN IMMEDIATE" if writing else "BEGIN")
                 self._prepare(connection, writing=writing)
                 yield connection
+                end()
                 connection.commit()
         except OSError as error:
             raise StoreError(
@@ -772,6 +776,29 @@ class Store:
             yield row
         for first in wrong.values():
             raise first
+
+
+@contextmanager
+def _held_interrupt(*, hold: bool) -> Iterator[Callable[[], None]]:
+    """Hold a Ctrl-C back until a transaction ends: a driver that is interrupted within a call may
+    swallow it. What is called before the commit raises it, so that nothing is kept.
+    """
+    if not hold or threading.current_thread() is not threading.main_thread():
+        yield lambda: None
+        return
+    held: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _frame: held.append(number))
+
+    def end() -> None:
+        if held:
+            held.clear()
+            raise KeyboardInterrupt
+
+    try:
+        yield end
+        end()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class _MisfitError(Exception):

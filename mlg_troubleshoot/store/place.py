@@ -14,6 +14,11 @@ from mlg_troubleshoot.errors import UsageError
 _HIDDEN = "***"
 # A scheme or a user with a password: a name of a file that is never meant, and would be shown.
 _LIKE_A_URL = re.compile(r"[\w+.\-]+:.*@")
+# The words of a connection string of libpq.
+_LIBPQ = re.compile(
+    r"(?:^|\s)(?:host|hostaddr|port|dbname|user|passfile|password|service|sslpassword)\s*=",
+    re.IGNORECASE,
+)
 
 
 class Place:
@@ -26,6 +31,10 @@ class Place:
     def __init__(self, given: str) -> None:
         if "://" not in given and _LIKE_A_URL.match(given):
             raise UsageError(f"--store {_HIDDEN} looks like a URL without its //", self.REMEDY)
+        if "://" not in given and _LIBPQ.search(given):
+            raise UsageError(
+                f"--store {_HIDDEN} looks like a connection string, not a URL", self.REMEDY
+            )
         self.url = _url(given) if "://" in given else sql.URL.create("sqlite", database=given)
         backend = self.url.get_backend_name()
         self._secrets = [

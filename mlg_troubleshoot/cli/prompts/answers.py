@@ -123,6 +123,13 @@ class Answers:
         """Return the optional columns that are set anew."""
         return {name for name, text in self.more.items() if text != before.more.get(name)}
 
+    def with_changes(self, begun: Answers, ended: Answers) -> Answers:
+        """Return the answers with what other ones changed from where they began."""
+        joints = {n: a for n, a in ended.joints.items() if a != begun.joints.get(n)}
+        names = {*begun.more, *ended.more}
+        more = {n: ended.more.get(n) for n in names if ended.more.get(n) != begun.more.get(n)}
+        return replace(self, joints=MappingProxyType({**self.joints, **joints})).with_more(**more)
+
     def completed_from(self, given: Answers) -> Answers:
         """Return the answers with what is missing filled from flags; only the record id is taken
         from these first.

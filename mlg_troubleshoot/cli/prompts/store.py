@@ -4,6 +4,7 @@ resumed.
 
 from __future__ import annotations
 
+import getpass
 import json
 import os
 import secrets
@@ -70,6 +71,15 @@ def new_session(gear_id: str, started: datetime, answers: Answers) -> Session:
     return Session(f"{started:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}", gear_id, started, answers)
 
 
+def _login() -> str:
+    """Who types: by the environment, else by the system."""
+    stated = os.environ.get("USER") or os.environ.get("USERNAME")
+    try:
+        return stated or getpass.getuser()
+    except (KeyError, OSError):
+        return f"user {os.getuid()}"
+
+
 @dataclass(slots=True)
 class SessionStore:
     """The sessions of a user in the store where finished inspections are kept; made with the first
@@ -80,9 +90,7 @@ class SessionStore:
 
     place: str | Path | None = None
     run: str = field(default_factory=lambda: secrets.token_hex(4))
-    owner: str = field(
-        default_factory=lambda: os.environ.get("USER") or os.environ.get("USERNAME") or ""
-    )
+    owner: str = field(default_factory=_login)
     away: str = ""
 
     _kept: Drafts = field(init=False)

@@ -5,7 +5,7 @@ for.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import date
 from types import MappingProxyType
 from typing import Any
@@ -53,7 +53,7 @@ class Visit:
 
     `read_on` is the day on which each reading was entered, `before` the answers before the last
     change that was not undone, `todo` what NEXT asks for,
-    `stays_open` what was not settled.
+    `stays_open` what was not settled, `versions` the answers of each version by its hash.
     """
 
     record: Record
@@ -67,6 +67,7 @@ class Visit:
     joints: tuple[int, ...]
     before: Answers | None = None
     stays_open: Sentence | None = None
+    versions: Mapping[str, Answers] = field(default_factory=dict)
 
     def begun(self, today: date | None) -> Answers:
         """The answers with what NEXT asks for still to come, on the day of this visit."""
@@ -146,7 +147,8 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear) -> Visit | None:
         todo = restored
         said = Sentence(f"Restored since, as the records say: {names}. Enter the new clearances.")
     versions = life.versions(latest.record)
-    standing = _not_undone([answers_of(inspection_from(v), gear, "") for v in versions])
+    by_version = {v.digest: answers_of(inspection_from(v), gear, "") for v in versions}
+    standing = _not_undone([*by_version.values()])
     return Visit(
         latest.record,
         row,
@@ -159,6 +161,7 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear) -> Visit | None:
         step.joints,
         replace(standing[-2], continues=latest.record.digest) if len(standing) > 1 else None,
         Sentence.of("{}", question) if question and not restored else None,
+        by_version,
     )
 
 
