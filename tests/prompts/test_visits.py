@@ -10,10 +10,18 @@ from pathlib import Path
 
 import pytest
 
+from mlg_troubleshoot.cli.by_hand import continued
 from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.check_run import Run
 from mlg_troubleshoot.cli.options import Tables
-from mlg_troubleshoot.cli.prompts import EntryInterruptedError, SessionStore, ask_inspection
+from mlg_troubleshoot.cli.prompts import (
+    EntryInterruptedError,
+    SessionStore,
+    ask_inspection,
+    last_visit,
+)
+from mlg_troubleshoot.cli.prompts.answers import JointAnswer, parse_reading
+from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import GearLife, life_of
@@ -293,18 +301,22 @@ def test_a_repair_that_was_recorded_elsewhere_opens_its_joints(
 def test_a_stale_window_leaves_out_nothing_that_another_one_entered(
     visit: Visit, store: SessionStore, capsys: pytest.CaptureFixture
 ) -> None:
+    gear = load_gear()
+    find = partial(last_visit, Store(store.place), gear, "N1", Side.LH)
     visit(*SOUND)
-    broken_off(visit, *GEAR, "n 3 5", "4")
+    begun = find()
     # Another window goes on meanwhile, and reads the plunger beyond its margin.
-    visit(*GEAR, "y", "60")
-    capsys.readouterr()
-    visit("4", "", "", resume=True)
-    (kept,) = life(store).inspections
-    assert kept.inspection.readings_in == (0.06,)
-    assert kept.inspection.restored_joints == (3, 5)
-    shown = capsys.readouterr()
-    assert "was changed meanwhile" in shown.err
-    assert "OUTSIDE MARGIN, MEASURED" in shown.out
+    visit(*GEAR, "y", "36")
+    newest = find()
+    assert begun is not None
+    assert newest is not None
+    ended = begun.answers.with_joint(1, JointAnswer(parse_reading("6 thou")))
+    read = ended.inspection(gear, begun.record.record_id)
+    found, before = continued(read, ended, newest, gear)
+    assert before is newest
+    assert found.readings_in == (0.036,)
+    assert found.clearance_in[1] == pytest.approx(0.003)
+    assert "was changed meanwhile" in capsys.readouterr().err
 
 
 def test_two_entries_of_one_gear_begun_in_one_second_are_both_kept(
