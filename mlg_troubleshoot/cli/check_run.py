@@ -39,6 +39,9 @@ if TYPE_CHECKING:
 _ASKED_FOR = Path("report")
 # One gear, and one before and after a repair, are shown in full.
 _FEW = 2
+# Inspections that --report writes at most: HTML and PDF of one take 0.1 s, and their judgements
+# stand in memory until then. [1]
+_MOST_REPORTS = 1000
 
 
 @dataclass
@@ -146,6 +149,12 @@ class Run:
     ) -> list[task.BlockOutput]:
         """What is made of the judgements as they come."""
         wanted = self._wanted
+        if wanted.report is not None and total > _MOST_REPORTS:
+            raise UsageError(
+                f"--report of {total} inspections: at most {_MOST_REPORTS} are written at once;"
+                " nothing was judged",
+                "Give a table with the gears that need a report; --csv and --json take all.",
+            )
         outputs = [task.BlockOutput(listed, found.lines.extend)]
         if wanted.as_json and total > 1:
             from mlg_troubleshoot.reporting.json_form import CheckText, inspection_lines

@@ -12,6 +12,7 @@ import sys
 import zipfile
 from collections import Counter
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import openpyxl
 import pytest
@@ -19,7 +20,7 @@ import pytest
 from mlg_troubleshoot.records.cells import LETTERS
 from mlg_troubleshoot.reporting.json_form import CheckText, check_as_json, inspection_lines
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
-from tests.cli.conftest import mlg
+from tests.cli.conftest import FLEET, mlg
 
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs a terminal of POSIX")
 COLUMNS = (
@@ -611,3 +612,13 @@ def test_the_json_of_a_batch_written_in_pieces_is_the_whole_form(gear, mixed):
     assert json.loads(text.begin + "".join(map(text.joined, blocks)) + text.end) == json.loads(
         json.dumps(check_as_json(gear, result.judgements, result.problems, result.notes))
     )
+
+
+def test_reports_of_a_table_that_is_too_long_are_refused_before_it_is_judged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mlg_troubleshoot.cli.check_run._MOST_REPORTS", 45)
+    run = mlg("check", FLEET, "--report", tmp_path / "out")
+    assert (run.code, run.out) == (2, "")
+    assert "--report of 46 inspections" in run.err
+    assert not (tmp_path / "out").exists()
