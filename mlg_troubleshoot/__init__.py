@@ -36,11 +36,10 @@ schema                   JSON Schema of what a command writes with ``--json``
 Names are imported when they are first used, so that importing the package stays fast.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
-# typing is not imported: python -m has the current folder on its path until __main__ takes it off.
+# Neither __future__ nor typing is imported: python -m has the current folder on its path until
+# __main__ takes it off.
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:

@@ -44,7 +44,6 @@ GONE = {
     "study --report": "--figure OUT.svg draws the indices, --csv and --json list them",
     "study --page": "a study writes no report; --figure OUT.svg draws the indices",
     "study --show": "indices have no unit of length",
-    "study --version": "mlg --version shows it",
     "study --quiet": "progress is shown at a terminal only",
     "study --accuracy": "the default design is exact; --design sampled gives its intervals",
     "study --most": "the number of points of a design is fixed; --size sets that of the paper's",

@@ -20,17 +20,27 @@ LEFT = "imported.txt"
 TRAP = f'with open({LEFT!r}, "a") as file: file.write(__name__ + "\\n")\n'
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def trapped(folder: Path, spared: set[str]) -> Path:
     """A table of 552 rows and a file for each module that anything imports."""
-    folder = tmp_path_factory.mktemp("folder")
     header, *rows = FLEET.read_text(encoding="utf-8").splitlines()
     numbered = [f"{k}{row}" for k in range(12) for row in rows]
     (folder / "table.csv").write_text("\n".join([header, *numbered]), encoding="utf-8")
     (folder / "few.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
-    for name in (sys.stdlib_module_names | packages_distributions().keys()) - OWN:
+    for name in (sys.stdlib_module_names | packages_distributions().keys()) - OWN - spared:
         (folder / f"{name}.py").write_text(TRAP, encoding="utf-8")
     return folder
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, ...], Path]:
+    """A folder for each way to start; python -m itself imports from there before it starts us."""
+    loaded = [sys.executable, "-c", "import runpy, sys; print(*sys.modules)"]
+    before = subprocess.run(loaded, capture_output=True, text=True, check=True).stdout.split()
+    spared = {name.partition(".")[0] for name in before}
+    return {
+        MLG: trapped(tmp_path_factory.mktemp("script"), set()),
+        AS_A_MODULE: trapped(tmp_path_factory.mktemp("module"), spared),
+    }
 
 
 @pytest.mark.parametrize(
@@ -49,7 +59,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (MLG, "template form.xlsx"),
     ],
 )
-def test_nothing_in_the_folder_runs(folder: Path, program: tuple[str, ...], arguments: str) -> None:
+def test_nothing_in_the_folder_runs(
+    folders: dict[tuple[str, ...], Path], program: tuple[str, ...], arguments: str
+) -> None:
+    folder = folders[program]
+    imported = folder / LEFT
+    imported.unlink(missing_ok=True)
     run = subprocess.run(
         [*program, *arguments.split()],
         cwd=folder,
@@ -59,6 +74,6 @@ def test_nothing_in_the_folder_runs(folder: Path, program: tuple[str, ...], argu
         text=True,
         check=False,
     )
-    imported = folder / LEFT
     assert not imported.exists(), imported.read_text(encoding="utf-8")
     assert run.returncode in {0, 1, 3}, run.stderr
+    assert "Traceback" not in run.stderr
