@@ -1,25 +1,34 @@
-"""Which parameters of a simulation its measured data show to be wrong."""
+"""Which parameters of a simulation its measured data show to be wrong.
+
+The simulation is linearised where the likeliest of its suspects fit best; all else is the inference
+of any misfit. Smooth discrepancies that no suspect makes are its contexts: a cause must explain the
+data better than they do (Kennedy and O'Hagan 2001).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtrc, stdtrit
+from scipy.linalg import cholesky, orth
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial.distance import cdist
+from scipy.special import stdtrit
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array, Wholes, rms
+from mlg_troubleshoot.arrays import Array, Wholes, numbered, rms
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.misfit import simulation_inputs as inputs
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.covariance import FAR
-from mlg_troubleshoot.misfit.fitting import blocks_of, folds_of
-from mlg_troubleshoot.misfit.linearised import FittedPoint, JudgedPoint, Study, key_of
-from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
-from mlg_troubleshoot.misfit.simulation_inputs import checked, followed
+from mlg_troubleshoot.misfit.conclusion import Conclusion
+from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
+from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
+from mlg_troubleshoot.misfit.fitting import Fit, blocks_of, fit, folds_of, held_out_part, likelier
+from mlg_troubleshoot.misfit.posterior import posterior
+from mlg_troubleshoot.misfit.runner import Predict, Runner
 from mlg_troubleshoot.misfit.simulation_result import (
     HeldOutGain,
     SimulationDiagnosis,
@@ -28,12 +37,32 @@ from mlg_troubleshoot.misfit.simulation_result import (
 )
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
-# Difference of two equal calls, over the smallest effect, from which derivatives are off.
-_DRAWN = 0.01
+# What is tried of a size that nobody knows, over the usual one.
+_SIZES = 3.0 ** np.arange(-1, 5)
+# Scatter between groups over that of a reading: its median beforehand, about which its logarithm
+# has a standard deviation of one.
+_GROUP_RATIO = 0.15
+# Correlations of neighbouring rows that are tried: equal steps of Fisher's z.
+_CORRELATIONS = np.tanh(0.35 * np.arange(8)).tolist()
+# Standard deviation of nuisance parameters, over the scatter of a reading: whatever they are.
+_WIDE = 1e4
+# Scatter of a reading over the largest one: numbers have no more digits.
+_DIGITS = 1e-9
+# Share of its effect that a suspect keeps given the nuisance parameters, below which it cannot be
+# tested; given another suspect, below which the two are one.
+_TESTABLE = 0.03
+# Share of spare readings below which the residual of all columns says nothing of the noise.
+_SPARE = 0.25
+# Rows that stand for all in a smooth shape; lengths in units of the median distance of the rows.
+_LANDMARKS = 60
+_LENGTHS = 1 / 2 ** np.arange(2, -1, -1)
+# Computing only: suspects that act together at most, and rounds until the same is likeliest again.
+_MOST = 12
+_ROUNDS = 8
 
 
 def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong, how rows belong together
-    predict: Callable[[Mapping[str, float]], Any],
+    predict: Predict,
     measured: ArrayLike | Mapping[str, ArrayLike],
     suspects: Sequence[Suspect],
     nuisance: Sequence[Suspect] = (),
@@ -43,26 +72,22 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     *,
     series: ArrayLike | None = None,
     time: ArrayLike | None = None,
-    most_calls: int = 400,
-    progress: Callable[[int, int], object] | None = None,
-    workers: int | Callable[..., Iterable[Any]] = 1,
 ) -> SimulationDiagnosis:
     """Find which parameters of a simulation its measured data show to be wrong.
 
-    What no data of these rows could tell is stated first, from the sensitivities alone: classes of
-    suspects that are one to these rows, and suspects that the nuisance parameters absorb. Then the
-    probability of every set of suspects follows from Bayes' rule, each as a change of unknown size,
-    against nothing at all and against smooth discrepancies that no suspect makes. The simulation is
-    linearised where the likeliest set fits best. What is named is sure, and makes the misfit of
-    held-out rows smaller. Linear algebra runs on one thread meanwhile, in the simulation as well.
+    The probability of every set of suspects follows from Bayes' rule, each as a change of unknown
+    size, against nothing at all and against smooth discrepancies that no suspect makes. The
+    simulation is linearised where the likeliest set fits best. What is named is sure, and makes the
+    misfit of held-out rows smaller. Linear algebra runs on one thread meanwhile, in the simulation
+    as well.
 
     Parameters
     ----------
     predict : callable
-        Takes the parameters by name, returns the prediction of all rows and outputs, shape (n, m),
-        or a mapping or DataFrame of channels by name. Where it raises an ArithmeticError, a
-        ValueError or a RuntimeError, or returns NaN, the values are avoided, counted and reported;
-        other exceptions are passed on.
+        Takes the parameters by name in one mapping, returns the prediction of all rows and outputs,
+        shape (n, m), or a mapping or DataFrame of channels by name; it is copied. Where it raises
+        an ArithmeticError, a ValueError or a RuntimeError, or returns NaN, the values are avoided,
+        counted and reported; other exceptions are passed on.
     measured : array_like, shape (n, m) or (n,), or mapping or DataFrame of channels, each (n,)
         Readings, NaN where not read.
     suspects : sequence of Suspect
@@ -84,14 +109,6 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     time : array_like, shape (n,), optional
         When each row of a series was read, numbers or dates; without it steps are equal, in the
         order given.
-    most_calls : int, optional
-        Calls of the simulation up to which the gain is measured by fitting it again without each
-        fold; what needs more is taken for linear there. The search itself is not cut off.
-    progress : callable, optional
-        Called with the number of calls so far and `most_calls` after each round of calls.
-    workers : int or callable, optional
-        Threads that call the simulation at once, or a function like ``map`` (of a process pool):
-        the result is the same.
 
     Returns
     -------
@@ -104,342 +121,445 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
         If the arrays do not fit together, a name stands twice, a trial is 0, or the simulation
         gives no number.
     """
-    data, channels, declared, group = checked(measured, suspects, nuisance, groups, reading_u)
-    follows = followed(series, time, len(data))
-
-    def diagnosed(call: Callable[..., Iterable[Any]]) -> SimulationDiagnosis:
-        runner = Runner(predict, data, [*suspects, *nuisance], channels, call)
-        if progress is not None:
-            runner.progress = lambda: progress(runner.calls, most_calls)
-        # The matrices are small: threads that wait for each other cost several times what they
-        # save.
-        with threadpool_limits(1, "blas"):
-            study = Study(runner, len(suspects), declared, group, beliefs or Beliefs(), follows)
-            return _diagnosed(study, most_calls)
-
-    if callable(workers):
-        return diagnosed(workers)
-    if workers < 1:
-        raise UsageError(f"workers is {workers}", "give at least one thread")
-    if workers == 1:
-        return diagnosed(map)
-    with ThreadPoolExecutor(workers) as pool:
-        return diagnosed(pool.map)
-
-
-def _diagnosed(study: Study, most_calls: int) -> SimulationDiagnosis:
-    """Say what is wrong, what may be, what that gains, and the residual."""
-    runner = study.runner
-    names = study.runner.names
-    start = study.start()
-    at = study.judged(start)
-    causes = _causes(study, at)
-    final = study.fitted(at, causes, 0)
-    moved = [k for k in causes if final.values[k] != runner.nominal[k]]
-    if moved != causes:
-        # What would only move beyond its bound is not a cause.
-        causes = moved
-        final = study.fitted(at, moved, 0)
-    report = _Report(study, at, final, tuple(causes))
-    open_ = study.chosen(at.follows.open_beside([key_of(names[k]) for k in causes]))
-    verdict = at.follows.verdict
-    found = at.follows.posterior
-    if verdict is Verdict.NAMED and not causes:
-        # Held-out rows veto what these rows name.
-        verdict = Verdict.AMBIGUOUS
-        open_ = study.chosen(at.follows.sure)
-    often = study.often
-    n = len(at.unit)
-    in_sequence = report.in_sequence()
-    # With rivals no single set predicts best: each counts by how likely it is.
-    rivals = verdict is at.follows.verdict is Verdict.AMBIGUOUS
-    values = study.expected(at) if rivals else final.values
-    smallest = study.beliefs.seen_from(often, n) * float(np.sqrt(np.mean(at.unit**2) / n))
-    described = [report.describe(k) for k in causes]
-    gain = report.gain(start, most_calls)
-    untestable = report.untestable({*causes, *open_})
-    return SimulationDiagnosis(
-        verdict=verdict,
-        causes=tuple(sorted(described, key=lambda c: -c.effect_rms)),
-        also_possible=tuple(report.describe(k) for k in open_ if k not in causes),
-        aliases=tuple(
-            tuple(names[k] for k in members) for members in study.design.classes if len(members) > 1
-        ),
-        untestable=tuple(untestable),
-        why_untestable=untestable,
-        p_nothing=found.nothing,
-        p_unlisted=min(found.unlisted, 1.0),
-        gain=gain,
-        parameters=dict(zip(names, values.tolist(), strict=True)),
-        remainder_p=report.remainder_p(),
-        smallest_detectable_rms=smallest,
-        noise=tuple(
-            float(np.median(at.weight[own])) if np.any(own := runner.output == k) else float("nan")
-            for k in range(runner.shape[1])
-        ),
-        correlation=at.noise.correlation,
-        in_sequence=in_sequence,
-        notes=report.notes(in_sequence),
-        calls=runner.calls,
-        failed=runner.failed,
-        arrived=final.arrived,
-        condition=final.condition,
-    )
-
-
-def _causes(study: Study, at: JudgedPoint) -> list[int]:
-    """Suspects that are sure, and given a discrepancy also those that take away most of the misfit
-    where they act; without those that make held-out rows worse, and those whose interval
-    contains the nominal value.
-    """
-    causes = study.chosen(at.follows.sure)
-    first = [members[0] for members in study.design.classes]
-    while at.follows.verdict is Verdict.UNLISTED:
-        shares = {k: _share(at, causes, k) for k in first if k not in causes}
-        most = max(shares, key=shares.__getitem__, default=-1)
-        # A cause is added that takes away most of the squared misfit that is left.
-        if shares.get(most, 0.0) <= 0.5:
-            break
-        causes.append(most)
-    for k in causes[::-1]:
-        others = [j for j in causes if j != k]
-        before, after = (
-            _held_out(study, at, at.point, fitted, causes, whole=False)[0]
-            for fitted in (others, causes)
+    data, channels = inputs.read_measured(measured)
+    inputs.check_suspects(suspects, nuisance, data)
+    declared = inputs.read_declared(reading_u, data)
+    group = inputs.read_labels(groups, len(data), "groups")
+    chain = inputs.read_labels(series, len(data), "series")
+    when = inputs.read_times(time, chain)
+    if series is None and time is not None:
+        raise UsageError(
+            "time was given without series", "say with series= which rows follow each other"
         )
-        change = abs(float(at.linear([k, *others], 0).values[0]))
-        if after @ after >= before @ before or change < _reach(study, at, k, others):
-            causes = others
-    return causes
-
-
-def _reach(study: Study, at: JudgedPoint, k: int, others: Sequence[int]) -> float:
-    """Half the 95 % interval of a suspect's change, what looks like a discrepancy being one.
-    [trials]
-    """
-    context = at.follows.reported([key_of(study.runner.names[k])]).context
-    degrees = max(at.noise.worth - at.noise.absorbed - len(others) - 1, 1.0)
-    return float(stdtrit(degrees, 0.975) * at.linear([k, *others], context).errors[0])
-
-
-def _share(at: JudgedPoint, others: Sequence[int], k: int) -> float:
-    """Share of the squared misfit where a suspect acts that it takes away from what others leave.
-    [1]
-    """
-    noise = at.settled([*others, k], 0)
-    acts = at.point.columns[:, k] != 0.0
-    square = []
-    for chosen in ([*others], [*others, k]):
-        left = at.point.whole / at.unit - at.columns[:, chosen] @ at.linear(chosen, 0).values
-        own, _spare = noise.own_part(left)
-        square.append(float(np.sum((own[acts] / noise.relative[acts]) ** 2)))
-    return 1.0 - square[1] / max(square[0], 1e-300)
-
-
-def _held_out(
-    study: Study,
-    at: JudgedPoint,
-    point: FittedPoint,
-    fitted: Sequence[int],
-    acting: Sequence[int],
-    whole: bool = True,
-) -> tuple[Array, str, Wholes]:
-    """Misfit of rows held out over their scatter, some causes fitted to the others, or what of it
-    is new in each row; rows are held out by group as long as the others teach what acts.
-    """
-    row = study.runner.row
-    both = np.column_stack([point.columns, point.whole]) / at.unit[:, None]
-    both = both / at.noise.relative[:, None] if whole else at.noise.own(both)
-    columns = both[:, :-1]
-    rest = both[:, -1]
-    part, by = folds_of(row, study.group, columns[:, list(acting)], study.fold)
-    if by == "row" and study.series is not None:
-        part = blocks_of(*study.series)[row]
-        by = "block"
-    return held_out(columns, rest, fitted, study.nuisance, part), by, part
-
-
-def _stated(s: Suspect) -> float:
-    """Largest change that is stated to be possible; two standard deviations. [unit]"""
-    bounds = (
-        s.nominal - s.low if s.low is not None else None,
-        s.high - s.nominal if s.high is not None else None,
-    )
-    ranges = [] if None in bounds else [max(b for b in bounds if b is not None)]
-    ranges += [] if s.prior_sd is None else [2.0 * s.prior_sd]
-    return min(ranges, default=float("inf"))
+    run = Runner(predict, data, [*suspects, *nuisance], channels)
+    bad = np.flatnonzero(~np.isfinite(run.at(run.nominal)))
+    if len(bad):
+        raise UsageError(
+            f"The simulation gives no number for {len(bad)} of {len(run.row)} readings at the"
+            f" nominal values, the first at row {run.row[bad[0]]}, output {run.output[bad[0]]}"
+            f" (counted from 0); {run.failures[0]}",
+            "set these readings to NaN or correct the simulation",
+        )
+    # The matrices are small: threads that wait for each other cost several times what they save.
+    with threadpool_limits(1, "blas"):
+        follow = None if series is None else (chain, when)
+        study = _Study(run, len(suspects), group, follow, declared, beliefs or Beliefs())
+        return study.diagnosis()
 
 
 @dataclass(frozen=True)
-class _Report:
-    """What is said of a diagnosis: final is where the causes alone fit best."""
+class _Point:
+    """The simulation at some values of its parameters, and what is believed there, over the scatter
+    of each output.
 
-    study: Study
-    at: JudgedPoint
-    final: FittedPoint
-    causes: tuple[int, ...]
+    rest, shape (N,): reading less prediction. columns, shape (N, p): effects of a trial of each
+    parameter. whole: misfit with all suspects at nominal, as far as the columns say. unit: scatter
+    of each output. [unit of the readings] classes: suspects that look alike here.
+    """
 
-    def describe(self, k: int) -> SuspectFound:
+    values: Array
+    unit: Array
+    rest: Array
+    columns: Array
+    whole: Array
+    noise: NoiseModel
+    classes: list[list[int]]
+    follows: Conclusion
+
+    @property
+    def likeliest(self) -> Explanation:
+        """The likeliest explanation."""
+        return self.follows.posterior.likeliest[0]
+
+    def linear(self, chosen: Sequence[int], context: int = 0) -> tuple[Fit, NoiseModel]:
+        """Fit changes of some suspects in their trials; noise with a discrepancy, and with the
+        scatter between groups that they leave.
+        """
+        noise = self.noise.with_effects(self.follows.posterior.contexts[context].shared_in)
+        found = fit(noise, self.columns[:, list(chosen)], self.whole)
+        return found, noise.with_tails(found.tail_ratio)
+
+    def less_nuisance(self, data: Array) -> Array:
+        """Data less what the nuisance parameters explain of them. [unit of the readings]"""
+        return (data - self.noise.share_of(self.noise.loadings, data)) * self.unit
+
+
+@dataclass(frozen=True)
+class _Study:
+    """A simulation, its readings and what is believed: suspects come first, then nuisance."""
+
+    run: Runner
+    count: int
+    group: Wholes
+    follow: tuple[Wholes, Array] | None
+    declared: Array | None
+    beliefs: Beliefs
+
+    @property
+    def nuisance(self) -> list[int]:
+        """Places of the nuisance parameters."""
+        return list(range(self.count, len(self.run.names)))
+
+    @property
+    def outputs(self) -> list[Wholes]:
+        """Readings of each output."""
+        return [np.flatnonzero(self.run.output == k) for k in np.unique(self.run.output)]
+
+    @cached_property
+    def contexts(self) -> list[Context]:
+        """Nothing, or a smooth discrepancy of some size, each output by itself."""
+        run = self.run
+        n = len(self.group)
+        moves = np.zeros((n, run.shape[1], self.count))
+        moves[run.row, run.output] = run.columns(run.nominal, range(self.count))
+        order = np.arange(n, dtype=float)[:, None]
+        features = (np.nan_to_num(run.call(run.nominal)), moves.reshape(n, -1), order)
+        shapes = [
+            shape for own in features for shape in _smooth_shapes(own, self.group, own is order)
+        ]
+        sizes = self.beliefs.shape_size * np.array(Beliefs().sizes)
+        share = self.beliefs.expected * self.beliefs.unlisted / max(len(shapes) * len(sizes), 1)
+        own = (run.output[:, None] == np.unique(run.output))[:, :, None]
+        return [
+            Context.none(len(run.row)),
+            *(
+                Context(
+                    (UNLISTED, None),
+                    float(np.log(share)),
+                    size * (own * shape[run.row][:, None]).reshape(len(own), -1),
+                    listed=False,
+                )
+                for shape in shapes
+                for size in sizes
+            ),
+        ]
+
+    def scale(self, left: Array, spare: float) -> Array:
+        """Scatter of each reading by itself, from residuals of which a share is spare; far ones
+        count less. [unit of the readings]
+        """
+        relative = np.ones(len(left)) if self.declared is None else self.declared
+        size = np.abs(left) / relative
+        level = np.empty(len(left))
+        for index in self.outputs if self.declared is None else [np.arange(len(left))]:
+            near = FAR * 1.4826 * np.median(size[index]) / np.sqrt(spare)
+            level[index] = np.sqrt(np.mean(np.minimum(size[index], near) ** 2) / spare)
+        least = _DIGITS * np.max(np.abs([*self.run.reading, *self.run.at(self.run.nominal)]))
+        return np.asarray(np.maximum(relative * np.maximum(level, size / FAR), least))
+
+    def first_scale(self, values: Array) -> Array:
+        """The same before anything is explained: from what all columns leave, or those of nuisance
+        parameters where rows are too few for all.
+        """
+        columns = self.run.columns(values, range(len(values)))
+        rest = self.run.reading - self.run.at(values)
+        scale = np.ones(len(rest)) if self.declared is None else self.declared
+        for _ in range(6):
+            basis = _basis_of(columns / scale[:, None], 1e-4)
+            spare = 1.0 - basis.shape[1] / len(rest)
+            if spare < _SPARE:
+                columns = columns[:, self.nuisance]
+                continue
+            left = rest - scale * (basis @ (basis.T @ (rest / scale)))
+            scale = self.scale(left, spare)
+        return scale
+
+    def noise(self, scale: Array, free: Array, correlation: float) -> tuple[NoiseModel, Array]:
+        """Noise over the scatter of each output, free columns absorbed, and these scatters."""
+        run = self.run
+        unit = np.empty(len(scale))
+        for index in self.outputs:
+            unit[index] = np.median(scale[index])
+        chain, time = self.follow or (self.group, self.group)
+        basis = _basis_of(free / scale[:, None])
+        sizes = _SIZES if self.group.any() else np.zeros(1)
+        noise = replace(
+            NoiseModel.white(len(scale)),
+            relative=scale / unit,
+            tails=numbered(self.group[run.row] + 1j * run.output),
+            loadings=_WIDE * (scale / unit)[:, None] * basis,
+            floor_in=1e-4,
+            tail_ratios=tuple((_GROUP_RATIO * sizes).tolist()),
+            absorbed=basis.shape[1],
+            tail_chances=tuple(np.exp(-0.5 * np.log(sizes + (sizes == 0.0)) ** 2).tolist()),
+            chain=numbered(chain[run.row] + 1j * run.output),
+            time=np.asarray(time[run.row], float),
+            correlation=correlation,
+        )
+        return noise, unit
+
+    def point(self, values: Array, scale: Array) -> _Point:
+        """Linearise the simulation and judge it, rows that follow each other as alike as all
+        explanations together make likeliest; beforehand those that forget soon are likelier.
+        """
+        run = self.run
+        columns = run.columns(values, range(len(values)))
+        change = ((values - run.nominal) / run.trial)[: self.count]
+        rest = run.reading - run.at(values)
+        whole = rest + columns[:, : self.count] @ change
+        classes = _alias_classes(columns / scale[:, None], self.count)
+        beliefs = replace(self.beliefs, sizes=tuple(_SIZES.tolist()))
+
+        def judged(correlation: float) -> _Point:
+            noise, unit = self.noise(scale, columns[:, self.nuisance], correlation)
+            seen = columns / unit[:, None]
+            effects = self.effects([own[0] for own in classes], seen)
+            data = whole / unit
+            found = posterior(noise, data, effects, self.contexts, beliefs, (), _MOST)
+            follows = Conclusion(found, beliefs)
+            return _Point(values, unit, rest / unit, seen, data, noise, classes, follows)
+
+        return max(
+            map(judged, _CORRELATIONS if self.follow else [0.0]),
+            key=lambda at: at.follows.posterior.log_evidence + np.log1p(-(at.noise.correlation**2)),
+        )
+
+    def effects(self, first: list[int], columns: Array) -> Effects:
+        """One effect of each class of suspects."""
+        run = self.run
+        own = columns[:, first]
+        acting = np.sqrt(np.sum(own**2, axis=0) / np.sum(own != 0.0, axis=0))
+        stated = np.array([run.suspects[k].prior_sd for k in first], float) / abs(run.trial[first])
+        # A suspect whose nominal value is one of its bounds can move in one way only.
+        way = (run.nominal == run.low).astype(float) - (run.nominal == run.high)
+        often = self.beliefs.expected * (1.0 - self.beliefs.unlisted) / max(len(first), 1)
+        return replace(
+            Effects.free(own, [self.key(k) for k in first], np.log(often), 0.0),
+            listed=np.ones(len(first), bool),
+            size=np.where(np.isnan(stated), self.beliefs.shape_size / acting, stated),
+            scales=np.isnan(stated),
+            sign=(way * np.sign(run.trial))[first],
+        )
+
+    def key(self, k: int) -> Key:
+        """What the posterior calls a suspect."""
+        return "suspect", self.run.names[k]
+
+    def chosen(self, names: Iterable[Key]) -> list[int]:
+        """Places of the suspects among some names."""
+        return sorted(self.run.names.index(str(name)) for what, name in names if what != UNLISTED)
+
+    def fit(self, at: _Point, chosen: list[int], context: int = 0) -> Array:
+        """Fit some suspects and all nuisance parameters, the other suspects nominal."""
+        free = [*chosen, *self.nuisance]
+        _found, noise = at.linear(chosen, context)
+        bare = replace(noise, loadings=noise.loadings[:, noise.absorbed :], absorbed=0)
+        root = cholesky(bare.precision_times(np.eye(len(at.unit)), bare.tail_ratios[0])[0])
+        start = np.where(np.isin(np.arange(len(at.values)), free), at.values, self.run.nominal)
+        return self.run.fit(start, free, lambda columns: root @ (columns.T / at.unit).T)
+
+    def search(self, values: Array) -> _Point:
+        """Judge, fit what is likeliest and linearise there, until the same is likeliest again."""
+        scale = self.first_scale(values)
+        tried = set[tuple[int, ...]]()
+        while True:
+            at = self.point(values, scale)
+            chosen = self.chosen(at.follows.posterior.names_of(at.likeliest))
+            state = (at.likeliest.context, *chosen)
+            if state in tried or len(tried) == _ROUNDS:
+                return at
+            tried.add(state)
+            values = self.fit(at, chosen, at.likeliest.context)
+            _found, noise = at.linear(chosen, at.likeliest.context)
+            own, spare = noise.own_part((self.run.reading - self.run.at(values)) / at.unit)
+            spare = max(spare - len(chosen) / len(own), 1.0 / len(own))
+            scale = self.scale(own * at.unit, spare)
+
+    def settled(self, start: Array) -> _Point:
+        """Search; where that ends with a discrepancy, also from what explains most without one,
+        which may be the bend of a large change.
+        """
+        at = self.search(start)
+        if at.likeliest.context:
+            found = at.follows.posterior
+            plain = next(e for e in found.likeliest if e.members and not e.context)
+            again = self.search(self.fit(at, self.chosen(found.names_of(plain))))
+            at = at if again.likeliest.context else again
+        return at
+
+    def diagnosis(self) -> SimulationDiagnosis:
+        """Say what is wrong, what may be, what that gains, and how residuals look."""
+        run = self.run
+        names = run.names
+        start = self.fit(self.point(run.nominal, self.first_scale(run.nominal)), [])
+        at = self.settled(start)
+        follows = at.follows
+        verdict = follows.verdict
+        causes = self.causes(at)
+        open_ = self.chosen(follows.open_beside([self.key(k) for k in causes]))
+        if verdict is Verdict.NAMED and not causes:
+            # Held-out rows veto what these rows name.
+            verdict = Verdict.AMBIGUOUS
+            open_ = self.chosen(follows.sure)
+        final = self.point(self.fit(at, causes), at.unit * at.noise.relative)
+        # What would only move beyond its bound is not a cause.
+        causes = [k for k in causes if final.values[k] != run.nominal[k]]
+        best = at if verdict is Verdict.AMBIGUOUS else final
+        fold, by = self.folds(final, causes)
+        explained = held_out_part(final.noise, final.columns[:, causes], final.whole, fold, None)
+        before = final.less_nuisance((run.reading - run.at(start)) / final.unit)
+        told = {k: self.describe(at, final, k, causes) for k in (*causes, *open_)}
+        _found, noise = at.linear(causes, at.likeliest.context if self.follow else 0)
+        own, _spare = noise.own_part(at.rest)
+        pairs = [own[index][1:] @ own[index][:-1] for index in self.outputs]
+        in_sequence = bool(sum(pairs) > FAR * (own @ own) / np.sqrt(len(own)))
+        testable = [k for members in at.classes for k in members]
+        reason = {True: "absorbed by the nuisance parameters", False: "no effect here"}
+        return SimulationDiagnosis(
+            verdict=verdict,
+            causes=tuple(sorted((told[k] for k in causes), key=lambda c: -c.effect_rms)),
+            also_possible=tuple(told[k] for k in open_ if k not in causes),
+            aliases=tuple(tuple(names[k] for k in own) for own in at.classes if len(own) > 1),
+            why_untestable={
+                names[k]: reason[bool(at.columns[:, k].any())]
+                for k in range(self.count)
+                if k not in testable
+            },
+            p_nothing=follows.posterior.nothing,
+            p_unlisted=min(follows.posterior.unlisted, 1.0),
+            gain=HeldOutGain(rms(before), rms(final.less_nuisance(final.whole - explained)), by),
+            parameters=dict(zip(names, best.values.tolist(), strict=True)),
+            noise=tuple(float(at.unit[index[0]]) for index in self.outputs),
+            correlation=at.noise.correlation,
+            in_sequence=in_sequence,
+            notes=tuple(self.notes(in_sequence)),
+            calls=run.calls,
+            failed=len(run.failures),
+        )
+
+    def folds(self, at: _Point, causes: Sequence[int]) -> tuple[Wholes, str]:
+        """Number the fold in which each reading is held out, and what is held out together."""
+        row = self.run.row
+        if self.follow:
+            return blocks_of(*self.follow)[row], "block"
+        # Rows are dealt to folds in an order that no pattern of the rows has.
+        shuffled = np.random.default_rng(0).permutation(len(self.group))
+        return folds_of(row, self.group, at.columns[:, list(causes)], shuffled)
+
+    def causes(self, at: _Point) -> list[int]:
+        """Suspects that are sure, and given a discrepancy also those that take away most of the
+        misfit where they act; without those that make held-out rows worse, and those whose interval
+        contains the nominal value.
+        """
+
+        def share(k: int) -> float:
+            """Share of the squared misfit where a suspect acts that it takes away. [1]"""
+            acts = at.columns[:, k] != 0.0
+            left = [
+                at.whole - at.columns[:, own] @ at.linear(own)[0].values
+                for own in (causes, [*causes, k])
+            ]
+            square = [np.sum(at.less_nuisance(own)[acts] ** 2) for own in left]
+            return float(1.0 - square[1] / max(square[0], 1e-300))
+
+        causes = self.chosen(at.follows.sure)
+        others = [own[0] for own in at.classes if own[0] not in causes]
+        while at.follows.verdict is Verdict.UNLISTED and others:
+            most = max(others, key=share)
+            if share(most) <= 0.5:
+                break
+            others.remove(most)
+            causes.append(most)
+        fold, _by = self.folds(at, causes)
+        for k in causes[::-1]:
+            others = [j for j in causes if j != k]
+            found, noise = at.linear([k, *others])
+            before, after = (
+                at.whole - held_out_part(noise, at.columns[:, own], at.whole, fold, None)
+                for own in (others, causes)
+            )
+            sure = abs(found.values[0]) > self.reach(at, k, others)
+            if not (sure and likelier(noise, before, after, fold)):
+                causes = others
+        return causes
+
+    def reach(self, at: _Point, k: int, others: Sequence[int]) -> float:
+        """Half the 95 % interval of a suspect's change, what looks like a discrepancy being one.
+        [trials]
+        """
+        found, noise = at.linear([k, *others], at.follows.reported([self.key(k)]).context)
+        degrees = max(noise.worth - noise.absorbed - len(others) - 1, 1.0)
+        return float(stdtrit(degrees, 0.975) * found.errors[0])
+
+    def describe(self, at: _Point, final: _Point, k: int, causes: Sequence[int]) -> SuspectFound:
         """Describe a cause, or what may be one in addition to the causes."""
-        at = self.at
-        run = self.study.runner
-        names = self.study.runner.names
-        others = [j for j in self.causes if j != k]
-        size = float(at.linear([k, *others], at.likeliest.context).values[0])
-        change = size * run.trial[k]
-        whole = at.point.columns[:, k] * size
-        if k in self.causes:
-            change = self.final.values[k] - run.nominal[k]
-            without = np.where(np.arange(len(names)) == k, run.nominal, self.final.values)
-            whole = run.reading - self.final.rest - run.at(without)
-        held = self.final.columns[:, self.study.nuisance] / at.weight[:, None]
-        seen = whole / at.weight
-        seen = (seen - held @ least_squares(held, seen)) * at.weight
-        reach = _reach(self.study, at, k, others) * float(abs(run.trial[k]))
-        value = float(np.clip(run.nominal[k] + change, run.low[k], run.high[k]))
+        run = self.run
+        others = [j for j in causes if j != k]
+        change = at.linear([k, *others], at.likeliest.context)[0].values[0] * run.trial[k]
+        if k in causes:
+            change = final.values[k] - run.nominal[k]
+        half = self.reach(at, k, others) * abs(run.trial[k])
+        ends = run.nominal[k] + change + half * np.arange(-1, 2)
+        low, value, high = np.clip(ends, run.low[k], run.high[k]).tolist()
         return SuspectFound(
             suspect=run.suspects[k],
             value=value,
-            interval=(
-                float(max(value - reach, run.low[k])),
-                float(min(value + reach, run.high[k])),
-            ),
-            effect_rms=rms(seen),
-            probability=min(at.follows.listed.get(key_of(names[k]), 0.0), 1.0),
-            aliases=tuple(names[j] for j in self.study.design.class_of(k) if j != k),
+            interval=(low, high),
+            effect_rms=rms(final.less_nuisance(final.columns[:, k] * change / run.trial[k])),
+            probability=min(at.follows.listed.get(self.key(k), 0.0), 1.0),
+            aliases=tuple(run.names[j] for own in at.classes if k in own for j in own if j != k),
         )
 
-    def gain(self, start: FittedPoint, most_calls: int) -> HeldOutGain:
-        """Misfit of rows held out, before and after, in the unit of the readings."""
-        study = self.study
-        at = self.at
-        before, by, part = _held_out(study, at, start, (), self.causes)
-        after, by, part = _held_out(study, at, self.final, self.causes, self.causes)
-        # Each fold needs a step, its check, and the columns at both.
-        folds = len(np.unique(part))
-        fitted = (len(study.nuisance), len(study.nuisance) + len(self.causes))
-        needed = sum(folds * 2 * (2 * k + 1) for k in fitted if k)
-        refitted = study.runner.calls + needed <= most_calls
-        if refitted:
-            before = self._refitted(start, (), part)
-            after = self._refitted(self.final, self.causes, part)
-        return HeldOutGain(rms(before * at.weight), rms(after * at.weight), by, refitted)
-
-    def _refitted(self, point: FittedPoint, fitted: Sequence[int], part: Wholes) -> Array:
-        """Misfit of each reading over its scatter, the simulation fitted to the other folds."""
-        study = self.study
-        weight = self.at.weight
-        active = [*fitted, *study.nuisance]
-        left = point.rest / weight
-        for k in np.unique(part):
-            test = part == k
-            if test.all() or not active:
-                continue
-            share = np.where(test, 0.0, 1.0 / weight**2)
-            found = study.runner.fit(point.values, active, lambda c, w=share: w[:, None] * c)  # type: ignore[misc]
-            slopes = study.runner.sensitivities(found.values, found.base, active)
-            rest = (study.runner.reading - found.base) / weight
-            own = list(range(len(fitted)))
-            free = list(range(len(fitted), len(active)))
-            left[test] = held_out(slopes / weight[:, None], rest, own, free, part, [k])[test]
-        return left
-
-    def untestable(self, found: Collection[int]) -> dict[str, str]:
-        """Suspects that these rows cannot test, and why."""
-        study = self.study
-        run = self.study.runner
-        why = dict[str, str]()
-        for k, s in enumerate(run.suspects[: study.count]):
-            if k in run.silent:
-                why[s.name] = "the simulation gives no number near its nominal value"
-            elif k not in study.design.testable:
-                acts = np.any(study.nominal.columns[:, k] != 0.0)
-                why[s.name] = "absorbed by the nuisance parameters" if acts else "no effect here"
-            elif k not in found and (widest := _stated(s)) < (least := self._detectable(k)):
-                unit = f" {s.unit}".rstrip()
-                why[s.name] = (
-                    f"a change of {least:.3g}{unit} would be detected, {widest:.3g}{unit} is the"
-                    " most that is stated to be possible"
-                )
-        return why
-
-    def _detectable(self, k: int) -> float:
-        """Smallest change of a suspect that is detected with 80 % power. [unit of the suspect]"""
-        error = self.at.linear([k, *(j for j in self.causes if j != k)], 0).errors[0]
-        seen = self.study.beliefs.seen_from(self.study.often, len(self.at.unit))
-        return float(seen * error * abs(self.study.runner.trial[k]))
-
-    def notes(self, in_sequence: bool) -> tuple[str, ...]:
+    def notes(self, in_sequence: bool) -> Iterator[str]:
         """What to know before the numbers are used, as sentences."""
-        run = self.study.runner
-        notes = list[str]()
-        if self.study.drawn > _DRAWN:
-            notes.append(
-                "Two calls with the same values gave different numbers, by"
-                f" {self.study.drawn:.1%} of the smallest effect of a trial: let the simulation"
-                " draw the same random numbers in each call (one seed)."
+        run = self.run
+        again = run.call(run.nominal)[run.row, run.output]
+        if not np.allclose(again, run.at(run.nominal), 1e-9, 1e-300):
+            yield (
+                "Two calls with the same values gave different numbers: let the simulation draw the"
+                " same random numbers in each call (one seed)."
             )
-        if in_sequence and self.study.series is None:
-            notes.append(
-                "Residuals of neighbouring rows are correlated: probabilities and intervals are too"
-                " sharp. State with series= (and time=) which rows follow each other."
+        if in_sequence:
+            yield (
+                "Residuals of neighbouring rows are correlated beyond what series= and time= say of"
+                " them: probabilities and intervals are too sharp."
             )
-        elif in_sequence:
-            notes.append(
-                "Residuals are correlated further than one correlation from row to row explains:"
-                " probabilities and intervals may be too sharp."
+        if run.failures:
+            yield (
+                f"{len(run.failures)} of {run.calls} calls gave no number for some reading, the"
+                f" first with {run.failures[0]}."
             )
-        for k in self.causes:
-            if self.final.values[k] in {run.low[k], run.high[k]}:
-                own = {run.names[j] for j in (*self.causes, *self.study.design.class_of(k))}
-                others = (str(name) for _what, name in self.at.follows.listed if name not in own)
-                notes.append(
-                    f"{run.names[k]} stands at its bound {self.final.values[k]:g}; the likeliest"
-                    f" rival is {next(others, 'something that is not listed')}."
-                )
-        if not self.final.arrived:
-            notes.append("The fit did not arrive: values may be off, and intervals too narrow.")
-        if run.failed:
-            notes.append(
-                f"{run.failed} of {run.calls} calls gave no number for some reading, the first"
-                f" with {run.reasons[0]}."
-            )
-        return tuple(notes)
 
-    def in_sequence(self) -> bool:
-        """True if what the likeliest explanation leaves of a row resembles what it leaves of the
-        row before it, the known correlation taken out.
-        """
-        at = self.at
-        chosen = self.study.chosen(at.follows.posterior.names_of(at.likeliest))
-        noise = at.settled(chosen, 0 if self.study.series is None else at.likeliest.context)
-        own, _spare = noise.own_part(at.point.rest / at.unit)
-        own = own / at.noise.relative
-        along = 0.0
-        square = 0.0
-        for index in self.study.outputs:
-            along += float(own[index][1:] @ own[index][:-1])
-            square += float(own[index] @ own[index])
-        return bool(along > FAR * square / np.sqrt(len(own)))
 
-    def remainder_p(self) -> float:
-        """p-value of the smooth shape that stands out most in the residual, as one of all of them
-        (Bonferroni); each sum of squares as a multiple of chi-squared (Satterthwaite 1946).
-        """
-        noise = self.at.settled(self.causes, 0)
-        ratio = noise.tail_ratios[-1]
-        left = self.final.rest / self.at.unit
-        weighed = noise.precision_times(left[:, None], ratio)[0][:, 0]
-        variance = float(left @ weighed) / max(len(left) - noise.absorbed - len(self.causes), 1)
-        if variance == 0.0:
-            return 1.0
-        patterns = self.study.contexts[1 :: len(self.study.beliefs.sizes)]
-        chances = [1.0]
-        for pattern in patterns:
-            shape = pattern.shared_in
-            spread = shape.T @ noise.precision_times(shape, ratio)[0]
-            mean = float(np.trace(spread))
-            square = float(np.sum(spread**2))
-            size = float(np.sum((shape.T @ weighed) ** 2)) / variance
-            chances.append(len(patterns) * float(chdtrc(mean**2 / square, size * mean / square)))
-        return min(chances)
+def _basis_of(columns: Array, tolerance: float = 1e-7) -> Array:
+    """Orthonormal basis of what some columns of equal worth span."""
+    size = np.linalg.norm(columns, axis=0)
+    return np.asarray(orth(columns / np.where(size > 0.0, size, 1.0), tolerance))
+
+
+def _alias_classes(columns: Array, count: int) -> list[list[int]]:
+    """Places of the suspects that can be tested beside nuisance parameters, those in one class that
+    only differ in size.
+    """
+    basis = _basis_of(columns[:, count:])
+    whole = columns[:, :count]
+    left = whole - basis @ (basis.T @ whole)
+    size, own = np.linalg.norm([whole, left], axis=1)
+    seen = np.flatnonzero((own > _TESTABLE * size) & (size > 1e-9 * size.max()))
+    unit = left[:, seen] / own[seen]
+    number, label = connected_components(1.0 - (unit.T @ unit) ** 2 < _TESTABLE**2)
+    return [seen[label == k].tolist() for k in range(number)]
+
+
+def _smooth_shapes(feature: Array, group: Wholes, alone: bool) -> Iterator[Array]:
+    """Ways in which a discrepancy may move with a feature of the rows, the same in every group or,
+    unless it moves alone, not: a factor of its covariance, shape (n, r).
+
+    What has few values only (a direction, a place) is not a quantity along which something could
+    move smoothly.
+    """
+    n = len(feature)
+    many = [len(np.unique(np.round(own / (np.ptp(own) or 1.0), 6))) > 5 for own in feature.T]
+    if n < 8 or not any(many):
+        return
+    z = feature[:, many] / feature[:, many].std(axis=0)
+    landmarks = np.unique(np.linspace(0, n - 1, min(n, _LANDMARKS)).astype(np.int64))
+    apart = cdist(z, z[landmarks])
+    for length in _LENGTHS * np.median(apart[apart > 0.0]):
+        alike = np.exp(-0.5 * (apart / length) ** 2)
+        kinds = [alike, alike * (group[:, None] == group[landmarks])]
+        for own in kinds[: 1 if alone or not group.any() else 2]:
+            # The covariance of which these columns are given (Nyström).
+            values, vectors = np.linalg.eigh(own[landmarks])
+            kept = values > 1e-6 * values[-1]
+            yield own @ (vectors[:, kept] / np.sqrt(values[kept]))

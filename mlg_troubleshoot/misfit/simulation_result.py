@@ -91,26 +91,22 @@ class SuspectFound(Result):
 
 @dataclass(frozen=True, slots=True)
 class HeldOutGain:
-    """Misfit of held-out rows.
+    """Misfit of held-out rows, nuisance parameters fitted to all rows.
 
     Parameters
     ----------
     rms_before : float
-        Root mean square with the suspects at their nominal values, nuisance parameters fitted.
-        [unit of the readings]
+        Root mean square with the suspects at their nominal values. [unit of the readings]
     rms_after : float
-        The same with the causes fitted. [unit of the readings]
+        The same with the causes fitted to the other rows, the simulation taken for linear about its
+        best fit. [unit of the readings]
     held_out_by : str
         What was held out together: ``group``, ``row``, or ``block``: rows that follow each other.
-    refitted : bool
-        True if the simulation itself was fitted again without each fold; False if it was taken for
-        linear, since that would have needed more calls than it may be called.
     """
 
     rms_before: float
     rms_after: float
     held_out_by: str
-    refitted: bool
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -128,13 +124,10 @@ class SimulationDiagnosis(Result):
         The whole set that the data leave possible, where there are rivals that no alias class says,
         or what held-out rows speak against; else empty.
     aliases : tuple of tuple of str
-        Classes of suspects that these rows cannot distinguish, known before a measured value is
-        looked at.
-    untestable : tuple of str
-        Suspects that these rows cannot test.
+        Classes of suspects that these rows cannot distinguish where the simulation fits best.
     why_untestable : mapping of str to str
-        Why each of them: no effect here, absorbed by the nuisance parameters, no number near the
-        nominal value, or less than these rows detect in all of the range that is stated.
+        Suspects that these rows cannot test, and why: no effect here, absorbed by the nuisance
+        parameters, or no number near the nominal value.
     p_nothing : float
         Probability that nothing is wrong. [1]
     p_unlisted : float
@@ -145,17 +138,11 @@ class SimulationDiagnosis(Result):
         Value of every suspect and nuisance parameter, to predict with: the causes as fitted, all
         else nominal; where the posterior leaves rivals (AMBIGUOUS), each suspect as expected over
         all that may be wrong, by how likely it is.
-    remainder_p : float
-        p-value of the pattern in the residual. [1]
-    smallest_detectable_rms : float
-        Root mean square of the smallest effect that is detected with 80 % power. [unit of the
-        readings]
     noise : tuple of float
-        Standard deviation of a reading of each output, as it is estimated with all suspects fitted.
-        [unit of the readings]
+        Standard deviation of a reading of each output. [unit of the readings]
     correlation : float
-        Of the scatter of two rows of a series one usual step apart, one standard error more than is
-        likeliest; 0 where no series was given. [1]
+        Of the scatter of two rows of a series one usual step apart, as expected; 0 where no series
+        was given. [1]
     in_sequence : bool
         True if residuals of neighbouring rows are correlated in the order given, beyond what
         `series` accounts for: then probabilities are too sharp.
@@ -165,34 +152,30 @@ class SimulationDiagnosis(Result):
         Times that the simulation was called.
     failed : int
         Calls that gave no number for some reading, or failed.
-    arrived : bool
-        True if the last fit ended where a further step changes next to nothing.
-    condition : float
-        Condition number of the last fit's columns, each scaled to unit length. [1]
     """
 
     verdict: Verdict
     causes: tuple[SuspectFound, ...]
     also_possible: tuple[SuspectFound, ...]
     aliases: tuple[tuple[str, ...], ...]
-    untestable: tuple[str, ...]
     why_untestable: Mapping[str, str]
     p_nothing: float
     p_unlisted: float
     gain: HeldOutGain
     parameters: Mapping[str, float]
-    remainder_p: float
-    smallest_detectable_rms: float
     noise: tuple[float, ...]
     correlation: float
     in_sequence: bool
     notes: tuple[str, ...]
     calls: int
     failed: int
-    arrived: bool
-    condition: float
 
     @property
     def named(self) -> tuple[SuspectFound, ...]:
         """The causes that the verdict stands for."""
         return self.causes if self.verdict is Verdict.NAMED else ()
+
+    @property
+    def untestable(self) -> tuple[str, ...]:
+        """Suspects that these rows cannot test."""
+        return tuple(self.why_untestable)

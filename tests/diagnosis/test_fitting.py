@@ -12,7 +12,6 @@ from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.design import basis_of
 from mlg_troubleshoot.misfit.fitting import blocks_of, fit, shrunk
 
 from .conftest import Array
@@ -185,9 +184,3 @@ def test_a_single_series_is_held_out_in_stretches_of_equal_length() -> None:
     fold = blocks_of(np.zeros(80, np.intp), time)
     assert len(set(np.bincount(fold).tolist())) == 1 < len(set(fold.tolist()))
     assert (np.diff(fold[np.argsort(time)]) >= 0).all()
-
-
-def test_columns_that_differ_by_less_than_the_tolerance_span_one_direction() -> None:
-    column = np.eye(3)[:, :1]
-    other = column + 0.2 * np.eye(3)[:, 1:2]
-    assert basis_of(np.hstack([column] * 8 + [other]), tolerance=0.1).shape == (3, 1)

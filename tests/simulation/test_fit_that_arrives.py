@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.optimize import least_squares
 
-from mlg_troubleshoot.diagnosis import SimulationDiagnosis, Suspect, Verdict, diagnose_simulation
+from mlg_troubleshoot.diagnosis import Suspect, Verdict, diagnose_simulation
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.misfit.runner import Runner
 
 T = np.linspace(0.0, 10.0, 150)
 Predict = Callable[[Mapping[str, float]], np.ndarray]
@@ -41,22 +39,6 @@ def test_a_frequency_twenty_trials_off_is_found() -> None:
     found = diagnose_simulation(swing, noisy({"rate": 2.4}), SWING, ZERO)
     assert (found.verdict, [c.name for c in found.causes]) == (Verdict.NAMED, ["rate"])
     assert found.causes[0].value == pytest.approx(2.4, rel=0.01)
-    assert found.arrived
-
-
-def test_a_pulse_is_found_where_its_nominal_place_shows_nothing_of_it() -> None:
-    when = np.linspace(0.0, 30.0, 150)
-
-    def pulse(p: Mapping[str, float]) -> np.ndarray:
-        return np.asarray(np.exp(-0.5 * ((when - p["at"]) / p["wide"]) ** 2) + p["zero"])
-
-    read = pulse({"at": 13.5, "wide": 0.8, "zero": 0.0})
-    read = read + 0.02 * np.random.default_rng(1).standard_normal(150)
-    found = diagnose_simulation(
-        pulse, read, [Suspect("at", 5.0, 0.3), Suspect("wide", 0.8, 0.05)], ZERO
-    )
-    assert [c.name for c in found.named] == ["at"]
-    assert found.named[0].value == pytest.approx(13.5, abs=0.05)
 
 
 def test_the_parameters_are_those_of_least_squares_of_the_same_names() -> None:
@@ -77,14 +59,13 @@ def test_the_parameters_are_those_of_least_squares_of_the_same_names() -> None:
         assert np.sqrt(np.mean(here**2)) <= 1.02 * np.sqrt(np.mean(best**2))
 
 
-def test_a_value_stays_within_its_bounds_and_the_result_says_that_it_stands_at_one() -> None:
+def test_a_value_and_its_interval_stay_within_their_bounds() -> None:
     suspects = [Suspect("size", 1.0, 0.05, low=0.9, high=1.1), *SWING[1:]]
     found = diagnose_simulation(swing, noisy({"size": 1.3}), suspects, ZERO)
     assert found.parameters["size"] <= 1.1
     (cause,) = found.causes
     assert cause.value == 1.1
     assert cause.interval[1] <= 1.1
-    assert any("size stands at its bound 1.1" in note for note in found.notes)
 
 
 def test_what_would_only_move_beyond_its_bound_is_not_reported() -> None:
@@ -104,7 +85,7 @@ def test_a_call_that_fails_is_avoided_counted_and_told_with_its_parameters() -> 
     assert [c.name for c in found.causes] == ["size"]
     assert found.failed >= 1
     (note,) = found.notes
-    assert "damping=0.099" in note
+    assert "'damping': 0.099" in note
     assert "unstable" in note
 
 
@@ -122,7 +103,8 @@ def test_a_suspect_around_which_the_simulation_fails_cannot_be_tested_and_stops_
 
     found = diagnose_simulation(rigid, noisy({"size": 1.3}), SWING, ZERO)
     assert [c.name for c in found.causes] == ["size"]
-    assert "no number" in found.why_untestable["damping"]
+    assert found.untestable == ("damping",)
+    assert "damping" in found.notes[0]
 
 
 @pytest.mark.parametrize("form", [dict, pd.DataFrame])
@@ -140,54 +122,20 @@ def test_channels_with_names_are_matched_by_name(form: Callable[..., object]) ->
         diagnose_simulation(lambda _p: {"speed_mm_s": T}, measured, SWING, ZERO)  # type: ignore[arg-type]
 
 
-def said(found: SimulationDiagnosis) -> tuple[object, ...]:
-    return found.verdict, dict(found.parameters), found.gain, found.calls
-
-
-def test_calls_at_once_give_the_same_result() -> None:
-    read = noisy({"rate": 2.1})
-    alone = diagnose_simulation(swing, read, SWING, ZERO)
-    threads = diagnose_simulation(swing, read, SWING, ZERO, workers=3)
-    with ThreadPoolExecutor(2) as pool:
-        mapped = diagnose_simulation(swing, read, SWING, ZERO, workers=pool.map)
-    assert said(alone) == said(threads) == said(mapped)
-
-
-def test_the_gain_is_refitted_where_calls_allow_and_else_says_that_it_is_linear() -> None:
-    read = noisy({"rate": 2.1})
-    full = diagnose_simulation(swing, read, SWING, ZERO)
-    linear = diagnose_simulation(swing, read, SWING, ZERO, most_calls=1)
-    assert (full.gain.refitted, linear.gain.refitted) == (True, False)
-    assert full.calls <= 400
-    assert full.gain.rms_after == pytest.approx(0.02, rel=0.2)
-    assert full.gain.rms_after == pytest.approx(linear.gain.rms_after, rel=0.1)
-
-
-def test_progress_is_told_after_each_round_of_calls() -> None:
-    seen: list[tuple[int, int]] = []
-    found = diagnose_simulation(
-        swing, noisy({"rate": 2.1}), SWING, ZERO, progress=lambda *done: seen.append(done)
-    )
-    assert seen == sorted(seen)
-    assert seen[-1] == (found.calls, 400)
-
-
 def test_why_a_suspect_cannot_be_tested_is_said() -> None:
     def several(p: Mapping[str, float]) -> np.ndarray:
-        return swing(p) + p["shift"] + 0.0 * p["idle"] + 0.001 * p["small"] * T
+        return swing(p) + p["shift"] + 0.0 * p["idle"]
 
     suspects = [
         *SWING,
         Suspect("shift", 0.0, 0.1),
         Suspect("idle", 0.0, 0.1),
-        Suspect("small", 0.0, 0.1, prior_sd=0.1),
     ]
-    read = noisy({"shift": 0.0, "idle": 0.0, "small": 0.0}, predict=several)
+    read = noisy({"shift": 0.0, "idle": 0.0}, predict=several)
     found = diagnose_simulation(several, read, suspects, ZERO)
-    assert found.untestable == ("shift", "idle", "small")
+    assert found.untestable == ("shift", "idle")
     assert found.why_untestable["shift"] == "absorbed by the nuisance parameters"
     assert found.why_untestable["idle"] == "no effect here"
-    assert "would be detected" in found.why_untestable["small"]
 
 
 def test_what_does_nothing_at_the_nominal_values_is_asked_for_where_it_does() -> None:
@@ -212,17 +160,6 @@ def test_what_does_nothing_at_the_nominal_values_is_asked_for_where_it_does() ->
 def test_bounds_and_scatter_that_cannot_be_are_refused(suspect: Suspect, says: str) -> None:
     with pytest.raises(UsageError, match=says):
         diagnose_simulation(swing, T, [suspect, *SWING[1:]], ZERO)
-
-
-def test_a_damped_step_arrives_where_a_whole_one_overshoots() -> None:
-    runner = Runner(
-        lambda p: np.arctan(p["x"] * np.linspace(0.5, 2.0, 20))[:, None],
-        np.zeros((20, 1)),
-        [Suspect("x", 3.0, 0.1)],
-    )
-    found = runner.fit(runner.nominal, [0], lambda columns: 1e4 * columns)
-    assert found.values[0] == pytest.approx(0.0, abs=1e-3)
-    assert found.arrived
 
 
 def test_among_rivals_the_parameters_predict_better_than_the_nominal_values() -> None:
@@ -253,8 +190,3 @@ def test_a_simulation_that_draws_other_numbers_in_each_call_is_told(
 
     found = diagnose_simulation(drawing, noisy({}), SWING, ZERO)
     assert any("same random numbers" in note for note in found.notes) == said
-
-
-def test_no_thread_at_all_is_refused() -> None:
-    with pytest.raises(UsageError, match="workers is 0"):
-        diagnose_simulation(swing, noisy({}), SWING, ZERO, workers=0)

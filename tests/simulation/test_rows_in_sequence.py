@@ -87,13 +87,6 @@ def test_what_is_new_in_each_row_is_independent_and_of_unit_size(noise: NoiseMod
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("correlation", [0.0, 0.7])
-def test_the_correlation_of_rows_is_estimated(correlation: float) -> None:
-    found = [diagnosed(seed, correlation).correlation for seed in range(8)]
-    assert np.mean(found) == pytest.approx(correlation, abs=0.16)
-
-
-@pytest.mark.slow
 def test_rows_that_remember_each_other_name_nothing_where_nothing_is_wrong() -> None:
     named = [diagnosed(seed, 0.7).verdict is Verdict.NAMED for seed in range(15)]
     assert not any(named)

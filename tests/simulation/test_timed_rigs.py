@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
 from collections import Counter
 
 import numpy as np
 import pytest
 
 from mlg_troubleshoot.diagnosis import Verdict
-from tests.benchmarks.bench_series import METHODS, Draw, counted, drawn, draws
+from tests.benchmarks.bench_series import METHODS, Draw, counted, drawn
 from tests.simulation.timed_rigs import NOISES, TIMED, ar1, real_residuals, scatter
 
 EXACT = np.linspace(-2.0, 5.0, 4000)
@@ -62,19 +61,6 @@ def summed(kind: str, size: float, rigs: tuple[str, ...], count: int) -> Counter
 FAST = ("beam", "pump")
 
 
-@pytest.mark.slow
-def test_correlated_rows_with_nothing_wrong_name_nothing() -> None:
-    total = summed("AR .7", 0.0, FAST, 2)
-    assert (total["draws"], total["a cause"], total["NAMED"]) == (4, 0, 0)
-
-
-@pytest.mark.slow
-def test_a_large_change_is_in_the_set_and_nothing_else_is_named() -> None:
-    total = summed("AR .7", 40.0, FAST, 2)
-    assert total["draws"] + total["untestable"] == 4
-    assert (total["in the set"], total["wrong unique"]) == (total["draws"], 0)
-
-
 def test_a_wrong_unique_name_is_counted() -> None:
     draw = drawn("beam", "iid", 40.0, False, (35, 0))
     found = draw.diagnosed()
@@ -91,13 +77,3 @@ def test_every_method_predicts_white_rows_better_than_they_are_read(method: str)
     answer = METHODS[method](draw, np.arange(len(draw.read)) % 4 > 0)
     assert draw.name in answer.names
     assert np.sqrt(np.mean((answer.predicted - draw.exact) ** 2)) < 0.5 * draw.noise
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["iid", "t2.5", "growing", "AR .7"])
-def test_few_draws_with_nothing_wrong_name_anything(kind: str) -> None:
-    total: Counter[str] = Counter()
-    for draw in draws(kind, 0.0, False, Namespace(draws=6, seed=351)):
-        total += counted(draw, draw.diagnosed())
-    assert total["draws"] == 48
-    assert total["a cause"] <= 2
