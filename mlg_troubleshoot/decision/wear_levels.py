@@ -86,7 +86,8 @@ class Doubted:
         limits = cases.gear.limits_in
         rows, joints = np.nonzero(cases.over_limit)
         read = (cases.clearance_in[rows, joints] / limits[joints])[:, None]
-        u = (cases.gauge_u_in[rows, joints] / limits[joints])[:, None]
+        # No share is known better than its cell is wide.
+        u = np.maximum(cases.gauge_u_in[rows, joints] / limits[joints], 0.25 * SHARE)[:, None]
         again = cases.own_gauge[rows, joints][:, None]
         logs = []
         slip = -np.expm1(-PRIORS.wrong_readings / len(limits))

@@ -15,7 +15,7 @@ from mlg_troubleshoot.decision.assessment import (
     Verdict,
 )
 from mlg_troubleshoot.decision.case import Cases, predict_batch
-from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.inspection import Inspection, Outcome
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.prediction import (
     PROVISIONAL_U_IN,
@@ -335,3 +335,8 @@ def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(
         assert all(
             (chance is None) == (0.05 < p < 0.95) for p, chance in zip(stated, wrong, strict=True)
         )
+
+
+def test_a_joint_over_its_limit_may_state_any_uncertainty_above_nothing(judge: Judge) -> None:
+    found = judge({3: 0.009}, gauge_u_by_joint_in={3: 1e-320}, outcome=Outcome.FAILED)
+    assert [finding.joint for finding in found.joints if finding.over_limit] == [3]
