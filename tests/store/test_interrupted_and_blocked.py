@@ -93,7 +93,8 @@ def test_a_clock_at_the_end_of_all_days_ends_no_command(
 def test_a_lock_that_somebody_holds_on_a_server_is_waited_for_no_longer_than_patience() -> None:
     with places.server() as url:
         Store(url).add(places.records(1, 2))
-        with sql.create_engine(url).connect() as other:
+        engine = sql.create_engine(url, poolclass=sql.NullPool)
+        with engine.connect() as other:
             other.execute(sql.select(sql.func.pg_advisory_lock(_ADVISORY_LOCK)))
             began = time.monotonic()
             with pytest.raises(StoreError, match="lock timeout"):
