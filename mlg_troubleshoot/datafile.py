@@ -41,6 +41,7 @@ LONGEST_LINE = 8_000
 DEEPEST = 24
 MOST_ENTRIES = 200
 LONGEST_NAME = 40
+LONGEST_FILE_NAME = 200
 LONGEST_TEXT = 2_000
 LARGEST = 10**12
 _SHOWN = 80
@@ -56,7 +57,16 @@ Sibling = Annotated[
     str,
     Meta(
         pattern=r"^(?!\.{1,2}$)[^/\\\n]+$",
+        max_length=LONGEST_FILE_NAME,
         description="the name of a file in the same folder, without a folder",
+    ),
+]
+JsonSibling = Annotated[
+    str,
+    Meta(
+        pattern=r"^[^/\\\n]+\.json$",
+        max_length=LONGEST_FILE_NAME,
+        description="the name of a .json file in the same folder, without a folder",
     ),
 ]
 

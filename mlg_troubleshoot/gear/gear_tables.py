@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from mlg_troubleshoot.datafile import Name, RefusedValueError, Sibling, Table
+from mlg_troubleshoot.datafile import JsonSibling, Name, RefusedValueError, Sibling, Table
 from mlg_troubleshoot.gear.gear import Discrepancies, RetractionCycle, Source
 
 # Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
@@ -25,13 +25,6 @@ Places = dict[Name, Place]
 Ends = Annotated[tuple[Name, ...], Meta(min_length=2)]
 # A line that moves: the point where it starts, and the one that it leads to or its direction. [deg]
 MovingLine = tuple[Name, Name | Angle]
-IndexFile = Annotated[
-    str,
-    Meta(
-        pattern=r"^[^/\\\n]+\.json$",
-        description="the name of a .json file in the same folder, without a folder",
-    ),
-]
 
 
 class SourcedTable(Table, kw_only=True):
@@ -169,7 +162,7 @@ class GearFile(SourcedTable, kw_only=True):
     diagnosis: Discrepancies = msgspec.field(default_factory=Discrepancies)
     cycle: RetractionCycle | None = None
     ensemble: Sibling | None = None
-    indices: IndexFile | None = None
+    indices: JsonSibling | None = None
 
     @property
     def in_planes(self) -> dict[str, PlaneTable | GearFile]:

@@ -223,6 +223,7 @@ def edited(gear: Gear, tmp_path: Path) -> Edit:
             'indices = "mlg.toml"',
             r"indices: expected the name of a \.json file in the same folder",
         ),
+        ('indices = "hawker', f'indices = "{"h" * 300}', r"indices: expected the name of a \.json"),
         ("F = [-1.8, -11.85]", "F = [1e308, -11.85]", r"ground\.F: expected two numbers"),
         (
             "F = [-1.8, -11.85]",
