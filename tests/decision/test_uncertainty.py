@@ -337,6 +337,10 @@ def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(
         )
 
 
-def test_a_joint_over_its_limit_may_state_any_uncertainty_above_nothing(judge: Judge) -> None:
-    found = judge({3: 0.009}, gauge_u_by_joint_in={3: 1e-320}, outcome=Outcome.FAILED)
+def test_a_joint_over_its_limit_may_state_any_uncertainty_above_nothing(
+    gear: Gear, table: IndexTable
+) -> None:
+    row = inspected({3: 0.009}, gauge_u_by_joint_in={3: 1e-320}, outcome=Outcome.FAILED)
+    (found,) = assess([row], gear, table)
+    assert isinstance(found, Assessment)
     assert [finding.joint for finding in found.joints if finding.over_limit] == [3]
