@@ -223,11 +223,11 @@ def test_of_two_inspections_of_one_day_the_worse_is_shown(judge: Judge) -> None:
     assert latest_of_each_gear(listed(one_day)) == ([0], [1])
 
 
-def test_an_inspection_after_a_repair_is_later_than_another_of_its_day(judge: Judge) -> None:
+def test_a_repair_hides_no_worse_inspection_of_its_day(judge: Judge) -> None:
     day = date(2024, 3, 1)
     after = judge(SOUND, inspection_date=day, restored_joints=(3,), repair_date=day)
     one_day = [after, judge(FAILURE, inspection_date=day)]
-    assert latest_of_each_gear(listed(one_day)) == ([0], [1])
+    assert latest_of_each_gear(listed(one_day)) == ([1], [0])
 
 
 def test_a_gear_that_cannot_be_cleared_has_no_probability_that_would_clear_it(
