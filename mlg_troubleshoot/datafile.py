@@ -50,6 +50,7 @@ Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 AboveZero = Annotated[float, Meta(gt=0, le=LARGEST)]
 Whole = Annotated[int, Meta(ge=-LARGEST, le=LARGEST)]
 Count = Annotated[int, Meta(ge=0, le=LARGEST)]
+Pair = tuple[Number, Number]
 # A name becomes part of messages, keys and drawings.
 Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME, pattern=r"^[^\n]*\S[^\n]*$")]
 Sibling = Annotated[
