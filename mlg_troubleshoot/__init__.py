@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.reporting.picture import Picture
     from mlg_troubleshoot.schemas import schema
     from mlg_troubleshoot.store.database import Store
-    from mlg_troubleshoot.surveying.result import SurveyResult
+    from mlg_troubleshoot.surveying import SurveyResult, survey
     from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length
     from mlg_troubleshoot.workflows.check import (
         CheckOptions,
@@ -80,7 +80,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.workflows.history import Lives
     from mlg_troubleshoot.workflows.index_tables import load_index_table
     from mlg_troubleshoot.workflows.study import run_study
-    from mlg_troubleshoot.workflows.survey import survey
 
 _HOME = {
     "decision.assessment": "Assessment Verdict",
@@ -98,7 +97,7 @@ _HOME = {
     "reporting.picture": "Picture",
     "schemas": "schema",
     "store.database": "Store",
-    "surveying.result": "SurveyResult",
+    "surveying": "SurveyResult survey",
     "units": "ClearanceConvention LengthUnit parse_length",
     "workflows.check": (
         "CheckOptions CheckResult check check_files predict read_inspections write_reports"
@@ -110,7 +109,6 @@ _HOME = {
     "workflows.history": "Lives",
     "workflows.index_tables": "load_index_table",
     "workflows.study": "run_study",
-    "workflows.survey": "survey",
 }
 _MODULES = {name: module for module, names in _HOME.items() for name in names.split()}
 

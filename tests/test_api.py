@@ -124,7 +124,7 @@ def test_a_check_of_one_file_loads_no_room_that_it_does_not_use(output: list[str
 
 
 def test_a_command_loads_none_of_the_others() -> None:
-    others = {"diagnose", "fleet", "gear", "history", "study", "survey", "template"}
+    others = {"diagnose", "fleet", "gear", "history", "study", "template"}
     assert {f"mlg_troubleshoot.cli.{name}" for name in others} & modules_of(*ONE_GEAR) == set()
 
 

@@ -197,7 +197,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "diagnosis": lambda: result("diagnose").diagnosis,
     "extension": lambda: result("diagnose").extension,
     "simulation": simulated,
-    "survey": lambda: mlg.survey(pd.DataFrame(SURVEY)),
+    "survey": lambda: mlg.survey(FOUR_BAR_READINGS, FOUR_BAR),
     "lives": lambda: mlg.forecast(DATA / "fleet_batch.csv"),
     "catalogue": lambda: CATALOGUE,
     "picture": lambda: result("gear").plot(),
@@ -210,7 +210,8 @@ def result(name: str) -> Any:
     return RESULTS[name]()
 
 
-SURVEY = {"kind": ["PLUNGER"], "from": [None], "to": [None], "value_in": ["x"]}
+FOUR_BAR = ROOT / "tests" / "geometry" / "data" / "four-bar.toml"
+FOUR_BAR_READINGS = ROOT / "docs" / "how-to" / "data" / "four-bar-readings.csv"
 COPIES: dict[str, Callable[[Any], Any]] = {
     "pickle": lambda given: pickle.loads(pickle.dumps(given)),
     "deepcopy": copy.deepcopy,
@@ -254,7 +255,7 @@ def test_a_result_is_a_table(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "command"),
     [
-        *((name, name) for name in ("check", "diagnose", "study", "survey", "gear")),
+        *((name, name) for name in ("check", "diagnose", "study", "gear")),
         ("lives", "fleet"),
     ],
 )
@@ -358,11 +359,6 @@ def test_a_store_gives_what_it_keeps_as_tables(tmp_path: Path) -> None:
     assert len(store.lives()) == len(gears)
 
 
-def test_a_survey_of_a_frame_names_its_wrong_cell() -> None:
-    (problem,) = result("survey").problems
-    assert problem.place() == "DataFrame, cell loc[0, 'value_in'], column 'value_in'"
-
-
 CAUSE = """
 import numpy as np
 from mlg_troubleshoot import Cause
@@ -439,7 +435,8 @@ def test_every_file_may_be_given_by_its_name(tmp_path: Path) -> None:
     (tmp_path / "beliefs.toml").write_text("schema = 1\n")
     options = {"cause_files": (cause,), "beliefs_file": str(tmp_path / "beliefs.toml")}
     assert mlg.diagnose(str(DATA / "measured_pressure.csv"), **options).diagnosis.causes
-    assert mlg.survey(pd.DataFrame(SURVEY), write=str(tmp_path / "gear.toml")).gear_file is None
+    surveyed = mlg.survey(str(FOUR_BAR_READINGS), str(FOUR_BAR))
+    assert surveyed.write(str(tmp_path / "gear.toml")).path == tmp_path / "gear.toml"
     found = mlg.check(str(DATA / "failure_case.csv"))
     (report,) = mlg.write_reports(found, mlg.CheckOptions(), str(tmp_path / "pages"), **PAGES)
     assert report.html is not None and report.html.parent == tmp_path / "pages"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +22,6 @@ from tests.hidden_effect.simulator.generate import draw_fleet, write_csv
 from tests.store.places import table
 
 FOUR_BAR = Path(__file__).parent / "geometry" / "data" / "four-bar.toml"
-SURVEY_HEADER = "kind,from,to,value_in,u_in"
-GOOD_READINGS = [
-    "DISTANCE,O2,A,2.1,0.005",
-    "DISTANCE,A,B,7.15,0.005",
-    "DISTANCE,B,O4,9.1,0.005",
-    "DISTANCE,O2,O4,6.05,0.005",
-    "DISTANCE,A,O4,4.0197,0.005",
-]
-BAD_READINGS = [*GOOD_READINGS, "DISTANCE,A,B,7.36,0.005", "DISTANCE,A,X,1,0.005"]
 Change = Callable[[Any], object]
 ROOT = Path(__file__).parents[1]
 BAD_ROWS = (
@@ -55,7 +46,7 @@ def test_an_unknown_schema_is_refused() -> None:
 
 
 def test_the_contract_names_eight_outputs_and_the_verification() -> None:
-    named = "check diagnose study fleet history life gear survey"
+    named = "check diagnose study fleet history life gear"
     assert set(schemas.NAMES) == {*named.split(), "verify"}
 
 
@@ -235,14 +226,6 @@ def test_what_is_said_of_the_gear_fits_its_schema(name: str, arguments: tuple[ob
 
 def test_a_diagnosis_that_cannot_be_concluded_fits_its_schema() -> None:
     assert complain("diagnose", mlg("diagnose", FAILURE, "--json").json) == []
-
-
-@pytest.mark.parametrize("rows", [GOOD_READINGS, GOOD_READINGS[:1], BAD_READINGS])
-def test_every_survey_fits_its_schema(rows: Sequence[str], tmp_path: Path) -> None:
-    file = tmp_path / "s.csv"
-    file.write_text("\n".join((SURVEY_HEADER, *rows)) + "\n")
-    run = mlg("gear", "--gear", FOUR_BAR, "survey", file, "--json")
-    assert complain("survey", run.json) == []
 
 
 def test_the_keys_of_an_output_stand_in_the_order_of_its_type(judged: Any) -> None:

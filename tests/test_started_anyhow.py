@@ -13,7 +13,6 @@ ROOT = Path(__file__).parents[1]
 ON_A_TERMINAL = (
     "tests/cli/test_on_a_terminal.py::test_an_interrupt_says_how_to_go_on_and_exits_130",
     "tests/prompts/test_prompt_terminal.py::test_no_question_loses_an_answer[joint]",
-    "tests/cli/test_survey_prompts.py::test_an_interrupt_at_the_line_loses_nothing_and_says_how_to_go_on",
 )
 WHAT_A_USER_SETS = (
     "tests/cli/test_views.py::test_the_screen_follows_columns_and_is_80_wide_without",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mlg_troubleshoot.cli import options, output, survey
+from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 
@@ -83,4 +83,3 @@ app = options.commands(
 )
 app.callback(epilog="Example: [b]mlg gear verify[/b]")(show)
 app.command(epilog="Example: [b]mlg gear verify[/b]")(verify)
-app.command(epilog=survey.EPILOG)(survey.survey)

@@ -30,9 +30,9 @@ from mlg_troubleshoot.reporting.json_form import (
     plain,
 )
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
-from mlg_troubleshoot.reporting.model_json import study_as_json, survey_as_json
+from mlg_troubleshoot.reporting.model_json import study_as_json
 from mlg_troubleshoot.store import Store
-from mlg_troubleshoot.surveying.result import SurveyResult
+from mlg_troubleshoot.surveying import SurveyResult
 from mlg_troubleshoot.workflows.check import CheckResult
 from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
 from mlg_troubleshoot.workflows.history import Lives, show_fleet
@@ -69,7 +69,7 @@ _AS_JSON: dict[type, Callable[[Any], Any]] = {
     Assessment: assessment_as_json,
     DiagnoseResult: lambda r: diagnosis_as_json(r.diagnosis, r.extension, r.notes),
     Diagnosis: lambda r: diagnosis_as_json(r, None),
-    SurveyResult: survey_as_json,
+    SurveyResult: lambda r: plain({"numbers": r.numbers, "joints": r.joints}),
     StudyFindings: study_as_json,
     WorstCase: _worst_case_as_json,
     Gear: gear_as_json,

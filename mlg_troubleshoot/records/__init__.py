@@ -34,7 +34,6 @@ __all__ = [
     "read",
     "read_many",
     "rows",
-    "survey_table",
     "template",
     "values",
 ]

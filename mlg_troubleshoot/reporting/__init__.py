@@ -17,5 +17,4 @@ __all__ = [
     "publish",
     "schematic",
     "study_figures",
-    "survey_report",
 ]

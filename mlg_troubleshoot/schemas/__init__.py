@@ -18,7 +18,6 @@ NAMES = (
     "life",
     "gear",
     "verify",
-    "survey",
 )
 FILES = ("gear-file", "ensemble", "targets", "indices", "extension", "headers", "beliefs")
 
@@ -29,8 +28,8 @@ def schema(name: str) -> dict[str, Any]:
     Parameters
     ----------
     name : str
-        ``check``, ``diagnose``, ``study``, ``fleet``, ``history``, ``life``, ``gear``, ``verify``
-        or ``survey``; of files ``gear-file``, ``ensemble``, ``targets``, ``indices``,
+        ``check``, ``diagnose``, ``study``, ``fleet``, ``history``, ``life``, ``gear`` or
+        ``verify``; of files ``gear-file``, ``ensemble``, ``targets``, ``indices``,
         ``extension``, ``headers`` or ``beliefs``.
 
     Returns

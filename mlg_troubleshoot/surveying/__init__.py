@@ -1,10 +1,5 @@
 """The geometry of a gear from readings of a real one."""
 
-__all__ = [
-    "as_gear_file",
-    "plan",
-    "readings",
-    "result",
-    "survey",
-    "tuned",
-]
+from mlg_troubleshoot.surveying.survey import SurveyResult, survey
+
+__all__ = ["SurveyResult", "survey"]

@@ -10,5 +10,4 @@ __all__ = [
     "keep",
     "kept",
     "study",
-    "survey",
 ]

@@ -17,8 +17,6 @@ from mlg_troubleshoot.cli import output
 from tests.cli.conftest import DATA, FAILURE, FLEET, ROOT
 
 pexpect = pytest.importorskip("pexpect")
-FOUR_BAR = ROOT / "tests" / "geometry" / "data" / "four-bar.toml"
-SURVEY = ROOT / "tests" / "studies" / "data" / "four-bar-survey.csv"
 STORE = ROOT / "tests" / "store" / "data" / "version-1.sqlite"
 COMMANDS = {
     "help": (("--help",), 0),
@@ -33,8 +31,6 @@ COMMANDS = {
     "study": (("study", "--design", "lhs", "--size", "2,20,2"), 0),
     "history": (("history", "--store", str(STORE)), 0),
     "fleet": (("fleet", "--no-forecast", "--store", str(STORE)), 0),
-    "survey template": (("gear", "survey", "template", "neu–2.csv"), 0),
-    "survey": (("gear", "--gear", str(FOUR_BAR), "survey", str(SURVEY), "--show", "mm"), 1),
     "diagnose": (("diagnose", str(DATA / "measured_pressure.csv")), 1),
 }
 STREAMS = {

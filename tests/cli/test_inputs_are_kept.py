@@ -263,7 +263,6 @@ def test_an_export_is_written_again_with_force_only(store: Path, tmp_path: Path)
         ("study", "--csv"),
         ("history", "export"),
         ("template",),
-        ("gear", "survey", "template"),
     ],
     ids=lambda command: " ".join(str(word) for word in command if not isinstance(word, Path)),
 )
@@ -276,16 +275,6 @@ def test_a_file_that_something_else_wrote_is_not_replaced(
     assert "--force" in found.err
     assert found.out == ""
     assert path.read_text(encoding="utf-8") == "Dear Sir,"
-
-
-@pytest.mark.parametrize("name", ["mine.toml", "mine-ensemble.toml", "mine-indices.json"])
-def test_a_surveyed_gear_does_not_replace_another_file(name: str, tmp_path: Path) -> None:
-    mlg("gear", "survey", "template", tmp_path / "s.csv")
-    (tmp_path / name).write_text("mine", encoding="utf-8")
-    found = mlg("gear", "survey", tmp_path / "s.csv", "--write", tmp_path / "mine.toml")
-    assert found.code == 2
-    assert f"--write {tmp_path / name} exists" in found.err
-    assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
 
 
 def test_a_table_of_a_study_replaces_another_with_force_only(own_gear: Path) -> None:

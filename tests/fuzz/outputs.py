@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.fuzz.case import Case
-from tests.fuzz.desk import DATA, STORE, Desk
+from tests.fuzz.desk import STORE, Desk
 
-SURVEY = str(DATA.parent / "tests" / "studies" / "data" / "four-bar-survey.csv")
-FOUR_BAR = str(DATA.parent / "tests" / "geometry" / "data" / "four-bar.toml")
 SMALL = ["study", "--design", "lhs", "--size", "2,20,1"]
 
 
@@ -71,14 +69,12 @@ OUTPUTS = (
     ),
     Output(["fleet", "--no-forecast", "-q", "--report"], (), "", folder=True, takes_a_store=True),
     Output(["template"], (), ""),
-    Output(["gear", "survey", "template"], (), ""),
     Output(
         ["diagnose", "far.csv", "-q", "--write-extension"],
         ("far.csv",),
         rare=True,
     ),
     Output([*SMALL, "--csv"], (), "", rare=True),
-    Output(["gear", "--gear", FOUR_BAR, "survey", SURVEY, "-q", "--write"], (), "", rare=True),
 )
 FOREIGN = (
     "mine.txt",

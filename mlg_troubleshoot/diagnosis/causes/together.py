@@ -222,8 +222,8 @@ class OtherGeometry(JointFactors):
     name = "geometry"
     bounds = (0.0, 3.0)
     sentence = "The linkage has other dimensions than the drawn one: its joints count more or less"
-    inspect = "Distances between the pivots of one gear (mlg gear survey says which one first)"
-    separates = "the next distance that the survey of one gear asks for"
+    inspect = "Distances between the pivots of one gear (a survey of the gear)"
+    separates = "a survey of one gear"
 
     def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
         """Second moments of what the linkages of the ensemble make of each joint, about the drawn
