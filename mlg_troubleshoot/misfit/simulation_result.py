@@ -126,8 +126,8 @@ class SimulationDiagnosis(Result):
     aliases : tuple of tuple of str
         Classes of suspects that these rows cannot distinguish where the simulation fits best.
     why_untestable : mapping of str to str
-        Suspects that these rows cannot test, and why: no effect here, absorbed by the nuisance
-        parameters, or no number near the nominal value.
+        Suspects that these rows cannot test, and why: absorbed by the nuisance parameters, or no
+        effect here, also where no call gives numbers.
     p_nothing : float
         Probability that nothing is wrong. [1]
     p_unlisted : float
@@ -136,13 +136,13 @@ class SimulationDiagnosis(Result):
         Gain on held-out rows.
     parameters : mapping of str to float
         Value of every suspect and nuisance parameter, to predict with: the causes as fitted, all
-        else nominal; where the posterior leaves rivals (AMBIGUOUS), each suspect as expected over
-        all that may be wrong, by how likely it is.
+        else nominal; where the posterior leaves rivals (AMBIGUOUS), those of the likeliest
+        explanation.
     noise : tuple of float
         Standard deviation of a reading of each output. [unit of the readings]
     correlation : float
-        Of the scatter of two rows of a series one usual step apart, as expected; 0 where no series
-        was given. [1]
+        Of the scatter of two rows of a series one usual step apart, as it is likeliest; 0 where no
+        series was given. [1]
     in_sequence : bool
         True if residuals of neighbouring rows are correlated in the order given, beyond what
         `series` accounts for: then probabilities are too sharp.
