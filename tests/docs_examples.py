@@ -125,18 +125,22 @@ def pictures() -> dict[str, str]:
     does.
     """
     from mlg_troubleshoot import ClearanceConvention, Inspection, Side, check, load_gear
+    from mlg_troubleshoot.reporting.formats import Lengths
     from mlg_troubleshoot.reporting.inspection_figures import plunger_curve
-    from mlg_troubleshoot.reporting.schematic import schematic
+    from mlg_troubleshoot.reporting.schematic import joint_key, schematic
 
     gear = load_gear()
     failure = {3: 0.013, 5: 0.007}
     found = check(
         Inspection("PAPER-4.4", "not-stated", Side.LH, ClearanceConvention.RADIAL, failure), gear
     )
-    drawn = schematic(gear, found, width=900.0)
+    drawn = schematic(gear, found, width=610.0)
     return {
         "linkage.svg": standing_alone(
-            [str(panel) for _plane, panel, _width in drawn.panels],
+            [
+                *(str(panel) for _plane, panel, _width in drawn.panels),
+                str(joint_key(gear, failure, Lengths())),
+            ],
             f"{gear.name}, linkage {gear.reference.name} at mid-position: {gear.provenance}."
             f" Arrows: worst-case clearances of the published failure, {drawn.exaggeration} times"
             " larger than life.",
@@ -166,7 +170,7 @@ def standing_alone(panels: list[str], caption: str) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}"'
         f' width="{width:g}" height="{height:g}" font-family="{_FONTS}" role="img"><rect'
         f' width="100%" height="100%" fill="#ffffff"/>{"".join(parts)}<text x="{margin:g}"'
-        f' y="{height - margin:g}" font-size="11" fill="#3c4650">{caption}</text></svg>\n'
+        f' y="{height - margin:g}" font-size="9.5" fill="#3c4650">{caption}</text></svg>\n'
     )
 
 

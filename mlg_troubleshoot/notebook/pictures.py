@@ -15,7 +15,7 @@ from mlg_troubleshoot.reporting import diagnosis_figures
 from mlg_troubleshoot.reporting.fleet_figures import wear_figure
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.picture import Picture
-from mlg_troubleshoot.reporting.schematic import Schematic, blank_schematic, schematic
+from mlg_troubleshoot.reporting.schematic import blank_schematic, joint_key, schematic
 from mlg_troubleshoot.reporting.study_figures import indices_figure
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.check import CheckResult
@@ -29,15 +29,14 @@ def _linkage(result: CheckResult, row: int = 0, unit: str = "in") -> list[Markup
         raise UsageError(
             f"row {row} has nothing to draw", "Give the place of a row that was judged."
         )
-    return _panels(schematic(result.gear, judgement, Lengths(LengthUnit.parse(unit))))
+    clearance_in = judgement.inspection.clearance_in
+    key = joint_key(result.gear, clearance_in, Lengths(LengthUnit.parse(unit)))
+    return [panel for _, panel, _ in schematic(result.gear, judgement).panels] + [key]
 
 
 def _unmeasured(gear: Gear) -> list[Markup]:
-    return _panels(blank_schematic(gear))
-
-
-def _panels(drawn: Schematic) -> list[Markup]:
-    return [panel for _, panel, _ in drawn.panels]
+    drawn = blank_schematic(gear)
+    return [panel for _, panel, _ in drawn.panels] + [joint_key(gear, {}, Lengths())]
 
 
 def _indices(result: StudyFindings | IndexTable) -> list[Markup]:

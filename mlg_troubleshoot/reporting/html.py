@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cache, partial
-from pathlib import PurePath
+from importlib.resources import files
+from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
 
@@ -17,11 +18,14 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context,
 from jinja2.runtime import Context
 from markupsafe import Markup
 
-from mlg_troubleshoot.errors import grouped
+from mlg_troubleshoot.errors import OutputError, grouped
 from mlg_troubleshoot.reporting import formats
-from mlg_troubleshoot.reporting.glyphs import breakable, font_faces, templates_folder
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.visible import visible
+
+FONT_FILES = {"normal": "fonts/DejaVuSans.ttf", "bold": "fonts/DejaVuSans-Bold.ttf"}
+_LONGEST_WORD = 64
+_LONG_WORD = re.compile(rf"\S{{{_LONGEST_WORD + 1},}}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +47,20 @@ class Document:
         """The moment of the document: the same input and the same moment give the same bytes."""
         made: ReportProvenance = self.context["made"]
         return made.created
+
+
+@cache
+def templates_folder() -> Path:
+    package = Path(str(files("mlg_troubleshoot")))
+    candidates = (package / "templates", package.parent / "templates")
+    for folder in candidates:
+        if (folder / "base.html.j2").is_file():
+            return folder
+    raise OutputError(
+        f"the report templates are missing: neither {candidates[0]} nor {candidates[1]} holds"
+        " base.html.j2",
+        "Install the package again.",
+    )
 
 
 @cache
@@ -99,6 +117,15 @@ def _readable(value: Any) -> Any:
     )
 
 
+def breakable(text: str) -> str:
+    """Let a word that is wider than a page be broken: the PDF engine would shrink the whole page to
+    fit it.
+    """
+    if len(text) <= _LONGEST_WORD:
+        return text
+    return _LONG_WORD.sub(lambda word: "\u200b".join(re.findall(".{1,32}", word[0])), text)
+
+
 def address(file_name: str) -> Markup:
     """Write the name of a file next to the document as a link's address, which nothing may be added
     to.
@@ -117,6 +144,16 @@ def css_string(text: str) -> Markup:
 
 
 @cache
+def font_faces() -> str:
+    """Return the ``@font-face`` rules of the bundled fonts, which the PDF engine knows by name."""
+    return "".join(
+        f"@font-face{{font-family:'Report Sans';font-weight:{weight};"
+        f"src:url({PurePath(name).name}) format('truetype')}}"
+        for weight, name in FONT_FILES.items()
+    )
+
+
+@cache
 def _stylesheet() -> str:
     return (templates_folder() / "report.css").read_text(encoding="utf-8")
 
@@ -129,7 +166,7 @@ def _scripted(name: str | None) -> dict[str, Markup]:
     return {"script": Markup(text), "script_hash": Markup(mark)}
 
 
-def render(document: Document, page: str, *, for_pdf: bool = False, glyph_note: str = "") -> str:
+def render(document: Document, page: str, *, for_pdf: bool = False) -> str:
     return (
         environment()
         .get_template(document.template)
@@ -138,7 +175,6 @@ def render(document: Document, page: str, *, for_pdf: bool = False, glyph_note: 
             page=page,
             orientation="landscape" if document.landscape else "portrait",
             for_pdf=for_pdf,
-            glyph_note=glyph_note,
             **_scripted(None if for_pdf else document.script),
             font_faces=Markup(font_faces()) if for_pdf else Markup(""),
             stylesheet=Markup(_stylesheet()),

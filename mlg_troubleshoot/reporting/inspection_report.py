@@ -120,7 +120,7 @@ def _inspection(
         "carried_in_full": carried if carried != in_front else [],
         "front_warnings": front,
         "gauge": drawn.margin_gauge(a, lengths),
-        "drawing": schematic(gear, a, lengths),
+        "drawing": schematic(gear, a),
         "legend": [(joint_mark("", state), words) for state, words in JOINT_STATES.items()],
         "wrong": chance_wrong_sentence(a),
         "no_repair": no_repair_set(a),

@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from mlg_troubleshoot.reporting.glyphs import FONT_FILES, templates_folder
+from mlg_troubleshoot.reporting.html import FONT_FILES, templates_folder
 
 # A page takes 0.03 to 0.1 s: what takes longer than this does not end. [s]
 TIME_LIMIT_S = 30

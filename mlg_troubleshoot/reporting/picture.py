@@ -11,7 +11,7 @@ from markupsafe import Markup, escape
 
 from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.reporting.glyphs import font_faces
+from mlg_troubleshoot.reporting.html import font_faces
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
 
 _FONT = "DejaVu Sans, Verdana, sans-serif"

@@ -14,13 +14,16 @@ from pathlib import Path
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.reporting.glyphs import missing_characters, spell_out
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
 
 Progress = Callable[[int, int], None]
 FORMATS = ("html", "pdf")
 PAGES = ("A4", "Letter")
+_BOXES = (
+    "Some characters stand as boxes in the PDF: no font on this computer has them. The HTML report"
+    " has them as entered."
+)
 _NAME = re.compile(r"(mlg-.*|fleet)\.(html|pdf)", re.IGNORECASE)
 
 
@@ -95,8 +98,11 @@ def publish(
                 running.start()
         if "pdf" in wanted:
             try:
-                pdf, found = _pdf(document, page, running)
-                notes += found
+                html = render(document, page, for_pdf=True)
+                pdf, boxes = running.convert(html, page, document.created)
+                if boxes:
+                    notes.append(_BOXES)
+                    wanted.add("html")
                 made["pdf"] = _written(directory / f"{document.stem}.pdf", pdf)
             except PdfError as error:
                 instead = f"Open {web.name} in a web browser and print it"
@@ -113,26 +119,6 @@ def publish(
 def _written(file: Path, data: bytes) -> Path:
     write_bytes(file, data)
     return file
-
-
-def _pdf(document: Document, page: str, engine: PdfEngine) -> tuple[bytes, list[str]]:
-    """Make the PDF; characters that no font of this machine can draw are spelled out."""
-    html = render(document, page, for_pdf=True)
-    made, boxes = engine.convert(html, page, document.created)
-    missing = missing_characters(html)
-    if not missing or not boxes:
-        return made, []
-    note = (
-        "No font on this computer can draw"
-        f" {' '.join(missing[:12])}{' …' if len(missing) > 12 else ''}: they stand in the PDF by"
-        " their sound or code in ‹ ›; the HTML report has them as entered."
-    )
-    on_paper = (
-        "Text in ‹ › stands for characters that this PDF's fonts lack; the HTML report has them as"
-        " entered."
-    )
-    html = render(document, page, for_pdf=True, glyph_note=on_paper)
-    return engine.convert(spell_out(html, missing), page, document.created)[0], [note]
 
 
 def publish_all(

@@ -1,5 +1,5 @@
 """The linkage drawn in its planes: joints numbered in place, distinguished by shape, clearances
-exaggerated.
+exaggerated; a table next to the drawing names them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import Any, Literal, Unpack
 import numpy as np
 from markupsafe import Markup
 
-from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.gear.gear import Gear, JointSpec
 from mlg_troubleshoot.geometry.mechanism import (
@@ -34,6 +33,7 @@ from mlg_troubleshoot.reporting.figures import (
     PAPER,
     RULE,
     SOFT,
+    TEXT_SIZE,
     Anchor,
     Canvas,
     Stroke,
@@ -69,47 +69,47 @@ _LONGEST_ARROW = 42
 _SHORTEST_ARROW = 2.5
 # One scale for most reports, so that their drawings compare.
 _LARGEST_EXAGGERATION = 100
-# With more joints over their limit, frames would cover the linkage.
-_MOST_FRAMES = 2
-# Room for labels, supports and the slot above and below the linkage. [px]
+# Room for supports and the slot above and below the linkage. [px]
 _ABOVE = 44
 _BELOW = 40
 
-# Where a label is tried around a joint: every 15 degrees, none of them straight along a line, at
-# these distances from its marker. [rad, px]
-_TURNS = np.arange(24) * np.pi / 12 + 1e-6
-_COSINES = np.cos(_TURNS)
-_SINES = np.sin(_TURNS)
-_RINGS = np.array([0, 5, 10, 16, 24, 34, 46, 60, 76, 94], float)
-
 # Points and directions of a drawing are complex numbers: x to the right, y downward. [canvas units]
-Segment = tuple[complex, complex]
-Box = tuple[float, float, float, float]
 
 
-def schematic(
-    gear: Gear, assessment: Assessment, lengths: Lengths | None = None, width: float = _WIDTH
-) -> Schematic:
+def schematic(gear: Gear, assessment: Assessment, width: float = _WIDTH) -> Schematic:
     """Draw the linkage at mid-position, its joints numbered in place and their clearances
     exaggerated.
     """
     over = (assessment.over_travel_in or 0.0) >= -(assessment.under_travel_in or 0.0)
     directions = assessment.over_directions_rad if over else assessment.under_directions_rad
-    clearance_in = assessment.inspection.clearance_in
-    return _drawn(gear, clearance_in, directions, lengths or Lengths(), width)
+    return _drawn(gear, assessment.inspection.clearance_in, directions, width)
 
 
 def blank_schematic(gear: Gear) -> Schematic:
-    """Draw the linkage with its joints numbered and named, none of them measured yet."""
-    return _drawn(gear, {}, (), Lengths(), _WIDTH)
+    """Draw the linkage with its joints numbered, none of them measured yet."""
+    return _drawn(gear, {}, (), _WIDTH)
+
+
+def joint_key(gear: Gear, clearance_in: Mapping[int, float], lengths: Lengths) -> Markup:
+    """List the joints by their marks with names and clearances, for a drawing without a table."""
+    lines = []
+    for joint in gear.joints:
+        clearance = clearance_in.get(joint.number)
+        state = joint_state(joint, clearance)
+        said = "" if clearance is None else f", {lengths.full(clearance)}"
+        over = ", OVER LIMIT" if state == "over" else ""
+        lines.append((joint, state, joint.name + said + over))
+    width = 34 + max(text_width(line, TEXT_SIZE) for _, _, line in lines)
+    canvas = Canvas(width, 4 + 21 * len(lines), "Joints")
+    for row, (joint, state, line) in enumerate(lines):
+        y = 12 + 21 * row
+        _mark(canvas, complex(12, y), str(joint.number), state)
+        canvas.text(28, y + 4, line, bold=state == "over")
+    return canvas.svg("figure")
 
 
 def _drawn(
-    gear: Gear,
-    clearance_in: Mapping[int, float],
-    directions: Sequence[float],
-    lengths: Lengths,
-    width: float,
+    gear: Gear, clearance_in: Mapping[int, float], directions: Sequence[float], width: float
 ) -> Schematic:
     planes = (_PlaneDrawing(gear, plane.name) for plane in gear.reference.mechanism.planes)
     drawings = [drawing for drawing in planes if drawing.points]
@@ -119,62 +119,17 @@ def _drawn(
     scale = free / sum(drawing.size.real for drawing in drawings)
     largest = max(clearance_in.values(), default=0.0)
     exaggeration = None
+    links: dict[int, complex] = {}
     if largest > 0.0 and directions:
         exaggeration = min(_LARGEST_EXAGGERATION, _one_digit(_LONGEST_ARROW / (largest * scale)))
+        for joint, angle in zip(gear.joint_numbers, directions, strict=True):
+            length = clearance_in.get(joint, 0.0) * exaggeration * scale
+            if length > _SHORTEST_ARROW:
+                links[joint] = cmath.rect(length, -angle)
     height = max(drawing.size.imag for drawing in drawings) * scale + _ABOVE + _BELOW
-    shown = _Shown(
-        gear,
-        clearance_in,
-        dict(zip(gear.joint_numbers, directions, strict=True)) if exaggeration else {},
-        (exaggeration or 0) * scale,
-        lengths,
-    )
-    return Schematic(
-        tuple(drawing.draw(scale, side, height, shown) for drawing in drawings), exaggeration
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Shown:
-    """What is shown at the joints: clearances, their directions, and how long an inch of clearance
-    is drawn.
-    """
-
-    gear: Gear
-    clearance_in: Mapping[int, float]
-    angles: dict[int, float]
-    per_inch: float
-    lengths: Lengths
-
-    def state(self, joint: int) -> JointState:
-        return joint_state(self.gear.joint(joint), self.clearance_in.get(joint))
-
-    def said(self, joint: int) -> str:
-        state = self.state(joint)
-        if state == "missing":
-            return JOINT_STATES[state]
-        over = f" {JOINT_STATES[state]}" if state == "over" else ""
-        return self.lengths.full(self.clearance_in[joint]) + over
-
-    def arrow(self, joint: int, place: complex) -> Segment | None:
-        """The joint's clearance as an arrow from the edge of its marker; None if it would be too
-        short to see.
-        """
-        length = self.clearance_in.get(joint, 0.0) * self.per_inch
-        if joint not in self.angles or length <= _SHORTEST_ARROW:
-            return None
-        along = cmath.rect(1.0, -self.angles[joint])
-        start = place + _MARKER * along
-        return start, start + length * along
-
-    def label(self, joint: int, name: str, *, strong: bool) -> list[_Line]:
-        lines = [_Line(part, 8.5, False) for part in ([name] if strong else _two_lines(name))]
-        state = self.state(joint)
-        if state != "missing":
-            mark = " OVER LIMIT" if strong else " OVER" if state == "over" else ""
-            size = 10.5 if strong else 9.5
-            lines.append(_Line(self.lengths.bare(self.clearance_in[joint]) + mark, size, True))
-        return lines
+    states = {j.number: joint_state(j, clearance_in.get(j.number)) for j in gear.joints}
+    panels = (drawing.draw(scale, side, height, states, links) for drawing in drawings)
+    return Schematic(tuple(panels), exaggeration)
 
 
 def _one_digit(value: float) -> int:
@@ -225,15 +180,20 @@ class _PlaneDrawing:
             self.points[anchor] = self.points[joint] + share * run
 
     def draw(
-        self, scale: float, side: float, height: float, shown: _Shown
+        self,
+        scale: float,
+        side: float,
+        height: float,
+        states: Mapping[int, JointState],
+        links: Mapping[int, complex],
     ) -> tuple[str, Markup, float]:
-        """Draw the plane: links and supports, then joints with their clearances, then their
-        names.
+        """Draw the plane: rigid parts and supports, then joints with their virtual links [canvas
+        units].
         """
         width = self.size.real * scale + 2 * side
         name = self.plane.replace("_", " ") + " plane"
         joints = [j for j in self.gear.joints if j.point in self.points]
-        said = ", ".join(f"joint {j.number} {shown.said(j.number)}" for j in joints)
+        said = ", ".join(f"joint {j.number} {JOINT_STATES[states[j.number]]}" for j in joints)
         canvas = Canvas(width, height, f"Linkage schematic, {name}", said)
         # Upward in the plane is to lower numbers on the canvas.
         corner = complex(side, (height + _ABOVE - _BELOW + self.size.imag * scale) / 2)
@@ -243,8 +203,7 @@ class _PlaneDrawing:
         }
 
         canvas.text(2, 11, name, size=10.5, bold=True, colour=SOFT)
-        segments = self._links(canvas, at)
-        boxes = self._obstacles(at)
+        self._links(canvas, at)
         for point, place in at.items():
             if point not in self.cut:
                 if self.mechanism.point(point).fixed:
@@ -252,105 +211,56 @@ class _PlaneDrawing:
                 if all(joint.point != point for joint in joints):
                     canvas.marker("circle", place.real, place.imag, 3.0)
         markers = _without_overlap({j.number: at[j.point] for j in joints})
-        here = [j for j in joints if self.mechanism.point(j.point).plane == self.plane]
-        for joint in joints:
-            if joint not in here:
-                state = shown.state(joint.number)
-                _mark(canvas, markers[joint.number], str(joint.number), state, faded=True)
-        for joint in here:
+        # Those of another plane first: nothing of theirs may cover this one's.
+        for joint in sorted(joints, key=self._stands_here):
+            number = joint.number
             place = at[joint.point]
-            marker = markers[joint.number]
-            arrow = shown.arrow(joint.number, place)
-            if arrow is not None:
-                _arrow(canvas, *arrow)
-                segments.append(arrow)
-                boxes.append(_box(*arrow))
-            if marker != place:
+            marker = markers[number]
+            here = self._stands_here(joint)
+            if here and number in links:
+                along = links[number]
+                start = place + _MARKER * _unit(along)
+                _arrow(canvas, start, start + along)
+            if here and marker != place:
                 _line(canvas, place, marker, colour=SOFT, width=1.2)
                 canvas.marker("circle", place.real, place.imag, 2.5)
-                boxes.append(_box(marker, around=11 + 11j))
-            _mark(canvas, marker, str(joint.number), shown.state(joint.number))
-        over = [joint for joint in here if shown.state(joint.number) == "over"]
-        for joint in sorted(here, key=lambda joint: joint not in over):
-            strong = joint in over and len(over) <= _MOST_FRAMES
-            lines = shown.label(joint.number, joint.name, strong=strong)
-            _callout(canvas, markers[joint.number], lines, boxes, segments, strong)
+            _mark(canvas, marker, str(number), states[number], faded=not here)
         return name, canvas.svg("figure panel"), width
 
-    def _obstacles(self, at: Mapping[str, complex]) -> list[Box]:
-        """Boxes of what labels must not cover: markers, supports, the slot, actuator and plunger
-        with their names.
-        """
-        boxes: list[Box] = [(0.0, 0.0, 130.0, 14.0)]
-        pins = {s.pin for s in self.steps if isinstance(s, Slot)}
-        for point, place in at.items():
-            fixed = self.mechanism.point(point).fixed and point not in self.cut
-            reach = 27.0 if point in pins or fixed else _MARKER
-            half = 15.0 if fixed else 11.0
-            # A support hidden by a label would be missed most: it counts three times.
-            box = _box(place - complex(half, 11.0), place + complex(half, reach))
-            boxes += [box] * (3 if fixed else 1)
-        for step in self.steps:
-            place = at[step.joint]
-            if isinstance(step, Slider):
-                along = cmath.rect(1.0, -step.axis)
-                left, top, right, bottom = _box(place + 20 * along, place + 60 * along)
-                boxes.append((left - 60, top - 6, right + 10, bottom + 6))
-            if isinstance(step, Dyad) and step.driven:
-                far = at[step.upstream]
-                left, _top, right, bottom = _box(place, far)
-                middle = (place + far).imag / 2
-                boxes.append((left - 62, middle - 12, right + 8, bottom))
-        return boxes
+    def _stands_here(self, joint: JointSpec) -> bool:
+        return self.mechanism.point(joint.point).plane == self.plane
 
-    def _links(self, canvas: Canvas, at: Mapping[str, complex]) -> list[Segment]:
-        """Draw the rigid parts below, the links above; return the segments for the placing of
-        labels.
-        """
-        segments = self._rigid_parts(canvas, at)
+    def _links(self, canvas: Canvas, at: Mapping[str, complex]) -> None:
+        """Draw the rigid parts below, the links above."""
+        self._rigid_parts(canvas, at)
         for step in self.steps:
             place = at[step.joint]
             match step:
                 case Dyad():
-                    ends = at[step.upstream], at[step.downstream]
-                    (_actuator if step.driven else _bar)(canvas, ends[0], place)
+                    (_actuator if step.driven else _bar)(canvas, at[step.upstream], place)
                     if not self._rigid(step.joint, step.downstream):
-                        _bar(canvas, place, ends[1])
-                    segments += [(ends[0], place), (place, ends[1])]
+                        _bar(canvas, place, at[step.downstream])
                 case Crank():
                     _bar(canvas, at[step.pivot], place)
-                    segments.append((at[step.pivot], place))
                 case Slider():
-                    segments += [_plunger(canvas, place, step.axis), (at[step.upstream], place)]
+                    _plunger(canvas, place, step.axis)
                     _bar(canvas, at[step.upstream], place)
                 case Guided():
-                    segments += _guides(canvas, step, at)
-        return segments
+                    _guides(canvas, step, at)
 
-    def _rigid_parts(self, canvas: Canvas, at: Mapping[str, complex]) -> list[Segment]:
+    def _rigid_parts(self, canvas: Canvas, at: Mapping[str, complex]) -> None:
         """Draw levers as plates, and the slot in its lever."""
-        segments: list[Segment] = []
         for step in self.steps:
             if isinstance(step, (Lever, Slot)):
                 first = step.follows if isinstance(step, Lever) else step.pin
                 corners = at[first], at[step.pivot], at[step.joint]
                 _polygon(canvas, *corners, fill=PALE, colour=RULE, width=7.0)
                 _polygon(canvas, *corners, fill=PALE, colour=PALE, width=4.0)
-                segments += combinations(corners, 2)
         for step in self.steps:
             if isinstance(step, Slot):
-                pivot = at[step.pivot]
                 pin = at[step.pin]
-                along = _unit(pin - pivot)
-                _tube(
-                    canvas,
-                    pin - 13 * along,
-                    pin + 9 * along,
-                    25,
-                    PAPER,
-                    cap="round",
-                )
-        return segments
+                along = _unit(pin - at[step.pivot])
+                _tube(canvas, pin - 13 * along, pin + 9 * along, 25, PAPER, cap="round")
 
     def _rigid(self, joint: str, pivot: str) -> bool:
         """Tell whether two points are already drawn as an edge of a rigid part."""
@@ -381,18 +291,6 @@ def _without_overlap(markers: Mapping[int, complex]) -> dict[int, complex]:
 
 def _unit(run: complex) -> complex:
     return run / (abs(run) or 1.0)
-
-
-def _box(*points: complex, around: complex = 0) -> Box:
-    """The box about some points, with room around it."""
-    xs = [p.real for p in points]
-    ys = [p.imag for p in points]
-    return (
-        min(xs) - around.real,
-        min(ys) - around.imag,
-        max(xs) + around.real,
-        max(ys) + around.imag,
-    )
 
 
 def _line(canvas: Canvas, start: complex, end: complex, **stroke: Unpack[Stroke]) -> None:
@@ -428,7 +326,7 @@ def _actuator(canvas: Canvas, far: complex, joint: complex) -> None:
     _named(canvas, neck + complex(-12 if left else 12, 16), "actuator", "end" if left else "start")
 
 
-def _plunger(canvas: Canvas, joint: complex, axis: float) -> Segment:
+def _plunger(canvas: Canvas, joint: complex, axis: float) -> None:
     """The plunger beyond its pin, entering the valve."""
     along = cmath.rect(1.0, -axis)
     tip = joint + 30 * along
@@ -436,25 +334,20 @@ def _plunger(canvas: Canvas, joint: complex, axis: float) -> Segment:
     _line(canvas, joint, tip, width=6)
     _tube(canvas, tip, end, 24, PALE)
     _named(canvas, (tip + end) / 2 - (18 + 7j), "plunger", "end")
-    return joint, end
 
 
-def _guides(canvas: Canvas, step: Guided, at: Mapping[str, complex]) -> list[Segment]:
+def _guides(canvas: Canvas, step: Guided, at: Mapping[str, complex]) -> None:
     """The lines that a joint slides on, broken where they keep a direction, and its link."""
     place = at[step.joint]
     lines: list[tuple[str, Towards | None]] = [step.line, (step.upstream, step.across)]
-    segments = []
     for start, to in lines:
         if isinstance(to, float):
             along = cmath.rect(45.0, -to)
-            segments.append((place - along, place + along))
-            _line(canvas, *segments[-1], width=3)
+            _line(canvas, place - along, place + along, width=3)
             if start == step.upstream:
                 _line(canvas, at[start], place)
         else:
-            segments.append((at[start], place if to is None else at[to]))
-            (_bar if to is None else _line)(canvas, *segments[-1])
-    return segments
+            (_bar if to is None else _line)(canvas, at[start], place if to is None else at[to])
 
 
 def _named(canvas: Canvas, place: complex, name: str, anchor: Anchor) -> None:
@@ -537,120 +430,3 @@ def _arrow(canvas: Canvas, start: complex, end: complex) -> None:
         fill=INK,
         width=0.5,
     )
-
-
-@dataclass(frozen=True, slots=True)
-class _Line:
-    text: str
-    size: float
-    bold: bool
-
-
-def _callout(
-    canvas: Canvas,
-    joint: complex,
-    lines: list[_Line],
-    boxes: list[Box],
-    segments: list[Segment],
-    framed: bool,
-) -> None:
-    """Write a label where it covers least, and remember its box."""
-    widths = [text_width(line.text, line.size) * (1.12 if line.bold else 1.0) for line in lines]
-    width = max(widths) + 6
-    height = sum(line.size + 2.0 for line in lines) + 3
-    # From the marker's edge outwards until the label's box clears it, in every direction and at
-    # several distances.
-    with np.errstate(divide="ignore"):
-        sideways = width / 2 / np.abs(_COSINES)
-        above = height / 2 / np.abs(_SINES)
-    clears = np.minimum(sideways, above)
-    reach = _MARKER + 2 + _RINGS[:, None] + clears
-    x = (joint.real + _COSINES * reach).ravel()
-    y = (joint.imag + _SINES * reach).ravel()
-    across = width / 2
-    up = height / 2
-    tried = np.column_stack([x - across, y - up, x + across, y + up])
-    too_low = tried < [0, 14, 0, 0]
-    too_high = tried > [np.inf, np.inf, canvas.width, canvas.height]
-    outside = np.any(too_low | too_high, axis=1)
-    cost = (
-        np.repeat(1.1 * _RINGS, len(_COSINES))
-        + _overlap(tried, np.array(boxes))
-        + _covered(tried, segments)
-        + 2000.0 * outside
-    )
-    cheapest = int(np.argmin(np.round(cost, 6)))
-    box: Box = tuple(tried[cheapest].tolist())
-    # A label under another cannot be read at all.
-    boxes += [box] * 16
-    edge = complex(
-        min(max(joint.real, box[0]), box[2]),
-        min(max(joint.imag, box[1]), box[3]),
-    )
-    if abs(edge - joint) > _MARKER + 14:
-        start = joint + (_MARKER + 1) * _unit(edge - joint)
-        _line(canvas, start, edge, colour=SOFT, width=0.8)
-    if framed:
-        canvas.rectangle(
-            box[0],
-            box[1],
-            width,
-            height,
-            fill=PAPER,
-            colour=INK,
-            width=1.4,
-        )
-    base = box[1] + 0.5
-    middle = (box[0] + box[2]) / 2
-    for line in lines:
-        base += line.size + 2.0
-        canvas.text(
-            middle,
-            base - 1.5,
-            line.text,
-            size=line.size,
-            bold=line.bold,
-            anchor="middle",
-            colour=INK if line.bold else SOFT,
-        )
-
-
-def _two_lines(name: str) -> list[str]:
-    """Split a name of several words near its middle, so that its label is compact."""
-    words = name.split()
-    if len(name) <= 14 or len(words) < 2:
-        return [name]
-
-    def from_middle(cut: int) -> float:
-        return abs(len(" ".join(words[:cut])) - len(name) / 2)
-
-    cut = min(range(1, len(words)), key=from_middle)
-    return [" ".join(words[:cut]), " ".join(words[cut:])]
-
-
-def _overlap(tried: Array, boxes: Array) -> Array:
-    """Area that each tried box shares with all others. [canvas units squared]"""
-    low = np.maximum(tried[:, None, :2], boxes[None, :, :2])
-    high = np.minimum(tried[:, None, 2:], boxes[None, :, 2:])
-    sides = np.clip(high - low, 0.0, None)
-    area: Array = sides.prod(axis=2).sum(axis=1)
-    return area
-
-
-def _covered(tried: Array, segments: list[Segment]) -> Array:
-    """Cost of laying each tried box, a little widened, over lines: by the length it covers."""
-    if not segments:
-        return np.zeros(len(tried))
-    ends = np.array([[(p.real, p.imag) for p in segment] for segment in segments])
-    start = ends[:, 0]
-    run = ends[:, 1] - ends[:, 0]
-    run = np.where(np.abs(run) < 1e-9, 1e-9, run)
-    # The part of each line between the box's sides, as in Liang and Barsky's clipping.
-    first = (tried[:, None, :2] - 3.0 - start) / run
-    last = (tried[:, None, 2:] + 3.0 - start) / run
-    enter = np.maximum(np.minimum(first, last).max(axis=2), 0.0)
-    leave = np.minimum(np.maximum(first, last).min(axis=2), 1.0)
-    share = np.clip(leave - enter, 0.0, None)
-    length = share * np.hypot(run[:, 0], run[:, 1])
-    total: Array = length.sum(axis=1)
-    return 6.0 * total

@@ -24,7 +24,7 @@ from mlg_troubleshoot.reporting.figures import (
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.reporting.inspection_figures import margin_gauge, plunger_curve
-from mlg_troubleshoot.reporting.schematic import schematic
+from mlg_troubleshoot.reporting.schematic import joint_key, schematic
 from mlg_troubleshoot.units import LengthUnit
 
 from .conftest import FAILURE, SOUND, WORN, Judge
@@ -177,6 +177,13 @@ def test_virtual_links_are_exaggerated_as_stated(gear: Gear, judge: Judge) -> No
 
 def test_small_clearances_are_not_blown_up(gear: Gear, judge: Judge) -> None:
     assert schematic(gear, judge(SOUND)).exaggeration == schematic(gear, judge(WORN)).exaggeration
+
+
+def test_the_key_of_a_picture_names_the_joints_with_their_clearances(gear: Gear) -> None:
+    key = str(joint_key(gear, FAILURE, INCHES))
+    assert all(f">{joint.name}" in key for joint in gear.joints)
+    assert "short link inner bearing, 0.0130\u00a0in, OVER LIMIT<" in key
+    assert key.count("stroke-dasharray") == len(gear.joints) - len(FAILURE)
 
 
 def test_no_label_of_the_schematic_lies_outside_it(gear: Gear, judge: Judge) -> None:

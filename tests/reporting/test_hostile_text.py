@@ -10,8 +10,7 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Rejected
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.reporting.glyphs import breakable
-from mlg_troubleshoot.reporting.html import css_string
+from mlg_troubleshoot.reporting.html import breakable, css_string
 from mlg_troubleshoot.visible import visible
 
 from .conftest import FAILURE, Judge, Made, readable

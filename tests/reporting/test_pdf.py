@@ -24,8 +24,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import pdf
 from mlg_troubleshoot.reporting.engine import check_fonts
-from mlg_troubleshoot.reporting.glyphs import font_faces
-from mlg_troubleshoot.reporting.html import render
+from mlg_troubleshoot.reporting.html import font_faces, render
 from mlg_troubleshoot.reporting.inspection_report import inspection_document
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError, sections_of
 from mlg_troubleshoot.reporting.provenance import ReportProvenance, provenance_of
@@ -80,7 +79,7 @@ def test_a_computer_without_fonts_makes_the_same_pdf(
 
 
 @pytest.mark.parametrize(
-    "words", ["N123AB", "OUTSIDE MARGIN", "short link inner bearing", "0.0130 OVER LIMIT"]
+    "words", ["N123AB", "OUTSIDE MARGIN", "short link inner bearing", "0.0130 0.0075 OVER LIMIT"]
 )
 def test_text_can_be_searched(words: str, failure: Made) -> None:
     assert words in text_of(failure.pdf)
