@@ -41,9 +41,9 @@ AREA = [joint["area"] for joint in _RAW["joints"].values()]
 AREA_MIN = {name: float(area["access_min"]) for name, area in _RAW["areas"].items()}
 READ_MIN = [float(joint["access_min"]) for joint in _RAW["joints"].values()]
 RESTORE_MIN = [float(joint["restore_min"]) for joint in _RAW["joints"].values()]
-PLUNGER_MIN = float(_RAW["plunger"]["read_min"])
-RIGGING_MIN = float(_RAW["rigging_check"]["minutes"])
-RETRACT_MIN = float(_RAW["repair"]["retraction_min"])
+PLUNGER_MIN = float(_RAW["workshop"]["read_plunger_min"])
+RIGGING_MIN = float(_RAW["workshop"]["check_rigging_min"])
+RETRACT_MIN = float(_RAW["workshop"]["trial_retraction_min"])
 _BEGIN = datetime(2026, 3, 2, 8, 0)
 
 
