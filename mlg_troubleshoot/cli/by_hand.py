@@ -78,10 +78,13 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
 def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
     """What the flags answer already of the questions on a terminal."""
     from mlg_troubleshoot.cli.prompts.answers import Answers
-    from mlg_troubleshoot.records.gate import judge_text
+    from mlg_troubleshoot.records import ReadOptions, admit
+    from mlg_troubleshoot.records.gate import NOBODY
 
     if flags.tail is not None:
-        judge_text("--tail", flags.tail, "Give the tail number.")
+        given = {**NOBODY, CONVENTION.name: "RADIAL", TAIL_NO.name: flags.tail}
+        options = ReadOptions.of(load_gear(declared.gear), declared)
+        admit(given, options, {TAIL_NO.name: f"--tail {flags.tail!r}"})
     return Answers(
         tail_no=flags.tail,
         side=declared.side,

@@ -164,4 +164,4 @@ def test_a_gear_file_with_a_name_that_no_file_can_have_ends_with_words(tmp_path:
     text = gear.read_text(encoding="utf-8").replace("hawker-800xp-indices.json", "x" * 300)
     gear.write_text(text, encoding="utf-8")
     found = mlg("check", FAILURE, "--gear", gear)
-    assert (found.code, "shorter name" in found.err) == (5, True)
+    assert (found.code, "expected the name of a .json file" in found.err) == (2, True)

@@ -229,7 +229,7 @@ def test_a_failure_within_the_margin_is_not_put_on_the_joints(table: Table) -> N
 
 def test_a_plunger_outside_its_down_lock_range_is_said_once(table: Table) -> None:
     shown = mlg("check", table(row(plunger_down_lock_in="0.06")))
-    assert (shown.out + shown.err).count("Down Lock") == 1
+    assert (shown.out + shown.err).count("Plunger at Down Lock") == 1
     words = " ".join(shown.out.split())
     assert (
         "Plunger at Down Lock 0.0600 in is outside 0.01 to 0.05 in: check the rigging first."

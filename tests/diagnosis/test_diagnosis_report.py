@@ -366,7 +366,7 @@ def test_a_table_without_dates_tails_or_names_has_a_report(gear: Gear, make: Mak
 def test_the_command_s_report_is_written_as_html_and_pdf(tmp_path: Path) -> None:
     options = DiagnoseOptions()
     result = diagnose_files([FOLDER / "measured_pressure.csv"], options)
-    written = report_of(result, options, tmp_path, "A4").files
+    written = report_of(result, tmp_path, "A4").files
     assert [path.suffix for path in written] == [".html", ".pdf"]
     assert written[1].read_bytes().startswith(b"%PDF")
 

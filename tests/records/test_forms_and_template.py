@@ -321,7 +321,7 @@ def test_a_template_is_in_the_unit_that_is_asked_for(tmp_path, unit):
 def test_a_template_says_the_numbers_of_its_gear(tmp_path):
     gear = own_gear(
         tmp_path,
-        ("[margin]", "value = 0.03", "value = 0.05"),
+        ("schema", "\nmargin = 0.03", "\nmargin = 0.05"),
         ("down_lock_range", "[0.01, 0.05]", "[0.02, 0.04]"),
     )
     assert mlg("template", tmp_path / "t.xlsx", "--gear", gear).code == 0

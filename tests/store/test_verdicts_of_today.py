@@ -12,7 +12,7 @@ from tests.cli.conftest import Run, mlg, row
 from .places import table
 
 SOUND = {f"clearance_{n}_in": "0.0011" for n in range(1, 11)}
-MARGIN = "[margin]\nvalue = 0.03"
+MARGIN = "\nmargin = 0.03"
 FAR = {"plunger_displacement_in": "0.06"}
 
 
