@@ -40,6 +40,15 @@ def test_every_door_leads_into_its_room(room: str) -> None:
     ] == []
 
 
+@pytest.mark.parametrize("room", sorted(house.BUDGETS))
+def test_a_room_stays_within_its_budget(room: str) -> None:
+    assert house.weights()[room] <= house.BUDGETS[room]
+
+
+def test_every_room_has_a_budget_and_none_is_for_a_room_that_is_gone() -> None:
+    assert sorted(house.BUDGETS) == sorted({*house.rooms(), "(top)"})
+
+
 # Rooms that scripts use, whose names nobody in the package needs to take.
 FOR_SCRIPTS = {"diagnosis", "notebook", "records", "schemas", "wear", "cli"}
 
