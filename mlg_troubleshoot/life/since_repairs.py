@@ -102,7 +102,9 @@ def since_repairs(
                 for repair in repairs[key]
                 if _may_be_later(repair, row, place, entered_now=entered_now)
             ]
-            counting.append(_since(row, later) if later else row)
+            counting.append(
+                _since(row, later) if later else _after_repairs(row, before, repairs[key])
+            )
     return counting
 
 
@@ -137,7 +139,7 @@ def _complaint(row: Inspection, before: Inspection | None, gear: Gear) -> Inspec
     if row.outcome is Outcome.FAILED or beyond:
         return row
     failed = before is not None and before.outcome is Outcome.FAILED
-    settles = row.outcome is not None or (row.readings_in and not failed)
+    settles = row.standing_outcome is not None or (row.readings_in and not failed)
     return None if settles else before
 
 
@@ -147,7 +149,7 @@ def _untried(row: Inspection, before: Inspection | None) -> Inspection:
     """
     if (
         before is None
-        or row.outcome is not None
+        or row.standing_outcome is not None
         or (row.readings_in and before.outcome is not Outcome.FAILED)
         or surely_later(before.inspection_date, row.repair_date)
     ):
@@ -160,6 +162,33 @@ def _untried(row: Inspection, before: Inspection | None) -> Inspection:
         outcome_date=before.inspection_date,
         warnings=(*row.warnings, said),
     )
+
+
+def _after_repairs(
+    row: Inspection, before: Inspection | None, repairs: Sequence[Repair]
+) -> Inspection:
+    """A row that is surely later than repairs of what failed before it, as that of a gear that was
+    not tried since.
+    """
+    if before is None:
+        return row
+    since = [
+        repair
+        for repair in repairs
+        if surely_later(row.inspection_date, repair.at)
+        and not surely_later(before.inspection_date, repair.at)
+    ]
+    if not since:
+        return row
+    rerigged = any(repair.rerigged for repair in since)
+    repaired = replace(
+        row,
+        restored_joints=tuple(sorted(frozenset().union(*(repair.joints for repair in since)))),
+        repair_date=max(since, key=lambda repair: repair.day).at,
+        rigging_checked=RiggingCheck.CORRECTED if rerigged else row.rigging_checked,
+    )
+    untried = _untried(repaired, before)
+    return row if untried is repaired else untried
 
 
 def _kept(life: GearLife) -> Iterator[Repair]:

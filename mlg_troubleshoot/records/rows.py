@@ -37,6 +37,7 @@ from mlg_troubleshoot.decision.inspection import (
     EnteredClearance,
     Inspection,
     InvalidRow,
+    Outcome,
     RowSource,
 )
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
@@ -463,7 +464,7 @@ class RowReader:
             text = cell if isinstance(cell, str) else ""
             said = convention_word(text)
             unit = UNIT_SPELLINGS.get(plain_text(text).lower())
-            if OUTCOME not in found.values and (
+            if found.values.get(OUTCOME) is not Outcome.FAILED and (
                 says_failed(text) or answers_outcome(placed.header, cell)
             ):
                 column = OUTCOME
@@ -491,7 +492,9 @@ class RowReader:
             cell = cells[placed.index]
             if cell is None or not (nearest or of_joint):
                 continue
-            value, unit = written_number(cell, decimal_comma=self._table.decimal_comma)
+            # What is asked about may have either point.
+            comma = self._table.decimal_comma or (isinstance(cell, str) and "," in cell)
+            value, unit = written_number(cell, decimal_comma=comma)
             usual = list(LengthUnit) if is_sure else [LengthUnit.INCH, LengthUnit.MILLIMETRE]
             size = min(abs(each.to_inches(value)) for each in ([unit] if unit else usual))
             if not 0.0 < size <= self._options.plunger_hard_max_in or not (

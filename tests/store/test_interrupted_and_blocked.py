@@ -24,12 +24,13 @@ from . import places
 def test_an_interrupt_within_a_transaction_ends_it_and_keeps_nothing(tmp_path: Path) -> None:
     store = Store(tmp_path / "store.sqlite")
     every = list(places.records(1, 3))
+    before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt), store.transaction(writing=True) as connection:
         store._prepare(connection, writing=True)
         signal.raise_signal(signal.SIGINT)
     assert store.all() == []
     assert store.add(every).new == len(every)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 ENDED = """
