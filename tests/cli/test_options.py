@@ -9,7 +9,7 @@ import pytest
 
 from tests.cli.conftest import command
 
-ALL = 123
+ALL = 114
 BUDGET = {"check": 27, "diagnose": 17, "fleet": 12, "study": 10}
 
 
