@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 
 WRITE_TABLE = "--write-table"
 _STANDARD_INPUT = "-"
@@ -36,6 +36,7 @@ def claim(
     from mlg_troubleshoot.store import files_of
 
     files: list[str | Path | int] = [*files_of(store)]
+    files += [path for _, path in wanted if _is_gear_file(Path(path))]
     for name in inputs:
         files += _read(name)
     if gear is not None:
@@ -61,6 +62,19 @@ def _read(name: str | Path | None) -> Sequence[str | Path | int]:
         return [sys.stdin.fileno()]
     except (OSError, ValueError):
         return ()
+
+
+def _is_gear_file(path: Path) -> bool:
+    """Whether a gear file stands there, in use or not."""
+    from mlg_troubleshoot.gear.gear_file import load_gear
+
+    if path.suffix != ".toml" or not path.is_file():
+        return False
+    try:
+        load_gear(str(path))
+    except TroubleshootError:
+        return False
+    return True
 
 
 def _reports(folder: Path, others: Outputs) -> Outputs:

@@ -405,3 +405,10 @@ def test_a_template_that_was_filled_in_is_not_replaced(tmp_path: Path) -> None:
     found = mlg("template", tmp_path / "t.xlsx")
     assert found.code == 2
     assert (tmp_path / "t.xlsx").read_bytes() == before
+
+
+def test_a_gear_file_that_is_not_in_use_is_not_replaced_either(own_gear: Path) -> None:
+    before = own_gear.read_bytes()
+    line = ("diagnose", DATA / "measured_pressure.csv", "--write-extension", own_gear, "--force")
+    found = mlg(*line)
+    assert (found.code, own_gear.read_bytes()) == (2, before)
