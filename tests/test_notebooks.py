@@ -1,4 +1,7 @@
-"""The notebooks of the documentation run, and the code host can show them with their pictures."""
+"""The notebooks of the documentation run, and the code host can show them with their pictures.
+
+`python tests/test_notebooks.py` runs them and keeps what they show.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,18 @@ NAMES = ("a-hidden-cause", "another-simulation", "check-a-fleet")
 
 def notebook(name: str) -> Any:
     return nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
+
+
+def run_notebook(name: str) -> Any:
+    run = notebook(name)
+    NotebookClient(
+        run,
+        timeout=300,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(FOLDER)}},
+        record_timing=False,
+    ).execute()
+    return run
 
 
 def shown(cell: Any) -> list[str]:
@@ -40,8 +55,10 @@ def test_a_notebook_is_kept_with_a_picture_and_without_an_error(name: str) -> No
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_notebook_runs_and_shows_what_is_kept_in_it(name: str) -> None:
-    kept, run = notebook(name), notebook(name)
-    NotebookClient(
-        run, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
-    ).execute()
+    kept, run = notebook(name), run_notebook(name)
     assert [shown(cell) for cell in run.cells] == [shown(cell) for cell in kept.cells]
+
+
+if __name__ == "__main__":
+    for each in NAMES:
+        nbformat.write(run_notebook(each), FOLDER / f"{each}.ipynb")
