@@ -10,21 +10,13 @@ import typer
 
 from mlg_troubleshoot.cli import history, options, output
 
-EPILOG = (
-    "Example: [b]mlg fleet[/b] · [b]mlg fleet --only OUTSIDE_MARGIN --sort due --csv due.csv[/b]"
-)
+EPILOG = "Example: [b]mlg fleet[/b] · [b]mlg fleet --only OUTSIDE_MARGIN --csv outside.csv[/b]"
 
 
 def _verdict(text: str) -> StrEnum:
     from mlg_troubleshoot.decision.assessment import Verdict
 
     return options.one_of(Verdict, text.upper(), "--only")
-
-
-def _order(text: str) -> StrEnum:
-    from mlg_troubleshoot.life.landings_left import Order
-
-    return options.one_of(Order, text, "--sort")
 
 
 @options.flat
@@ -40,10 +32,6 @@ def fleet(
             help="Only gears with this verdict, e.g. OUTSIDE_MARGIN; may repeat.",
         ),
     ] = None,
-    sort: Annotated[
-        str,
-        typer.Option(metavar="worst|due|tail|minutes", parser=_order, help="Order of the gears."),
-    ] = "worst",
     csv: Annotated[
         Path | None, typer.Option(metavar="OUT.csv", help="The gears as CSV, one line per gear.")
     ] = None,
@@ -55,7 +43,6 @@ def fleet(
     """
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.life.landings_left import Order
     from mlg_troubleshoot.life.unrecorded_work import suggestions
     from mlg_troubleshoot.reporting.life_json import fleet_as_json
     from mlg_troubleshoot.workflows.history import show_fleet
@@ -70,13 +57,12 @@ def fleet(
             whole=shown.report is not None,
             progress=bar,
         )
-        order = Order(sort)
-        found = everything.chosen(only or (), order)
+        found = everything.chosen(only or ())
     compared = () if shown.quiet else [line.key for line in found.lines]
     for line in suggestions(compared, found.forecasts):
         output.say(f"Note: {line}")
     if shown.as_json:
-        output.write_json(fleet_as_json(found.lines, found.forecasts, order))
+        output.write_json(fleet_as_json(found.lines, found.forecasts))
     elif found.lines:
         history.show_gears(found, ahead=not no_forecast)
     elif everything.lines:

@@ -37,6 +37,7 @@ GONE = {
     "--small-readings-true": "say yes in the column of that name, or --set small_readings_true=yes",
     "--install-completion": "the names of commands and options stand in mlg --help",
     "--show-completion": "the names of commands and options stand in mlg --help",
+    "fleet --sort": "the most urgent stands first; the table of --csv can be sorted",
     "fleet --xlsx": "--csv OUT.csv writes the gears, --report DIR their pages",
     "check --open": "NEXT is one step with its minutes; stop when the time is over",
     "check --minutes": "NEXT is one step with its minutes; stop when the time is over",

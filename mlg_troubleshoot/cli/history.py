@@ -145,7 +145,7 @@ def show_gears(found: Lives, *, ahead: bool) -> None:
 
     console = output.console()
     gear = found.gear
-    lines = fleet_lines(found.lines, found.forecasts, found.order)
+    lines = fleet_lines(found.lines, found.forecasts)
     headings = (
         *("tail", "side", "last seen", "landings>", "verdict", "inspect"),
         *("to limit", "to margin", "next due", "next action"),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from functools import partial
 from itertools import chain
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -76,14 +77,20 @@ def _judge_part(
     part: Sequence[Inspection | InvalidRow],
 ) -> tuple[Judgement, ...]:
     valid = [row for row in part if isinstance(row, Inspection)]
+    # Gears of which the same is known are judged once; to an extension it matters whose they are.
+    known = [n if extension is not None else _known_of(row) for n, row in enumerate(valid)]
+    alike = dict(zip(known, valid, strict=True))
     # Products of this size take twice as long where they wait for other threads.
     with threadpool_limits(1, "blas"):
-        cases = Cases.of(gear, valid, fleet=fleet)
+        cases = Cases.of(gear, [*alike.values()], fleet=fleet)
         found = _assess_valid(cases, table, advice) if valid else []
         if extension is not None and valid:
             extended = _assess_valid(replace(cases, extension=extension), table, advice)
             found = [_never_relaxed(*both) for both in zip(found, extended, strict=True)]
-        assessed = iter(found)
+    judged = dict(zip(alike, found, strict=True))
+    assessed = (
+        replace(judged[each], inspection=row) for each, row in zip(known, valid, strict=True)
+    )
     return tuple(
         (
             next(assessed)
@@ -92,6 +99,16 @@ def _judge_part(
         )
         for row in part
     )
+
+
+# What a judgement without an extension does not depend on.
+_IDENTITY = {"record_id", "tail_no", "side", "source", "carried", "other_columns"}
+_KNOWN = attrgetter(*(f.name for f in fields(Inspection) if f.name not in _IDENTITY))
+
+
+def _known_of(row: Inspection) -> object:
+    """All that is known of a gear but whose it is."""
+    return tuple(tuple(v.items()) if isinstance(v, Mapping) else v for v in _KNOWN(row))
 
 
 # From the best to the worst.

@@ -4,12 +4,10 @@ comes first.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
-from functools import partial
+from operator import attrgetter
 
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.ranking import WORST_FIRST
@@ -102,38 +100,15 @@ class FleetLine:
         return rank, float("inf") if due is None else due, self.key
 
 
-class Order(StrEnum):
-    """What a fleet is sorted by."""
-
-    WORST = "worst"
-    DUE = "due"
-    TAIL = "tail"
-    MINUTES = "minutes"
-
-
-def _place_in(order: Order, line: FleetLine) -> tuple[float, tuple[int, float, GearKey]]:
-    due = line.next_inspection_landings
-    first = {
-        Order.WORST: 0.0,
-        Order.DUE: math.inf if due is None else due,
-        Order.TAIL: 0.0,
-        Order.MINUTES: -line.minutes,
-    }[order]
-    return first, (0, 0.0, line.key) if order is Order.TAIL else line.urgency
-
-
 def fleet_lines(
     lines: Iterable[FleetLine],
     forecasts: Mapping[GearKey, Forecast],
-    order: Order,
 ) -> list[FleetLine]:
-    """The gears that were inspected, with their forecasts; worst first unless another order is
-    asked for.
-    """
+    """The gears that were inspected, with their forecasts; worst first."""
     seen = [
         line.forecast(forecasts.get(line.key, Forecast())) for line in lines if line.inspections
     ]
-    return sorted(seen, key=partial(_place_in, order))
+    return sorted(seen, key=attrgetter("urgency"))
 
 
 def work_sentence(lines: Sequence[FleetLine]) -> str:

@@ -17,6 +17,7 @@ from mlg_troubleshoot.decision.columns import (
     DATE,
     JOINT,
     LANDINGS,
+    MARGIN,
     PLUNGER_DISPLACEMENT,
     RESTORED_JOINTS,
     SIDE,
@@ -144,6 +145,7 @@ _CONVENTION_WORDS = frozenset(
     ("radial", "diametral", "diametrical", "diameter", "diam", "dia", "play")
 )
 _PLUNGER = re.compile(r"plung|\brv\b|reversing|(?:over|under)[ -]?travel|mid[ -]?position")
+_MARGIN = re.compile(r"margin|\ballow(?:ed|able)\b|\bpermi(?:tted|ssible)\b|\btolerance\b")
 # Words of readings, and of numbers that are given next to readings.
 _READING_WORDS = frozenset(
     ("reading", "gap", "slop", "looseness", "wear", "displacement", "displ", "spiel", "offset")
@@ -272,6 +274,8 @@ def suspect(header: str, joints: Joints) -> tuple[str, bool]:
     may be one, or only a fraction.
     """
     text = tidy(header).replace("_", " ")
+    if _MARGIN.search(text):
+        return MARGIN.header(), True
     found = _TOKEN.findall(text)
     units, foreign, _ = _units_in(_BRACKETS.findall(text))
     has_unit = bool(units or foreign) or _trailing_unit(found)[1] is not None

@@ -11,7 +11,6 @@ from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.landings_left import (
     FleetLine,
-    Order,
     fleet_lines,
     outlook_sentence,
     work_sentence,
@@ -32,7 +31,6 @@ def fleet_document(
     gear: Gear,
     provenance: ReportProvenance,
     unit: LengthUnit,
-    order: Order,
 ) -> Document:
     """Make one page: one line per gear, worst first, with its landings left and the worst case over
     its inspections.
@@ -40,7 +38,7 @@ def fleet_document(
     lengths = Lengths(unit)
     by_key = {life.key: life for life in lives}
     every = [*map(FleetLine.of, by_key.values())]
-    gears = fleet_lines(every, forecasts, order)
+    gears = fleet_lines(every, forecasts)
     places = []
     lines = []
     for line in gears:

@@ -10,7 +10,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.json_outputs import FleetGear, FleetOutput, LifeOutput
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
-from mlg_troubleshoot.life.landings_left import FleetLine, Order, fleet_lines, work_sentence
+from mlg_troubleshoot.life.landings_left import FleetLine, fleet_lines, work_sentence
 from mlg_troubleshoot.life.looking_back import Advice
 from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.reporting.json_form import filled, written
@@ -20,10 +20,9 @@ from mlg_troubleshoot.store import Record, RecordKind
 def fleet_as_json(
     gears: Sequence[FleetLine],
     forecasts: Mapping[GearKey, Forecast],
-    order: Order = Order.WORST,
 ) -> dict[str, Any]:
-    """One line per gear, worst first unless another order is asked for."""
-    lines = fleet_lines(gears, forecasts, order)
+    """One line per gear, worst first."""
+    lines = fleet_lines(gears, forecasts)
     return written(
         FleetOutput,
         gears=[filled(FleetGear, line) for line in lines],

@@ -24,7 +24,7 @@ from mlg_troubleshoot.life.folding import (
     life_of,
     lives_of,
 )
-from mlg_troubleshoot.life.landings_left import FleetLine, Order
+from mlg_troubleshoot.life.landings_left import FleetLine
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.parallel import Progress, StageProgress
 from mlg_troubleshoot.records import ReadOptions, admit
@@ -66,8 +66,6 @@ class Lives(Result):
         How joints wear; None if nothing can be learnt.
     problems : tuple of Problem
         Wrong cells of the table that they were read from, if it was one.
-    order : Order
-        Order of the gears in tables and reports.
     """
 
     gear: Gear
@@ -76,20 +74,19 @@ class Lives(Result):
     forecasts: Mapping[GearKey, Forecast]
     model: WearModel | None
     problems: tuple[Problem, ...] = ()
-    order: Order = Order.WORST
 
-    def chosen(self, verdicts: Collection[str], order: Order) -> Lives:
+    def chosen(self, verdicts: Collection[str]) -> Lives:
         """The gears of which the last verdict is one of these; all of them where none is asked."""
         lines = tuple(line for line in self.lines if not verdicts or line.verdict in verdicts)
         keys = {line.key for line in lines}
         lives = tuple(life for life in self.lives if life.key in keys)
-        return replace(self, lives=lives, lines=lines, order=order)
+        return replace(self, lives=lives, lines=lines)
 
     def write_csv(self, file: Path) -> None:
         """Write the fleet as CSV, one line per gear."""
         from mlg_troubleshoot.reporting.life_json import fleet_as_json, fleet_table
 
-        gears = fleet_as_json(self.lines, self.forecasts, self.order)["gears"]
+        gears = fleet_as_json(self.lines, self.forecasts)["gears"]
         write_csv(file, *fleet_table(gears))
 
 
@@ -201,9 +198,7 @@ def write_pages(
     )
     if not fleet:
         return [*map(write, documents)]
-    sheet = fleet_report.fleet_document(
-        shown.lives, shown.forecasts, shown.gear, made, unit, shown.order
-    )
+    sheet = fleet_report.fleet_document(shown.lives, shown.forecasts, shown.gear, made, unit)
     written = [write(sheet)]
     # The pages behind the lines of a fleet are for the screen.
     return written + [write(each, formats=("html",)) for each in documents]

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +16,8 @@ from hypothesis import strategies as st
 from scipy.stats import norm, qmc
 
 from mlg_troubleshoot.decision.assessment import Assessment, Rejected, Verdict
-from mlg_troubleshoot.decision.inspection import InvalidRow, Outcome, Side
+from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.decision.verdict_rule import verdict, zone
@@ -185,6 +188,25 @@ def test_a_batch_judges_each_gear_as_if_it_were_alone(
         assert found.probability_within_margin == pytest.approx(
             alone.probability_within_margin, abs=1e-12
         )
+
+
+def test_gears_of_which_the_same_is_known_are_judged_once(
+    gear: Gear, table: IndexTable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged: list[int] = []
+    of = Cases.of
+
+    def counted(gear: Gear, rows: Sequence[Inspection], **declared: object) -> Cases:
+        judged.append(len(rows))
+        return of(gear, rows, **declared)
+
+    monkeypatch.setattr(Cases, "of", counted)
+    rows = [replace(inspected(FAILURE), tail_no=f"N{n}") for n in range(5)]
+    rows.append(inspected({1: 0.001}))
+    found = assess(rows, gear, table)
+    assert judged == [2]
+    assert [f.row.tail_no for f in found] == ["N0", "N1", "N2", "N3", "N4", "258401"]
+    assert found[5].headline != found[0].headline
 
 
 def test_a_gear_that_does_not_close_is_outside_with_its_numbers_absent_and_a_warning(

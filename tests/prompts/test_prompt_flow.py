@@ -546,6 +546,11 @@ def test_the_plunger_displacement_is_signed(
     assert plunger_in(play(flow, [*TEN, typed]).state.answers, gear) == pytest.approx(stands_in)
 
 
+def test_two_plunger_readings_on_one_line_both_count(gear: Gear, flow: Flow) -> None:
+    answers = play(flow, [*TEN, "p .041 p .002"]).state.answers
+    assert answers.inspection(gear, "R1").readings_in == (0.041, 0.002)
+
+
 @pytest.mark.parametrize(
     ("typed", "taken"), [("y", "-.3 in"), ("n", None), ("b", None), ("p .04", ".04 in")]
 )
@@ -565,7 +570,10 @@ def test_enter_does_not_confirm_the_plunger(flow: Flow) -> None:
 
 @pytest.mark.parametrize(
     "typed",
-    ["x y", "p", "p 0,041", "p 1/8", "p .6", "m 0", "m -.03", "m .3", "q .04", "p 1e999", ".04"],
+    [
+        *("x y", "p", "p 0,041", "p 1/8", "p .6", "m 0", "m -.03", "m .3", "q .04", "p 1e999"),
+        *(".04", "m .02 m .03", "r", "p .041 p .6"),
+    ],
 )
 def test_an_optional_answer_that_is_not_understood_changes_nothing(flow: Flow, typed: str) -> None:
     turn = play(flow, [*TEN, "r", f"f {typed}"])

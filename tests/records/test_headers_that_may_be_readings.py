@@ -35,6 +35,10 @@ JOINTS = (
     *("play 6", "6 play", "reading 6", "value 6", "c6 measured", "gap #6", "pos 6", "Spiel 6"),
     *("6a", "Lever end 6", "bellcrank", "wear 6 thou", "total play 6", "6 found", ""),
 )
+MARGINS = (
+    *("Margin of gear", "allowed displacement in", "rig margin", "Margin as rigged", "MARGIN 2"),
+    *("Allowable travel (thou)", "permitted travel", "tolerance in", "Marginal travel allowed"),
+)
 
 
 def judged(headers: list[str], cells: list[str], **declared: object) -> Judgement:
@@ -84,7 +88,15 @@ def test_a_number_that_may_be_a_clearance_is_asked_about(header: str, value: str
     assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
 
 
-@pytest.mark.parametrize("header", ["Plunger reading 1", "play 6"])
+@pytest.mark.parametrize("value", ["0.005", "5 thou", "0.12 mm"])
+@pytest.mark.parametrize("header", MARGINS)
+def test_a_number_that_may_be_the_margin_of_the_gear_is_asked_about(
+    header: str, value: str
+) -> None:
+    assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
+
+
+@pytest.mark.parametrize("header", ["Plunger reading 1", "play 6", "rig margin"])
 def test_carry_answers_the_question(header: str) -> None:
     asked = judged([header], ["0.0121"])
     assert asked.verdict is Verdict.INCOMPLETE

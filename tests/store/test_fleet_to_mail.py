@@ -56,19 +56,6 @@ def test_an_empty_store_says_how_to_keep_inspections(tmp_path: Path) -> None:
     assert " ".join(found.out.split()).endswith("Keep inspections with: mlg check FILE --keep")
 
 
-def test_what_is_due_first_stands_first(store: Path) -> None:
-    due = [gear["next_inspection_landings"] for gear in gears(store, "--sort", "due")]
-    known = [each for each in due if each is not None]
-    assert due[: len(known)] == sorted(known)
-    assert len(known) > 1
-
-
-def test_the_gear_with_the_most_work_stands_first_when_sorted_by_minutes(store: Path) -> None:
-    minutes = [gear["minutes"] for gear in gears(store, "--sort", "minutes", "--no-forecast")]
-    assert minutes == sorted(minutes, reverse=True)
-    assert minutes[0] != minutes[-1]
-
-
 def test_history_and_fleet_agree_on_the_next_inspection(store: Path) -> None:
     for gear in gears(store):
         shown = mlg("history", gear["tail_no"], gear["side"], "--store", store, "--json", "-q")

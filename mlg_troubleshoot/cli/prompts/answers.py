@@ -335,6 +335,7 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
     in.
     """
     remarks: list[Line] = []
+    taken: set[str] = set()
     at = 0
     while at < len(typed):
         item = _ITEM.match(typed, at)
@@ -344,13 +345,17 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
                 "Type f, r, p .041, m .028 or n 3 5, or Enter alone.",
             )
         at = item.end()
-        answers, said = _taken(item, answers, gear)
+        answers, said = _taken(item, answers, gear, taken)
         remarks.append(line((said, Tone.GOOD)))
     return answers, tuple(remarks)
 
 
-def _taken(item: re.Match[str], answers: Answers, gear: Gear) -> tuple[Answers, str]:
-    """Take one answer; a repair, and what is typed after it, is dated by the clock."""
+def _taken(
+    item: re.Match[str], answers: Answers, gear: Gear, taken: set[str]
+) -> tuple[Answers, str]:
+    """Take one answer; a repair, and what is typed after it, is dated by the clock. `taken`: the
+    columns that were typed before on the same line, to which this one is added.
+    """
     did = (item["did"] or "").lower()
     length = item["length"]
     if did == "x":
@@ -370,6 +375,11 @@ def _taken(item: re.Match[str], answers: Answers, gear: Gear) -> tuple[Answers, 
         column = next(name for name in DAY.values() if item[name])
         text = item[column].strip()
     judge_more(column, text, answers.unit, gear)
+    if column in taken and column != PLUNGER_DISPLACEMENT.name:
+        raise UsageError(f"{column.replace('_', ' ')} is typed twice on one line", "Type it once.")
+    if column in taken:
+        text = f"{answers.more[column]};{text}"
+    taken.add(column)
     answers = answers.with_more(**{column: text})
     if column == DAY["n"] or text.lower() == "corrected":
         answers = _repaired_now(answers)
