@@ -70,7 +70,7 @@ BUDGETS: dict[str, int] = {
     "misfit": 19216,
     "notebook": 2231,
     "paper": 6762,
-    "records": 43379,
+    "records": 43311,
     "reporting": 27592,
     "schemas": 771,
     "store": 7255,

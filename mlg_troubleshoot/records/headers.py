@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Collection, Set
+from collections.abc import Collection, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -122,94 +122,49 @@ _SHORT = {
     "restored": RESTORED_JOINTS.name,
 }
 
-_FOREIGN_UNITS = frozenset(
-    (
-        "cm",
-        "um",
-        "μm",
-        "µm",
-        "micron",
-        "microns",
-        "m",
-        "ft",
-        "foot",
-        "feet",
-        "dm",
-        "nm",
-        "cms",
-        "metre",
-        "meter",
-    )
-)
-_CONVENTION_WORDS = frozenset(
-    ("radial", "diametral", "diametrical", "diameter", "diam", "dia", "play")
-)
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_FOREIGN_UNITS = _words("cm um μm µm micron microns m ft foot feet dm nm cms metre meter")
+_CONVENTION_WORDS = _words("radial diametral diametrical diameter diam dia play")
 _PLUNGER = re.compile(r"plung|\brv\b|reversing|(?:over|under)[ -]?travel|mid[ -]?position")
-_MARGIN = re.compile(r"margin|\ballow(?:ed|able)\b|\bpermi(?:tted|ssible)\b|\btolerance\b")
+_MARGIN = re.compile(r"margin|marge|spielraum|\ballow|\bpermi(?:tted|ssible)\b|\btolerance\b")
 # Words of readings, and of numbers that are given next to readings.
-_READING_WORDS = frozenset(
-    ("reading", "gap", "slop", "looseness", "wear", "displacement", "displ", "spiel", "offset")
-)
-_REFERENCE_WORDS = frozenset(
-    ("limit", "limits", "max", "maximum", "min", "minimum", "nominal", "new", "part", "drawing")
-)
-_CLEARANCE_WORDS = frozenset(("clearance", "clearances", "clr"))
-_JOINT_WORDS = frozenset(("joint", "jt", "j", "no", "nr", "number", "#"))
-_FLOAT_WORDS = frozenset(("axial", "float", "end", "endfloat"))
-_FILLERS = frozenset(("of", "at", "the", "for", "in"))
+_READING_WORDS = _words("reading gap slop looseness wear displacement displ spiel offset")
+_REFERENCE_WORDS = _words("limit limits max maximum min minimum nominal new part drawing")
+_CLEARANCE_WORDS = _words("clearance clearances clr")
+_JOINT_WORDS = _words("joint jt j no nr number #")
+_FLOAT_WORDS = _words("axial float end endfloat")
+_FILLERS = _words("of at the for in")
 # A joint's column with one of these words holds something other than a measurement.
-_OTHER_MATTER = frozenset(
-    (
-        *(
-            "remark",
-            "remarks",
-            "comment",
-            "comments",
-            "note",
-            "notes",
-            "photo",
-            "photos",
-            "picture",
-            "date",
-            "by",
-        ),
-        *(
-            "initials",
-            "sign",
-            "signature",
-            "stamp",
-            "part",
-            "serial",
-            "sn",
-            "pn",
-            "status",
-            "ok",
-            "condition",
-        ),
-        *("technician", "inspector", "gauge", "name", "description", "location", "access"),
-    )
+_OTHER_MATTER = _words(
+    "remark remarks comment comments note notes photo photos picture date by initials sign"
+    " signature stamp part serial sn pn status ok condition technician inspector gauge name"
+    " description location access signed greased lubricated cleaned"
 )
 
-# Headers as people write them; of a number with a unit the unit belongs to the spelling.
-_ALIASES: dict[str, Column] = {
-    spelling: column
-    for column in COLUMNS
-    if not column.unit
-    for spelling in (*filter(None, column.spellings.split("|")), column.plain)
-}
-_WITH_OTHER_UNIT: dict[str, Column] = {
-    spelling: column
-    for column in COLUMNS
-    if column.unit
-    for spelling in (*filter(None, column.spellings.split("|")), column.plain)
-}
+
+def _aliases(*, with_unit: bool) -> dict[str, Column]:
+    """Headers as people write them; of a number with a unit the unit belongs to the spelling."""
+    return {
+        spelling: column
+        for column in COLUMNS
+        if bool(column.unit) is with_unit
+        for spelling in (*filter(None, column.spellings.split("|")), column.plain)
+    }
+
+
+_ALIASES = _aliases(with_unit=False)
+_WITH_OTHER_UNIT = _aliases(with_unit=True)
 
 _CANONICAL = re.compile(
     r"(?P<name>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>[1-9]\d?))?(?:_(?P<unit>in|thou|mm))?", re.ASCII
 )
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _TOKEN = re.compile(r"""[a-zµμ]+\d*|\d+(?:[.,]\d+)?|["″]|''|\#""")
-_GLUED = re.compile(r"(j|jt|joint|clearance|clr|no|nr)0?(\d{1,2})", re.ASCII)
+_NUMBER = re.compile(r"(?P<word>j|jt|joint|clearance|clr|no|nr)?0?(?P<number>\d{1,2})", re.ASCII)
 _YES_NO = re.compile(r"[\W_]+(?:y|yes)[\W_]*(?:n|no)[\W_]*$")
 _DASHES = re.compile(r"[\u2010-\u2015\u2212]")
 
@@ -241,32 +196,68 @@ def parse_canonical(name: str, joints: Joints) -> Field | None:
     return Field.of(column, number, unit)
 
 
+@dataclass(frozen=True, slots=True)
+class _Units:
+    """The units that a header names, and words next to them that are not units."""
+
+    known: Set[LengthUnit]
+    foreign: Sequence[str]
+    odd: Sequence[str]
+
+    @classmethod
+    def of(cls, words: Sequence[str]) -> _Units:
+        return cls(
+            {UNIT_SPELLINGS[word] for word in words if word in UNIT_SPELLINGS},
+            [word for word in words if word in _FOREIGN_UNITS],
+            [word for word in words if word not in UNIT_SPELLINGS and word not in _FOREIGN_UNITS],
+        )
+
+    def given_to(self, field: Field) -> Recognition:
+        reason = ""
+        if self.foreign:
+            reason = f"the unit {self.foreign[0]!r} is not in, thou or mm"
+        elif len(self.known) > 1:
+            reason = "it names two units"
+        elif self.odd:
+            reason = f"{' '.join(self.odd)!r} next to it leaves open what was measured"
+        if reason:
+            return Recognition(None, reason, field.name)
+        return Recognition(replace(field, unit=next(iter(self.known), None)))
+
+
+def _taken_apart(text: str) -> tuple[list[str], list[str], _Units]:
+    """The words of a tidy header without its unit, what stands in brackets, and the units."""
+    bracketed = [part.strip() for part in _BRACKETS.findall(text)]
+    words = _TOKEN.findall(re.sub("[_°]", " ", _BRACKETS.sub(" ", text)))
+    said = [word for part in bracketed for word in re.split(r"[\s,;/]+", part.rstrip("."))]
+    for at, word in enumerate(words):
+        # The last word, or one behind "in": "Joint 3 in mm", "Clearance in mm, joint 3".
+        follows_in = at > 0 and words[at - 1] == "in"
+        if at and word in UNIT_SPELLINGS and (at == len(words) - 1 or follows_in):
+            words = words[: at - (follows_in and at > 1)] + words[at + 1 :]
+            said.append(word)
+            break
+    return words, bracketed, _Units.of([word for word in said if word])
+
+
 @lru_cache(maxsize=4096)
 def recognise(header: str, joints: Joints) -> Recognition:
     text = _YES_NO.sub("", tidy(header))
     if not text or len(text) > 120:
         return UNKNOWN
-    snake = re.sub(r"[\s\-]+", "_", text)
-    field = parse_canonical(snake, joints)
+    field = parse_canonical(_snake(text), joints)
     if field is not None:
         return Recognition(field)
-    bracketed = [part.strip() for part in _BRACKETS.findall(text)]
-    words = _TOKEN.findall(_BRACKETS.sub(" ", text).replace("_", " ").replace("°", " "))
-    units, foreign, odd = _units_in(bracketed)
-    words, trailing = _trailing_unit(words)
-    if trailing is not None:
-        units.add(trailing)
+    words, bracketed, units = _taken_apart(text)
     plain = " ".join(words)
-    other = " ".join([plain, *(b.replace("°", "") for b in bracketed)]).strip()
-    if other in _WITH_OTHER_UNIT:
-        return Recognition(Field(_WITH_OTHER_UNIT[other]))
-    numbered = _numbered(words, joints)
-    if numbered is None:
-        found = _by_alias(plain, units, foreign, odd)
-        if found is UNKNOWN:
-            found = _resembles_plunger(words, bool(units))
-        return _resembles_clearance(words, bool(units), joints) if found is UNKNOWN else found
-    return numbered if numbered.field is None else _with_unit(numbered.field, units, foreign, odd)
+    whole = " ".join([plain, *(part.replace("°", "") for part in bracketed)]).strip()
+    if whole in _WITH_OTHER_UNIT:
+        return Recognition(Field(_WITH_OTHER_UNIT[whole]))
+    return (
+        _numbered(words, units, joints)
+        or _aliased(plain, units)
+        or next(_resembling(words, units, joints), UNKNOWN)
+    )
 
 
 def suspect(header: str, joints: Joints) -> tuple[str, bool]:
@@ -276,10 +267,9 @@ def suspect(header: str, joints: Joints) -> tuple[str, bool]:
     text = tidy(header).replace("_", " ")
     if _MARGIN.search(text):
         return MARGIN.header(), True
-    found = _TOKEN.findall(text)
-    units, foreign, _ = _units_in(_BRACKETS.findall(text))
-    has_unit = bool(units or foreign) or _trailing_unit(found)[1] is not None
-    said = {word for word in found if word not in UNIT_SPELLINGS} - _FILLERS
+    said = {word for word in _TOKEN.findall(text) if word not in UNIT_SPELLINGS} - _FILLERS
+    units = _taken_apart(text)[2]
+    has_unit = bool(units.known or units.foreign)
     plain = {word for word in said if not word.isdigit()} - _JOINT_WORDS
     if plain and plain <= _REFERENCE_WORDS:
         return "", False
@@ -287,7 +277,8 @@ def suspect(header: str, joints: Joints) -> tuple[str, bool]:
     is_plunger = _PLUNGER.search(text) is not None
     is_reading = bool(said & (_CLEARANCE_WORDS | _CONVENTION_WORDS | _READING_WORDS))
     named = len(said) > 1 and said <= joints.vocabulary
-    sure = not said & _OTHER_MATTER and (is_plunger or is_reading or named or has_unit)
+    is_sure = is_plunger or is_reading or named or has_unit
+    sure = is_sure and not said & _OTHER_MATTER
     if not (sure or is_plunger or numbers or said & joints.vocabulary or not text):
         return "", False
     fitting = [*numbers] or joints.called(said)
@@ -297,159 +288,83 @@ def suspect(header: str, joints: Joints) -> tuple[str, bool]:
     ), sure
 
 
-def _units_in(bracketed: list[str]) -> tuple[set[LengthUnit], list[str], list[str]]:
-    units: set[LengthUnit] = set()
-    foreign: list[str] = []
-    odd: list[str] = []
-    for part in bracketed:
-        for word in re.split(r"[\s,;/]+", part.rstrip(".")):
-            if word in UNIT_SPELLINGS:
-                units.add(UNIT_SPELLINGS[word])
-            elif word in _FOREIGN_UNITS:
-                foreign.append(word)
-            elif word:
-                odd.append(word)
-    return units, foreign, odd
+def may_ask_outcome(header: str) -> bool:
+    """Whether a yes under an unread header may say that the gear failed or retracted."""
+    said = {*_TOKEN.findall(tidy(header).replace("_", " "))}
+    return not said & (_OTHER_MATTER - {"status", "ok", "condition"})
 
 
-def _trailing_unit(words: list[str]) -> tuple[list[str], LengthUnit | None]:
-    if len(words) > 1 and words[-1] in UNIT_SPELLINGS:
-        rest = words[:-1]
-        if len(rest) > 1 and rest[-1] == "in":  # "Joint 3 in mm"
-            rest = rest[:-1]
-        return rest, UNIT_SPELLINGS[words[-1]]
-    for i in range(len(words) - 2):  # "Clearance in mm, joint 3"
-        if words[i] == "in" and words[i + 1] in UNIT_SPELLINGS:
-            return words[:i] + words[i + 2 :], UNIT_SPELLINGS[words[i + 1]]
-    return words, None
+def _aliased(plain: str, units: _Units) -> Recognition | None:
+    with_words = _ALIASES.get(f"{plain} {' '.join(units.odd)}") if units.odd else None
+    units = units if with_words is None else replace(units, odd=())
+    column = with_words or _ALIASES.get(plain)
+    stated = units.known or units.foreign or units.odd
+    if column is None or (stated and not column.is_length):
+        return None
+    return units.given_to(Field.of(column))
 
 
-def _by_alias(
-    plain: str, units: set[LengthUnit], foreign: list[str], odd: list[str]
-) -> Recognition:
-    column = _ALIASES.get(f"{plain} {' '.join(odd)}") if odd else None
-    odd = [] if column is not None else odd
-    column = column or _ALIASES.get(plain)
-    if column is None or (not column.is_length and (units or foreign or odd)):
-        return UNKNOWN
-    return _with_unit(Field.of(column), units, foreign, odd)
-
-
-def _resembles_plunger(words: list[str], has_unit: bool) -> Recognition:
-    """Doubt a length of the plunger that matches no column of the plunger."""
-    if has_unit and "plunger" in words and not set(words) & _OTHER_MATTER:
-        return _doubt(
-            "it may be the measured displacement of the plunger", PLUNGER_DISPLACEMENT.name
-        )
-    return UNKNOWN
-
-
-def _resembles_clearance(
-    words: list[str],
-    has_unit: bool,
-    joints: Joints,
-) -> Recognition:
-    """Doubt a header that may be a joint's clearance, although it does not say so plainly."""
-    said = set(words) - _FILLERS
+def _resembling(words: list[str], units: _Units, joints: Joints) -> Iterator[Recognition]:
+    """Doubt what may decide a verdict although it does not say so plainly."""
+    said = {*words} - _FILLERS
     if said & _OTHER_MATTER or not said:
-        return UNKNOWN
-    if len(words) == 1:
-        number = re.fullmatch(r"(?:c|cl)?0?(\d{1,2})", words[0], re.ASCII)
-        if number is not None and int(number[1]) in joints.numbers:
-            return _doubt(
-                "a number alone does not say what was measured", f"clearance_{int(number[1])}"
-            )
+        return
+    if units.known and "plunger" in said:
+        reason = "it may be the measured displacement of the plunger"
+        yield Recognition(None, reason, PLUNGER_DISPLACEMENT.name)
+    alone = re.fullmatch(r"(?:c|cl)?0?(\d{1,2})", words[0], re.ASCII) if len(words) == 1 else None
+    if alone is not None and int(alone[1]) in joints.numbers:
+        reason = "a number alone does not say what was measured"
+        yield Recognition(None, reason, CLEARANCE.header(int(alone[1])))
     rest = said - _CLEARANCE_WORDS - _JOINT_WORDS
-    speaks_of_joint = len(rest) < len(said)
+    speaks_of_joint = rest != said
     named = len(rest) > 1 and rest <= joints.vocabulary
-    if (speaks_of_joint and has_unit and rest) or (named and (speaks_of_joint or has_unit)):
+    if (speaks_of_joint and units.known and rest) or (named and (speaks_of_joint or units.known)):
         fitting = joints.called(rest)
-        nearest = f"clearance_{fitting[0]}" if len(fitting) == 1 else None
-        return _doubt(
-            "it may be a joint's clearance, but does not give the joint's number", nearest
-        )
-    return UNKNOWN
+        meant = CLEARANCE.header(fitting[0]) if len(fitting) == 1 else None
+        reason = "it may be a joint's clearance, but does not give the joint's number"
+        yield Recognition(None, reason, meant)
 
 
-def _with_unit(
-    field: Field, units: set[LengthUnit], foreign: list[str], odd: list[str]
-) -> Recognition:
-    if foreign:
-        return _doubt(f"the unit {foreign[0]!r} is not in, thou or mm", field.name)
-    if len(units) > 1:
-        return _doubt("it names two units", field.name)
-    if odd:
-        return _doubt(f"{' '.join(odd)!r} next to it leaves open what was measured", field.name)
-    return Recognition(replace(field, unit=next(iter(units), None)))
-
-
-def _doubt(reason: str, nearest: str | None, code: str = "header_doubtful") -> Recognition:
-    return Recognition(None, reason, nearest, code)
-
-
-def _split_number(words: list[str]) -> tuple[list[str], int | None, list[str]]:
-    """Split the words around the joint's number; a number glued to a joint word is taken apart."""
-    for i, word in enumerate(words):
-        glued = _GLUED.fullmatch(word)
-        if glued is not None:
-            return [*words[:i], glued[1]], int(glued[2]), words[i + 1 :]
-        if word.isascii() and word.isdigit() and len(word) <= 2:
-            return words[:i], int(word), words[i + 1 :]
-    return words, None, []
-
-
-def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
-    words: list[str], joints: Joints
-) -> Recognition | None:
+def _numbered(words: list[str], units: _Units, joints: Joints) -> Recognition | None:
     """Read the words of a joint's column; None if they do not number a joint."""
-    before, number, after = _split_number(words)
-    said = set(before)
-    if number is None:
+    matches = ((at, _NUMBER.fullmatch(word)) for at, word in enumerate(words))
+    at, match = next(((at, match) for at, match in matches if match is not None), (0, None))
+    if match is None:
         return None
-    is_joint = bool(said & _JOINT_WORDS)
-    is_clearance = bool(said & _CLEARANCE_WORDS)
-    is_float = bool(said & {"float", "axial", "endfloat"})
-    everything = said | set(after)
-    if not (is_joint or is_clearance or is_float):
-        if said == {"plunger", "displacement"} and not after:
-            return Recognition(Field(PLUNGER_DISPLACEMENT, number))
-        return None
+    number = int(match["number"])
+    before = {*words[:at], *filter(None, [match["word"]])}
+    after = words[at + 1 :]
+    is_clearance = bool(before & _CLEARANCE_WORDS)
+    is_float = bool(before & {"float", "axial", "endfloat"})
+    if not (before & _JOINT_WORDS or is_clearance or is_float):
+        is_plunger = before == {"plunger", "displacement"} and not after
+        return units.given_to(Field(PLUNGER_DISPLACEMENT, number)) if is_plunger else None
+    everything = before | {*after}
     if everything & _OTHER_MATTER and not (is_clearance or is_float):
         return UNKNOWN
     column = AXIAL_FLOAT if is_float else CLEARANCE
-    nearest = column.header(number)
+    meant = column.header(number)
     if number not in joints.numbers:
-        close = difflib.get_close_matches(
-            nearest, [column.header(n) for n in joints.numbers], 2, 0.0
-        )
-        return _doubt(joints.lack(number), " or ".join(close), "joint_unknown")
+        columns = [column.header(each) for each in joints.numbers]
+        close = difflib.get_close_matches(meant, columns, 2, 0.0)
+        return Recognition(None, joints.lack(number), " or ".join(close), "joint_unknown")
+    extra = before - _CLEARANCE_WORDS - _JOINT_WORDS - _FILLERS
+    extra -= _FLOAT_WORDS if is_float else frozenset()
+    name = {*after} - _FILLERS - (frozenset() if is_float else _CLEARANCE_WORDS)
+    called = joints.called(name)
+    strange = extra or name - joints.vocabulary
+    reason = ""
     if everything & _CONVENTION_WORDS:
-        return _doubt("a convention in the header is not read; it has its own column", nearest)
-    allowed = (
-        _CLEARANCE_WORDS | _JOINT_WORDS | _FILLERS | (_FLOAT_WORDS if is_float else frozenset())
-    )
-    extra = said - allowed
-    if extra:
-        return _doubt(
-            f"{' '.join(sorted(extra))!r} may mean something other than the clearance", nearest
-        )
-    if after and not is_float and set(after) <= _CLEARANCE_WORDS:
-        after = []
-    return _check_name(Field(column, number), after, joints)
-
-
-def _check_name(field: Field, after: list[str], joints: Joints) -> Recognition:
-    """Accept a joint's name behind its number only if it is this joint's, not another's."""
-    nearest = field.name
-    number = field.number
-    said = set(after) - _FILLERS
-    if said - joints.vocabulary:
-        return _doubt(f"{' '.join(after)!r} may mean something other than the clearance", nearest)
-    called = joints.called(said)
-    if number not in called and (called or joints.names):
+        reason = "a convention in the header is not read; it has its own column"
+    elif strange:
+        reason = f"{' '.join(sorted(strange))!r} may mean something other than the clearance"
+    elif name and number not in called and (called or joints.names):
         hint = f"; that is joint {called[0]}" if len(called) == 1 else ""
-        return _doubt(f"{' '.join(after)!r} is not the name of joint {number}{hint}", nearest)
-    return Recognition(field)
+        reason = f"{' '.join(after)!r} is not the name of joint {number}{hint}"
+    if reason:
+        return Recognition(None, reason, meant)
+    return units.given_to(Field(column, number))
 
 
 def near_miss(header: str, joints: Joints) -> Recognition:
@@ -466,10 +381,10 @@ def near_miss(header: str, joints: Joints) -> Recognition:
     if not close:
         return UNKNOWN
     field = parse_canonical(close[0], joints)
-    if field is not None and field.column.bears_verdict:
-        unit = snake[len(bare) :]
-        return _doubt(f"it looks like an entry error for {close[0]}{unit}", close[0] + unit)
-    return Recognition(nearest=close[0])
+    decides = field is not None and field.column.bears_verdict
+    unit = snake[len(bare) :] * decides
+    reason = f"it looks like an entry error for {close[0]}{unit}" if decides else ""
+    return Recognition(None, reason, close[0] + unit)
 
 
 def _snake(name: str) -> str:

@@ -89,26 +89,41 @@ def _names(key: str, text: str, index: int) -> bool:
     return tidy(key) == tidy(text) or key == column_letters(index)
 
 
+def mapped_to(options: ReadOptions, text: str, index: int) -> str | None:
+    """What the caller reads a header as; None if it is not mapped."""
+    named = options.column_map
+    for key, target in (*named.items(), *options.shared_map.items()):
+        # Letters name a place in one table, not in several.
+        if tidy(key) == tidy(text) or (key in named and _names(key, text, index)):
+            return target
+    return None
+
+
 def header_score(cells: Cells, options: ReadOptions) -> int:
     """Twice the columns that the cells name, surely or in doubt, and the doubts that name none."""
     known: set[tuple[Column, int | None]] = set()
     meant: set[tuple[Column, int | None]] = set()
-    doubtful = 0
+    doubtful = mapped = 0
     for index, cell in enumerate(cells):
-        if isinstance(cell, str):
-            mapped = any(_names(key, cell, index) for key in options.column_map)
-            found = UNKNOWN if mapped else recognise(cell, options.joints)
-            known |= set() if found.field is None else {found.field.quantity}
-            doubtful += mapped or bool(found.reason)
-            nearest_field = parse_canonical(found.nearest or "", options.joints)
-            meant |= set() if nearest_field is None else {nearest_field.quantity}
+        if not isinstance(cell, str):
+            continue
+        target = mapped_to(options, cell, index)
+        if target is None:
+            found = recognise(cell, options.joints)
+        else:
+            mapped += 1
+            found = Recognition(parse_target(target, options.joints))
+        known |= set() if found.field is None else {found.field.quantity}
+        doubtful += bool(found.reason)
+        nearest_field = parse_canonical(found.nearest or "", options.joints)
+        meant |= set() if nearest_field is None else {nearest_field.quantity}
     columns = {column for column, _ in known}
     core = len(columns & {*IDENTITY, CLEARANCE}) + bool(doubtful)
     # A table of clearances alone is also a table: what it lacks is then named column by column.
     clearances = sum(column is CLEARANCE and number is not None for column, number in known)
-    if clearances < 2 and (core < 2 or len(known) + doubtful < 3):
+    if mapped < 2 and clearances < 2 and (core < 2 or len(known) + mapped + doubtful < 3):
         return 0
-    return 2 * len(known | meant) + doubtful - len(meant)
+    return 2 * len(known | meant) + mapped + doubtful - len(meant)
 
 
 def find_header(
@@ -216,7 +231,7 @@ class ColumnReader:
         at = places or [CellPlace.at(row, index, text) for index, text in enumerate(headers)]
         columns = Columns([])
         for index, (text, place, unit) in enumerate(zip_longest(headers, at, units)):
-            target = self._mapped_to(text, index)
+            target = mapped_to(self._options, text, index)
             if target is None:
                 found = _understood(text, self._options)
             else:
@@ -238,15 +253,6 @@ class ColumnReader:
         self._missing(columns, row)
         self._unused_map(columns, row)
         return columns
-
-    def _mapped_to(self, text: str, index: int) -> str | None:
-        """What the caller reads a header as; None if it is not mapped."""
-        named = self._options.column_map
-        for key, target in (*named.items(), *self._options.shared_map.items()):
-            # Letters name a place in one table, not in several.
-            if tidy(key) == tidy(text) or (key in named and _names(key, text, index)):
-                return target
-        return None
 
     def _tell(self, code: str, placed: PlacedField, expected: str, remedy: str) -> None:
         self._table.tell(code, placed.header, expected, remedy, placed.place)

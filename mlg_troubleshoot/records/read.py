@@ -125,33 +125,23 @@ def _subfolders_note(source: Source) -> str:
 
 
 def expand(source: Source) -> list[Source]:
+    """The tables that a folder or a pattern stands for; what cannot be one stands for itself."""
     if not isinstance(source, str | Path) or str(source) == STDIN_NAME:
         return [source]
     path = Path(source)
     try:
         if path.is_dir():
-            found = [
-                p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES and not _is_scratch(p)
-            ]
-            return [*sorted(found)] or [source]
-        if any(c in str(source) for c in "*?[") and not path.exists():
-            base = Path(path.anchor) if path.is_absolute() else Path()
-            pattern = str(path.relative_to(path.anchor)) if path.is_absolute() else str(path)
-            return [
-                *sorted(p for p in base.glob(pattern) if p.is_file() and not _is_scratch(p))
-            ] or [source]
-    except (
-        OSError,
-        ValueError,
-        NotImplementedError,
-    ):  # pathlib raises the last for patterns that it cannot follow
+            found = [p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES]
+        elif any(c in str(source) for c in "*?[") and not path.exists():
+            pattern = str(path.relative_to(path.anchor))
+            found = [p for p in Path(path.anchor).glob(pattern) if p.is_file()]
+        else:
+            return [source]
+    except (OSError, ValueError, NotImplementedError):
+        # pathlib raises the last for patterns that it cannot follow
         return [source]
-    return [source]
-
-
-def _is_scratch(path: Path) -> bool:
-    """Tell the lock files that spreadsheet programs lay next to an open workbook."""
-    return path.name.startswith(("~$", ".~lock", "."))
+    # Spreadsheet programs lay lock files next to an open workbook.
+    return [*sorted(p for p in found if not p.name.startswith(("~$", ".")))] or [source]
 
 
 def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
@@ -262,7 +252,7 @@ def _sniffed(data: bytes, name: str) -> str:
     low = head.lower()
     if low.startswith((b"<!doctype html", b"<html", b"<table", b"<head", b"<body")):
         raise FileRefusedError("file_kind", "a web page (HTML), whatever its name")
-    if low.startswith(b"<?xml") or low.startswith(b"<workbook"):
+    if low.startswith((b"<?xml", b"<workbook")):
         raise FileRefusedError("file_kind", "an XML file, whatever its name")
     suffix = Path(name).suffix.lower()
     if suffix in _WORKBOOK_NAMES:

@@ -54,7 +54,7 @@ from mlg_troubleshoot.records.cells import (
     writable,
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings
-from mlg_troubleshoot.records.headers import Field, suspect
+from mlg_troubleshoot.records.headers import Field, may_ask_outcome, suspect
 from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand
 from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.unit_fit import (
@@ -71,6 +71,7 @@ from mlg_troubleshoot.records.values import (
     answers_outcome,
     convention_word,
     is_no_name,
+    may_be_outcome,
     read_date,
     read_joints,
     read_length,
@@ -171,7 +172,7 @@ class RowReader:
         self._table = table
         self._options = table.options
         self._placed = {p.index: p for p in placed}
-        self._width = max(self._placed, default=-1) + 1
+        self._width = 0
         good = [(p.index, p.field) for p in placed if p.field is not None and not p.refused]
         self._refused = [p.index for p in placed if p.refused]
         self._at = {known.column: index for index, known in reversed(good)}
@@ -201,24 +202,13 @@ class RowReader:
         ]
         # The readings of a fleet repeat: what was understood once is not taken apart again.
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)
-        self._unread = self._names_of_unread(placed)
+        self._unread: dict[int, str] = {}
         # What is only carried, and may still say that the gear failed or how it was read.
-        self._unread_words = [
-            p
-            for p in placed
-            if (p.field is None or p.field.column.carried) and not (p.refused or p.is_mapped)
-        ]
-        self._suspects = [
-            (p, *suspect(p.header, self._options.joints))
-            for p in self._unread_words
-            if p.field is None
-        ]
+        self._unread_words: list[PlacedField] = []
+        self._suspects: list[tuple[PlacedField, str, bool]] = []
         # What a number format adds counts where a unit does.
-        self._plain = [
-            p.index
-            for p in placed
-            if p.field is None or p.field.column.holds not in (Holds.LENGTH, Holds.NUMBER)
-        ]
+        self._plain: list[int] = []
+        self._add(placed)
         self._blankable = [index for index, known in good if known.column.blank_by_word]
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
@@ -234,18 +224,29 @@ class RowReader:
         self._date_orders = set(DateOrder)
         self._waiting: dict[RowSource, tuple[AmbiguousDateError, Cell, CellPlace]] = {}
 
-    def _names_of_unread(self, placed: Sequence[PlacedField]) -> list[tuple[int, str]]:
-        """The columns that are only carried because they are unknown, each under its own name."""
-        named: list[tuple[int, str]] = []
-        taken = {column.name for column in self._at if column.carried}
+    def _add(self, placed: Sequence[PlacedField]) -> None:
+        """Take columns whose cells travel to the report, each under its own name, and are searched
+        for what may be a reading or a failure.
+        """
+        taken = {column.name for column in self._at if column.carried} | {*self._unread.values()}
         for p in placed:
-            if p.field is None and not p.refused:
-                name = p.header or f"column {column_letters(p.index)}"
-                while name in taken:
-                    name = f"{name} (again)"
-                taken.add(name)
-                named.append((p.index, name))
-        return named
+            self._placed[p.index] = p
+            self._width = max(self._width, p.index + 1)
+            if p.field is None or p.field.column.holds not in (Holds.LENGTH, Holds.NUMBER):
+                self._plain.append(p.index)
+            if (p.field is None or p.field.column.carried) and not (p.refused or p.is_mapped):
+                self._unread_words.append(p)
+            if p.field is not None or p.refused:
+                continue
+            name = p.header or f"column {column_letters(p.index)}"
+            while name in taken:
+                name = f"{name} (again)"
+            taken.add(name)
+            self._unread[p.index] = name
+            if not p.is_mapped:
+                nearest, is_sure = suspect(p.header, self._options.joints)
+                # A column without a header may only number the rows if it is the first one.
+                self._suspects.append((p, nearest, is_sure or (not p.header and p.index > 0)))
 
     def read(
         self, row: int, cells: Cells, places: Sequence[CellPlace] = ()
@@ -256,7 +257,7 @@ class RowReader:
         self._read_cells(found, self._read_row_unit())
         asked = self._unit_questions(found)
         if self._suspects:
-            asked += self.ask_about(self._cells)
+            asked += self.ask_about(self._cells, outcome=found.values.get(OUTCOME))
         question = Sentence.joined(asked) if asked else ""
         source = self._table.source(row)
         for index, fault in sorted(self._faults, key=itemgetter(0)):
@@ -324,7 +325,7 @@ class RowReader:
                 found.carried[column.name] = value
             elif value is not None:
                 found.values[column] = value
-        for index, name in self._unread:
+        for index, name in self._unread.items():
             cell = self._cells[index]
             if cell is not None:
                 found.carried[name] = writable(show(cell))
@@ -437,6 +438,9 @@ class RowReader:
         """Take up a row: fill it to the width of the header, and leave out what was not
         measured.
         """
+        if len(cells) > self._width:
+            # Something stands to the right of the last header.
+            self._add([PlacedField(i, "", None) for i in range(self._width, len(cells))])
         cells = [*cells, *[None] * (self._width - len(cells))]
         for index in self._plain:
             cells[index] = stored(cells[index])
@@ -483,31 +487,43 @@ class RowReader:
             self._fault(placed.index, CellFaultError(f"{what}_elsewhere", expected, remedy))
             self._bad.add(placed.index)
 
-    def ask_about(self, cells: Cells, *, of_joint: bool = False) -> list[str]:
-        """Ask about numbers in columns that are not read and may hold readings; next to a joint
-        any fraction may be one.
+    def ask_about(
+        self, cells: Cells, *, of_joint: bool = False, outcome: Outcome | None = None
+    ) -> list[str]:
+        """Ask about what stands in columns that are not read: numbers that may be readings, next
+        to a joint any fraction, and answers where no outcome is known.
         """
         asked = []
         for placed, nearest, is_sure in self._suspects:
             cell = cells[placed.index]
-            if cell is None or not (nearest or of_joint):
-                continue
-            # What is asked about may have either point.
-            comma = self._table.decimal_comma or (isinstance(cell, str) and "," in cell)
-            value, unit = written_number(cell, decimal_comma=comma)
-            usual = list(LengthUnit) if is_sure else [LengthUnit.INCH, LengthUnit.MILLIMETRE]
-            size = min(abs(each.to_inches(value)) for each in ([unit] if unit else usual))
-            if not 0.0 < size <= self._options.plunger_hard_max_in or not (
-                is_sure or unit or value % 1.0
-            ):
+            if cell is None:
                 continue
             header = placed.header or column_letters(placed.index)
-            asked.append(
-                f"{header!r} is not read and says {quote(cell, 40)}: if it is a reading, pass --map"
-                f' "{header}={nearest or CLEARANCE.name}" (a length with its unit); else'
-                f' "{header}=carry".'
-            )
+            meant = ""
+            if (nearest or of_joint) and self._may_be_length(cell, is_sure=is_sure):
+                meant = (
+                    f'a reading, pass --map "{header}={nearest or CLEARANCE.name}" (a length with'
+                )
+                meant += " its unit)"
+            elif outcome is None and may_be_outcome(cell) and may_ask_outcome(header):
+                meant = f'what the gear did, pass --map "{header}={OUTCOME.name}"'
+            if meant:
+                asked.append(
+                    f"{header!r} is not read and says {quote(cell, 40)}: if it is {meant}; else"
+                    f' "{header}=carry".'
+                )
         return asked
+
+    def _may_be_length(self, cell: Filled, *, is_sure: bool) -> bool:
+        """Whether a cell holds a length of a usual size: any number, or only a fraction."""
+        # What is asked about may have either point.
+        comma = self._table.decimal_comma or (isinstance(cell, str) and "," in cell)
+        value, unit = written_number(cell, decimal_comma=comma)
+        usual = list(LengthUnit) if is_sure else [LengthUnit.INCH, LengthUnit.MILLIMETRE]
+        size = min(abs(each.to_inches(value)) for each in ([unit] if unit else usual))
+        return 0.0 < size <= self._options.plunger_hard_max_in and (
+            is_sure or unit is not None or value % 1.0 > 0.0
+        )
 
     def _made_id(self) -> str:
         cells = [show(cell) for cell in self._cells]

@@ -85,6 +85,10 @@ def read_table(
     rows = chain(first, rows)
     options, side, said = _sides(sheet.name, header, first, options, file)
     in_hand = TableInHand(options, file, sheet.name, out.tell, comma, side)
+    wide = max((len(cells) for number, cells in first if number > header.row), default=0)
+    if delimiter is None:
+        blank = ("",) * (wide - len(header.texts))
+        header = replace(header, texts=(*header.texts, *blank))
     columns = ColumnReader(in_hand).place(header.texts, header.row, units=header.units)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
     taken = 0
@@ -181,6 +185,9 @@ _NO_INSPECTION = re.compile(
       |no\ further)(?![^\s:.,'\u2019_/(\-])""",
     re.VERBOSE | re.IGNORECASE,
 )
+# Words of a reading that somebody wrote below the table; a day is not one.
+_JOINT_SAID = re.compile(r"\b(?:joints?|jt|plunger|clearance|gelenk)\b|#\s*\d", re.IGNORECASE)
+_FRACTION = re.compile(r"(?<![\d.,/\-])\d{0,3}[.,]\d+(?![\d.,/\-])|\d\s*(?:thou|mm)\b")
 _RULE = re.compile(r"[-=_*.\s]{3,}")
 
 
@@ -202,7 +209,9 @@ class _Table:
         self._long = LongReader(columns.placed, table) if columns.is_long else None
         self._faulty = sheet.facts.faulty
         self._texts = tuple(text or None for text in header.texts)
-        self._width = len(header.texts) if delimiter is not None else None
+        is_fixed = delimiter is not None or columns.is_long
+        self._width = len(header.texts) if is_fixed else None
+        self._may_be_short = delimiter is None
         self._out = out
         self._sheet = sheet
         # A workbook's cell that is merged over several rows says the same of each; of a reading it
@@ -223,7 +232,7 @@ class _Table:
         self._second: FileRefusedError | None = None
         self._telling = [
             [p.index for p in columns.placed if p.field is not None and p.field.column is column]
-            for column in (TAIL_NO, SIDE, CLEARANCE)
+            for column in (TAIL_NO, SIDE, CLEARANCE, JOINT)
         ]
         self._named = {
             p.index: p.field.column
@@ -251,7 +260,9 @@ class _Table:
         if self._second is not None:
             collect(self._reader.faulty(number, cells, self._second))
         elif (
-            width is not None and len(cells) != width and (len(cells) < width or any(cells[width:]))
+            width is not None
+            and len(cells) != width
+            and (any(cells[width:]) or (len(cells) < width and not self._may_be_short))
         ):
             collect(self._reader.ragged(number, cells, width))
         elif number in self._faulty:
@@ -341,6 +352,9 @@ class _Table:
         for number, name, cells in self._aside:
             found = self._alarms([reader.read(number, cells)])
             alarms = [what for what, value in found.items() if value > others.get(what, 0.0)]
+            texts = [*filter(None, map(show, cells))]
+            if _JOINT_SAID.search(" ".join(texts)) and any(map(_FRACTION.search, texts)):
+                alarms.append("a joint and a number in words")
             if alarms:
                 what = f"{quote(name, 40)!r}, set aside although it holds {', '.join(alarms)}"
                 why = FileRefusedError(

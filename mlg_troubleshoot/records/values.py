@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from datetime import date, datetime, time
 from enum import StrEnum
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 from mlg_troubleshoot.decision.columns import OUTCOME, Column, Holds
 from mlg_troubleshoot.decision.inspection import Outcome
@@ -27,6 +27,8 @@ from mlg_troubleshoot.records.cells import (
 from mlg_troubleshoot.records.dates import DateOrder, readings, written_day
 from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.units import MINUS, ClearanceConvention, LengthUnit, parse_length, vanishes
+
+_T = TypeVar("_T")
 
 
 class CellFaultError(Exception):
@@ -90,35 +92,11 @@ _PLAIN = re.compile(r"[+\-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+\-]?\d+)?", re.ASCII
 _NOT_FINITE = re.compile(r"[+\-]?\s*(nan|inf|infinity|1\.#\w+)", re.IGNORECASE)
 
 # What people write where nothing was measured; the error value #N/A is not one of them.
-NOT_MEASURED = frozenset(
-    (
-        *(
-            "-",
-            "--",
-            "\u2010",
-            "\u2011",
-            "\u2012",
-            "\u2013",
-            "\u2014",
-            "\u2212",
-            "n/a",
-            "na",
-            "n.a.",
-            "nm",
-            "n/m",
-        ),
-        *(
-            "n.m.",
-            "nil",
-            "none",
-            "not measured",
-            "not taken",
-            "not done",
-            "not applicable",
-            "not accessible",
-        ),
-    )
+_BLANK_WORDS = (
+    "-|--|\u2010|\u2011|\u2012|\u2013|\u2014|\u2212|n/a|na|n.a.|nm|n/m|n.m.|nil|none|not measured"
+    "|not taken|not done|not applicable|not accessible"
 )
+NOT_MEASURED = frozenset(_BLANK_WORDS.split("|"))
 # What they write for a tail that they do not know; NA and NONE may be tails.
 _NO_NAME = frozenset(("n/a", "n.a.", "unknown", "not known", "tbd", "tba"))
 
@@ -361,9 +339,13 @@ def _read_choice(column: Column, cell: Filled) -> StrEnum:
     raise CellFaultError(f"{column.filled}_unknown", column.asked, remedy)
 
 
+def _each(words: str, meaning: _T) -> dict[str, _T]:
+    return dict.fromkeys(words.split("|"), meaning)
+
+
 _YES_NO = {
-    **dict.fromkeys(("yes", "y", "true", "1"), True),
-    **dict.fromkeys(("no", "n", "false", "0"), False),
+    **_each("yes|y|true|1|ja|j|oui|si|sí|sim|\u2713|\u2714", True),
+    **_each("no|n|false|0|nein|non|não|nao|nee|\u2717|\u2718", False),
 }
 
 
@@ -382,22 +364,11 @@ def _read_yes_no(cell: Filled) -> bool:
 
 
 _OUTCOME_WORDS = {
-    **dict.fromkeys(
-        ("retracted", "retracts", "ok", "okay", "pass", "passed", "good", "normal"),
-        Outcome.RETRACTED,
-    ),
-    **dict.fromkeys(
-        (
-            "failed",
-            "fail",
-            "fails",
-            "failure",
-            "failed to retract",
-            "did not retract",
-            "not retracted",
-            "ng",
-            "not ok",
-        ),
+    **_each("retracted|retracts|ok|okay|pass|passed|good|normal", Outcome.RETRACTED),
+    **_each(
+        "failed|fail|fails|failure|failed to retract|did not retract|not retracted|ng|nok|not ok"
+        "|nicht ok|nio|nicht in ordnung|u s|unserviceable|defekt|ausfall|did not lock"
+        "|did not lock up",
         Outcome.FAILED,
     ),
 }
@@ -408,13 +379,16 @@ def in_words(text: str) -> str:
     return re.sub(r"[\W_]+", " ", tidy(text).replace(".", "")).strip()
 
 
-def _outcome_word(text: str) -> Outcome | None:
-    return _OUTCOME_WORDS.get(in_words(text))
-
-
 def says_failed(text: str) -> bool:
     """Whether a text says that the gear failed, wherever it stands."""
-    return _outcome_word(text) is Outcome.FAILED
+    return _OUTCOME_WORDS.get(in_words(text)) is Outcome.FAILED
+
+
+def may_be_outcome(cell: Filled) -> bool:
+    """Whether a cell answers a question that is not known, or doubts its own answer."""
+    text = show(cell)
+    is_doubted = "?" in text and in_words(text) in _OUTCOME_WORDS
+    return is_doubted or (not text.strip().isdigit() and _yes_no(cell) is not None)
 
 
 def answers_outcome(header: str, cell: Filled) -> bool:
@@ -442,17 +416,24 @@ def convention_word(text: str) -> ClearanceConvention | None:
         return None
 
 
+# Questions about the gear, by words of a header.
+_ASKS_FAILURE = re.compile(
+    r"fail|ausfall|versag|panne|échec|\b(?:no|not|nicht|non) (?:retract|eingefahren|rentr|ok|pass)"
+)
+_ASKS_SUCCESS = re.compile(r"retract|eingefahren|rentré|\bpass|\bok\b")
+
+
 def _read_outcome(cell: Filled, header: str) -> Outcome:
     """Read what the gear did; yes and no count only where the header asks a question (`Retracted?`,
     `Failed?`).
     """
     if isinstance(cell, str):
-        found = _outcome_word(cell)
+        found = None if "?" in cell else _OUTCOME_WORDS.get(in_words(cell))
         if found is not None:
             return found
     question = in_words(header)
-    asks_failure = re.search(r"fail|\b(?:no|not) retract", question) is not None
-    said = _yes_no(cell) if asks_failure or "retract" in question else None
+    asks_failure = _ASKS_FAILURE.search(question) is not None
+    said = _yes_no(cell) if asks_failure or _ASKS_SUCCESS.search(question) else None
     if said is None:
         if isinstance(cell, OddCell):
             raise odd_cell_fault(cell, "RETRACTED or FAILED")

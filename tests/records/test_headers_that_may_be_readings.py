@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
+
+import openpyxl
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Judgement, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions, ReadResult, read_many
 from mlg_troubleshoot.workflows.check import check
@@ -120,6 +124,121 @@ def test_carry_answers_the_question(header: str) -> None:
 )
 def test_other_numbers_are_carried(header: str, value: str) -> None:
     assert judged([header], [value]).verdict is Verdict.WITHIN_MARGIN
+
+
+@pytest.mark.parametrize("value", ["nein", "no", "FALSE", "ja", "non", "OK?", "\u2717"])
+@pytest.mark.parametrize(
+    "header", ["Eingefahren?", "Ausfall", "Rentré ?", "Pass", "status", "Locked up", "OK", ""]
+)
+def test_an_answer_to_an_unknown_question_is_asked_about(header: str, value: str) -> None:
+    asked = judged([header], [value])
+    assert asked.verdict is Verdict.INCOMPLETE
+    name = header or "O"
+    assert f'--map "{name}=outcome"' in asked.row.unit_question
+    declared = {"column_map": {name: "carry"}}
+    assert judged([header], [value], **declared).verdict is Verdict.WITHIN_MARGIN
+
+
+@pytest.mark.parametrize(
+    ("header", "value", "outcome"),
+    [
+        ("Eingefahren?", "nein", Outcome.FAILED),
+        ("Ausfall", "ja", Outcome.FAILED),
+        ("Rentré ?", "non", Outcome.FAILED),
+        ("Pass", "no", Outcome.FAILED),
+        ("Rentré ?", "oui", Outcome.RETRACTED),
+        ("Ausfall", "nein", Outcome.RETRACTED),
+    ],
+)
+def test_a_question_that_is_mapped_is_answered(header: str, value: str, outcome: Outcome) -> None:
+    text = ",".join([*ALL, header]) + "\n" + ",".join([*GOOD, value]) + "\n"
+    options = ReadOptions.of(GEAR, column_map={header: "outcome"})
+    (row,) = read_many([Named(text.encode(), "t.csv")], options).rows
+    assert isinstance(row, Inspection)
+    assert row.outcome is outcome
+
+
+@pytest.mark.parametrize(
+    "word", ["NOK", "n.i.O.", "u/s", "unserviceable", "did not lock up", "NG?"]
+)
+def test_further_words_of_failure_stop_a_row(word: str) -> None:
+    assert judged(["status"], [word]).verdict is Verdict.INVALID
+
+
+@pytest.mark.parametrize("word", ["RETRACTED?", "OK?", "retracted ?"])
+def test_an_outcome_that_is_in_doubt_is_not_taken_as_sure(word: str) -> None:
+    assert judged(["outcome"], [word]).verdict is Verdict.INVALID
+
+
+@pytest.mark.parametrize(
+    ("headers", "cells"),
+    [
+        (["greased"], ["yes"]),
+        (["photo taken"], ["yes"]),
+        (["status"], ["OK"]),
+        (["outcome", "Locked up"], ["RETRACTED", "yes"]),
+    ],
+)
+def test_other_answers_are_carried(headers: list[str], cells: list[str]) -> None:
+    assert judged(headers, cells).verdict is Verdict.WITHIN_MARGIN
+
+
+@pytest.mark.parametrize(
+    "header", ["Margin today (in)", "RV margin", "Margin left", "Spielraum (in)", "allowed travel"]
+)
+def test_a_margin_under_another_header_is_asked_about(header: str) -> None:
+    asked = judged([header], ["0.004"])
+    assert asked.verdict is Verdict.INCOMPLETE
+    assert "margin" in asked.row.unit_question
+
+
+@pytest.mark.parametrize("value", ["0.06", 60.0, "1.5 mm"])
+@pytest.mark.parametrize("row", [1, 60])
+@pytest.mark.parametrize("gap", [0, 1, 2])
+@pytest.mark.parametrize("joint", [False, True])
+def test_a_number_to_the_right_of_the_headers_is_never_dropped(
+    value: object, row: int, gap: int, joint: bool
+) -> None:
+    book = openpyxl.Workbook()
+    sheet = book.worksheets[0]
+    good = [*GOOD[:4], *[0.001] * 10]
+    if joint:
+        sheet.append([*ALL[:4], "joint", "clearance_in"])
+        lines = [[f"R{n}", *good[1:4], j, 0.001] for n in range(7) for j in range(1, 11)]
+    else:
+        sheet.append(ALL)
+        lines = [[f"R{n}", *good[1:]] for n in range(70)]
+    lines[row - 1] += [*[None] * gap, value]
+    for line in lines:
+        sheet.append(line)
+    data = io.BytesIO()
+    book.save(data)
+    result = check(Named(data.getvalue(), "t.xlsx"), advice=False)
+    assert result.exit_code is not ExitCode.FINE
+    assert any(j.verdict is not Verdict.WITHIN_MARGIN for j in result.judgements)
+
+
+def test_a_remark_to_the_right_of_the_headers_travels_to_the_report() -> None:
+    book = openpyxl.Workbook()
+    for line in (ALL, [*GOOD[:4], *[0.001] * 10, None, "checked by Max"]):
+        book.worksheets[0].append(line)
+    data = io.BytesIO()
+    book.save(data)
+    (row,) = read_many([Named(data.getvalue(), "t.xlsx")], ReadOptions.of(GEAR)).rows
+    assert isinstance(row, Inspection)
+    assert row.carried == {"column P": "checked by Max"}
+
+
+@pytest.mark.parametrize("title", [[], ["Zeiss Calypso"]])
+@pytest.mark.parametrize("carry", [{}, {"Prüfer": "carry"}])
+def test_a_header_is_found_by_what_is_mapped(title: list[str], carry: dict[str, str]) -> None:
+    names = {"Kennz.": "tail_no", "Seite": "side", "Gelenk": "joint", "Ist": "clearance_mm"}
+    lines = [title, [*names, "Prüfer"], ["N1", "LH", "3", "0.33", "Max"]]
+    text = "\n".join(",".join(line) for line in lines if line)
+    options = ReadOptions.of(GEAR, column_map={**names, **carry}, convention="RADIAL")
+    found = read_many([Named(text.encode(), "t.csv")], options)
+    assert "header_missing" not in {problem.code for problem in found.problems}
+    assert [row.tail_no for row in found.rows] == ["N1"]
 
 
 def test_a_second_column_of_numbers_in_a_list_of_joints_is_asked_about() -> None:

@@ -90,7 +90,34 @@ def test_the_maximum_of_a_gear_over_its_limit_is_a_statistic() -> None:
     assert found.problems == ()
 
 
-@pytest.mark.parametrize("name", ["Signed: J. Smith", "Page 7", "Key", "-----"])
+@pytest.mark.parametrize(
+    "words", ["joint 3 read 0.013", "#6 12.1 thou", "plunger 1.5 mm", "Clearance of 5: .014"]
+)
+@pytest.mark.parametrize("table", [f"{LONG}Anna,R1,N1,LH,3,0.001", f"{WIDE}N1,0.001,0.002,,"])
+def test_a_reading_in_words_below_the_table_is_a_row_to_correct(table: str, words: str) -> None:
+    commas = "," * table.partition("\n")[0].count(",")
+    for line in (f"Remark: {words}{commas}", f"Remark,{words}{commas[1:]}"):
+        found = read(f"{table}\n{line}\n", "LH.csv")
+        assert [type(row) for row in found.rows] == [Inspection, InvalidRow]
+        assert found.problems
+
+
+def test_a_joint_and_its_reading_are_never_set_aside() -> None:
+    found = read(f"{LONG}Anna,R1,N1,LH,3,0.001\n,Remark,,,6,0.0070\n")
+    assert [type(row) for row in found.rows] == [Inspection, InvalidRow]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Signed: J. Smith 12.03.2026",
+        "Notes: gauge 7 at 21.5 C",
+        "Signed: J. Smith",
+        "Page 7",
+        "Key",
+        "-----",
+    ],
+)
 def test_words_without_a_reading_are_set_aside(name: str) -> None:
     found = read(f"{WIDE}N1,0.001,0.002,,\n{name},,,,\n", "fleet LH.csv")
     assert [row.tail_no for row in found.rows] == ["N1"]
