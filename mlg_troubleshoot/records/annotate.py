@@ -70,15 +70,15 @@ def annotate_workbook(
         raise OutputError(
             f"{source} is no longer the workbook that was judged", "Check the workbook again."
         )
-    covered = sum(sheet.covered() for sheet in judged.sheets)
-    if covered > MAX_ROWS:
-        raise OutputError(
-            f"merged cells and links of {source} cover {covered} cells, at most {MAX_ROWS} can be"
-            " copied",
-            "Split the merged cells and delete the links that span whole sheets.",
-        )
     buffer = io.BytesIO()
     try:
+        covered = sum(sheet.covered() for sheet in judged.sheets)
+        if covered > MAX_ROWS:
+            raise OutputError(
+                f"merged cells and links of {source} cover {covered} cells, at most {MAX_ROWS} can be"
+                " copied",
+                "Split the merged cells and delete the links that span whole sheets.",
+            )
         # What the library drops is said below, in the user's words.
         with warnings.catch_warnings(), ZipFile(buffer, "w", ZIP_DEFLATED) as package:
             warnings.simplefilter("ignore")
@@ -88,6 +88,7 @@ def annotate_workbook(
             _annotate(book, label, result, verdicts, over_limit, widths)
             ExcelWriter(book, package).save()
     except (
+        FileRefusedError,
         BadZipFile,
         KeyError,
         ValueError,

@@ -270,6 +270,16 @@ def test_a_workbook_that_the_library_cannot_write_again_is_an_output_error(book,
     assert not (tmp_path / "o.xlsx").exists()
 
 
+def test_a_link_that_leads_nowhere_is_an_output_error(book, tmp_path):
+    source = tmp_path / "linked.xlsx"
+    link = b'<hyperlinks><hyperlink ref="nowhere"/></hyperlinks><pageMargins'
+    with zipfile.ZipFile(book) as whole, zipfile.ZipFile(source, "w") as file:
+        for name in whole.namelist():
+            file.writestr(name, whole.read(name).replace(b"<pageMargins", link, 1))
+    with pytest.raises(OutputError, match="cannot be copied"):
+        annotate_workbook(source, tmp_path / "o.xlsx", read_inspections(source, ReadOptions()), {})
+
+
 def test_csv_export_keeps_numbers_exact_and_blanks_blank(tmp_path):
     write_csv(tmp_path / "o.csv", ["a", "b", "c", "d"], [["x", 0.1 + 0.2, None, 3]])
     with (tmp_path / "o.csv").open(newline="") as file:
