@@ -440,15 +440,6 @@ class Landings(TypedDict):
     p95: float | None
 
 
-class HitRate(TypedDict):
-    """In how many outcomes that name a joint the advice was right, with a 90 % interval."""
-
-    right: Count
-    outcomes: Count
-    p05: Probability | None
-    p95: Probability | None
-
-
 class FleetGear(TypedDict):
     """One gear of a fleet: its last inspection, and the landings that it has left."""
 
@@ -483,7 +474,6 @@ class FleetOutput(TypedDict):
     schema_version: Version
     gears: list[FleetGear]
     work: str
-    advice: HitRate
     warnings: list[str]
 
 
@@ -534,7 +524,6 @@ class LifeOutput(TypedDict):
     landings_to_margin: Landings | None
     next_inspection_landings: float | None
     due_date: str | None
-    advice: HitRate
     notes: list[str]
     warnings: list[str]
 

@@ -102,8 +102,10 @@ class Run:
             return self._ask().exit_code
         typed = by_hand.from_flags(self._flags, self._asked, self._place)
         result = task.check_inspection(typed, self._asked, self._place)
-        self._publish(result, LengthUnit.INCH)
-        self._keep(result)
+        try:
+            self._keep(result)
+        finally:
+            self._publish(result, LengthUnit.INCH)
         return result.exit_code
 
     def _check_files(self) -> int:
@@ -137,9 +139,10 @@ class Run:
                 self._show(result, unit, found.lines, detail=wanted.detail)
         if wanted.annotate is not None and result.read is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
+        # A report states what was kept.
+        self._keep(result, judged=found.entries)
         if wanted.report is not None:
             self._write_reports(result, wanted.report, unit)
-        self._keep(result, judged=found.entries)
         if result.problems and not wanted.as_json and not found.lines:
             output.say("No row could be judged.")
         return task.exit_code_of(found.lines, result.unread_files)
@@ -318,6 +321,7 @@ class Run:
                 on_written=progress,
                 unit=unit,
                 before=before,
+                store=self._place,
                 # The prompts write the report of one inspection anew after each change.
                 replace_files=self._asks or self._wanted.force,
             )

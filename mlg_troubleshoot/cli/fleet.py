@@ -71,7 +71,7 @@ def fleet(
         output.console().print(history.no_records(records.kept.place))
     if csv is not None:
         found.write_csv(csv)
-    history.write_pages(found, shown, shown.unit(), fleet=True)
+    history.write_pages(found, records.kept, shown, shown.unit(), fleet=True)
 
 
 app = options.alone(fleet, EPILOG)

@@ -58,6 +58,7 @@ GONE = {
     "study --n1": "--size N1,N2,ITERATIONS sets the size of a paper design",
     "study --n2": "--size N1,N2,ITERATIONS sets the size of a paper design",
     "study --iterations": "--size N1,N2,ITERATIONS sets the size of a paper design",
+    "history outcome": "repairs, readings and outcomes are kept as they are found",
     "gear survey": "survey(readings, gear) in Python: docs/how-to/measured-gear.md",
     "gear separable": "a diagnosis says what would split its set of causes (mlg diagnose)",
     "gear new": "write the gear file: docs/how-to/own-gear.md shows a short one",

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.life.folding import GearLife
     from mlg_troubleshoot.life.forecast import Forecast, Quantiles
     from mlg_troubleshoot.life.landings_left import FleetLine
-    from mlg_troubleshoot.life.looking_back import Advice
     from mlg_troubleshoot.store import Record, Store
     from mlg_troubleshoot.workflows.history import Lives
 
@@ -111,11 +110,11 @@ def show(
             output.write_json(life_json.life_as_json(life, found.forecasts[life.key], known))
         else:
             _show_life(life, found.forecasts[life.key], known, unit)
-    write_pages(found, shown, unit, fleet=False)
+    write_pages(found, place, shown, unit, fleet=False)
 
 
 def write_pages(
-    found: Lives, shown: options.OutputOptions, unit: LengthUnit, *, fleet: bool
+    found: Lives, store: Store, shown: options.OutputOptions, unit: LengthUnit, *, fleet: bool
 ) -> None:
     """Write the pages of gears if they are asked for, and name them on stderr."""
     from mlg_troubleshoot.workflows import history
@@ -124,6 +123,7 @@ def write_pages(
         return
     written = history.write_pages(
         found,
+        store,
         shown.report,
         fleet=fleet,
         page=shown.page.value,
@@ -141,7 +141,6 @@ def show_gears(found: Lives, *, ahead: bool) -> None:
     """Show one line per gear, worst first; `ahead`: with the landings that are left."""
     from mlg_troubleshoot.cli.views.tables import STYLES, Cell
     from mlg_troubleshoot.life.landings_left import fleet_lines, landings_shown, work_sentence
-    from mlg_troubleshoot.life.looking_back import Advice
 
     console = output.console()
     gear = found.gear
@@ -189,7 +188,6 @@ def show_gears(found: Lives, *, ahead: bool) -> None:
     spare = ("landings", "inspect", "last seen", "to limit", "to margin")
     output.print_table(console, headings, rows, spare, "--json lists all of them")
     console.print(work_sentence(lines))
-    _show_advice(console, Advice.total(line.advice for line in found.lines))
 
 
 def _count(landings: float | None) -> str:
@@ -202,14 +200,8 @@ def show_warnings(console: output.DataConsole, found: Iterable[GearLife | FleetL
             console.print(output.text(f"Warning: {warning}"))
 
 
-def _show_advice(console: output.DataConsole, advice: Advice) -> None:
-    if advice.outcomes:
-        console.print(advice.sentence)
-
-
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
     from mlg_troubleshoot.life.landings_left import outlook_sentence
-    from mlg_troubleshoot.life.looking_back import Advice
     from mlg_troubleshoot.reporting.life_json import life_as_json
 
     console = output.console(unit=unit)
@@ -233,7 +225,6 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
     _show_joints(console, life, values["joints"], ahead, gear)
-    _show_advice(console, Advice.of([life]))
 
 
 def _show_joints(
@@ -414,26 +405,6 @@ def void(
 
 
 @options.flat
-def outcome(
-    *,
-    record: RecordId,
-    found: Annotated[str, typer.Option(metavar="TEXT", help="What was found.")],
-    joint: Annotated[
-        int | None, typer.Option(metavar="N", help="The joint that was the cause.")
-    ] = None,
-    records: options.Records,
-) -> None:
-    """Record what was found after the advice; mlg history then shows how often it was right."""
-    from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.workflows import history
-
-    if joint is not None:
-        load_gear(records.gear).require_joints([joint], "--joint")
-    added = history.outcome(records.kept, record, found, joint)
-    output.say(f"Kept: outcome of {record} ({added.tail_no} {added.side}).")
-
-
-@options.flat
 def verify(
     *,
     expect: Annotated[
@@ -442,6 +413,10 @@ def verify(
             metavar="HASH",
             help="A last hash noted earlier; it must still be in the chain.",
         ),
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A report: HOLDS, STALE or VIOLATED, and why."),
     ] = None,
     records: options.Records,
 ) -> None:
@@ -455,6 +430,15 @@ def verify(
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.workflows import history
 
+    if report is not None:
+        from mlg_troubleshoot.gear.gear_file import load_gear
+        from mlg_troubleshoot.workflows.witness import Standing, compare_report
+
+        checked = compare_report(records.kept, load_gear(records.gear), report)
+        output.write("\n".join([f"{checked.standing}: {report}", *checked.why]))
+        if checked.standing is not Standing.HOLDS:
+            raise typer.Exit(ExitCode.ATTENTION)
+        return
     noted = None if expect is None else expect.strip().lower()
     if noted is not None and not re.fullmatch(r"[0-9a-f]{64}", noted):
         raise UsageError(
@@ -494,11 +478,11 @@ app = options.commands(
     cls=HistoryGroup,
     help=(
         "Show the records of each gear ([b]mlg history[/b], [b]mlg history TAIL LH[/b]) and add"
-        " repairs, corrections and outcomes."
+        " repairs and corrections."
     ),
     epilog=EPILOG,
 )
 app.command(_SHOW, hidden=True)(show)
-for command in (repair, rerig, correct, void, outcome, verify, export):
+for command in (repair, rerig, correct, void, verify, export):
     app.command()(command)
 app.command("import")(import_chain)

@@ -14,7 +14,6 @@ from mlg_troubleshoot.decision.ranking import WORST_FIRST
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast, Quantiles
-from mlg_troubleshoot.life.looking_back import Advice
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +29,6 @@ class FleetLine:
     inspections: int
     repairs: int
     warnings: tuple[str, ...]
-    advice: Advice
     record_id: str = ""
     inspection_date: str | None = None
     gear_landings: int | float | None = None
@@ -50,7 +48,7 @@ class FleetLine:
     @classmethod
     def of(cls, life: GearLife) -> FleetLine:
         counts = len(life.inspections), len(life.repairs)
-        line = cls(*life.key, *counts, life.warnings, Advice.of([life]))
+        line = cls(*life.key, *counts, life.warnings)
         if life.latest is None:
             return line
         kept, found = life.worst or (life.latest, None)

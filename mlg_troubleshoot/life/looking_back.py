@@ -1,10 +1,8 @@
-"""What the records say about the past: inspections in a row, how often the advice was right, and
-how worn gears usually are.
-"""
+"""What the records say about the past: inspections in a row, and how worn gears usually are."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
@@ -20,57 +18,6 @@ _SIDE_BY_SIDE = 4
 # Newest inspections that a fleet is judged by, which give a share to a few percent; fewest gears.
 _MOST = 500
 _FEWEST = 10
-
-
-@dataclass(frozen=True, slots=True)
-class Advice:
-    """How often the joint that was found stood in the advice, with a 90 % interval (Jeffreys)."""
-
-    right: int
-    outcomes: int
-
-    @classmethod
-    def of(cls, lives: Iterable[GearLife]) -> Advice:
-        """Count outcomes that name a joint, and those whose joint was advised first."""
-        right = outcomes = 0
-        for life in lives:
-            for record in life.outcomes:
-                joint = record.body["joint"]
-                kept = next(
-                    (k for k in life.inspections if k.record.record_id == record.record_id), None
-                )
-                said = None if kept is None else life.judged.get(kept.record.digest)
-                if joint is not None and said is not None:
-                    outcomes += 1
-                    right += joint in (said.worst_joint, *said.plan.steps[0].joints)
-        return cls(right, outcomes)
-
-    @classmethod
-    def total(cls, parts: Iterable[Advice]) -> Advice:
-        """Of several gears together."""
-        counts = [(each.right, each.outcomes) for each in parts]
-        return cls(*map(sum, zip(*counts, strict=True))) if counts else cls(0, 0)
-
-    @property
-    def interval(self) -> tuple[float, float] | None:
-        """None where no outcome names a joint."""
-        if not self.outcomes:
-            return None
-        from scipy.special import betaincinv
-
-        wrong = self.outcomes - self.right
-        low, high = betaincinv(self.right + 0.5, wrong + 0.5, [0.05, 0.95]).tolist()
-        return low if self.right else 0.0, high if wrong else 1.0
-
-    @property
-    def sentence(self) -> str:
-        if self.interval is None:
-            return "No outcome was recorded against the advice yet."
-        low, high = self.interval
-        return (
-            f"The advice was right in {self.right} of {self.outcomes} outcomes that name a joint "
-            f"({low:.0%} to {high:.0%} with 90 % confidence)."
-        )
 
 
 @dataclass(frozen=True, slots=True)

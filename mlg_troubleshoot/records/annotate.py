@@ -75,8 +75,8 @@ def annotate_workbook(
         covered = sum(sheet.covered() for sheet in judged.sheets)
         if covered > MAX_ROWS:
             raise OutputError(
-                f"merged cells and links of {source} cover {covered} cells, at most {MAX_ROWS} can be"
-                " copied",
+                f"merged cells and links of {source} cover {covered} cells, at most {MAX_ROWS} can"
+                " be copied",
                 "Split the merged cells and delete the links that span whole sheets.",
             )
         # What the library drops is said below, in the user's words.

@@ -17,4 +17,5 @@ __all__ = [
     "publish",
     "schematic",
     "study_figures",
+    "witness",
 ]

@@ -60,7 +60,7 @@ def serve(requests: BinaryIO, answers: BinaryIO, fonts: Mapping[str, bytes]) -> 
                 boxes = False
             else:
                 book.write_to_pdf_stream(stream)
-                about = job["sections"], job["title"], job["created"]
+                about = job["sections"], job["title"], job["created"], job["keywords"]
                 pdf, boxes = finished(stream.getvalue(), *about)
         except (plutoprint.Error, PyPdfError, OSError, ValueError) as error:
             answer = {"error": str(error) or type(error).__name__, "length": 0}
@@ -72,9 +72,10 @@ def serve(requests: BinaryIO, answers: BinaryIO, fonts: Mapping[str, bytes]) -> 
 
 
 def finished(
-    pdf: bytes, sections: Mapping[str, str], title: str, created: str
+    pdf: bytes, sections: Mapping[str, str], title: str, created: str, keywords: str
 ) -> tuple[bytes, bool]:
-    """Give a PDF its title, language, dates and a bookmark for each section (anchor to heading).
+    """Give a PDF its title, keywords, language, dates and a bookmark for each section (anchor to
+    heading).
 
     Also tell whether it shows the box that stands for a character that no font has. The dates are
     those given, so that the same document always has the same bytes.
@@ -108,6 +109,7 @@ def finished(
         writer.page_mode = "/UseOutlines"
     writer.metadata = {
         "/Title": title,
+        "/Keywords": keywords,
         "/Creator": "mlg-troubleshoot",
         "/Producer": "PlutoBook, cairo",
         "/CreationDate": created,

@@ -15,7 +15,7 @@ from mlg_troubleshoot.life.landings_left import (
     outlook_sentence,
     work_sentence,
 )
-from mlg_troubleshoot.life.looking_back import Advice, side_by_side
+from mlg_troubleshoot.life.looking_back import side_by_side
 from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture, wear_figure
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import Document
@@ -58,7 +58,6 @@ def fleet_document(
         "lines_of": lines,
         "picture": fleet_picture(places),
         "work": work_sentence(gears),
-        "advice": Advice.total(line.advice for line in every).sentence,
         "notes": [warning for line in every for warning in line.warnings],
     }
     return Document("fleet.html.j2", context, "fleet", landscape=True, script="table.js")

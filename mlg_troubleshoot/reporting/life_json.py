@@ -11,7 +11,6 @@ from mlg_troubleshoot.json_outputs import FleetGear, FleetOutput, LifeOutput
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.landings_left import FleetLine, fleet_lines, work_sentence
-from mlg_troubleshoot.life.looking_back import Advice
 from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.reporting.json_form import filled, written
 from mlg_troubleshoot.store import Record, RecordKind
@@ -27,7 +26,6 @@ def fleet_as_json(
         FleetOutput,
         gears=[filled(FleetGear, line) for line in lines],
         work=work_sentence(lines),
-        advice=_advice(Advice.total(gear.advice for gear in gears)),
         warnings=[warning for gear in gears for warning in gear.warnings],
     )
 
@@ -75,7 +73,6 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
             }
             for number, between in stretches(life, gear.joint_numbers).items()
         ],
-        advice=_advice(Advice.of([life])),
         notes=life.notes,
         warnings=life.warnings,
     )
@@ -102,9 +99,3 @@ def _event(record: Record, life: GearLife, *, counts: bool) -> dict[str, Any]:
             }
         return event | {"clearance_in": inspection.get("clearance_in", {})}
     return event | {name: value for name, value in body.items() if name != "landings"}
-
-
-def _advice(advice: Advice) -> dict[str, int | float | None]:
-    """The hit rate; its interval is null where no outcome names a joint."""
-    low, high = advice.interval or (None, None)
-    return {"right": advice.right, "outcomes": advice.outcomes, "p05": low, "p95": high}

@@ -74,7 +74,12 @@ class PdfEngine:
         """
         body = html.encode("utf-8")
         dated = created.astimezone(UTC).strftime("D:%Y%m%d%H%M%SZ")
-        about = {"sections": sections_of(html), "title": title_of(html), "created": dated}
+        about = {
+            "sections": sections_of(html),
+            "title": _found(_TITLE, html),
+            "created": dated,
+            "keywords": _found(_KEYWORDS, html),
+        }
         job = {"length": len(body), "page": page, "kind": kind, "width": width, **about}
         process = self.start()
         if process.stdin is None or process.stdout is None:
@@ -115,6 +120,7 @@ _HEADING = re.compile(
     r'<h2\b[^>]*\bid="(?P<id>[a-z0-9-]+)"[^>]*><a href="#(?P=id)">(?P<text>.*?)</a></h2>', re.DOTALL
 )
 _TITLE = re.compile(r"<title>(.*?)</title>", re.DOTALL)
+_KEYWORDS = re.compile(r'<meta name="keywords" content="(\w+)">')
 
 
 def sections_of(html: str) -> dict[str, str]:
@@ -129,6 +135,6 @@ def sections_of(html: str) -> dict[str, str]:
     return sections
 
 
-def title_of(html: str) -> str:
-    found = _TITLE.search(html)
+def _found(pattern: re.Pattern[str], html: str) -> str:
+    found = pattern.search(html)
     return html_text.unescape(found[1]).strip() if found else ""

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from typing import Any
 
+import msgspec
+
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear, SourceKind
 from mlg_troubleshoot.reporting.formats import Lengths
+from mlg_troubleshoot.reporting.witness import Witness
 
 Facts = list[tuple[str, str]]
 DISCLAIMER = (
@@ -29,6 +32,7 @@ class ReportProvenance:
 
     input_sha256: hash of the bytes of each input file by its name; empty for prompts and the
     command line.
+    witness: the log that holds what is reported; None where nothing was kept.
     """
 
     program_version: str
@@ -37,6 +41,14 @@ class ReportProvenance:
     input_sha256: Mapping[str, str] = field(default_factory=dict)
     seed: int | None = None
     extension: str | None = None
+    witness: Witness | None = None
+
+    def about(self, *gear: str | None) -> ReportProvenance:
+        """The provenance of the report of one gear, by tail and side, among others."""
+        if self.witness is None:
+            return self
+        own = [each for each in self.witness.gears if (each.tail_no, each.side) == gear]
+        return replace(self, witness=msgspec.structs.replace(self.witness, gears=tuple(own)))
 
 
 def provenance_of(
@@ -45,9 +57,10 @@ def provenance_of(
     *,
     seed: int | None = None,
     extension: str | None = None,
+    witness: Witness | None = None,
 ) -> ReportProvenance:
     made = program_version(), moment_of_report(), gear.geometry_sha256
-    return ReportProvenance(*made, dict(input_sha256), seed, extension)
+    return ReportProvenance(*made, dict(input_sha256), seed, extension, witness)
 
 
 @cache

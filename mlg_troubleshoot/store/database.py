@@ -505,6 +505,12 @@ class Store:
             count = count + 1
             yield row
 
+    def head(self) -> tuple[int, str]:
+        """How many records there are, and the hash of the last one."""
+        with self.transaction(writing=False) as connection:
+            count, last = self._head(connection) if self._ready else (0, b"")
+            return count, last.hex()
+
     def _head(self, connection: sql.Connection) -> tuple[int, bytes]:
         """Number and hash of the last record; a chain whose newest records do not fit takes no
         more.

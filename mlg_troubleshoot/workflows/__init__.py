@@ -10,4 +10,5 @@ __all__ = [
     "keep",
     "kept",
     "study",
+    "witness",
 ]

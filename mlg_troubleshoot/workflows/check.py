@@ -20,7 +20,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSour
 from mlg_troubleshoot.decision.judge_rows import AT_ONCE, assess
 from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.decision.prediction import Extension
-from mlg_troubleshoot.decision.ranking import Listed, listed
+from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear, listed
 from mlg_troubleshoot.errors import ExitCode, OutputError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.records.frames import Frame
     from mlg_troubleshoot.records.read import Source
     from mlg_troubleshoot.reporting.publish import WrittenReport
+    from mlg_troubleshoot.reporting.witness import Witness
     from mlg_troubleshoot.store import Store
 
 
@@ -469,6 +470,7 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
     *,
     unit: LengthUnit | str = LengthUnit.INCH,
     before: Sequence[Sequence[PastInspection]] = (),
+    store: Store | None = None,
     replace_files: bool = True,
 ) -> tuple[WrittenReport, ...]:
     """Write a report for each inspection that was judged and, for a batch, its summary, in which
@@ -492,6 +494,8 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
         The unit that its readers use.
     before : sequence, optional
         What each gear was like before, as `looking_back.seen_before` says it.
+    store : Store, optional
+        Where the inspections were kept: each report states its record and the head of the log.
     replace_files : bool
         Replace reports that exist; False refuses to.
 
@@ -521,12 +525,21 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
     judgements = result.judgements
     problems = result.problems
     extension = None if options.extension is None else options.extension.describe()
-    made = provenance_of(gear, result.inputs_sha256, extension=extension)
+    witness = None if store is None else _witness(result, store, extension)
+    made = provenance_of(gear, result.inputs_sha256, extension=extension, witness=witness)
     alone = len(judgements) == 1
     steps = before or [()] * len(judgements)
     places = [k for k, j in enumerate(judgements) if alone or isinstance(j, Assessment)]
     documents = (
-        inspection_document(judgements[k], gear, made, problems, unit, steps[k]) for k in places
+        inspection_document(
+            judgements[k],
+            gear,
+            made.about(judgements[k].row.tail_no, judgements[k].row.side),
+            problems,
+            unit,
+            steps[k],
+        )
+        for k in places
     )
     reports = publish_all(
         documents,
@@ -547,6 +560,15 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
     summary = batch_document(judgements, problems, gear, made, result.notes, links, unit)
     whole = publish(summary, directory, formats=formats, page=page, replace_files=replace_files)
     return (whole, *reports)
+
+
+def _witness(result: CheckResult, store: Store, extension: str | None) -> Witness:
+    from mlg_troubleshoot.workflows.witness import witness_of
+
+    latest, _earlier = latest_of_each_gear(listed(result.judgements))
+    judged = [a for a in (result.judgements[n] for n in latest) if isinstance(a, Assessment)]
+    verdicts = {key_of(a.inspection): a.verdict.value for a in judged}
+    return witness_of(store, result.gear, verdicts, extension)
 
 
 def write_template(

@@ -175,6 +175,7 @@ def show_lives(
 
 def write_pages(
     shown: Lives,
+    store: Store,
     directory: Path,
     *,
     fleet: bool,
@@ -186,14 +187,15 @@ def write_pages(
     from mlg_troubleshoot.reporting import fleet_report
     from mlg_troubleshoot.reporting.provenance import provenance_of
     from mlg_troubleshoot.reporting.publish import publish
+    from mlg_troubleshoot.workflows.witness import witness_of
 
-    records = (record for life in shown.lives for record in life.records)
-    last = max(records, key=lambda record: record.seq, default=None)
-    hashes = {} if last is None else {f"store up to record {last.seq}": last.digest}
-    made = provenance_of(shown.gear, hashes)
+    verdicts = {line.key: line.verdict for line in shown.lines}
+    made = provenance_of(shown.gear, {}, witness=witness_of(store, shown.gear, verdicts))
     write = partial(publish, directory=directory, page=page, replace_files=replace_files)
     documents = (
-        fleet_report.life_document(life, shown.forecasts[life.key], shown.gear, made, unit)
+        fleet_report.life_document(
+            life, shown.forecasts[life.key], shown.gear, made.about(*life.key), unit
+        )
         for life in shown.lives
     )
     if not fleet:
@@ -255,18 +257,6 @@ def _unreadable(store: Store, digest: str) -> Record | None:
         return None
     found = [record for record in store.all() if record.digest.startswith(digest.lower())]
     return found[0] if len(found) == 1 and not is_readable(found[0]) else None
-
-
-def outcome(store: Store, record_id: str, found: str, joint: int | None) -> Record:
-    """Record what was found after the advice."""
-    judge_text("--found", found, "State what was found.")
-    of = find(store, record_id)
-    if of.kind not in (RecordKind.INSPECTION, RecordKind.CORRECTION):
-        raise UsageError(
-            f"{record_id!r} is a {of.kind}", "Give the record of the inspection that advised."
-        )
-    body = {"of": of.digest, "found": found, "joint": joint}
-    return _added(store, replace(of, kind=RecordKind.OUTCOME, packed=packed(body), identity=()))
 
 
 def _added(store: Store, record: Record) -> Record:

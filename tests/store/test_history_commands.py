@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pypdf
 import pytest
-import scipy.stats
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear import gear_file
@@ -216,35 +215,6 @@ def test_a_void_inspection_does_not_count(tmp_path: Path, place: Path) -> None:
     assert mlg("history", "void", "N123-LH-2", "--why", "another aircraft").code == 0
     assert joint_3(life())["readings"] == [[400.0, 0.001]]
     assert mlg("history", "void", "N123-LH-2", "--why", "again").code == 2
-
-
-def test_outcomes_say_how_often_the_advice_was_right(tmp_path: Path, place: Path) -> None:
-    seeded((1, 0.013), (2, 0.014))
-    mlg("history", "outcome", "N123-LH-1", "--found", "worn bearing", "--joint", "3")
-    mlg("history", "outcome", "N123-LH-2", "--found", "worn pin", "--joint", "9")
-    assert "The advice was right in 1 of 2 outcomes" in mlg("history").out
-
-
-def test_the_hit_rate_of_the_advice_is_in_the_json_with_its_interval(
-    tmp_path: Path, place: Path
-) -> None:
-    seeded((1, 0.013))
-    assert mlg("history", "--json").json["advice"] == {
-        "right": 0,
-        "outcomes": 0,
-        "p05": None,
-        "p95": None,
-    }
-    mlg("history", "outcome", "N123-LH-1", "--found", "worn bearing", "--joint", "3")
-    # Jeffreys' interval of 1 of 1: the beta distribution of 1.5 and 0.5.
-    expected = {
-        "right": 1,
-        "outcomes": 1,
-        "p05": pytest.approx(scipy.stats.beta(1.5, 0.5).ppf(0.05)),
-        "p95": 1.0,
-    }
-    assert mlg("history", "--json").json["advice"] == expected
-    assert life()["advice"] == expected
 
 
 def test_no_worst_case_is_stated_of_a_visit_on_which_no_joint_was_read(
