@@ -344,7 +344,9 @@ class Store:
             if writing and self.file is not None:
                 self.file.parent.mkdir(parents=True, exist_ok=True)
             # Reading does not make a file.
-            engine = self._engine if writing or not self.is_new else sql.create_engine("sqlite://")
+            engine = self._engine
+            if self.is_new and not writing:
+                engine = sql.create_engine("sqlite://", poolclass=sql.NullPool)
             with _held_interrupt(hold=writing) as end, engine.connect() as connection:
                 if self._postgres and writing:
                     limit = sql.func.set_config("lock_timeout", f"{self._patience_s}s", True)

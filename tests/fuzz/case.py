@@ -12,6 +12,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -139,7 +140,7 @@ def _rows(store: Path) -> list[tuple[object, ...]]:
     if not store.is_file():
         return []
     try:
-        with sqlite3.connect(f"file:{store}?mode=ro", uri=True) as raw:
+        with closing(sqlite3.connect(f"file:{store}?mode=ro", uri=True)) as raw:
             raw.text_factory = bytes
             if raw.execute(
                 "SELECT type FROM sqlite_master WHERE name = 'mlg_records'"

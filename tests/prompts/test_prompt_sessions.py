@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import shutil
 import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
@@ -108,7 +109,7 @@ def test_a_draft_is_not_a_record_and_in_no_chain(gear: Gear, store: SessionStore
 def test_a_save_that_fails_leaves_what_was_saved_before_it(gear: Gear, store: SessionStore) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     before = latest(store)
-    with sqlite3.connect(store.place) as raw:
+    with closing(sqlite3.connect(store.place)) as raw, raw:
         raw.execute(
             "CREATE TRIGGER other BEFORE INSERT ON mlg_drafts BEGIN SELECT RAISE(ABORT, 'not"
             " now'); END"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -125,7 +126,8 @@ def test_the_database_itself_refuses_to_change_a_record(
     store: Store, place: Path, change: str
 ) -> None:
     with (
-        sqlite3.connect(place) as raw,
+        closing(sqlite3.connect(place)) as raw,
+        raw,
         pytest.raises(sqlite3.IntegrityError, match="only ever added"),
     ):
         raw.execute(change)
@@ -140,7 +142,7 @@ COLUMNS = ("seq", "kind", "record_id", "tail_no", "side", "day", "identity", "bo
 
 def forged(place: Path, column: str, seq: int) -> Iterator[object]:
     """Values with one byte changed, at the first, a middle and the last place."""
-    with sqlite3.connect(place) as raw:
+    with closing(sqlite3.connect(place)) as raw, raw:
         (value,) = raw.execute(f"SELECT {column} FROM mlg_records WHERE seq = ?", (seq,)).fetchone()
     if isinstance(value, int):
         yield value + 100
@@ -159,7 +161,7 @@ def test_a_changed_byte_in_any_field_is_found_and_its_record_named(
     store: Store, place: Path, column: str
 ) -> None:
     for value in list(forged(place, column, 4)):
-        with sqlite3.connect(place) as raw:
+        with closing(sqlite3.connect(place)) as raw, raw:
             raw.execute("DROP TRIGGER IF EXISTS mlg_no_update")
             (before,) = raw.execute(f"SELECT {column} FROM mlg_records WHERE seq = 4").fetchone()
             raw.execute(f"UPDATE mlg_records SET {column} = ? WHERE seq = 4", (value,))
@@ -167,14 +169,14 @@ def test_a_changed_byte_in_any_field_is_found_and_its_record_named(
         assert broken is not None
         # A record that was put elsewhere leaves a gap where it stood.
         assert broken.seq == (5 if column == "seq" else 4), value
-        with sqlite3.connect(place) as raw:
+        with closing(sqlite3.connect(place)) as raw, raw:
             at = value if column == "seq" else 4
             raw.execute(f"UPDATE mlg_records SET {column} = ? WHERE seq = ?", (before, at))
     assert store.verify() == (10, None)
 
 
 def test_a_record_that_was_taken_out_is_missed(store: Store, place: Path) -> None:
-    with sqlite3.connect(place) as raw:
+    with closing(sqlite3.connect(place)) as raw, raw:
         raw.execute("DROP TRIGGER mlg_no_delete")
         raw.execute("DELETE FROM mlg_records WHERE seq = 4")
     count, broken = store.verify()
@@ -217,7 +219,7 @@ def test_an_export_in_which_a_word_was_changed_is_refused(store: Store, tmp_path
 
 
 def test_a_store_of_a_newer_schema_is_refused(store: Store, place: Path) -> None:
-    with sqlite3.connect(place) as raw:
+    with closing(sqlite3.connect(place)) as raw, raw:
         raw.execute("INSERT INTO mlg_meta VALUES (99)")
     with pytest.raises(StoreError, match="schema version 99"):
         Store(place).gears()

@@ -9,6 +9,7 @@ import time
 import tracemalloc
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -227,7 +228,7 @@ def test_every_kind_of_record_that_the_program_keeps_is_read_again(
 
 
 def tampered(place: Path, change: str, *values: object) -> None:
-    with sqlite3.connect(place) as raw:
+    with closing(sqlite3.connect(place)) as raw, raw:
         raw.execute("DROP TRIGGER IF EXISTS mlg_no_update")
         raw.execute("DROP TRIGGER IF EXISTS mlg_no_delete")
         raw.execute(change, values)
@@ -268,7 +269,8 @@ def test_a_record_that_cannot_be_read_is_named_with_what_to_do(
     # Whoever does not read the record cannot be hindered by it, unless the chain is written to.
     assert run.code in (0, 5), run.err
     assert run.code == 0 or ("record 1" in run.err and "mlg history verify" in run.err), run.err
-    assert len(sqlite3.connect(place).execute("SELECT seq FROM mlg_records").fetchall()) == 6
+    with closing(sqlite3.connect(place)) as raw:
+        assert len(raw.execute("SELECT seq FROM mlg_records").fetchall()) == 6
 
 
 @pytest.mark.parametrize("change", BROKEN)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -90,7 +91,7 @@ def test_reading_at_the_url_of_no_file_makes_none(tmp_path: Path) -> None:
 
 
 def application_id(path: Path) -> int:
-    with sqlite3.connect(path) as raw:
+    with closing(sqlite3.connect(path)) as raw, raw:
         return int(raw.execute("PRAGMA application_id").fetchone()[0])
 
 
@@ -114,7 +115,7 @@ def test_the_database_of_another_program_is_not_taken_as_a_store(
     tmp_path: Path, command: str, marked: int
 ) -> None:
     other = tmp_path / "other.sqlite"
-    with sqlite3.connect(other) as raw:
+    with closing(sqlite3.connect(other)) as raw, raw:
         raw.execute("CREATE TABLE accounts (name TEXT)")
         raw.execute(f"PRAGMA application_id = {marked}")
     before = other.read_bytes()
@@ -127,7 +128,7 @@ def test_the_database_of_another_program_is_not_taken_as_a_store(
 
 
 def test_an_empty_database_that_another_program_has_marked_is_not_taken(tmp_path: Path) -> None:
-    with sqlite3.connect(tmp_path / "other.sqlite") as raw:
+    with closing(sqlite3.connect(tmp_path / "other.sqlite")) as raw, raw:
         raw.execute("PRAGMA application_id = 252006674")
     assert keep(tmp_path, tmp_path / "other.sqlite").code == 5
 
@@ -143,7 +144,7 @@ def test_a_file_that_is_not_a_database_is_refused_with_what_to_give(tmp_path: Pa
 
 
 def changed(place: Path, *statements: str) -> None:
-    with sqlite3.connect(place) as raw:
+    with closing(sqlite3.connect(place)) as raw, raw:
         for statement in statements:
             raw.execute(statement)
 

@@ -30,7 +30,7 @@ _DIAL_IN = 0.1 / 2
 def change_date(scene: Scene, day: float) -> str | None:
     """Date of a day of the table, ISO 8601; None if the table has no dates."""
     first = scene.table.first_day
-    return None if first is None else str(np.datetime64(first) + int(day))
+    return None if first is None else str(np.datetime64(first) + np.timedelta64(int(day), "D"))
 
 
 def dated(scene: Scene, day: float | None) -> dict[str, Any]:
