@@ -171,7 +171,7 @@ def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Arra
     before = np.zeros_like(s)
     again = steps.begins & (np.cumsum(steps.begins, axis=0) > 1)
     # After that the own drift decides nothing.
-    last = np.flatnonzero(again.any(axis=1)).max(initial=-1)
+    last = int(np.flatnonzero(again.any(axis=1)).max(initial=-1))
     for i, (begins, value) in enumerate(zip(again, steps.value, strict=True)):
         now = clock(usages[i], draws.power)
         if begins.any():

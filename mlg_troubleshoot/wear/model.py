@@ -210,7 +210,7 @@ class WearModel(Result):
         return self.paths.get(unit) or (WearPath(unit, (), ()),)
 
     def _last(self, units: Sequence[str]) -> Array:
-        last = [np.max(self._paths(u)[-1].usage, initial=0.0) for u in units]
+        last = [np.append(0.0, self._paths(u)[-1].usage).max() for u in units]
         return np.array(last) / self.scale.usage
 
     def _known_reading(self, units: Sequence[str]) -> Array:
