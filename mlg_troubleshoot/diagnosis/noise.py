@@ -247,8 +247,8 @@ def _scatter(rest: Array, alone: Array, rows: Rows, far: float) -> NoiseModel:
     loadings = np.hstack([loadings, *each_own])
     alike = replace(noise, loadings=loadings, gear_ratio=0.0)
     some = gears < _MOST_LEVELS
-    levels = np.arange(_MOST_LEVELS)[: gears.max() + 1]
-    each = (gears[some][:, None] == levels).astype(float)
+    marks = np.arange(_MOST_LEVELS)[: gears.max() + 1]
+    each = (gears[some][:, None] == marks).astype(float)
     ratio = _ratio(alike.take(some), each, standard[some])
     return replace(noise, loadings=loadings, gear_ratio=ratio)
 
