@@ -17,7 +17,7 @@ from mlg_troubleshoot.decision.assessment import (
     RigidBound,
     Verdict,
 )
-from mlg_troubleshoot.decision.inspection import Side
+from mlg_troubleshoot.decision.inspection import FactKind, Side
 from mlg_troubleshoot.decision.plan import Basis, End, Step
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Sourced
@@ -67,8 +67,25 @@ class CheckedJoint(TypedDict):
     acts_like: list[JointNumber] | None
 
 
+class StandingFact(TypedDict):
+    """A fact that the verdict rests on: of this row, or of another visit of the gear.
+
+    value_in: radial clearance, or signed displacement of the plunger. date: the day, with its time
+    if one was stated; null where it is not known. record: the visit that states it.
+    """
+
+    kind: FactKind
+    joint: JointNumber | None
+    value_in: float | None
+    date: str | None
+    record: str
+
+
 class CheckedInspection(TypedDict):
     """One data row of the input; of an INVALID one every number is null.
+
+    The verdict is that of the state of the gear at this row: what older visits found and no later
+    one or repair replaced counts as well. standing: the facts that it rests on, with their day.
 
     predicted_displacement_in: worst case, the larger of the two senses in magnitude; null where the
     linkage does not close. over_travel_in, under_travel_in: signed worst case of each sense.
@@ -112,6 +129,7 @@ class CheckedInspection(TypedDict):
     measured_displacement_in: float | None
     joints: list[CheckedJoint]
     basis: Basis | None
+    standing: list[StandingFact] | None
     next_action: Step
     in_brief: str
     plan: Annotated[list[Step], Meta(min_length=1)]

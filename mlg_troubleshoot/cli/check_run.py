@@ -90,8 +90,9 @@ class Run:
             workers=wanted.workers or os.cpu_count() or 1,
         )
         self._records = options.Records(wanted.store, tables.gear)
-        # A store in which no record will be kept is not opened: SQLAlchemy is a third of a check.
-        self._place = self._records.kept if wanted.keep or self._asks else None
+        # A store that is not asked for is not opened: SQLAlchemy is a third of a check.
+        reads = wanted.keep or self._asks or wanted.store is not None
+        self._place = self._records.kept if reads else None
 
     def run(self) -> int:
         """Judge, show and keep; the exit code is returned."""
@@ -198,7 +199,7 @@ class Run:
             SessionStore,
             ask_inspection,
         )
-        from mlg_troubleshoot.workflows.keep import take_back_repair, under_a_free_id
+        from mlg_troubleshoot.workflows.keep import under_a_free_id
 
         wanted = self._wanted
         gear = load_gear(self._asked.gear)
@@ -221,8 +222,6 @@ class Run:
                 inspection, before = by_hand.continued(inspection, answers, before, gear)
             elif visit is None and answers.record_id is None and self._place is not None:
                 inspection = under_a_free_id(inspection, self._place)
-            if before is not None:
-                take_back_repair(self._records.kept, before.record, inspection)
             unit = answers.unit or self._asked.unit or LengthUnit.INCH
             result = task.check_inspection(inspection, self._asked, self._place)
             match entry.effect:
@@ -334,7 +333,7 @@ class Run:
         judged: Sequence[Inspection] | None = None,
     ) -> None:
         """Add what was found to the store; what continues a kept inspection takes its place."""
-        if self._place is None:
+        if self._place is None or not (self._wanted.keep or self._asks):
             return
         from mlg_troubleshoot.life.folding import warnings_of
         from mlg_troubleshoot.workflows.keep import Kept, is_same, keep, supersede

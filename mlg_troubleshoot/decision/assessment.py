@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.decision.inspection import Fact, Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.decision.plan import Basis, End, Plan, Step, in_brief
 from mlg_troubleshoot.results import Result
 
@@ -295,6 +295,8 @@ class Assessment(_Planned, Result):
         asked for.
     rigid : RigidBound or None
         The plain model's bound, which an extension does not relax; None without an extension.
+    older : tuple of Fact
+        What stands of other visits to the gear.
     """
 
     inspection: Inspection
@@ -325,6 +327,14 @@ class Assessment(_Planned, Result):
     rigging: Rigging | None = None
     posterior: Posterior | None = None
     rigid: RigidBound | None = None
+    older: tuple[Fact, ...] = ()
+
+    @property
+    def standing(self) -> tuple[Fact, ...]:
+        """The facts that the verdict rests on, those of other visits with their own day."""
+        replaced = {(fact.kind, fact.joint) for fact in self.older}
+        own = (f for f in self.inspection.facts if (f.kind, f.joint) not in replaced)
+        return (*own, *self.older)
 
     @property
     def row(self) -> Inspection:

@@ -16,7 +16,7 @@ from typing import Any
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.results import Result
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, with_unit
+from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence, with_unit
 
 
 class Side(StrEnum):
@@ -116,6 +116,8 @@ def surely_later(one: date | None, other: date | None) -> bool:
     """
     if one is None or other is None:
         return False
+    if one.__class__ is other.__class__ is date:
+        return one > other
     begins, its_end, has_zone = _span(one)
     other_begins, ends, other_has_zone = _span(other)
     if has_zone and not other_has_zone:
@@ -125,6 +127,44 @@ def surely_later(one: date | None, other: date | None) -> bool:
     # Two days may touch, two instants may not.
     instants = begins == its_end and other_begins == ends
     return begins > ends if instants else begins >= ends
+
+
+class FactKind(StrEnum):
+    """What was found or done."""
+
+    READING = "reading"
+    PLUNGER = "plunger"
+    FAILED = "FAILED"
+    RETRACTED = "RETRACTED"
+    RESTORED = "restored"
+    RIGGING = "rigging"
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """One thing that was found or done at a gear.
+
+    value_in: radial clearance of `joint`, or signed displacement of the plunger. [in]
+    date: the stated day, with its time if one was stated. record: the visit that states it.
+    """
+
+    kind: FactKind
+    joint: int | None
+    value_in: float | None
+    date: date | None
+    record: str
+
+    @property
+    def words(self) -> Sentence:
+        """The fact in words: ``#3 0.0130 in on 2026-01-15 (R1)``."""
+        what = f"#{self.joint}" if self.kind is FactKind.READING else self.kind.value
+        if self.joint is not None and self.kind is not FactKind.READING:
+            what = f"{what} #{self.joint}"
+        length = Length(self.value_in, sign=self.kind is FactKind.PLUNGER) if self.value_in else ""
+        when = "without a date" if self.date is None else f"on {self.date.isoformat()}"
+        return Sentence.of(
+            "{} {} {} ({})" if length else "{}{} {} ({})", what, length, when, self.record
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,6 +350,37 @@ class Inspection(Result):
     def standing_outcome(self) -> Outcome | None:
         """The outcome that is surely newer than a repair."""
         return self.outcome if self.is_since_repair(self.outcome_date) else None
+
+    @property
+    def facts(self) -> tuple[Fact, ...]:
+        """What was found and done, as far as no repair of this inspection replaced it."""
+        day = self.inspection_date
+        plunger = self.plunger_date or day
+        found = [
+            Fact(FactKind.READING, joint, value, day, self.record_id)
+            for joint, value in self.clearance_in.items()
+        ]
+        found += [
+            Fact(FactKind.PLUNGER, None, reading, plunger, self.record_id)
+            for reading in self.standing_readings_in
+        ]
+        if self.outcome is not None and self.is_since_repair(self.outcome_date) is not False:
+            at = self.outcome_date or day
+            found.append(Fact(FactKind(self.outcome.value), None, None, at, self.record_id))
+        found += [
+            Fact(FactKind.RESTORED, joint, None, self.repair_date, self.record_id)
+            for joint in self.restored_joints
+        ]
+        if self.rigging_checked not in (None, RiggingCheck.NO):
+            at = self.repair_date or day
+            found.append(Fact(FactKind.RIGGING, None, None, at, self.record_id))
+        return tuple(found)
+
+    @property
+    def says_nothing(self) -> bool:
+        """Whether nothing was found or done: no reading, outcome, repair or check."""
+        found = (self.clearance_in, self.readings_in, self.outcome, self.restored_joints)
+        return not any(found) and self.rigging_checked is None and self.plunger_down_lock_in is None
 
     @property
     def measured_displacement_in(self) -> float | None:

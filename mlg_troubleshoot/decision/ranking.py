@@ -10,7 +10,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Verdict
-from mlg_troubleshoot.decision.inspection import Outcome, Side
+from mlg_troubleshoot.decision.inspection import FactKind, Outcome, Side
 from mlg_troubleshoot.decision.plan import Action, Basis
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
@@ -151,7 +151,11 @@ class Listed:
             a is not None and a.basis is Basis.MEASURED,
             _severity(judgement),
             a is not None
-            and (a.inspection.outcome is Outcome.FAILED or judgement.next_action.action in _OPEN),
+            and (
+                a.inspection.outcome is Outcome.FAILED
+                or any(fact.kind is FactKind.FAILED for fact in a.older)
+                or judgement.next_action.action in _OPEN
+            ),
             () if a is None else tuple(f.joint for f in a.joints if f.over_limit),
             a.deciding_in if a is not None and a.inspection.clearance_in else None,
             None if a is None else a.margin_in,

@@ -10,7 +10,7 @@ __all__ = [
     "judged",
     "landings_left",
     "looking_back",
-    "since_repairs",
+    "state",
     "unrecorded_work",
     "wear_paths",
 ]

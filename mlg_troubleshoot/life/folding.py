@@ -9,11 +9,12 @@ from functools import cached_property, lru_cache
 from math import inf
 
 from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, Side, plain_tail, surely_later
+from mlg_troubleshoot.decision.inspection import Inspection, RiggingCheck, Side, plain_tail
 from mlg_troubleshoot.decision.plan import Plan
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order, overhauls
+from mlg_troubleshoot.life.state import GearKey, State, Visit
 from mlg_troubleshoot.store import (
     Judge,
     Record,
@@ -22,10 +23,11 @@ from mlg_troubleshoot.store import (
     StoreError,
     inspection_from,
 )
+from mlg_troubleshoot.units import ClearanceConvention
 
-GearKey = tuple[str, str]
 # Letters of a hash by which a record may be named. [1]
 LEAST_OF_A_HASH = 6
+_WORK = (RecordKind.REPAIR, RecordKind.RERIG)
 # Contents that stay unpacked: those of the gears that are being worked on, not of a fleet. [1]
 _UNPACKED = 4096
 
@@ -50,15 +52,52 @@ class KeptInspection:
     def moment(self) -> Moment:
         return Moment.of(self.inspection)
 
+    @property
+    def visit(self) -> Visit:
+        row = self.inspection
+        return Visit(row, self.record.seq, typed=row.source.file is None)
 
-Event = KeptInspection | Record
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """Joints that were restored on a day (ISO 8601, empty if not known), or none where the rigging
+    was set right, and the record that states it.
+    """
+
+    record: Record
+    day: str
+    joints: frozenset[int]
+    landings: float | None = None
+
+    @classmethod
+    def of(cls, record: Record) -> Repair:
+        """A repair that was recorded by itself."""
+        joints = frozenset(record.body.get("joints", ()))
+        return cls(record, record.day, joints, record.body.get("landings"))
+
+    @classmethod
+    def stated(cls, kept: KeptInspection) -> list[Repair]:
+        """What an inspection states of repairs."""
+        row = kept.inspection
+        day = "" if row.repair_date is None else _day_of(row.repair_date).isoformat()
+        rerigged = row.rigging_checked is RiggingCheck.CORRECTED
+        done = [frozenset(row.restored_joints)] * bool(row.restored_joints)
+        done += [frozenset()] * rerigged
+        return [cls(kept.record, day, joints) for joints in done if day]
+
+    @property
+    def moment(self) -> Moment:
+        return Moment(self.day, self.landings, restored=self.joints)
+
+
+Event = KeptInspection | Repair
 
 
 @dataclass(frozen=True, slots=True)
 class TodaysVerdict:
-    """What a check says of one kept inspection; the worse of two has the greater `severity`.
+    """What a check says of a gear today.
 
-    worst_joint: the joint to look at first.
+    worst_joint: the joint to look at first. is_fine: whether nothing needs attention.
     """
 
     verdict: Verdict
@@ -67,7 +106,7 @@ class TodaysVerdict:
     worst_joint: int
     plan: Plan
     in_brief: str
-    severity: tuple[float, ...]
+    is_fine: bool
 
 
 @dataclass(frozen=True)
@@ -79,8 +118,9 @@ class GearLife:
     them nothing is forecast.
     overhauls: events from which landings begin anew, by their place, with the joints that were
     restored there.
-    judged, standing: what is said of inspections as they were found, and of those that may be the
-    last one since the repairs, by their hash; empty until they are judged.
+    judged: what is said of the gear at each inspection, by the hash of its record.
+    state, now: what stands of the gear today, and what is said of that; None until it is judged, or
+    if it cannot be.
     """
 
     key: GearKey
@@ -90,7 +130,8 @@ class GearLife:
     warnings: tuple[str, ...]
     overhauls: Mapping[int, frozenset[int]] = field(default_factory=dict)
     judged: Mapping[str, TodaysVerdict] = field(default_factory=dict)
-    standing: Mapping[str, TodaysVerdict] = field(default_factory=dict)
+    state: State | None = None
+    now: TodaysVerdict | None = None
 
     @property
     def name(self) -> str:
@@ -100,7 +141,7 @@ class GearLife:
     def notes(self) -> tuple[str, ...]:
         """What is to be known of its history: from where its landings begin anew."""
         return tuple(
-            f"Landings begin anew on {_moment(self.events[place]).day}: taken as an overhaul that"
+            f"Landings begin anew on {self.events[place].moment.day}: taken as an overhaul that"
             f" restored {joint_list(sorted(joints))}. Landings before it are negative here."
             for place, joints in self.overhauls.items()
         )
@@ -110,55 +151,24 @@ class GearLife:
         return tuple(event for event in self.events if isinstance(event, KeptInspection))
 
     @cached_property
-    def repairs(self) -> tuple[Record, ...]:
+    def repairs(self) -> tuple[Repair, ...]:
         """Restorations of joints and re-riggings."""
-        return tuple(event for event in self.events if isinstance(event, Record))
+        return tuple(event for event in self.events if isinstance(event, Repair))
 
     @property
     def latest(self) -> KeptInspection | None:
         return self.inspections[-1] if self.inspections else None
 
-    @property
-    def newest(self) -> tuple[KeptInspection, ...]:
-        """The inspections that may be the last one, as far as days, landings and the order of what
-        was entered by hand say.
+    @cached_property
+    def visits(self) -> tuple[Visit, ...]:
+        """The inspections, and the repairs that were recorded by themselves, in the order of
+        time.
         """
-        newest = max((kept.record.day for kept in self.inspections), default="")
-        return tuple(kept for kept in self.inspections if self._may_be_last(kept, newest))
-
-    def _may_be_last(self, kept: KeptInspection, newest: str) -> bool:
-        last = self.inspections[-1]
-        if kept is last:
-            return True
-        if not kept.record.day:
-            # Nobody can say that an inspection without a date is an earlier one, unless a repair
-            # was entered after it; rows of a table are in no order.
-            entered = [r.seq for r in self.repairs if "stated_by" not in r.body]
-            return kept.record.seq > max(entered, default=-1)
-        if not last.record.day:
-            return kept.record.day == newest and not self.is_repaired_since(kept)
-        landings = kept.inspection.gear_landings, last.inspection.gear_landings
-        ordered = None not in landings and landings[0] != landings[1]
-        by_hand = kept.inspection.source.file is last.inspection.source.file is None
-        return kept.record.day == last.record.day and not ordered and not by_hand
-
-    def is_repaired_since(self, kept: KeptInspection) -> bool:
-        """Whether a repair is surely later, also than the one that the inspection states."""
-        row = kept.inspection
-        days = (row.inspection_date, *((row.repair_date,) if row.is_repaired else ()))
-        return any(
-            all(surely_later(moment_of_repair(record), day) for day in days)
-            for record in self.repairs
+        return tuple(
+            event.visit if isinstance(event, KeptInspection) else repair_visit(event.record)
+            for event in self.events
+            if isinstance(event, KeptInspection) or event.record.kind in _WORK
         )
-
-    @property
-    def worst(self) -> tuple[KeptInspection, TodaysVerdict] | None:
-        """Of the inspections that may be the last one the worst; None until they are judged."""
-        known = [kept for kept in self.newest if kept.record.digest in self.standing]
-        if not known:
-            return None
-        worst = max(known, key=lambda kept: self.standing[kept.record.digest].severity)
-        return worst, self.standing[worst.record.digest]
 
     def versions(self, last: Record) -> list[Record]:
         """An inspection from its first entry to the given one."""
@@ -232,7 +242,7 @@ def find(store: Store, record_id: str) -> Record:
     live = [
         record
         for life in lives(store).values()
-        for record in (*(s.record for s in life.inspections), *life.repairs, *life.outcomes)
+        for record in dict.fromkeys((*(event.record for event in life.events), *life.outcomes))
     ]
     inspections = (RecordKind.INSPECTION, RecordKind.CORRECTION)
     found = [r for r in live if r.record_id == record_id and r.kind in inspections]
@@ -254,12 +264,24 @@ def find(store: Store, record_id: str) -> Record:
     )
 
 
-def moment_of_repair(record: Record) -> date | None:
-    """When a kept repair was done, with its time where the inspection that states it has one."""
-    try:
-        return datetime.fromisoformat(record.body["at"])
-    except (KeyError, TypeError, ValueError):
-        return date.fromisoformat(record.day) if record.day else None
+def repair_visit(record: Record) -> Visit:
+    """A repair that was recorded by itself."""
+    body = record.body
+    day = date.fromisoformat(record.day) if record.day else None
+    joints = tuple(body.get("joints", ()))
+    row = Inspection(
+        record.record_id or record.digest[:LEAST_OF_A_HASH],
+        record.tail_no,
+        Side(record.side),
+        ClearanceConvention.RADIAL,
+        {},
+        inspection_date=day,
+        gear_landings=body.get("landings"),
+        restored_joints=joints,
+        rigging_checked=None if joints else RiggingCheck.CORRECTED,
+        repair_date=datetime.fromisoformat(body["at"]) if "at" in body else day,
+    )
+    return Visit(row, record.seq, typed="stated_by" not in body)
 
 
 def is_readable(record: Record) -> bool:
@@ -287,11 +309,20 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
             others.pop(gone, None)
         elif record.kind is not RecordKind.ASSESSMENT:
             others[record.digest] = record
-    work = (RecordKind.REPAIR, RecordKind.RERIG)
-    repairs = [r for r in others.values() if r.kind in work]
-    events: list[Event] = [*kept.values(), *repairs]
-    events.sort(key=lambda event: _record_of(event).seq)
-    moments = [_moment(event) for event in events]
+    stated = [repair for each in kept.values() for repair in Repair.stated(each)]
+    # A repair that came with an inspection stands in it, and falls with it.
+    known = {(repair.day, repair.joints) for repair in stated}
+    sound = {each.record.record_id for each in kept.values() if not each.inspection.is_repaired}
+    alone = (Repair.of(r) for r in others.values() if r.kind in _WORK)
+    repairs = [
+        r
+        for r in alone
+        if "stated_by" not in r.record.body
+        or ((r.day, r.joints) not in known and r.record.body["stated_by"] not in sound)
+    ]
+    events: list[Event] = [*stated, *repairs, *kept.values()]
+    events.sort(key=lambda event: event.record.seq)
+    moments = [event.moment for event in events]
     order = in_order(moments)
     return GearLife(
         key,
@@ -316,15 +347,8 @@ def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:
     return kept[::-1]
 
 
-def _record_of(event: Event) -> Record:
-    return event.record if isinstance(event, KeptInspection) else event
-
-
-def _moment(event: Event) -> Moment:
-    if isinstance(event, KeptInspection):
-        return event.moment
-    joints = frozenset(event.body.get("joints", ()))
-    return Moment(event.day, event.body.get("landings"), restored=joints)
+def _day_of(at: date) -> date:
+    return at.date() if isinstance(at, datetime) else at
 
 
 def _disagreements(
@@ -333,8 +357,8 @@ def _disagreements(
     """Name the records whose dates and landings disagree, each with how to correct it."""
 
     def name(place: int) -> str:
-        record = _record_of(events[place])
-        what = "" if isinstance(events[place], KeptInspection) else f"{record.kind} "
+        record = events[place].record
+        what = f"{record.kind} " if record.kind in _WORK else ""
         return f"{what}{record.record_id}, ".lstrip(", ") + record.digest[:10]
 
     by_sentence: dict[str, list[int]] = {}
@@ -342,9 +366,9 @@ def _disagreements(
         by_sentence.setdefault(sentence, []).append(place)
     warnings = []
     for sentence, places in by_sentence.items():
-        record = _record_of(events[places[0]]).digest[:10] if len(places) == 1 else "RECORD"
+        record = events[places[0]].record.digest[:10] if len(places) == 1 else "RECORD"
         remedy = f"mlg history void {record} --why TEXT"
-        if any(isinstance(events[place], Record) for place in places):
+        if any(events[place].record.kind in _WORK for place in places):
             remedy += ", then mlg history repair"
         else:
             remedy = f"mlg history correct {record} FILE, or {remedy}"

@@ -19,8 +19,9 @@ from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearKey, GearLife
-from mlg_troubleshoot.life.wear_paths import newest_readings, placed_in_time, unit_of, wear_paths
+from mlg_troubleshoot.life.folding import GearLife
+from mlg_troubleshoot.life.state import GearKey
+from mlg_troubleshoot.life.wear_paths import placed_in_time, unit_of, wear_paths
 from mlg_troubleshoot.wear import (
     Samples,
     WearModel,
@@ -154,24 +155,11 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
     """The forecast of a gear that is outside its margin or has a joint over its limit: nothing
     remains of anything.
     """
-    over = _over_limit(newest_readings(life, gear.joint_numbers), gear)
-    reasons = []
-    last = life.inspections[-1]
-    for kept in life.newest[::-1]:
-        said = life.standing.get(kept.record.digest)
-        outside = (
-            said is not None
-            and said.verdict is Verdict.OUTSIDE_MARGIN
-            and not life.is_repaired_since(kept)
-        )
-        if kept is last:
-            reasons += ["outside the margin at the last inspection"] if outside else []
-            continue
-        read_over = _over_limit(kept.inspection.clearance_in, gear)
-        over |= read_over
-        if read_over or outside:
-            why = "is of the same day" if kept.record.day else "has no date"
-            reasons.append(f"inspection {kept.record.record_id} {why} and may be the last one")
+    if life.state is None or life.now is None:
+        return None
+    over = _over_limit(life.state.inspection.clearance_in, gear)
+    outside = life.now.verdict is Verdict.OUTSIDE_MARGIN
+    reasons = ["outside the margin at the last inspection"] if outside else []
     if over:
         reasons.append(f"{joint_list(list(over))} over the limit when last read")
     if not reasons:

@@ -1,4 +1,4 @@
-"""What the model of today says of kept inspections: worked out when it is asked for, never kept.
+"""What the model of today says of kept gears: worked out when it is asked for, never kept.
 
 Margin, limits, repairs, version and correction of an inspection are thus always those that stand.
 """
@@ -9,69 +9,52 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from mlg_troubleshoot.decision.assessment import Assessment
-from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.ranking import Listed
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
-from mlg_troubleshoot.life.folding import GearLife, KeptInspection, TodaysVerdict
-from mlg_troubleshoot.life.since_repairs import since_repairs
-
-
-def since_kept_repairs(kept: KeptInspection, life: GearLife, gear: Gear) -> Inspection:
-    """A kept inspection since the repairs of its gear; on one day those entered by hand follow each
-    other as they were entered.
-    """
-    row = kept.inspection
-    day = kept.record.day
-    later = any(r.day == day and r.seq > kept.record.seq for r in life.repairs)
-    by_hand = row.source.file is None and not later
-    (found,) = since_repairs([row], gear, {life.key: life}, entered_now=by_hand)
-    return found if isinstance(found, Inspection) else row
+from mlg_troubleshoot.life.folding import GearLife, TodaysVerdict
+from mlg_troubleshoot.life.state import State, state_now, states
 
 
 def judge_lives(
     lives: Iterable[GearLife], gear: Gear, table: IndexTable, *, every: bool = False
 ) -> list[GearLife]:
-    """Judge of each life what may be the last inspection, and those that an outcome names, or every
-    one; what a repair is later than is judged as it was found.
+    """Judge what stands of each gear today, and what stood at the inspections that an outcome
+    names, or at every one.
     """
     asked = list(lives)
     numbers = set(gear.joint_numbers)
-    rows: dict[tuple[str, bool], Inspection] = {}
-    for life in asked:
+    found: dict[tuple[int, str], State] = {}
+    for place, life in enumerate(asked):
         named = {record.record_id for record in life.outcomes}
-        newest = {kept.record.digest for kept in life.newest}
-        for kept in life.inspections:
-            digest = kept.record.digest
-            last = digest in newest
-            if (every or last or kept.record.record_id in named) and (
-                kept.inspection.clearance_in.keys() <= numbers
-            ):
-                rows[digest, False] = kept.inspection
-                if last and not life.is_repaired_since(kept):
-                    rows[digest, True] = since_kept_repairs(kept, life, gear)
-    different = {at: row for at, row in rows.items() if not at[1] or row is not rows[at[0], False]}
-    found = dict(zip(different, _judged([*different.values()], gear, table), strict=True))
+        known = [v for v in life.visits if v.inspection.clearance_in.keys() <= numbers]
+        if (now := state_now(known, gear)) is not None:
+            found[place, _NOW] = now
+        if not every and not named:
+            continue
+        digests = {kept.record.seq: kept.record.digest for kept in life.inspections}
+        for state in states(known, gear):
+            digest = digests.get(int(state.visit.place))
+            if digest and (every or state.visit.inspection.record_id in named):
+                found[place, digest] = state
+    said = dict(zip(found, _judged([*found.values()], gear, table), strict=True))
     return [
         replace(
             life,
-            judged={
-                digest: found[digest, False]
-                for kept in life.inspections
-                if ((digest := kept.record.digest), False) in found
-            },
-            standing={
-                digest: found.get((digest, True), found[digest, False])
-                for kept in life.newest
-                if ((digest := kept.record.digest), False) in found
-            },
+            judged={digest: each for (n, digest), each in said.items() if n == place and digest},
+            state=found.get((place, _NOW)),
+            now=said.get((place, _NOW)),
         )
-        for life in asked
+        for place, life in enumerate(asked)
     ]
 
 
-def _judged(rows: Sequence[Inspection], gear: Gear, table: IndexTable) -> list[TodaysVerdict]:
+# Stands in place of the hash of an inspection.
+_NOW = ""
+
+
+def _judged(states: Sequence[State], gear: Gear, table: IndexTable) -> list[TodaysVerdict]:
     return [
         TodaysVerdict(
             found.verdict,
@@ -80,8 +63,10 @@ def _judged(rows: Sequence[Inspection], gear: Gear, table: IndexTable) -> list[T
             found.ranked[0].joint,
             found.plan,
             found.in_brief,
-            (not (line := Listed.of(found)).is_fine, *(-x for x in line.severity)),
+            Listed.of(replace(found, older=state.older)).is_fine,
         )
-        for found in assess(rows, gear, table)
+        for state, found in zip(
+            states, assess([state.inspection for state in states], gear, table), strict=True
+        )
         if isinstance(found, Assessment)
     ]

@@ -12,14 +12,15 @@ from operator import attrgetter
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.ranking import WORST_FIRST
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearKey, GearLife
+from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import Forecast, Quantiles
+from mlg_troubleshoot.life.state import GearKey
 
 
 @dataclass(frozen=True, slots=True)
 class FleetLine:
-    """One gear of a fleet as every output shows it: its latest inspection, of those that may be it
-    the worst, and its landings left once they are forecast.
+    """One gear of a fleet as every output shows it: its latest inspection, what stands of it today,
+    and its landings left once they are forecast.
 
     inspections, repairs: how many count. Numbers stand as they did in the record.
     """
@@ -51,7 +52,7 @@ class FleetLine:
         line = cls(*life.key, *counts, life.warnings)
         if life.latest is None:
             return line
-        kept, found = life.worst or (life.latest, None)
+        kept, found = life.latest, life.now
         line = replace(
             line,
             record_id=kept.record.record_id,
@@ -60,18 +61,17 @@ class FleetLine:
         )
         if found is None:
             return line
-        # A plan that was made before a repair says nothing of the work that is left.
-        done = life.is_repaired_since(kept)
-        plan = () if done else found.plan.steps
         return replace(
             line,
             verdict=found.verdict.value,
             worst_joint=found.worst_joint,
             predicted_displacement_in=found.predicted_displacement_in,
             margin_in=found.margin_in,
-            next_action="Repaired since then: check again" if done else found.in_brief,
-            minutes=sum(step.minutes for step in plan),
-            restore=tuple(n for s in plan if s.action is Action.RESTORE for n in s.joints),
+            next_action=found.in_brief,
+            minutes=sum(step.minutes for step in found.plan.steps),
+            restore=tuple(
+                n for s in found.plan.steps if s.action is Action.RESTORE for n in s.joints
+            ),
         )
 
     def forecast(self, ahead: Forecast) -> FleetLine:

@@ -10,7 +10,7 @@ from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.life.folding import GearLife, lives_of
-from mlg_troubleshoot.life.since_repairs import key_of
+from mlg_troubleshoot.life.state import key_of
 from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_from
 
 # Inspections that stand side by side on a page.
@@ -57,7 +57,7 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[PastInsp
     steps: list[PastInspection] = []
     before: tuple[str, int] | None = None
     for inspection, at, worst_in, verdict in rows:
-        since = [r for r in life.repairs if before and before < (r.day, r.seq) < at]
+        since = [r for r in life.repairs if before and before < (r.day, r.record.seq) <= at]
         day = inspection.inspection_date.isoformat() if inspection.inspection_date else ""
         steps.append(
             PastInspection(
@@ -65,8 +65,8 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[PastInsp
                 day,
                 inspection.gear_landings,
                 inspection.clearance_in,
-                restored=tuple(sorted({n for r in since for n in r.body.get("joints", ())})),
-                rerigged=any(r.kind is RecordKind.RERIG for r in since),
+                restored=tuple(sorted(frozenset().union(*(r.joints for r in since)))),
+                rerigged=any(not r.joints for r in since),
                 worst_in=worst_in,
                 verdict=verdict,
             )

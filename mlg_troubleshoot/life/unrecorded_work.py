@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from mlg_troubleshoot.decision.sentences import joint_list
-from mlg_troubleshoot.life.folding import GearKey
 from mlg_troubleshoot.life.forecast import Forecast
+from mlg_troubleshoot.life.state import GearKey
 
 # A reading as many forecast standard deviations below its forecast is not wear: a restoration that
 # nobody recorded. Lower ones name sound joints, one in 30,000 of a normal distribution at 4. [1]

@@ -9,8 +9,8 @@ from operator import itemgetter
 
 import numpy as np
 
-from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection
-from mlg_troubleshoot.store import Record, RecordKind
+from mlg_troubleshoot.life.folding import GearLife, KeptInspection, Repair
+from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.wear import WearPath
 
 
@@ -50,9 +50,9 @@ def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]
                 if joint in found:
                     reading = (read.gear_landings, clearance, read.gauge_u_of(joint))
                     found[joint][-1].readings.append(reading)
-        elif event.kind is RecordKind.REPAIR:
+        else:
             at = _landings_of(event, life)
-            for joint in found.keys() & set(event.body["joints"]):
+            for joint in found.keys() & event.joints:
                 begun = found[joint][-1].begun if at is None else at
                 found[joint].append(Stretch(begun, []))
     return found
@@ -67,22 +67,6 @@ def _begin_anew(
             stretch.count_from(landings)
         if joint in restored:
             between.append(Stretch(0.0, []))
-
-
-def newest_readings(life: GearLife, joints: Sequence[int]) -> dict[int, float]:
-    """The last reading of each joint that was read since it was last restored. [in]"""
-    found: dict[int, float] = {}
-    asked = set(joints)
-    for event in reversed(life.events):
-        if not asked:
-            break
-        if isinstance(event, KeptInspection):
-            read = event.inspection.clearance_in
-            found |= {joint: read[joint] for joint in asked & read.keys()}
-            asked -= read.keys()
-        elif event.kind is RecordKind.REPAIR:
-            asked -= set(event.body["joints"])
-    return {joint: found[joint] for joint in joints if joint in found}
 
 
 def wear_paths(life: GearLife, joints: Sequence[int]) -> dict[int, tuple[list[WearPath], float]]:
@@ -123,15 +107,14 @@ def placed_in_time(life: GearLife) -> list[list[tuple[int, float]]]:
     return found
 
 
-def _landings_of(record: Record, life: GearLife) -> float | None:
+def _landings_of(repair: Repair, life: GearLife) -> float | None:
     """Landings at a repair: as recorded, else between the inspections about it, by their days."""
-    stated = record.body.get("landings")
-    if stated is not None:
-        return float(stated)
+    if repair.landings is not None:
+        return float(repair.landings)
     eras = [era for era in placed_in_time(life) if era]
-    if not eras or not record.day:
+    if not eras or not repair.day:
         return None
-    day = date.fromisoformat(record.day).toordinal()
+    day = date.fromisoformat(repair.day).toordinal()
     own = max((era for era in eras if era[0][0] <= day), key=itemgetter(0), default=eras[0])
     days, landings = zip(*own, strict=True)
     return float(np.interp(day, days, landings))

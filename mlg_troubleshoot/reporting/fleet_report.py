@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearKey, GearLife
+from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.landings_left import (
     FleetLine,
@@ -16,6 +16,7 @@ from mlg_troubleshoot.life.landings_left import (
     work_sentence,
 )
 from mlg_troubleshoot.life.looking_back import side_by_side
+from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture, wear_figure
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import Document

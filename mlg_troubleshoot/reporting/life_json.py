@@ -8,9 +8,10 @@ from typing import Any
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.json_outputs import FleetGear, FleetOutput, LifeOutput
-from mlg_troubleshoot.life.folding import GearKey, GearLife
+from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.landings_left import FleetLine, fleet_lines, work_sentence
+from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.reporting.json_form import filled, written
 from mlg_troubleshoot.store import Record, RecordKind

@@ -26,7 +26,14 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.life.since_repairs import doubts, key_of, since_repairs
+from mlg_troubleshoot.life.state import (
+    GearKey,
+    State,
+    Visit,
+    key_of,
+    other_visits_count,
+    states,
+)
 from mlg_troubleshoot.outputs import csv_lines, write_text
 from mlg_troubleshoot.parallel import Progress, map_blocks
 from mlg_troubleshoot.records.model import TableOptions, TableResult
@@ -379,17 +386,20 @@ def _judge(
     outputs: Callable[[CheckResult, int], Sequence[BlockOutput]] | None = None,
 ) -> CheckResult:
     """Judge rows; the list is empty afterwards."""
+    if found.read is not None:
+        blank = [
+            n for n, row in enumerate(rows) if isinstance(row, Inspection) and row.says_nothing
+        ]
+        if blank:
+            rows[:] = [row for n, row in enumerate(rows) if n not in set(blank)]
+            found = replace(found, notes=(*found.notes, _set_aside(len(blank))))
     total = len(rows)
-    lives = {}
-    if store is not None:
-        from mlg_troubleshoot.life.folding import lives_of
-
-        lives = lives_of(store, {key_of(row) for row in rows if isinstance(row, Inspection)})
-    counting = since_repairs(rows, found.gear, lives, entered_now=found.read is None)
+    kept = _kept_visits(rows, store)
+    counting = _states(rows, found.gear, kept, typed=found.read is None)
     if total > 1:
-        found = replace(found, notes=(*found.notes, *doubts(counting)))
+        found = replace(found, notes=(*found.notes, *other_visits_count(counting)))
     blocks = [slice(start, start + AT_ONCE) for start in range(0, total, AT_ONCE)]
-    # As they were read, and as they count since repairs: packed they take a tenth of the memory.
+    # As they were read, and what else counts of each gear: packed they take a tenth of the memory.
     pickled = (pickle.dumps((rows[at], counting[at])) for at in blocks)
     waiting = [zlib.compress(block, 1) for block in pickled]
     rows.clear()
@@ -450,14 +460,61 @@ def _made(
 ) -> tuple[int, list[Any]]:
     """Judge a block of rows; how many they are, and what is made of them."""
     rows, counting = pickle.loads(zlib.decompress(block))
-    # What is shown and kept of an inspection is what was found, whatever counts no more.
-    judged = [
-        replace(each, inspection=row)
-        if isinstance(each, Assessment) and each.inspection is not row
+    judged = judge(
+        [
+            row if state is None else state.inspection
+            for row, state in zip(rows, counting, strict=True)
+        ]
+    )
+    # What is shown and kept of a visit is what was found at it.
+    own = [
+        replace(each, inspection=row, older=state.older)
+        if isinstance(each, Assessment) and state is not None
         else each
-        for each, row in zip(judge(counting), rows, strict=True)
+        for each, row, state in zip(judged, rows, counting, strict=True)
     ]
-    return len(rows), [make(judged) for make in makers]
+    return len(rows), [make(own) for make in makers]
+
+
+def _set_aside(count: int) -> str:
+    rows = "1 row" if count == 1 else f"{count} rows"
+    return f"{rows} without a reading or an outcome: nothing to judge, set aside and not kept"
+
+
+def _kept_visits(
+    rows: Iterable[Inspection | InvalidRow], store: Store | None
+) -> Mapping[GearKey, Sequence[Visit]]:
+    """What a store keeps of the gears of some rows."""
+    if store is None:
+        return {}
+    from mlg_troubleshoot.life.folding import lives_of
+
+    lives = lives_of(store, {key_of(row) for row in rows if isinstance(row, Inspection)})
+    return {key: life.visits for key, life in lives.items()}
+
+
+def _states(
+    rows: Sequence[Inspection | InvalidRow],
+    gear: Gear,
+    kept: Mapping[GearKey, Sequence[Visit]],
+    *,
+    typed: bool,
+) -> list[State | None]:
+    """The state of its gear at each row; None where nothing but the row counts."""
+    places: dict[GearKey, list[int]] = {}
+    for place, row in enumerate(rows):
+        if isinstance(row, Inspection):
+            places.setdefault(key_of(row), []).append(place)
+    found: list[State | None] = [None] * len(rows)
+    for key, own in places.items():
+        new = [Visit(row, typed=typed) for n in own if isinstance(row := rows[n], Inspection)]
+        # A visit that is kept already, or takes the place of one, is the one that is judged.
+        ids = {each.inspection.record_id for each in new}
+        old = [each for each in kept.get(key, ()) if each.inspection.record_id not in ids]
+        for place, state in zip(own, states([*old, *new], gear)[len(old) :], strict=True):
+            is_alone = state.inspection is rows[place]
+            found[place] = None if is_alone else state
+    return found
 
 
 def write_reports(  # noqa: PLR0913 - each stands for one choice of the user

@@ -17,7 +17,6 @@ from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import (
     LEAST_OF_A_HASH,
-    GearKey,
     GearLife,
     find,
     is_readable,
@@ -25,6 +24,7 @@ from mlg_troubleshoot.life.folding import (
     lives_of,
 )
 from mlg_troubleshoot.life.landings_left import FleetLine
+from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.parallel import Progress, StageProgress
 from mlg_troubleshoot.records import ReadOptions, admit

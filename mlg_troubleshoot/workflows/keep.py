@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
-from typing import Any
+from datetime import date
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
 from mlg_troubleshoot.decision.inspection import (
     Inspection,
+    RiggingCheck,
     RowSource,
     plain_tail,
     surely_later,
 )
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.life.folding import find, is_readable, life_of, warnings_of
-from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
+from mlg_troubleshoot.life.folding import find, is_readable, warnings_of
+from mlg_troubleshoot.life.state import key_of
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.rows import is_made_for_row
 from mlg_troubleshoot.store import (
@@ -48,8 +48,12 @@ class Kept:
 
 
 def inspections_of(judgements: Iterable[Judgement]) -> list[Inspection]:
-    """What is kept of judgements; nothing of a row that was not judged."""
-    return [j.inspection for j in judgements if isinstance(j, Assessment)]
+    """What is kept of judgements: nothing of a row that was not judged or says nothing."""
+    return [
+        j.inspection
+        for j in judgements
+        if isinstance(j, Assessment) and not j.inspection.says_nothing
+    ]
 
 
 class _KnownContents:
@@ -108,7 +112,7 @@ def keep(
     progress: Progress = lambda _done, _total: None,
     judged: Sequence[Inspection] | None = None,
 ) -> Kept:
-    """Add the judged inspections of a check and the repairs that they state, all or none.
+    """Add the judged inspections of a check that found something, all or none.
 
     ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they
     are refused. ``judged``: the inspections of a result that does not hold its judgements.
@@ -127,8 +131,7 @@ def keep(
             other = known.otherwise(record)
             others += [other] if other else []
             known.add(record)
-            # Before what was read after it.
-            records += [*_repairs_of(row, store), record]
+            records.append(record)
             new += 1
         progress(done, len(rows))
     if others:
@@ -153,27 +156,6 @@ def under_a_free_id(made: Inspection, store: Store) -> Inspection:
         number += 1
         free = replace(made, record_id=f"{made.record_id}-{number}")
     return free
-
-
-def _repairs_of(row: Inspection, store: Store) -> list[Record]:
-    """The repair that a row states, as records; none that the store keeps already."""
-    repair = stated_repair(row)
-    if repair is None:
-        return []
-    known = [
-        record for record in store.of_gear(*key_of(row)) if record.day == repair.day.isoformat()
-    ]
-    body: dict[str, Any] = {"landings": None, "work_order": None, "stated_by": row.record_id}
-    if isinstance(repair.at, datetime):
-        body["at"] = repair.at.isoformat()
-    kinds = {RecordKind.REPAIR: sorted(repair.joints), RecordKind.RERIG: repair.rerigged}
-    return [
-        Record(kind, "", *key_of(row), repair.day.isoformat(), packed(body | more))
-        for kind, said in kinds.items()
-        if said
-        for more in ({"joints": said} if kind is RecordKind.REPAIR else {},)
-        if not any(r.kind is kind and r.body.get("joints") == more.get("joints") for r in known)
-    ]
 
 
 def row_of(store: Store, record_id: str, result: CheckResult) -> tuple[Record, CheckResult]:
@@ -216,9 +198,7 @@ def is_same(kept: Record, result: CheckResult) -> bool:
 
 
 def supersede(store: Store, wrong: Record, result: CheckResult) -> Record:
-    """Append what takes the place of a kept inspection, with the repair that it states; one that
-    only the former stated is void.
-    """
+    """Append what takes the place of a kept inspection."""
     (judged,) = (j for j in result.judgements if isinstance(j, Assessment))
     right = judged.inspection
     if (right.tail_no, right.side.value) != (wrong.tail_no, wrong.side):
@@ -228,46 +208,30 @@ def supersede(store: Store, wrong: Record, result: CheckResult) -> Record:
             "Void the record (mlg history void) and keep the corrected one: mlg check FILE --keep",
         )
     record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.digest)
-    repairs = [*_repairs_taken_back(store, wrong, right), *_repairs_of(right, store)]
-    store.add([*repairs, record])
+    store.add([*_former_repair(wrong, right), record])
     return record
 
 
-def take_back_repair(store: Store, wrong: Record, right: Inspection) -> None:
-    """Void the repair that only a kept inspection states, before what takes its place is judged."""
-    store.add(_repairs_taken_back(store, wrong, right))
-
-
-def _repairs_taken_back(store: Store, wrong: Record, right: Inspection) -> list[Record]:
-    """Void the repair that came with an inspection which states it no longer; a later one that it
-    states is a second repair.
-    """
-    kept = inspection_from(wrong)
-    was, stands = stated_repair(kept), stated_repair(right)
-    if was is None or was == stands:
+def _former_repair(wrong: Record, right: Inspection) -> list[Record]:
+    """The repair that a kept inspection states, where what takes its place states a later one."""
+    was = inspection_from(wrong)
+    if not was.is_repaired or not surely_later(right.repair_date, was.repair_date):
         return []
-    if stands is not None and surely_later(right.repair_date, kept.repair_date):
-        return []
-    life = life_of(store, wrong.tail_no, wrong.side)
-    entered = [record.seq for record in life.records if record.kind in _ENTERED]
-    stating = {
-        version.seq
-        for version in life.versions(wrong)
-        if (repair := stated_repair(inspection_from(version))) is not None
-        and (stands is None or repair == was)
+    at = was.repair_date
+    body = {"landings": None, "work_order": None, "stated_by": was.record_id, "at": _text(at)}
+    kinds = {
+        RecordKind.REPAIR: {"joints": sorted(was.restored_joints)} if was.restored_joints else None,
+        RecordKind.RERIG: {} if was.rigging_checked is RiggingCheck.CORRECTED else None,
     }
     return [
-        Record(
-            RecordKind.VOID,
-            "",
-            wrong.tail_no,
-            wrong.side,
-            "",
-            packed({"voids": repair.digest, "why": "taken back with the answer that stated it"}),
-        )
-        for repair in life.repairs
-        if min((seq for seq in entered if seq > repair.seq), default=0) in stating
+        Record(kind, "", *key_of(was), _text(at)[:10], packed(body | more))
+        for kind, more in kinds.items()
+        if more is not None
     ]
+
+
+def _text(at: date | None) -> str:
+    return "" if at is None else at.isoformat()
 
 
 def _settled_tails(

@@ -14,7 +14,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.chronology import Moment, contradictions, overhauls
 from mlg_troubleshoot.life.folding import GearLife, life_of
-from mlg_troubleshoot.life.wear_paths import newest_readings, placed_in_time, stretches
+from mlg_troubleshoot.life.wear_paths import placed_in_time, stretches
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.cli.conftest import mlg, row
@@ -169,10 +169,6 @@ def test_a_joint_that_was_left_goes_on_wearing(kept: GearLife) -> None:
 def test_days_and_landings_are_those_between_overhauls(kept: GearLife) -> None:
     eras = [[landings for _day, landings in era] for era in placed_in_time(kept)]
     assert eras == [[1400, 2200], [300, 1100]]
-
-
-def test_what_was_read_last_counts_whatever_was_restored(kept: GearLife) -> None:
-    assert newest_readings(kept, [1, 4]) == {1: 0.001, 4: 0.001}
 
 
 def test_the_gear_has_a_forecast_with_its_day_and_no_warning(kept: GearLife) -> None:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from mlg_troubleshoot.store import RecordKind, Store
+from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.store import Store
 from tests.cli.conftest import mlg, row
 
 from .places import table
@@ -48,33 +49,20 @@ def test_a_failure_after_the_repair_is_a_new_one(history: Path) -> None:
     assert next_of(history)["later"] != "READ_PLUNGER"
 
 
-def test_keeping_a_row_that_states_a_repair_keeps_the_repair_once(
+def test_a_repair_that_a_row_states_is_kept_once_with_the_row(
     history: Path, tmp_path: Path
 ) -> None:
     place = str(tmp_path / "store.sqlite")
     for _ in range(2):
         mlg("check", history, "--keep", "--store", place)
-    kept = [record for record in Store(place).all() if record.kind is RecordKind.REPAIR]
-    assert [(record.day, record.body["joints"]) for record in kept] == [("2026-03-02", [3])]
+    (life,) = lives(Store(place)).values()
+    assert [(each.day, each.joints) for each in life.repairs] == [("2026-03-02", {3})]
 
 
-def test_a_repair_that_was_recorded_by_hand_is_not_kept_twice(
-    history: Path, tmp_path: Path
-) -> None:
-    place = str(tmp_path / "store.sqlite")
-    first = table(tmp_path, visit("first", "2026-02-01", "0.0100"), name="first.csv")
-    mlg("check", first, "--keep", "--store", place)
-    gear = row()["tail_no"], row()["side"]
-    mlg("history", "repair", *gear, "--joint", "3", "--date", "2026-03-02", "--store", place)
-    mlg("check", history, "--keep", "--store", place)
-    kinds = [record.kind for record in Store(place).all()]
-    assert kinds.count(RecordKind.REPAIR) == 1
-
-
-def test_a_rigging_that_a_row_says_was_corrected_is_kept_as_a_re_rigging(tmp_path: Path) -> None:
+def test_a_rigging_that_a_row_says_was_corrected_is_a_re_rigging(tmp_path: Path) -> None:
     place = str(tmp_path / "store.sqlite")
     rerigged = {"rigging_checked": "corrected", "repair_date": "2026-03-02"}
     file = table(tmp_path, visit("rigged", "2026-03-02", "0.0010", **rerigged))
     mlg("check", file, "--keep", "--store", place)
-    kinds = [record.kind for record in Store(place).all()]
-    assert kinds.count(RecordKind.RERIG) == 1
+    (life,) = lives(Store(place)).values()
+    assert [(each.day, each.joints) for each in life.repairs] == [("2026-03-02", set())]

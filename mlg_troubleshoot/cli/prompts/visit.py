@@ -32,7 +32,7 @@ from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife, KeptInspection, lives
-from mlg_troubleshoot.life.judged import since_kept_repairs
+from mlg_troubleshoot.life.state import state_now
 from mlg_troubleshoot.store import Record, Store, inspection_from
 from mlg_troubleshoot.units import LengthUnit, Sentence, parse_length
 from mlg_troubleshoot.workflows.index_tables import load_index_table
@@ -130,11 +130,13 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear) -> Visit | None:
     stood = latest.inspection
     if not set(stood.clearance_in) <= set(gear.joint_numbers):
         return None
-    row = since_kept_repairs(latest, life, gear)
-    restored = tuple(sorted(set(row.restored_joints) - set(stood.restored_joints)))
-    # What was found before a repair is what was last said of the gear.
-    counts = stood if life.is_repaired_since(latest) else row
-    (found,) = assess([counts], gear, load_index_table(gear))
+    state = state_now(life.visits, gear)
+    if state is None or state.visit.place != latest.record.seq:
+        return None
+    (found,) = assess([state.inspection], gear, load_index_table(gear))
+    since = set(state.inspection.restored_joints) - set(stood.restored_joints)
+    restored = tuple(sorted(since - state.inspection.clearance_in.keys()))
+    row = _with_repairs(stood, state.inspection, since)
     step = found.next_action
     action = step.action
     asked = _ASKS.get(action)
@@ -162,6 +164,22 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear) -> Visit | None:
         replace(standing[-2], continues=latest.record.digest) if len(standing) > 1 else None,
         Sentence.of("{}", question) if question and not restored else None,
         by_version,
+    )
+
+
+def _with_repairs(stood: Inspection, counts: Inspection, since: set[int]) -> Inspection:
+    """An inspection with the repairs that were recorded after it."""
+    if not since and counts.rigging_checked is stood.rigging_checked:
+        return stood
+    day = stood.inspection_date
+    return replace(
+        stood,
+        clearance_in={j: c for j, c in stood.clearance_in.items() if j in counts.clearance_in},
+        restored_joints=counts.restored_joints,
+        rigging_checked=counts.rigging_checked,
+        repair_date=counts.repair_date,
+        plunger_date=stood.plunger_date or (day if stood.readings_in else None),
+        outcome_date=stood.outcome_date or (day if stood.outcome else None),
     )
 
 

@@ -1,0 +1,494 @@
+"""The state of a gear: what follows from the dated facts of its visits.
+
+A visit replaces what it says anew, and a repair what it is about: a reading by a later reading of
+the same joint or a later restoration of it, a plunger reading by a later one or any later repair, a
+failure by a later repair *and* a retraction after that. Later is what the stated days and times say
+for sure; of visits that were typed the order of entry decides where they do not. What cannot be
+ordered stands if it is against the gear, and is never taken in its favour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date, datetime, timedelta
+from itertools import groupby
+from math import inf
+from typing import Any
+
+from mlg_troubleshoot.decision.inspection import (
+    Fact,
+    FactKind,
+    Inspection,
+    Outcome,
+    RiggingCheck,
+    surely_later,
+)
+from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
+from mlg_troubleshoot.units import Sentence
+
+GearKey = tuple[str, str]
+_DAY = timedelta(days=1)
+# Rows that one note names at most.
+_MOST_NAMED = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """Facts that were taken together: a row of a table, an entry at the prompts, or a repair that
+    was recorded by itself.
+
+    place: its place in the log; infinite until it is kept. [1]
+    typed: whether it was typed; rows of a table are in no order.
+    """
+
+    inspection: Inspection
+    place: float = inf
+    typed: bool = False
+
+    @property
+    def at(self) -> date | None:
+        return self.inspection.inspection_date
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What stands of a gear at a visit, or now.
+
+    inspection: what the decision is about: the visit, with what stands of the other visits.
+    older: the facts of other visits among it.
+    """
+
+    visit: Visit
+    inspection: Inspection
+    older: tuple[Fact, ...] = ()
+
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether a plunger reading or an outcome is not surely newer than the repair."""
+        row = self.inspection
+        found = ((row.readings_in, row.plunger_date), (row.outcome, row.outcome_date))
+        return any(what and row.is_since_repair(day) is not True for what, day in found)
+
+
+def key_of(row: Inspection) -> GearKey:
+    return row.tail_no, row.side.value
+
+
+def other_visits_count(found: Iterable[State | None]) -> tuple[str, ...]:
+    """Name in one note the rows of a list of which something may be older than a repair, or to
+    which what another visit found counts as well.
+    """
+    named = [
+        state.visit.inspection.record_id
+        for state in found
+        if state is not None and (state.older or state.is_in_doubt)
+    ]
+    if not named:
+        return ()
+    listed = ", ".join(named[:_MOST_NAMED]) + (" …" if len(named) > _MOST_NAMED else "")
+    rows = "1 row" if len(named) == 1 else f"{len(named)} rows"
+    return (
+        f"{rows}: other visits or repairs of the gear count as well ({listed}); where the order is"
+        " not certain the worse reading does. The warnings of each row say which.",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Event:
+    """A fact with its visit; `value`: a clearance, or the largest displacement. [in]"""
+
+    visit: Visit
+    at: date | None
+    value: float = 0.0
+    joints: frozenset[int] = frozenset()
+
+    @property
+    def moment(self) -> tuple[object, ...]:
+        return self.at, self.landings, self.joints
+
+    @property
+    def landings(self) -> float | None:
+        return self.visit.inspection.gear_landings
+
+    @property
+    def occasion(self) -> _Event:
+        """Its visit, as what is compared in time."""
+        return _Event(self.visit, self.visit.at)
+
+    def fact(self, kind: FactKind, joint: int | None = None, value_in: float | None = None) -> Fact:
+        return Fact(kind, joint, value_in, self.at, self.visit.inspection.record_id)
+
+
+def _is_later(one: _Event, other: _Event) -> bool:
+    if surely_later(one.at, other.at):
+        return True
+    if one.visit is other.visit or surely_later(other.at, one.at):
+        return False
+    if one.at is not None and one.at == one.visit.at == other.at == other.visit.at:
+        landings, before = one.landings, other.landings
+        if landings is not None and before is not None and landings != before:
+            return landings > before
+    return one.visit.typed and one.visit.place > other.visit.place
+
+
+def _newest(events: Sequence[_Event]) -> list[_Event]:
+    return [e for e in events if not any(_is_later(other, e) for other in events)]
+
+
+def states(visits: Sequence[Visit], gear: Gear) -> list[State]:
+    """The state of one gear at each of its visits: what was known of it when the visit ended."""
+    if len(visits) == 1:
+        return [_alone(visits[0], gear)]
+    found: dict[int, State] = {}
+    known = _Known(gear)
+    order = sorted(range(len(visits)), key=lambda n: visits[n].at or date.min)
+    undated = [n for n in order if visits[n].at is None]
+    for n in undated:
+        known.add(visits[n])
+    for _day, same in groupby(order[len(undated) :], key=lambda n: visits[n].at):
+        known.forget_replaced()
+        together = list(same)
+        for n in together:
+            known.add(visits[n])
+        found |= {n: known.at(visits[n]) for n in together}
+    found |= {n: known.at(visits[n]) for n in undated}
+    return [found[n] for n in range(len(visits))]
+
+
+def state_now(visits: Sequence[Visit], gear: Gear) -> State | None:
+    """The state of one gear after all of its visits; None without any that found something.
+
+    Visits stand in the order of time as far as it is known.
+    """
+    found = [v for v in visits if not _is_repair_alone(v.inspection)]
+    if not found:
+        return None
+    known = _Known(gear)
+    for visit in visits:
+        known.add(visit)
+    return known.at(found[-1], now=True)
+
+
+def _is_repair_alone(row: Inspection) -> bool:
+    return row.is_repaired and not (row.clearance_in or row.readings_in or row.outcome)
+
+
+def _alone(visit: Visit, gear: Gear) -> State:
+    row = visit.inspection
+    said = _as_found(row, gear)
+    return State(visit, replace(row, warnings=(*row.warnings, said)) if said else row)
+
+
+def _as_found(row: Inspection, gear: Gear) -> str:
+    """Say which plunger reading of a visit its own repair replaced, where it was beyond the
+    margin.
+    """
+    if not row.readings_in or row.standing_readings_in:
+        return ""
+    if not _is_beyond(row.readings_in, row, gear):
+        return ""
+    worst = max(row.readings_in, key=abs)
+    fact = Fact(FactKind.PLUNGER, None, worst, row.plunger_date, row.record_id)
+    return Sentence.of("As found, before the repair: {}.", fact.words)
+
+
+def _is_beyond(readings_in: Iterable[float], row: Inspection, gear: Gear) -> bool:
+    margin = gear.margin.value if row.margin_in is None else row.margin_in
+    return any(abs(each) > margin + ROUNDING_IN for each in readings_in)
+
+
+def _put(events: list[_Event], new: _Event) -> None:
+    """Add an event; of rows of a table at one moment, which are in no order, the worst one."""
+    if new.visit.place == inf and not new.visit.typed:
+        for n, other in enumerate(events):
+            if other.visit.place == inf and new.moment == other.moment:
+                events[n] = max(other, new, key=lambda event: event.value)
+                return
+    events.append(new)
+
+
+def _plunger_of(visit: Visit) -> _Event:
+    row = visit.inspection
+    return _Event(visit, _when(visit, row.plunger_date), max(map(abs, row.readings_in)))
+
+
+def _outcome_of(visit: Visit) -> _Event:
+    return _Event(visit, _when(visit, visit.inspection.outcome_date))
+
+
+def _repair_of(visit: Visit) -> _Event:
+    row = visit.inspection
+    return _Event(visit, row.repair_date, joints=frozenset(row.restored_joints))
+
+
+def _when(visit: Visit, stated: date | None) -> date | None:
+    """When something was found: what stands beside a repair that is later than the day of the
+    visit may be newer than it.
+    """
+    row = visit.inspection
+    updated = row.is_repaired and surely_later(row.repair_date, visit.at)
+    return stated or (None if updated else visit.at)
+
+
+@dataclass(slots=True)
+class _Known:
+    """What may still count of one gear, as its visits are added in the order of their days."""
+
+    gear: Gear
+    readings: dict[int, list[_Event]] = field(default_factory=dict)
+    plunger: list[_Event] = field(default_factory=list)
+    failed: list[_Event] = field(default_factory=list)
+    retracted: list[_Event] = field(default_factory=list)
+    repairs: list[_Event] = field(default_factory=list)
+
+    def add(self, visit: Visit) -> None:
+        row = visit.inspection
+        for joint, value in row.clearance_in.items():
+            _put(self.readings.setdefault(joint, []), _Event(visit, visit.at, value))
+        if row.readings_in:
+            _put(self.plunger, _plunger_of(visit))
+        if row.outcome is not None:
+            tried = self.failed if row.outcome is Outcome.FAILED else self.retracted
+            _put(tried, _outcome_of(visit))
+        if row.is_repaired:
+            _put(self.repairs, _repair_of(visit))
+
+    def forget_replaced(self) -> None:
+        """Let go what is replaced by what is later by its date, at every visit that follows."""
+        self.readings = {joint: _last(events) for joint, events in self.readings.items()}
+        self.plunger = _last(self.plunger)
+        self.failed = [e for e in self.failed if not _is_settled(e, self.repairs, self.retracted)]
+        self.retracted = _last(self.retracted)
+        self.repairs = _last(self.repairs, lambda new, old: new.joints >= old.joints)
+
+    def at(self, visit: Visit, *, now: bool = False) -> State:
+        return _AsOf(self, visit, now=now).state()
+
+
+def _last(
+    events: Sequence[_Event], replaces: Callable[[_Event, _Event], bool] = lambda _new, _old: True
+) -> list[_Event]:
+    return [
+        e
+        for e in events
+        if not any(surely_later(other.at, e.at) and replaces(other, e) for other in events)
+    ]
+
+
+def _is_settled(event: _Event, repairs: Iterable[_Event], retracted: Sequence[_Event]) -> bool:
+    """Whether a gear was repaired after something was found, and retracted after that."""
+    return any(
+        _is_later(repair, event) and any(_is_later(tried, repair) for tried in retracted)
+        for repair in repairs
+    )
+
+
+class _AsOf:
+    """What counts at one visit; `now`: after all visits, of which it is the last one."""
+
+    def __init__(self, known: _Known, visit: Visit, *, now: bool) -> None:
+        self._known = known
+        self._gear = known.gear
+        self._visit = visit
+        self._row = visit.inspection
+        self._at = _Event(visit, visit.at)
+        self._now = now
+        self._repairs = self._counting(known.repairs)
+        self._retracted = self._counting(known.retracted)
+        self._older: list[Fact] = []
+        self._said: list[str] = []
+
+    def state(self) -> State:
+        row = self._row
+        changed = self._readings()
+        plunger = self._plunger()
+        outcome = self._outcome()
+        if plunger is not None and plunger.visit is not self._visit:
+            read = plunger.visit.inspection
+            changed["readings_in"] = read.readings_in
+            changed["plunger_gauge_u_in"] = read.plunger_gauge_u_in
+        if outcome is not None and outcome.visit is not self._visit:
+            changed["outcome"] = outcome.visit.inspection.outcome
+        changed |= self._in_order(plunger, outcome)
+        said = [*self._said, *filter(None, [_as_found(row, self._gear)])]
+        if not changed and not said:
+            return State(self._visit, row)
+        inspection = replace(row, warnings=(*row.warnings, *said), **changed)
+        return State(self._visit, inspection, tuple(self._older))
+
+    def _counting(self, events: Iterable[_Event]) -> list[_Event]:
+        """What is not surely later than the visit."""
+        return [e for e in events if self._now or not _is_later(e.occasion, self._at)]
+
+    def _is_own(self, event: _Event) -> bool:
+        return event.visit is self._visit
+
+    def _later(self, event: _Event, joint: int | None = None) -> list[_Event]:
+        """Repairs, of one joint or any, that are surely later."""
+        return [r for r in self._of(joint) if _is_later(r, event)]
+
+    def _of(self, joint: int | None) -> list[_Event]:
+        return [r for r in self._repairs if joint is None or joint in r.joints]
+
+    def _counts_for(self, event: _Event, joint: int | None = None) -> bool:
+        """Whether something may count in favour of the gear: it is surely older than the visit,
+        and no repair of another visit may have replaced it.
+        """
+        if self._is_own(event):
+            return True
+        is_before = self._now or _is_later(self._at, event.occasion)
+        repairs = (r for r in self._of(joint) if r.visit is not event.visit)
+        return is_before and all(_is_later(event, r) for r in repairs)
+
+    def _readings(self) -> dict[str, Any]:
+        """Clearances of other visits that stand, and of this one those that do."""
+        row = self._row
+        taken: dict[int, _Event] = {}
+        gone: set[int] = set()
+        for joint, events in self._known.readings.items():
+            own = joint in row.clearance_in
+            if (own and not self._now) or joint not in self._gear.joint_numbers:
+                continue
+            limit = self._gear.joint(joint)
+            standing = [
+                e
+                for e in _newest(self._counting(events))
+                if not any(r.visit is not e.visit for r in self._later(e, joint))
+                and (limit.is_over_limit(e.value) or self._counts_for(e, joint))
+            ]
+            worst = max(standing, key=lambda e: e.value, default=None)
+            if worst is None or not self._is_own(worst):
+                gone |= {joint} if own else set()
+            if worst is not None and not self._is_own(worst):
+                taken[joint] = worst
+        if not taken and not gone:
+            return {}
+        clearance = {j: value for j, value in row.clearance_in.items() if j not in gone}
+        entered = {j: text for j, text in row.entered.items() if j not in gone}
+        gauge_u = {j: u for j, u in row.gauge_u_by_joint_in.items() if j not in gone}
+        for joint, event in taken.items():
+            read = event.visit.inspection
+            clearance[joint] = event.value
+            if joint in read.entered and read.convention is row.convention:
+                entered[joint] = read.entered[joint]
+            if (u := read.gauge_u_of(joint)) != row.gauge_u_in:
+                gauge_u[joint] = u
+            self._older.append(event.fact(FactKind.READING, joint, event.value))
+        if taken:
+            listed = Sentence.joined((fact.words for fact in self._older), ", ")
+            self._said.append(Sentence.of("Readings of other visits stand as well: {}.", listed))
+        return {"clearance_in": clearance, "entered": entered, "gauge_u_by_joint_in": gauge_u}
+
+    def _plunger(self) -> _Event | None:
+        """The plunger reading that stands; one that a repair replaced where nobody has tried the
+        gear since.
+        """
+        row = self._row
+        own = _plunger_of(self._visit) if row.readings_in else None
+        if own is not None and not self._now:
+            return own
+        newest = _newest(self._counting(self._known.plunger))
+        replaced = [e for e in newest if any(r.visit is not e.visit for r in self._later(e))]
+        standing = [
+            e for e in newest if e not in replaced and (self._is_beyond(e) or self._counts_for(e))
+        ]
+        untried = [e for e in replaced if self._is_beyond(e) and not self._is_settled(e)]
+        event = max(standing or untried, key=lambda e: e.value, default=own)
+        if event is None or self._is_own(event):
+            return event
+        readings = event.visit.inspection.readings_in
+        facts = [event.fact(FactKind.PLUNGER, None, each) for each in readings]
+        listed = Sentence.joined((fact.words for fact in facts), ", ")
+        if not standing:
+            self._said.append(Sentence.of("Before the repair: {}. Not tried since.", listed))
+            return event
+        self._older += facts
+        self._said.append(Sentence.of("The plunger reading of another visit stands: {}.", listed))
+        return event
+
+    def _is_beyond(self, event: _Event) -> bool:
+        return _is_beyond(event.visit.inspection.readings_in, self._row, self._gear)
+
+    def _is_settled(self, event: _Event) -> bool:
+        return _is_settled(event, self._repairs, self._retracted)
+
+    def _outcome(self) -> _Event | None:
+        """The outcome that stands: a failure that is not settled, else the newest retraction."""
+        row = self._row
+        own = _outcome_of(self._visit) if row.outcome is not None else None
+        still = [e for e in self._counting(self._known.failed) if not self._is_settled(e)]
+        if own is not None and row.outcome is Outcome.FAILED and not self._is_settled(own):
+            return own
+        if still:
+            stands = [e for e in still if not self._later(e)]
+            event = (stands or still)[-1]
+            fact = event.fact(FactKind.FAILED)
+            self._older.append(fact)
+            then = "no repair is surely later" if stands else "it was not tried since the repair"
+            when = "" if event.at is None else f" on {event.at.isoformat()}"
+            self._said.append(f"{fact.record} states that this gear failed{when}: {then}.")
+            return event
+        tried = [e for e in _newest(self._retracted) if self._counts_for(e)]
+        if row.outcome is not None or not tried:
+            return own
+        self._older.append(tried[-1].fact(FactKind.RETRACTED))
+        return tried[-1]
+
+    def _in_order(self, plunger: _Event | None, outcome: _Event | None) -> dict[str, Any]:
+        """Tell the decision of the repairs of other visits, and whether the plunger reading and
+        the outcome are older, newer, or neither for sure.
+
+        The days are made for that comparison: the decision compares them and shows none.
+        """
+        row = self._row
+        found = {"plunger_date": plunger, "outcome_date": outcome}
+        dated = {name: event for name, event in found.items() if event is not None}
+        own = _repair_of(self._visit) if row.is_repaired else None
+        others = [r for r in self._repairs if not self._is_own(r)]
+        since = [r for r in others if not _is_later(self._at, r)]
+        since += [
+            r for r in others if r not in since and any(_is_later(r, e) for e in dated.values())
+        ]
+        if own is not None:
+            since = [r for r in since if self._now and _is_later(r, own)]
+        if not since:
+            taken = {name: e for name, e in dated.items() if not self._is_own(e)}
+            mine = [] if own is None else [own]
+            return {name: _place(e, mine, row.repair_date) for name, e in taken.items()}
+        day = max((_day_of(r.at) for r in since if r.at is not None), default=self._visit.at)
+        joints = frozenset(row.restored_joints).union(*(r.joints for r in since))
+        changed: dict[str, Any] = {"restored_joints": tuple(sorted(joints)), "repair_date": day}
+        if any(r.visit.inspection.rigging_checked is RiggingCheck.CORRECTED for r in since):
+            changed["rigging_checked"] = RiggingCheck.CORRECTED
+        self._say_repairs([r for r in since if not _is_later(self._at, r)])
+        return changed | {name: _place(e, since, day) for name, e in dated.items()}
+
+    def _say_repairs(self, repairs: Sequence[_Event]) -> None:
+        """Name repairs that may be later than this visit."""
+        for repair in repairs:
+            done = repair.visit.inspection
+            joints = [f"#{joint}" for joint in done.restored_joints]
+            rerigged = done.rigging_checked is RiggingCheck.CORRECTED
+            what = " and ".join([", ".join(joints)] * bool(joints) + ["the rigging"] * rerigged)
+            when = "without a date" if repair.at is None else f"on {repair.at.isoformat()}"
+            then = (
+                "what is older does not count"
+                if _is_later(repair, self._at)
+                else "this visit may be older or newer, so its worse readings count"
+            )
+            self._said.append(f"{done.record_id} states a repair of {what} {when}: {then}.")
+
+
+def _place(event: _Event, repairs: Iterable[_Event], repaired: date | None) -> date | None:
+    """A day before the repair, after it, or the same for what cannot be ordered."""
+    if repaired is None:
+        return event.at
+    day = _day_of(repaired)
+    if any(_is_later(repair, event) for repair in repairs):
+        return day - _DAY
+    return day + _DAY if all(_is_later(event, repair) for repair in repairs) else day
+
+
+def _day_of(at: date) -> date:
+    return at.date() if isinstance(at, datetime) else at
