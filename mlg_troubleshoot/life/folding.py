@@ -14,7 +14,7 @@ from mlg_troubleshoot.decision.plan import Plan
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order, overhauls
-from mlg_troubleshoot.life.state import GearKey, State, Visit
+from mlg_troubleshoot.life.state import GearKey, GearState, GearVisit
 from mlg_troubleshoot.store import (
     Judge,
     Record,
@@ -53,9 +53,9 @@ class KeptInspection:
         return Moment.of(self.inspection)
 
     @property
-    def visit(self) -> Visit:
+    def visit(self) -> GearVisit:
         row = self.inspection
-        return Visit(row, self.record.seq, typed=row.source.file is None)
+        return GearVisit(row, self.record.seq, typed=row.source.file is None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ class GearLife:
     warnings: tuple[str, ...]
     overhauls: Mapping[int, frozenset[int]] = field(default_factory=dict)
     judged: Mapping[str, TodaysVerdict] = field(default_factory=dict)
-    state: State | None = None
+    state: GearState | None = None
     now: TodaysVerdict | None = None
 
     @property
@@ -160,7 +160,7 @@ class GearLife:
         return self.inspections[-1] if self.inspections else None
 
     @cached_property
-    def visits(self) -> tuple[Visit, ...]:
+    def visits(self) -> tuple[GearVisit, ...]:
         """The inspections, and the repairs that were recorded by themselves, in the order of
         time.
         """
@@ -264,7 +264,7 @@ def find(store: Store, record_id: str) -> Record:
     )
 
 
-def repair_visit(record: Record) -> Visit:
+def repair_visit(record: Record) -> GearVisit:
     """A repair that was recorded by itself."""
     body = record.body
     day = date.fromisoformat(record.day) if record.day else None
@@ -281,7 +281,7 @@ def repair_visit(record: Record) -> Visit:
         rigging_checked=None if joints else RiggingCheck.CORRECTED,
         repair_date=datetime.fromisoformat(body["at"]) if "at" in body else day,
     )
-    return Visit(row, record.seq, typed="stated_by" not in body)
+    return GearVisit(row, record.seq, typed="stated_by" not in body)
 
 
 def is_readable(record: Record) -> bool:

@@ -14,7 +14,7 @@ from mlg_troubleshoot.decision.ranking import Listed
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.life.folding import GearLife, TodaysVerdict
-from mlg_troubleshoot.life.state import State, state_now, states
+from mlg_troubleshoot.life.state import GearState, state_now, states
 
 
 def judge_lives(
@@ -25,7 +25,7 @@ def judge_lives(
     """
     asked = list(lives)
     numbers = set(gear.joint_numbers)
-    found: dict[tuple[int, str], State] = {}
+    found: dict[tuple[int, str], GearState] = {}
     for place, life in enumerate(asked):
         named = {record.record_id for record in life.outcomes}
         known = [v for v in life.visits if v.inspection.clearance_in.keys() <= numbers]
@@ -54,7 +54,7 @@ def judge_lives(
 _NOW = ""
 
 
-def _judged(states: Sequence[State], gear: Gear, table: IndexTable) -> list[TodaysVerdict]:
+def _judged(states: Sequence[GearState], gear: Gear, table: IndexTable) -> list[TodaysVerdict]:
     return [
         TodaysVerdict(
             found.verdict,

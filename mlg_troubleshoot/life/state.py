@@ -3,8 +3,8 @@
 A visit replaces what it says anew, and a repair what it is about: a reading by a later reading of
 the same joint or a later restoration of it, a plunger reading by a later one or any later repair, a
 failure by a later repair *and* a retraction after that. Later is what the stated days and times say
-for sure; of visits that were typed the order of entry decides where they do not. What cannot be
-ordered stands if it is against the gear, and is never taken in its favour.
+for sure; of visits that were typed the order of entry decides where they do not. What is kept and
+cannot be ordered stands if it is against the gear, and is never taken in its favour.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _MOST_NAMED = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Visit:
+class GearVisit:
     """Facts that were taken together: a row of a table, an entry at the prompts, or a repair that
     was recorded by itself.
 
@@ -52,14 +52,14 @@ class Visit:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class GearState:
     """What stands of a gear at a visit, or now.
 
     inspection: what the decision is about: the visit, with what stands of the other visits.
     older: the facts of other visits among it.
     """
 
-    visit: Visit
+    visit: GearVisit
     inspection: Inspection
     older: tuple[Fact, ...] = ()
 
@@ -75,14 +75,12 @@ def key_of(row: Inspection) -> GearKey:
     return row.tail_no, row.side.value
 
 
-def other_visits_count(found: Iterable[State | None]) -> tuple[str, ...]:
-    """Name in one note the rows of a list of which something may be older than a repair, or to
-    which what another visit found counts as well.
-    """
+def other_visits_count(found: Iterable[GearState | None]) -> tuple[str, ...]:
+    """Name in one note the rows of a list of which something may be older than a repair."""
     named = [
         state.visit.inspection.record_id
         for state in found
-        if state is not None and (state.older or state.is_in_doubt)
+        if state is not None and state.is_in_doubt
     ]
     if not named:
         return ()
@@ -98,7 +96,7 @@ def other_visits_count(found: Iterable[State | None]) -> tuple[str, ...]:
 class _Event:
     """A fact with its visit; `value`: a clearance, or the largest displacement. [in]"""
 
-    visit: Visit
+    visit: GearVisit
     at: date | None
     value: float = 0.0
     joints: frozenset[int] = frozenset()
@@ -136,11 +134,11 @@ def _newest(events: Sequence[_Event]) -> list[_Event]:
     return [e for e in events if not any(_is_later(other, e) for other in events)]
 
 
-def states(visits: Sequence[Visit], gear: Gear) -> list[State]:
+def states(visits: Sequence[GearVisit], gear: Gear) -> list[GearState]:
     """The state of one gear at each of its visits: what was known of it when the visit ended."""
     if len(visits) == 1:
         return [_alone(visits[0], gear)]
-    found: dict[int, State] = {}
+    found: dict[int, GearState] = {}
     known = _Known(gear)
     order = sorted(range(len(visits)), key=lambda n: visits[n].at or date.min)
     undated = [n for n in order if visits[n].at is None]
@@ -156,7 +154,7 @@ def states(visits: Sequence[Visit], gear: Gear) -> list[State]:
     return [found[n] for n in range(len(visits))]
 
 
-def state_now(visits: Sequence[Visit], gear: Gear) -> State | None:
+def state_now(visits: Sequence[GearVisit], gear: Gear) -> GearState | None:
     """The state of one gear after all of its visits; None without any that found something.
 
     Visits stand in the order of time as far as it is known.
@@ -174,10 +172,10 @@ def _is_repair_alone(row: Inspection) -> bool:
     return row.is_repaired and not (row.clearance_in or row.readings_in or row.outcome)
 
 
-def _alone(visit: Visit, gear: Gear) -> State:
+def _alone(visit: GearVisit, gear: Gear) -> GearState:
     row = visit.inspection
     said = _as_found(row, gear)
-    return State(visit, replace(row, warnings=(*row.warnings, said)) if said else row)
+    return GearState(visit, replace(row, warnings=(*row.warnings, said)) if said else row)
 
 
 def _as_found(row: Inspection, gear: Gear) -> str:
@@ -208,21 +206,21 @@ def _put(events: list[_Event], new: _Event) -> None:
     events.append(new)
 
 
-def _plunger_of(visit: Visit) -> _Event:
+def _plunger_of(visit: GearVisit) -> _Event:
     row = visit.inspection
     return _Event(visit, _when(visit, row.plunger_date), max(map(abs, row.readings_in)))
 
 
-def _outcome_of(visit: Visit) -> _Event:
+def _outcome_of(visit: GearVisit) -> _Event:
     return _Event(visit, _when(visit, visit.inspection.outcome_date))
 
 
-def _repair_of(visit: Visit) -> _Event:
+def _repair_of(visit: GearVisit) -> _Event:
     row = visit.inspection
     return _Event(visit, row.repair_date, joints=frozenset(row.restored_joints))
 
 
-def _when(visit: Visit, stated: date | None) -> date | None:
+def _when(visit: GearVisit, stated: date | None) -> date | None:
     """When something was found: what stands beside a repair that is later than the day of the
     visit may be newer than it.
     """
@@ -242,7 +240,7 @@ class _Known:
     retracted: list[_Event] = field(default_factory=list)
     repairs: list[_Event] = field(default_factory=list)
 
-    def add(self, visit: Visit) -> None:
+    def add(self, visit: GearVisit) -> None:
         row = visit.inspection
         for joint, value in row.clearance_in.items():
             _put(self.readings.setdefault(joint, []), _Event(visit, visit.at, value))
@@ -262,7 +260,7 @@ class _Known:
         self.retracted = _last(self.retracted)
         self.repairs = _last(self.repairs, lambda new, old: new.joints >= old.joints)
 
-    def at(self, visit: Visit, *, now: bool = False) -> State:
+    def at(self, visit: GearVisit, *, now: bool = False) -> GearState:
         return _AsOf(self, visit, now=now).state()
 
 
@@ -287,19 +285,19 @@ def _is_settled(event: _Event, repairs: Iterable[_Event], retracted: Sequence[_E
 class _AsOf:
     """What counts at one visit; `now`: after all visits, of which it is the last one."""
 
-    def __init__(self, known: _Known, visit: Visit, *, now: bool) -> None:
+    def __init__(self, known: _Known, visit: GearVisit, *, now: bool) -> None:
         self._known = known
         self._gear = known.gear
         self._visit = visit
         self._row = visit.inspection
         self._at = _Event(visit, visit.at)
         self._now = now
-        self._repairs = self._counting(known.repairs)
+        self._repairs = [e for e in known.repairs if now or not _is_later(e.occasion, self._at)]
         self._retracted = self._counting(known.retracted)
         self._older: list[Fact] = []
         self._said: list[str] = []
 
-    def state(self) -> State:
+    def state(self) -> GearState:
         row = self._row
         changed = self._readings()
         plunger = self._plunger()
@@ -313,13 +311,22 @@ class _AsOf:
         changed |= self._in_order(plunger, outcome)
         said = [*self._said, *filter(None, [_as_found(row, self._gear)])]
         if not changed and not said:
-            return State(self._visit, row)
+            return GearState(self._visit, row)
         inspection = replace(row, warnings=(*row.warnings, *said), **changed)
-        return State(self._visit, inspection, tuple(self._older))
+        return GearState(self._visit, inspection, tuple(self._older))
 
     def _counting(self, events: Iterable[_Event]) -> list[_Event]:
-        """What is not surely later than the visit."""
-        return [e for e in events if self._now or not _is_later(e.occasion, self._at)]
+        """What is surely older than the visit, and what is kept and may be: rows of one table that
+        are in no order stand there themselves.
+        """
+        return [
+            e
+            for e in events
+            if self._now
+            or self._is_own(e)
+            or _is_later(self._at, e.occasion)
+            or (e.visit.place < inf and not _is_later(e.occasion, self._at))
+        ]
 
     def _is_own(self, event: _Event) -> bool:
         return event.visit is self._visit

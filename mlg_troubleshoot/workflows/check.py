@@ -28,8 +28,8 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.state import (
     GearKey,
-    State,
-    Visit,
+    GearState,
+    GearVisit,
     key_of,
     other_visits_count,
     states,
@@ -483,7 +483,7 @@ def _set_aside(count: int) -> str:
 
 def _kept_visits(
     rows: Iterable[Inspection | InvalidRow], store: Store | None
-) -> Mapping[GearKey, Sequence[Visit]]:
+) -> Mapping[GearKey, Sequence[GearVisit]]:
     """What a store keeps of the gears of some rows."""
     if store is None:
         return {}
@@ -496,18 +496,18 @@ def _kept_visits(
 def _states(
     rows: Sequence[Inspection | InvalidRow],
     gear: Gear,
-    kept: Mapping[GearKey, Sequence[Visit]],
+    kept: Mapping[GearKey, Sequence[GearVisit]],
     *,
     typed: bool,
-) -> list[State | None]:
+) -> list[GearState | None]:
     """The state of its gear at each row; None where nothing but the row counts."""
     places: dict[GearKey, list[int]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection):
             places.setdefault(key_of(row), []).append(place)
-    found: list[State | None] = [None] * len(rows)
+    found: list[GearState | None] = [None] * len(rows)
     for key, own in places.items():
-        new = [Visit(row, typed=typed) for n in own if isinstance(row := rows[n], Inspection)]
+        new = [GearVisit(row, typed=typed) for n in own if isinstance(row := rows[n], Inspection)]
         # A visit that is kept already, or takes the place of one, is the one that is judged.
         ids = {each.inspection.record_id for each in new}
         old = [each for each in kept.get(key, ()) if each.inspection.record_id not in ids]

@@ -141,7 +141,9 @@ def test_the_worst_gear_of_a_batch_stands_first(table: Table) -> None:
 
 def test_a_gear_of_which_nothing_was_read_has_no_worst_case_in_a_batch(table: Table) -> None:
     blank = {f"clearance_{j}_in": "" for j in range(1, 11)}
-    lines = mlg("check", table(row(record_id="A"), row(record_id="B", **blank))).out.splitlines()
+    lines = mlg(
+        "check", table(row(record_id="A"), row(record_id="B", outcome="FAILED", **blank))
+    ).out.splitlines()
     (shown,) = (line for line in lines if VERDICT_LINE.match(line) and " B " in line)
     assert "0.0000" not in shown
 
@@ -155,7 +157,7 @@ def test_a_gear_measured_outside_is_never_shown_as_within(table: Table) -> None:
 def test_a_batch_counts_its_verdicts(fleet: Run) -> None:
     counts = " ".join(fleet.out.split())
     assert counts.startswith(
-        "46 inspections: 8 outside margin · 8 incomplete · 25 within margin · 5 inconclusive"
+        "46 inspections: 9 outside margin · 2 incomplete · 30 within margin · 5 inconclusive"
     )
 
 
