@@ -8,9 +8,10 @@ from enum import StrEnum
 from pathlib import Path
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearKey, lives_of
+from mlg_troubleshoot.life.folding import lives_of
 from mlg_troubleshoot.life.judged import judge_lives
 from mlg_troubleshoot.life.landings_left import FleetLine
+from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.reporting.provenance import program_version
 from mlg_troubleshoot.reporting.witness import ReportedGear, Witness, read_witness
 from mlg_troubleshoot.store import Record, Store
