@@ -18,7 +18,7 @@ from mlg_troubleshoot.decision.assessment import (
     Verdict,
 )
 from mlg_troubleshoot.decision.inspection import FactKind, Side
-from mlg_troubleshoot.decision.plan import Basis, End, Step
+from mlg_troubleshoot.decision.plan import Action, Basis, End, Step
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Sourced
 
@@ -81,6 +81,13 @@ class StandingFact(TypedDict):
     record: str
 
 
+# What follows one outcome of the next action. minutes: of what is done then.
+NextOutcome = TypedDict(
+    "NextOutcome",
+    {"if": str, "action": Action, "joints": list[JointNumber], "minutes": Size, "text": str},
+)
+
+
 class CheckedInspection(TypedDict):
     """One data row of the input; of an INVALID one every number is null.
 
@@ -97,13 +104,14 @@ class CheckedInspection(TypedDict):
     the worst-case bound is within the margin. probability_exceed_random_directions: chance of
     exceeding the margin with uniformly random directions. geometry_spread_in: least and largest
     prediction over the ensemble. explained_at_most_in, unexplained_in: of a measured displacement,
-    by the joints' worst case; null without a reading. basis: MEASURED only with OUTSIDE_MARGIN,
-    when the mean reading is beyond the margin. next_action: the first step of the plan, of which
-    only that binds. in_brief: the same in words that stand alone, as on screen, in CSV and on
-    paper. open_question: what the day does not allow to settle, and at the end of the plan which
-    joints nobody read, with the chance that one is over its limit. repair_sets: null where the
-    linkage does not close. posterior: null in a batch
-    or where nothing was measured.
+    by the joints' worst case; null without a reading. headline: the words of the verdict, as every
+    channel prints them. basis: MEASURED where a plunger reading decides. standing: the facts that
+    the verdict rests on. next_action: the first step of the plan, of which only that binds;
+    required is false where nothing must be done. in_brief: the same in words that stand alone, as
+    on screen, in CSV and on paper. then: what follows each outcome of the next action; empty in a
+    batch. open_question: what the day does not allow to settle. repair_sets: null where the
+    linkage does not close. posterior: null in a batch, and of a gear that did not fail or whose
+    plunger was not read.
     """
 
     record_id: str | None
@@ -132,6 +140,7 @@ class CheckedInspection(TypedDict):
     standing: list[StandingFact] | None
     next_action: Step
     in_brief: str
+    then: list[NextOutcome]
     plan: Annotated[list[Step], Meta(min_length=1)]
     end: End
     open_question: str | None

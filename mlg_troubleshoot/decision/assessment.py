@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mlg_troubleshoot.decision.inspection import Fact, Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.decision.inspection import Fact, FactKind, Inspection, InvalidRow
 from mlg_troubleshoot.decision.plan import Basis, End, Plan, Step, in_brief
 from mlg_troubleshoot.results import Result
 
@@ -23,14 +23,30 @@ class Verdict(StrEnum):
 
     @property
     def words(self) -> str:
-        """The verdict as a technician reads it."""
+        """What is predicted, as a technician reads it."""
         return {
-            "INVALID": "INVALID – do not use",
-            "OUTSIDE_MARGIN": "OUTSIDE MARGIN",
-            "INCOMPLETE": "INCOMPLETE – cannot clear",
+            "INVALID": "CANNOT BE JUDGED",
+            "OUTSIDE_MARGIN": "COULD BE OUTSIDE",
+            "INCOMPLETE": "NOT ENOUGH READ",
             "WITHIN_MARGIN": "WITHIN MARGIN",
-            "INCONCLUSIVE": "INCONCLUSIVE – too close",
+            "INCONCLUSIVE": "CLOSE TO THE MARGIN",
         }[self.value]
+
+
+def title(verdict: Verdict, basis: Basis) -> str:
+    """A verdict in capitals, with what it rests on."""
+    if basis is Basis.MEASURED:
+        where = "OUTSIDE" if verdict is Verdict.OUTSIDE_MARGIN else "WITHIN"
+        return f"{where} MARGIN, MEASURED"
+    return verdict.words
+
+
+class VerdictTone(StrEnum):
+    """How loud a verdict is: RED is for what must be done now."""
+
+    RED = "red"
+    AMBER = "amber"
+    GREEN = "green"
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,10 +296,9 @@ class Assessment(_Planned, Result):
         What of a measured displacement the joints can explain at most, unmeasured ones at their
         limit, and what they cannot; None without a reading. [in]
     headline : str
-        The verdict in one or two plain sentences, what was measured first.
-    measured_statement : str or None
-        What a displacement measured within the margin says; None if none was, or if the headline
-        says it.
+        The words of the verdict, as every channel prints them.
+    alarm : str
+        What must be done about the gear whatever its verdict; empty if nothing.
     repair_sets : tuple of RepairSet or None
         Repair sets; None if they were not asked for.
     warnings : tuple of str
@@ -321,7 +336,7 @@ class Assessment(_Planned, Result):
     explained_at_most_in: float | None
     unexplained_in: float | None
     headline: str
-    measured_statement: str | None
+    alarm: str
     repair_sets: tuple[RepairSet, ...] | None
     warnings: tuple[str, ...]
     rigging: Rigging | None = None
@@ -342,11 +357,27 @@ class Assessment(_Planned, Result):
         return self.inspection
 
     @property
+    def title(self) -> str:
+        """The verdict in capitals, as it heads every channel."""
+        return title(self.verdict, self.basis)
+
+    @property
+    def is_measured_outside(self) -> bool:
+        """Whether the plunger was measured beyond its margin."""
+        return self.basis is Basis.MEASURED and self.verdict is Verdict.OUTSIDE_MARGIN
+
+    @property
+    def tone(self) -> VerdictTone:
+        """Red for what must be done now, green for a gear that is in order."""
+        failed = any(fact.kind is FactKind.FAILED for fact in self.older)
+        if self.is_measured_outside or self.alarm or failed:
+            return VerdictTone.RED
+        return VerdictTone.GREEN if self.verdict is Verdict.WITHIN_MARGIN else VerdictTone.AMBER
+
+    @property
     def in_brief(self) -> str:
         """The next action in words that stand alone."""
-        step = self.next_action
-        retracted = self.inspection.outcome is Outcome.RETRACTED
-        return in_brief(step.action, step.joints, self.end, step.text, retracted=retracted)
+        return in_brief(self.next_action, self.end)
 
     @property
     def as_loaded(self) -> bool:
@@ -409,6 +440,20 @@ class Rejected(_Planned, Result):
     @property
     def verdict(self) -> Verdict:
         return Verdict.INVALID
+
+    @property
+    def title(self) -> str:
+        return self.verdict.words
+
+    @property
+    def tone(self) -> VerdictTone:
+        """Amber: nothing was found, and nothing can be."""
+        return VerdictTone.AMBER
+
+    @property
+    def headline(self) -> str:
+        """What to correct."""
+        return self.next_action.text
 
     @property
     def in_brief(self) -> str:

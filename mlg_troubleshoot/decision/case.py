@@ -12,7 +12,12 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.fleet import Fleet
-from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
+from mlg_troubleshoot.decision.inspection import (
+    Inspection,
+    Outcome,
+    RiggingCheck,
+    surely_later,
+)
 from mlg_troubleshoot.decision.prediction import (
     DIRECTION_SETS,
     BatchPrediction,
@@ -129,6 +134,19 @@ class Cases:
     def critical_missing(self) -> Mask:
         """True for a gear with a critical joint that was not measured."""
         return np.asarray((~self.measured & self.gear.critical).any(axis=1))
+
+    @property
+    def failed_as_new(self) -> Mask:
+        """Gears of which a failure stands that is not surely older than their plunger reading."""
+        return np.array(
+            [
+                failed
+                and not surely_later(
+                    i.plunger_date or i.inspection_date, i.outcome_date or i.inspection_date
+                )
+                for failed, i in zip(self.failed.tolist(), self.inspections, strict=True)
+            ]
+        )
 
     @property
     def complained(self) -> Mask:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision import plunger_reading, sentences
 from mlg_troubleshoot.decision.assessment import (
     Assessment,
@@ -26,6 +26,7 @@ from mlg_troubleshoot.decision.assessment import (
 )
 from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.causes import believed
+from mlg_troubleshoot.decision.consequences import consequences
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.decision.likely_worn import explain
@@ -41,7 +42,7 @@ from mlg_troubleshoot.decision.prediction import (
 from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.decision.repair import repair_sets, rigging_alternative
 from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.verdict_rule import verdict
+from mlg_troubleshoot.decision.verdict_rule import PlungerState, verdict, with_reading
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
@@ -87,6 +88,8 @@ def _judge_part(
         if extension is not None and valid:
             extended = _assess_valid(replace(cases, extension=extension), table, advice)
             found = [_never_relaxed(*both) for both in zip(found, extended, strict=True)]
+        if advice:
+            found = [_with_consequences(a, cases, table) for a in found]
     judged = dict(zip(alike, found, strict=True))
     assessed = (
         replace(judged[each], inspection=row) for each, row in zip(known, valid, strict=True)
@@ -109,6 +112,17 @@ _KNOWN = attrgetter(*(f.name for f in fields(Inspection) if f.name not in _IDENT
 def _known_of(row: Inspection) -> object:
     """All that is known of a gear but whose it is."""
     return tuple(tuple(v.items()) if isinstance(v, Mapping) else v for v in _KNOWN(row))
+
+
+def _with_consequences(a: Assessment, cases: Cases, table: IndexTable) -> Assessment:
+    """Add what follows each outcome of the next action."""
+
+    def judge(rows: list[Inspection]) -> list[Assessment]:
+        hypothetical = Cases.of(cases.gear, rows, fleet=cases.fleet)
+        return _assess_valid(hypothetical, table, advice=False)
+
+    then = consequences(a, cases.gear, judge)
+    return replace(a, plan=replace(a.plan, then=then))
 
 
 # From the best to the worst.
@@ -162,21 +176,11 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
     plunger = plunger_reading.compare(cases, batch.upper)
-    # A gear whose entry leaves a question cannot be cleared either.
-    absent = cases.critical_missing | np.array([bool(i.unit_question) for i in cases.inspections])
-    predicted = [
-        verdict(float(low), float(high), critical_missing=bool(missing))
-        for low, high, missing in zip(p_lower, p_upper, absent, strict=True)
-    ]
-    # A reading that may be beyond the margin, or off at Down Lock, keeps a gear from being cleared.
-    unsettled = plunger.unsettled | cases.off_down_lock
-    unsettled &= np.array([v is Verdict.WITHIN_MARGIN for v in predicted])
-    verdicts = [
-        Verdict.OUTSIDE_MARGIN if beyond else Verdict.INCONCLUSIVE if open_ else found
-        for beyond, open_, found in zip(plunger.beyond, unsettled, predicted, strict=True)
-    ]
     closes = np.isfinite(batch.lower.displacement_in)
-    wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in verdicts]) & closes
+    questions = np.array([bool(i.unit_question) for i in cases.inspections])
+    verdicts = _verdicts(cases, plunger, (p_lower, p_upper), batch.chance_random, questions)
+    found = [verdict for verdict, _basis in verdicts]
+    wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes
     sets = repair_sets(cases, batch.upper, np.flatnonzero(wanted))
     findings = rank_joints(
         cases.gear,
@@ -187,19 +191,43 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
     )
     order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
     judged = Judged(
-        verdicts,
+        found,
+        [basis for _verdict, basis in verdicts],
         batch,
         plunger,
         order,
         p_lower,
         batch.lower.standard_uncertainty(cases.margin_u_in),
-        unsettled,
-        np.asarray(cases.retracted & (cases.measured & ~cases.over_limit).all(axis=1)),
     )
     planned = plans(cases, judged, causes, causes.with_chances(sets))
     return [
         _assessment(cases, judged, i, findings[i], *planned[i], advice) for i in range(len(cases))
     ]
+
+
+def _verdicts(
+    cases: Cases,
+    plunger: plunger_reading.Compared,
+    p_within: tuple[Array, Array],
+    chance: Array,
+    questions: Mask,
+) -> list[tuple[Verdict, Basis]]:
+    """The verdict of each gear, and what it rests on."""
+    # A gear whose entry leaves a question cannot be cleared either.
+    absent = cases.critical_missing | questions
+    off = cases.off_down_lock
+    clears = plunger.clears & np.isfinite(chance) & ~off & ~questions & ~cases.failed_as_new
+    found = []
+    for i, missing in enumerate(absent.tolist()):
+        low, high = (float(p[i]) for p in p_within)
+        state = PlungerState(
+            bool(plunger.beyond[i]),
+            bool(clears[i]),
+            bool(plunger.unsettled[i] or off[i]),
+            float(chance[i]),
+        )
+        found.append(with_reading(verdict(low, high, critical_missing=missing), state))
+    return found
 
 
 def _assessment(
@@ -226,7 +254,6 @@ def _assessment(
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.batch, cases, i) if known else None
-    beyond = bool(plunger.beyond[i])
     detail = _detail(cases, judged, i, budget) if advice and closes else {}
     return Assessment(
         inspection=inspection,
@@ -254,15 +281,13 @@ def _assessment(
         under_directions_rad=tuple(lower.worst.under_directions[i].tolist()) if closes else (),
         joints=findings,
         plan=plan,
-        basis=Basis.MEASURED if beyond else Basis.PREDICTED,
+        basis=judged.bases[i],
         bound_in=number_or_none(lower.bound_in[i] + 0.0, True),
         explained_at_most_in=number_or_none(plunger.explained_at_most_in[i]),
         unexplained_in=number_or_none(plunger.unexplained_in[i]),
         headline=_headline(cases, judged, i),
-        measured_statement=(
-            None
-            if beyond or not np.isfinite(cases.plunger_in[i])
-            else sentences.measured(float(cases.plunger_in[i]), margin, "within")
+        alarm=sentences.alarms(
+            [f.joint for f in findings if f.over_limit], failed=bool(cases.failed[i])
         ),
         repair_sets=sets if closes else None,
         warnings=_warnings(cases, i, findings, worst, float(judged.u_in[i])),
@@ -306,74 +331,36 @@ def _detail(
         lower = one.predict(one.filled(0.0))
         worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
         detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    if np.isfinite(one.plunger_in[0]):
+    if np.isfinite(one.plunger_in[0]) and one.failed[0]:
         detail["posterior"] = explain(one, believed(one))
     return detail
 
 
 def _headline(cases: Cases, judged: Judged, i: int) -> str:
-    margin = float(cases.margin_in[i])
-    mean = float(cases.plunger_in[i])
-    plunger = judged.plunger
     lower = judged.batch.lower
-    found = judged.verdicts[i]
-    chance = float(judged.batch.chance_random[i])
-    # Adding zero turns a minus zero into zero.
-    said = sentences.Predicted(
-        float(lower.displacement_in[i]) + 0.0,
-        float(lower.bound_in[i]) + 0.0,
-        chance,
+    plunger_in = float(cases.plunger_in[i])
+    numbers = cases.gear.joint_numbers
+    worst = float(lower.displacement_in[i])
+    said = sentences.Numbers(
+        # Adding zero turns a minus zero into zero.
+        worst_in=worst + 0.0 if np.isfinite(worst) else None,
+        margin_in=float(cases.margin_in[i]),
+        chance=float(judged.batch.chance_random[i]),
+        measured_in=plunger_in if np.isfinite(plunger_in) else None,
+        unread=tuple(n for n, read in zip(numbers, cases.measured[i], strict=True) if not read),
         read=int(cases.measured[i].sum()),
-        unread=int((~cases.measured[i]).sum()),
+        loaded=worst != float(lower.bound_in[i]),
     )
-    closes = np.isfinite(said.displacement_in)
-    if plunger.beyond[i]:
-        explained = sentences.explained(
-            float(plunger.explained_at_most_in[i]),
-            float(plunger.unexplained_in[i]),
-            by_read=not said.unread or abs(mean) <= said.bound_in,
-        )
-        then = (
-            Sentence.of("{} Predicted: {}.", explained, said.words)
-            if closes
-            else sentences.NO_CLOSURE
-        )
-        return Sentence.joined([sentences.measured(mean, margin, "outside"), then])
-    if not closes:
-        return sentences.NO_CLOSURE
-    if found is Verdict.INCOMPLETE:
-        open_joints = [
-            n
-            for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True)
-            if not read
-        ]
-        question = cases.inspections[i].unit_question
-        return (
-            sentences.entry_in_question(question, said)
-            if question
-            else sentences.incomplete(open_joints, said)
-        )
-    if found is Verdict.OUTSIDE_MARGIN:
-        return sentences.outside(margin, said)
-    if found is Verdict.WITHIN_MARGIN:
-        done = bool(judged.joints_done[i])
-        failed = bool(cases.failed[i])
-        clears = bool(plunger.clears[i])
-        return sentences.within(
-            margin,
-            said,
-            failed=failed,
-            clears=clears,
-            joints_done=done,
-            repaired=cases.inspections[i].is_repaired,
-        )
-    return (
-        sentences.OFF_DOWN_LOCK
-        if judged.unsettled[i] and cases.off_down_lock[i]
-        else sentences.plunger_unsettled(mean, float(cases.plunger_u_in[i]), margin)
-        if judged.unsettled[i]
-        else sentences.inconclusive(margin, said, float(judged.p_within[i]))
-    )
+    question = cases.inspections[i].unit_question
+    head = sentences.headline(judged.verdicts[i], judged.bases[i], said, question)
+    if judged.verdicts[i] is Verdict.INCONCLUSIVE and cases.off_down_lock[i]:
+        head = Sentence.joined([head, sentences.OFF_DOWN_LOCK])
+    elif said.measured_in is not None and judged.bases[i] is Basis.PREDICTED:
+        read = sentences.close_reading(said.measured_in, float(cases.plunger_u_in[i]))
+        head = Sentence.joined([head, read])
+    over = [numbers[j] for j in np.flatnonzero(cases.over_limit[i])]
+    alarm = sentences.alarms(over, failed=bool(cases.failed[i]))
+    return Sentence.joined([head, alarm]) if alarm else head
 
 
 _OF_EXTENSION = "The extension of the model"
@@ -399,18 +386,7 @@ def _warnings(
             f"{_OF_EXTENSION} needs {', '.join(lacking)}, which this inspection lacks:"
             " predicted without it."
         )
-    warnings += [
-        Sentence.of(
-            "Joint #{} {}: {} radial is above its limit of {} ({}): reject to the manual.",
-            finding.joint,
-            finding.name,
-            Length(finding.clearance_in),
-            Length(finding.limit_in),
-            gear.joint(finding.joint).limit.kind,
-        )
-        for finding in findings
-        if finding.over_limit and finding.clearance_in is not None
-    ]
+    warnings += [sentences.over_limit(gear, finding) for finding in findings if finding.over_limit]
     read = [f.clearance_in for f in findings if f.clearance_in is not None]
     if all(f.clearance_in == f.limit_in for f in findings):
         warnings.append(sentences.LIMITS_WRITTEN)

@@ -45,29 +45,24 @@ class End(StrEnum):
 
 # Where a plan ends, in words that stand alone; the whole sentence is the text of its last step.
 _ENDS = {
-    End.WITHIN: "Go on with fault isolation: within its margin",
     End.NOT_EXPLAINED: "Look elsewhere: the joints do not explain it",
-    End.TOO_CLOSE: "Go on: too close to the margin to decide",
-    End.OUTSIDE_NO_COMPLAINT: "Engineering decides: outside its bound, no failure recorded",
-    End.CANNOT_CLEAR: "Engineering decides: no set of repairs brings it within",
+    End.TOO_CLOSE: "Nothing required: too close to the margin to decide",
+    End.OUTSIDE_NO_COMPLAINT: "Refer to engineering: outside its margin, no failure recorded",
+    End.CANNOT_CLEAR: "Refer to engineering: no repair brings it within its margin",
 }
-_RETRACTED = "Engineering decides: outside its bound, retracted normally"
 _DONE = "Done: no further action on the joints"
 # How a step begins that the day forces, whatever the end.
 STOP = "Stop for today"
 
 
-def in_brief(action: Action, joints: Sequence[int], end: End, text: str, *, retracted: bool) -> str:
-    """Say the next action in words that stand alone: the same on screen, in files and on paper;
-    `text` is its sentence.
-    """
-    if action is Action.DONE:
+def in_brief(step: Step, end: End) -> str:
+    """Say the next action in words that stand alone: the same on screen, in files and on paper."""
+    if step.action is Action.DONE:
         return _DONE
-    if action is Action.CONTINUE and text.startswith(STOP):
-        return f"{STOP}: hand over what stays open"
-    if action is Action.CONTINUE:
-        return _RETRACTED if retracted and end is End.OUTSIDE_NO_COMPLAINT else _ENDS[end]
-    return f"{action.words} {', '.join(f'#{joint}' for joint in joints)}".rstrip().capitalize()
+    if step.action is Action.CONTINUE:
+        stops = step.text.startswith(STOP)
+        return f"{STOP}: hand over what stays open" if stops else _ENDS[end]
+    return step.words.capitalize() if step.required else f"Nothing required: {step.words} to clear"
 
 
 class Basis(StrEnum):
@@ -81,7 +76,8 @@ class Step:
 
     minutes: how long it takes: an area counts at its first step and again after a repair closed it.
     [min] gauge_u_needed_in: largest standard uncertainty of one radial reading that serves; for
-    `MEASURE_AGAIN` only. [in]
+    `MEASURE_AGAIN` only. [in] required: false where nothing must be done. how: where, with what,
+    from which datum, what is safe.
     """
 
     action: Action
@@ -89,6 +85,8 @@ class Step:
     minutes: float
     gauge_u_needed_in: float | None
     text: str
+    required: bool = True
+    how: str = ""
 
     @property
     def words(self) -> str:
@@ -98,16 +96,48 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
+class Consequence:
+    """What follows one outcome of the next action: IF `outcome` THEN `text`. minutes: [min]"""
+
+    outcome: str
+    action: Action
+    joints: tuple[int, ...]
+    minutes: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """The expected course from what is known now to an end; never empty, and only its first step
     binds.
 
-    open_question: what the day does not allow to settle, and joints that nobody read at the end.
+    open_question: what the day does not allow to settle. then: what follows the outcomes of the
+    first step.
     """
 
     steps: tuple[Step, ...]
     end: End
     open_question: str | None = None
+    then: tuple[Consequence, ...] = ()
+
+
+_HOW = {
+    Action.READ_PLUNGER: "read_plunger",
+    Action.CHECK_RIGGING: "check_rigging",
+    Action.RETRACT: "trial_retraction",
+    Action.MEASURE: "measure",
+    Action.MEASURE_AGAIN: "measure",
+    Action.RESTORE: "restore",
+}
+
+
+def how_to(gear: Gear, action: Action, joints: Sequence[int]) -> str:
+    """How an action is done, by the gear file: where the joints are, then each instruction."""
+    name = _HOW.get(action)
+    if name is None:
+        return ""
+    places = [f"#{n}: {gear.joint(n).location}." for n in joints]
+    return " ".join([*places, *gear.how[name]])
 
 
 def minutes_to_measure(

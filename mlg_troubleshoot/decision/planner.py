@@ -21,9 +21,11 @@ from mlg_troubleshoot.decision.causes import Causes
 from mlg_troubleshoot.decision.inspection import InvalidRow, RiggingCheck
 from mlg_troubleshoot.decision.plan import (
     Action,
+    Basis,
     End,
     Plan,
     Step,
+    how_to,
     minutes_to_measure,
     minutes_to_restore,
 )
@@ -31,13 +33,9 @@ from mlg_troubleshoot.decision.plunger_reading import Compared
 from mlg_troubleshoot.decision.prediction import BatchPrediction
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.repair import removable
-from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, tabled_normal_cdf, verdict
-from mlg_troubleshoot.decision.wear_levels import TOO_CLOSE, Unread
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
 
-# Readings of one round are read together until the verdict is settled with this chance. [1]
-_SETTLED = 0.2
 # A cause counts as excluded below this chance. [1]
 _EXCLUDED = 1 - CONFORMANCE
 # Joints read in one round of a gear that failed: until this share of what may be worn in the area
@@ -47,9 +45,27 @@ _TOGETHER = 0.6
 _MOST_EXTRA = 2
 # They are chosen among as many joints, those that move the plunger most.
 _MOST_TRIED = 6
+# Shares of its limit beyond which a joint is worn whatever its gauge. [1]
+_SURELY_WORN = 1.5
 # What one repair may be above the chance that the shop accepts over all: most are far below it, and
 # the average of simulated gears stays below it. [1]
 _FOR_ONE_REPAIR = 4
+
+
+def _doubted(cases: Cases, worn: Array) -> Mask:
+    """Readings over their limits that are taken again: within two standard uncertainties of the
+    limit, or, on a gear that failed, at odds with the plunger; of no joint far beyond its limit.
+    """
+    gear = cases.gear
+    read = cases.filled(0.0)
+    near = read - gear.limits_in <= 2.0 * cases.gauge_u_in
+    complaint = (cases.failed | cases.complained)[:, None]
+    sound = 1.0 - worn
+    contradicts = complaint & (sound > gear.second_repair_chance.value)
+    contradicts &= np.isfinite(cases.plunger_in)[:, None]
+    may_be = cases.over_limit & cases.reachable & ~cases.own_gauge
+    may_be &= read <= _SURELY_WORN * gear.limits_in
+    return np.asarray(may_be & (near | contradicts))
 
 
 def _correction(text: str) -> Plan:
@@ -75,21 +91,15 @@ class Judged:
         Chance that the worst case is within the margin. [1]
     u_in : ndarray, shape (n,)
         Uncertainty of the worst case against the margin. [in]
-    unsettled : ndarray of bool, shape (n,)
-        Gears that only a plunger reading at the edge of the margin, or off at Down Lock, keeps from
-        being within it.
-    joints_done : ndarray of bool, shape (n,)
-        Gears that retracted, with every joint read and none over its limit.
     """
 
     verdicts: Sequence[Verdict]
+    bases: Sequence[Basis]
     batch: BatchPrediction
     plunger: Compared
     order: Places
     p_within: Array
     u_in: Array
-    unsettled: Mask
-    joints_done: Mask
 
 
 def plans(
@@ -131,7 +141,6 @@ class _BatchContext:
 
     def __init__(self, cases: Cases, judged: Judged, causes: Causes) -> None:
         gear = cases.gear
-        ahead = Unread(cases, judged.batch.lower, causes.levels)
         self.cases = cases
         self.judged = judged
         self.causes = causes
@@ -145,23 +154,7 @@ class _BatchContext:
         self.over = cases.over_limit & cases.restorable
         self.removable = removable(cases)
         self.open: Mask = np.asarray(~cases.measured & cases.reachable)
-        critical = self.open & gear.critical
-        missing = np.asarray(critical.any(axis=1))
-        candidates = np.where(missing[:, None], critical, self.open)
-        self.group = ahead.group(candidates, _SETTLED)
-        self.rest = self.open & ~self.group
-        self.too_close = ~missing & (ahead.too_close() >= TOO_CLOSE)
-        self.rest_needed = ahead.settled(self.group, self.rest) < 0.5
-        # Restoring a joint that may be sound costs more than reading it with another gauge, and on
-        # a gear that failed it leads to a second repair.
-        sound = 1.0 - causes.worn
-        failed = (cases.failed | self.complained)[:, None]
-        doubt = sound * self.restore_min > gear.access_minutes
-        doubt |= failed & (sound > gear.second_repair_chance.value)
-        self.doubted = cases.over_limit & cases.reachable & ~cases.own_gauge & doubt
-        self.after_limits = _verdicts_after_limits(cases, judged)
-        self.again, self.again_u_in = _measure_again(cases, judged)
-        self.expected_end = _expected(cases, judged, ahead)
+        self.doubted = _doubted(cases, causes.worn)
         u = np.hypot(cases.plunger_u_in, cases.margin_u_in)
         apart = np.abs(np.abs(cases.plunger_in) - cases.margin_in)
         self.at_edge: Mask = np.asarray(apart < 2.0 * u)
@@ -212,19 +205,24 @@ class _PlanBuilder:
         return self._without_complaint()
 
     def _without_complaint(self) -> Plan:
+        """What is over its limit is restored; a reading of the plunger may clear the gear, and
+        nothing else is required.
+        """
         i = self.row
-        if self.judged.unsettled[i]:
-            if self.cases.off_down_lock[i]:
-                return self._restore_over_limit()._end(End.NOT_EXPLAINED)
-            if self._again():
-                self._read_the_plunger(again=True)
-            return self._restore_over_limit()._end(End.TOO_CLOSE)
-        if self.inspection.is_repaired and not self.over:
-            return self._restore_over_limit()._done()
-        if not self.judged.plunger.explained[i]:
-            return self._restore_over_limit()._check_rigging()._end(End.NOT_EXPLAINED)
-        within = self.judged.verdicts[i] is Verdict.WITHIN_MARGIN
-        return self._settled(End.WITHIN) if within else self._to_verdict()
+        self._restore_over_limit()
+        if self.over != self.over_limit:
+            return self._stop_for_today()
+        if self.judged.verdicts[i] is Verdict.WITHIN_MARGIN and not (
+            self.over and self.judged.bases[i] is Basis.MEASURED
+        ):
+            return self._done()
+        if not self.read_plunger or self.over or self.inspection.is_plunger_in_doubt:
+            minutes = self.gear.plunger_reading.value
+            text = sentences.read_to_clear(minutes)
+            self._step(Action.READ_PLUNGER, minutes, text, required=False)
+            return self._done()
+        beyond = bool(self.judged.plunger.beyond[i])
+        return self._end(End.OUTSIDE_NO_COMPLAINT if beyond else End.TOO_CLOSE)
 
     def _repaired(self) -> Plan:
         """A gear that failed and was repaired: the plunger says whether the repair holds."""
@@ -304,7 +302,7 @@ class _PlanBuilder:
         # that was looked at, the likelier cause decides.
         likely = joints >= 0.5 and float(f.causes.elsewhere[i]) <= 1.0 - PRIORS.usual
         if best is not None and (likely or set(best.joints) <= set(self.over_limit)):
-            return self._try(best.joints, best)
+            return self._try(best.joints)
         if best is not None:
             return self._elsewhere()
         if joints < 0.5 or not self.over:
@@ -439,52 +437,12 @@ class _PlanBuilder:
         opened = self.opened | {self.gear.joint(n).area for n in best.joints}
         return chosen if saved > minutes_to_measure(self.gear, chosen, opened) else ()
 
-    def _to_verdict(self) -> Plan:
-        """A gear without a complaint: read until there is a verdict, restore what is over its
-        limit, end.
-        """
-        f = self.facts
-        i = self.row
-        found = f.after_limits[i]
-        if found is Verdict.INCOMPLETE and f.too_close[i] and not self.over:
-            return self._end(End.TOO_CLOSE)
-        if found is Verdict.INCOMPLETE and f.group[i].any():
-            self._measure(self._joints(f.group[i]))
-            if f.rest[i].any() and f.rest_needed[i]:
-                self._measure(self._joints(f.rest[i]))
-            found = f.expected_end[i]
-        elif found is Verdict.INCOMPLETE:
-            return self._settled(End.CANNOT_CLEAR)
-        elif found is Verdict.INCONCLUSIVE and f.again[i].any() and not self.over:
-            self._measure(self._joints(f.again[i]), float(f.again_u_in[i]))
-            inside = self.judged.batch.lower.displacement_in[i] <= self.cases.margin_in[i]
-            found = Verdict.WITHIN_MARGIN if inside else Verdict.OUTSIDE_MARGIN
-        ends = {
-            Verdict.WITHIN_MARGIN: End.WITHIN,
-            Verdict.OUTSIDE_MARGIN: End.OUTSIDE_NO_COMPLAINT,
-            Verdict.INCOMPLETE: End.CANNOT_CLEAR,
-        }
-        return self._settled(ends.get(found, End.TOO_CLOSE))
-
-    def _settled(self, where: End) -> Plan:
-        """Restore what is over its limit, and end; the joints are done with where some were, or
-        where all were read on a gear that retracted.
-        """
-        if self.over and self.judged.plunger.beyond[self.row]:
-            return self._try(self.over)
-        if self.over_limit:
-            return self._restore_over_limit()._done()
-        done = bool(self.cases.retracted[self.row]) and not self._left_unread()
-        return self._done() if done and where is End.WITHIN else self._end(where)
-
     def _left_unread(self) -> list[int]:
         """Joints that nobody read and that no step reads."""
         asked = {n for step in self.steps for n in step.joints}
         return [n for n in self._joints(~self.cases.measured[self.row]) if n not in asked]
 
-    def _try(
-        self, joints: Sequence[int], best: RepairSet | None = None, *, expected: bool = False
-    ) -> Plan:
+    def _try(self, joints: Sequence[int], *, expected: bool = False) -> Plan:
         """Restore, read the plunger, retract the gear: done. Where something over its limit must
         wait for its spare, that comes after it.
         """
@@ -492,7 +450,7 @@ class _PlanBuilder:
         if waits and not expected:
             return self._restore_over_limit()._stop_for_today()
         ranked = self._joints(np.array([n in joints for n in self.numbers]))
-        self._restore(ranked, best, expected=expected)
+        self._restore(ranked, expected=expected)
         if waits:
             return self._stop_for_today()
         self._read_the_plunger()
@@ -510,7 +468,7 @@ class _PlanBuilder:
     def _stop_for_today(self, if_worn: Sequence[int] = ()) -> Plan:
         """What is over its limit, or may be found worn, cannot be restored today."""
         left = [n for n in self.over_limit if n not in self.over]
-        text = sentences.stop_for_today(left, if_worn, self._barred())
+        text = sentences.stop_for_today([*left, *if_worn], self._barred())
         self._step(Action.CONTINUE, 0.0, text)
         return Plan(tuple(self.steps), End.CANNOT_CLEAR)
 
@@ -525,15 +483,14 @@ class _PlanBuilder:
         if self.over != self.over_limit:
             return self._stop_for_today()
         restored = any(step.action is Action.RESTORE for step in self.steps)
-        unread = self._left_unread()
         text = sentences.done(
-            repaired=restored,
-            recorded=self.inspection.is_repaired,
-            read=len(self.numbers) - len(unread),
-            unread=len(unread),
+            len(self._left_unread()), repaired=restored or self.inspection.is_repaired
         )
-        self._step(Action.DONE, 0.0, text)
-        return Plan(tuple(self.steps), End.DONE)
+        end = End.DONE
+        if len(self.steps) == 0 and self.judged.bases[self.row] is Basis.PREDICTED:
+            end = End.WITHIN
+        self._step(Action.DONE, 0.0, text, required=False)
+        return Plan(tuple(self.steps), end)
 
     def _check_rigging(self, *, again: bool = False) -> _PlanBuilder:
         checked = any(step.action is Action.CHECK_RIGGING for step in self.steps)
@@ -556,12 +513,13 @@ class _PlanBuilder:
             return self._stop_for_today()
         text = sentences.go_on(
             where,
+            self.inspection,
             failed=bool(self.cases.failed[self.row]),
             beyond=bool(self.judged.plunger.beyond[self.row]),
             looked=self.looked,
-            look_again=sentences.look_again(self.inspection) if where is End.TOO_CLOSE else "",
         )
-        self._step(Action.CONTINUE, 0.0, text)
+        required = where is not End.TOO_CLOSE
+        self._step(Action.CONTINUE, 0.0, text, required=required)
         return Plan(tuple(self.steps), where)
 
     def _step(
@@ -571,8 +529,11 @@ class _PlanBuilder:
         text: str,
         joints: tuple[int, ...] = (),
         gauge_u_needed_in: float | None = None,
+        *,
+        required: bool = True,
     ) -> None:
-        self.steps.append(Step(action, joints, minutes, gauge_u_needed_in, text))
+        how = how_to(self.gear, action, joints)
+        self.steps.append(Step(action, joints, minutes, gauge_u_needed_in, text, required, how))
 
     def _measure(self, joints: tuple[int, ...], needed: float | None = None) -> None:
         """Measure joints; again where it is said how well."""
@@ -581,16 +542,15 @@ class _PlanBuilder:
         if needed is None:
             self._step(Action.MEASURE, minutes, sentences.measure(self.gear, joints), joints)
         else:
-            text = sentences.measure_again(joints, needed)
+            text = sentences.measure_again(joints)
             self._step(Action.MEASURE_AGAIN, minutes, text, joints, needed)
 
-    def _restore(self, joints: tuple[int, ...], best: RepairSet | None, *, expected: bool) -> None:
+    def _restore(self, joints: tuple[int, ...], *, expected: bool) -> None:
         """Restore joints; where a reading over the limit is in doubt it is taken again first."""
         if not expected:
             self._reread()
         minutes = minutes_to_restore(self.gear, joints, self.opened)
-        unread = not self.cases.measured[self.row].all()
-        text = sentences.restore(joints, self.over, best, unread=unread, expected=expected)
+        text = sentences.RESTORE_WORN if expected else sentences.restore(joints, self.over)
         self._step(Action.RESTORE, minutes, text, joints)
         self.opened = frozenset()
 
@@ -606,7 +566,7 @@ class _PlanBuilder:
         """Restore what can be today; a reading in doubt is taken again also where it cannot."""
         self._reread()
         if self.over:
-            self._restore(self.over, None, expected=False)
+            self._restore(self.over, expected=False)
         return self
 
     def _joints(self, places: Mask) -> tuple[int, ...]:
@@ -615,96 +575,11 @@ class _PlanBuilder:
         return tuple(self.numbers[j] for j in order if places[j]) if places.any() else ()
 
     def _open_question(self, found: Plan) -> str | None:
-        """What cannot be settled because of the day, and what nobody read where the plan ends."""
+        """What cannot be settled because of the day."""
         if found.end is End.CORRECT:
             return None
         cases = self.cases
         i = self.row
-        left = self._joints(self.facts.open[i])
-        never = None
-        if left and found.steps[0].action in (Action.CONTINUE, Action.DONE):
-            minutes = minutes_to_measure(self.gear, left)
-            never = sentences.never_read(left, minutes)
         unread = self._joints(~cases.measured[i] & ~cases.reachable[i])
         over = self._joints(cases.over_limit[i] & ~cases.restorable[i])
-        shut = sentences.open_question(unread, over)
-        return " ".join(said for said in (found.open_question, shut, never) if said) or None
-
-
-def _verdicts_after_limits(cases: Cases, judged: Judged) -> list[Verdict]:
-    """The verdicts that stand once what is over its limit is restored."""
-    verdicts = list(judged.verdicts)
-    rows = np.flatnonzero(cases.over_limit.any(axis=1) & ~judged.plunger.beyond)
-    if not len(rows):
-        return verdicts
-    some = cases.take(rows)
-    p = []
-    for unread in (0.0, cases.gear.limits_in):
-        found = some.predict(
-            np.where(some.over_limit, cases.gear.new_parts_in, some.filled(unread))
-        )
-        p.append(found.probability_within(some.margin_in, some.margin_u_in))
-    missing = some.critical_missing
-    for k, row in enumerate(rows):
-        verdicts[int(row)] = verdict(
-            float(p[0][k]), float(p[1][k]), critical_missing=bool(missing[k])
-        )
-    return verdicts
-
-
-def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
-    """Joints to measure again, and how well: the least work that settles the verdict more likely
-    than not.
-
-    A new reading differs from the old one by the errors of both.
-    """
-    n = len(cases)
-    chosen = np.zeros_like(cases.measured)
-    needed = np.full(n, np.nan)
-    close = np.array([v is Verdict.INCONCLUSIVE for v in judged.verdicts])
-    rows = np.flatnonzero(close & ~cases.failed & ~judged.unsettled)
-    if not len(rows):
-        return chosen, needed
-    some = cases.take(rows)
-    part = judged.batch.lower
-    slopes = responses(cases.gear)[0].slopes(some.filled(0.0))
-    fixed = part.u_geometry_in[rows] ** 2 + part.u_model_in[rows] ** 2 + some.margin_u_in**2
-    own = np.where(some.measured, (slopes * some.gauge_u_in) ** 2, 0.0)
-    off = part.displacement_in[rows] - cases.margin_in[rows]
-    off = off[:, None]
-    fixed = (fixed + own.sum(axis=1))[:, None]
-    for better in sorted(BETTER_GAUGES_IN):
-        eligible = some.measured & some.reachable & ~some.own_gauge & (some.gauge_u_in > better)
-        then = (slopes * better) ** 2
-        worth = np.where(eligible, own - then, 0.0)
-        order = np.argsort(-np.round(worth / cases.gear.access_minutes, 12), axis=1, kind="stable")
-        gained, moved = (
-            np.cumsum(np.take_along_axis(each, order, axis=1), axis=1)
-            for each in (worth, np.where(eligible, own + then, 0.0))
-        )
-        guard = SCORE * np.sqrt(fixed - gained)
-        moves = np.sqrt(np.maximum(moved, 1e-24))
-        settles = tabled_normal_cdf((off - guard) / moves) + tabled_normal_cdf(
-            (-off - guard) / moves
-        )
-        enough = (settles > 0.5) & np.take_along_axis(eligible, order, axis=1)
-        upto = np.argsort(order, axis=1) <= np.argmax(enough, axis=1)[:, None]
-        now = enough.any(axis=1)
-        chosen[rows[now]] = (eligible & upto)[now]
-        needed[rows[now]] = better
-    return chosen, needed
-
-
-def _expected(cases: Cases, judged: Judged, ahead: Unread) -> list[Verdict]:
-    """The likeliest verdict once every joint that can be reached is read."""
-    unread = ~cases.measured
-    within = ahead.below(ahead.within_in, unread)
-    close = ahead.too_close()
-    words = (Verdict.WITHIN_MARGIN, Verdict.INCONCLUSIVE, Verdict.OUTSIDE_MARGIN)
-    likeliest = np.argmax([within, close, 1.0 - within - close], axis=0)
-    shut = (unread & ~cases.reachable & cases.gear.critical).any(axis=1)
-    known = shut | cases.measured.all(axis=1) | ~np.isfinite(judged.batch.upper.displacement_in)
-    return [
-        now if done else words[place]
-        for now, done, place in zip(judged.verdicts, known, likeliest, strict=True)
-    ]
+        return sentences.open_question(unread, over)

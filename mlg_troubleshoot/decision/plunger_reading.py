@@ -61,33 +61,22 @@ def compare(cases: Cases, upper: Prediction) -> Compared:
 def disagreement(
     inspection: Inspection, over_in: float, under_in: float, standard_uncertainty_in: float
 ) -> str | None:
-    """Flag a measured displacement that differs from the prediction by more than two standard
+    """Flag a measured displacement that is beyond both worst cases by more than two standard
     uncertainties.
     """
     measured = inspection.measured_displacement_in
     if measured is None:
         return None
     u = math.hypot(standard_uncertainty_in, plunger_u(inspection))
-    if abs(measured - over_in) <= 2.0 * u:
+    if under_in - 2.0 * u <= measured <= over_in + 2.0 * u:
         return None
-    differs = Sentence.of(
-        "Measured {} differs from the predicted over-travel {} by more than two combined standard"
-        " uncertainties ({}).",
-        Length(measured, sign=True),
-        Length(over_in, sign=True),
-        Length(2 * u),
-    )
-    if under_in - 2.0 * u <= measured < over_in:
-        return Sentence.of(
-            "{} It lies inside the worst-case bounds, so it is possible: the clearances need not be"
-            " taken up in the worst direction.",
-            differs,
-        )
     return Sentence.of(
-        "{} It is beyond what the entered clearances can do in any direction. Look for: a clearance"
-        " read smaller than it is or entered with the wrong unit or convention, an unmeasured"
-        " joint, a part outside the listed joints, a changed rigging, the plunger gauge.{}",
-        differs,
+        "Measured {} is beyond what the entered clearances can do in any direction ({} to {})."
+        " Look for a clearance entered too small, an unmeasured joint, the rigging, the plunger"
+        " gauge.{}",
+        Length(measured, sign=True),
+        Length(under_in, sign=True, named=False),
+        Length(over_in, sign=True),
         _entry_error(inspection, abs(measured), over_in if measured > 0.0 else -under_in, u),
     )
 

@@ -9,9 +9,15 @@ from datetime import date
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
-from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Verdict
+from mlg_troubleshoot.decision.assessment import (
+    Assessment,
+    JointFinding,
+    Judgement,
+    Verdict,
+    VerdictTone,
+)
 from mlg_troubleshoot.decision.inspection import FactKind, Outcome, Side
-from mlg_troubleshoot.decision.plan import Action, Basis
+from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
@@ -129,7 +135,8 @@ class Listed:
     day: date | None
     verdict: Verdict
     in_brief: str
-    measured: bool
+    title: str
+    tone: VerdictTone
     severity: tuple[int, int, float]
     failed: bool
     over_limit: tuple[int, ...]
@@ -148,13 +155,14 @@ class Listed:
             None if a is None else a.inspection.inspection_date,
             judgement.verdict,
             judgement.in_brief,
-            a is not None and a.basis is Basis.MEASURED,
+            judgement.title,
+            judgement.tone,
             _severity(judgement),
             a is not None
             and (
                 a.inspection.outcome is Outcome.FAILED
                 or any(fact.kind is FactKind.FAILED for fact in a.older)
-                or judgement.next_action.action in _OPEN
+                or (judgement.next_action.required and judgement.next_action.action in _OPEN)
             ),
             () if a is None else tuple(f.joint for f in a.joints if f.over_limit),
             a.deciding_in if a is not None and a.inspection.clearance_in else None,
@@ -208,7 +216,7 @@ def _severity(judgement: Judgement) -> tuple[int, int, float]:
     rank = WORST_FIRST.index(judgement.verdict)
     if not isinstance(judgement, Assessment):
         return 1, rank, 0.0
-    measured = judgement.basis is Basis.MEASURED
+    measured = judgement.is_measured_outside
     size = judgement.inspection.measured_displacement_in if measured else judgement.deciding_in
     return (
         0 if measured else 1,

@@ -294,7 +294,7 @@ def rigging_alternative(
     over, under = worst_in
     measured = float(one.plunger_in[0])
     if np.isfinite(measured):
-        shift = -measured
+        shift = 0.0 - measured
         left = max(over, -under)
         chance = exact_chance(one, one.filled(0.0))
     else:

@@ -5,12 +5,14 @@ probability 95 %).
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.plan import Basis
 
 # Conformance probability of a verdict (JCGM 106). [1]
 CONFORMANCE = 0.95
@@ -42,7 +44,7 @@ def zone(probability: float) -> Verdict:
 
 
 def verdict(p_lower: float, p_upper: float, *, critical_missing: bool) -> Verdict:
-    """Apply the rule; the first match wins."""
+    """Apply the rule to what is predicted; the first match wins."""
     lower = zone(p_lower)
     upper = zone(p_upper)
     if lower is Verdict.OUTSIDE_MARGIN:
@@ -50,3 +52,32 @@ def verdict(p_lower: float, p_upper: float, *, critical_missing: bool) -> Verdic
     if critical_missing or lower is not upper:
         return Verdict.INCOMPLETE
     return lower
+
+
+def with_reading(predicted: Verdict, read: PlungerState) -> tuple[Verdict, Basis]:
+    """Apply the rule to the plunger that was read; what is predicted stands where it decides
+    nothing.
+    """
+    if read.beyond:
+        return Verdict.OUTSIDE_MARGIN, Basis.MEASURED
+    if read.clears and read.chance <= 1.0 - CONFORMANCE:
+        return Verdict.WITHIN_MARGIN, Basis.MEASURED
+    if read.clears or (read.unsettled and predicted is Verdict.WITHIN_MARGIN):
+        return Verdict.INCONCLUSIVE, Basis.PREDICTED
+    return predicted, Basis.PREDICTED
+
+
+@dataclass(frozen=True, slots=True)
+class PlungerState:
+    """What the plunger of one gear says.
+
+    beyond: a reading is beyond the margin. clears: every reading is within it, the mean also by
+    two standard uncertainties, and no failure is as new. unsettled: it is read, or was found at
+    Down Lock, such that nothing is cleared. chance: of leaving the margin with random directions;
+    NaN where the linkage does not close. [1]
+    """
+
+    beyond: bool
+    clears: bool
+    unsettled: bool
+    chance: float

@@ -4,7 +4,7 @@ well.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -209,6 +209,8 @@ class Gear(Result):
         Radial clearance beyond which a reading is refused, and beyond which it is asked again. [in]
     down_lock_range : tuple of float
         Allowed plunger displacement at Down Lock. [in]
+    how : mapping of str to tuple of str
+        How each action is done, one instruction per text, by its name in the gear file.
     discrepancies : Discrepancies
         Where a diagnosis may change the model.
     cycle : RetractionCycle or None
@@ -247,6 +249,7 @@ class Gear(Result):
     hard_limit: Sourced
     confirm_above: Sourced
     down_lock_range: tuple[float, float]
+    how: Mapping[str, tuple[str, ...]]
     discrepancies: Discrepancies
     cycle: RetractionCycle | None
     numbers: tuple[Sourced, ...]

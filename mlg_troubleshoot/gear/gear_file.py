@@ -31,6 +31,7 @@ from mlg_troubleshoot.gear.gear_tables import (
     CalibrationTable,
     EnsembleFile,
     GearFile,
+    HowTable,
     SourcedTable,
 )
 from mlg_troubleshoot.gear.model import Calibration
@@ -159,6 +160,7 @@ def _read(path: Path) -> Gear:
         hard_limit=numbers.of(form, "hard_limit", "in", _HARD_LIMIT * largest),
         confirm_above=numbers.of(form, "confirm_above", "in", _CONFIRM_ABOVE * largest),
         down_lock_range=down_lock_range,
+        how=_how(form.how, numbers),
         discrepancies=_discrepancies(file, reference.mechanism),
         cycle=form.cycle,
         numbers=tuple(numbers.found),
@@ -173,6 +175,18 @@ def _read(path: Path) -> Gear:
             )
         ),
     )
+
+
+def _how(table: HowTable, numbers: _Numbers) -> dict[str, tuple[str, ...]]:
+    """How each action is done; an assumed text says so."""
+    texts = msgspec.structs.asdict(table)
+    how = {}
+    for name in ("read_plunger", "check_rigging", "trial_retraction", "measure", "restore"):
+        said = texts[name]
+        is_assumed = numbers.source(table, name).kind is SourceKind.ASSUMED
+        marked = ("Assumed text: follow the manual.",) if said and is_assumed else ()
+        how[name] = (*said, *marked)
+    return how
 
 
 def _linkage(file: DataFile[GearFile], name: str) -> Linkage:

@@ -129,6 +129,18 @@ class WorkshopTable(SourcedTable, kw_only=True):
     accepted_chance: Chance | None = None
 
 
+class HowTable(SourcedTable, kw_only=True):
+    """How each action is done: where, with what, from which datum, which way is plus, what is
+    safe; one instruction per text.
+    """
+
+    read_plunger: tuple[str, ...] = ()
+    check_rigging: tuple[str, ...] = ()
+    trial_retraction: tuple[str, ...] = ()
+    measure: tuple[str, ...] = ()
+    restore: tuple[str, ...] = ()
+
+
 class GearFile(SourcedTable, kw_only=True):
     """A gear file: a linkage in one position, in inches, its joints, and where numbers come from.
 
@@ -159,6 +171,7 @@ class GearFile(SourcedTable, kw_only=True):
     confirm_above: Length | None = None
     areas: dict[Name, AreaTable] = msgspec.field(default_factory=dict)
     workshop: WorkshopTable = msgspec.field(default_factory=WorkshopTable)
+    how: HowTable = msgspec.field(default_factory=HowTable)
     diagnosis: Discrepancies = msgspec.field(default_factory=Discrepancies)
     cycle: RetractionCycle | None = None
     ensemble: Sibling | None = None

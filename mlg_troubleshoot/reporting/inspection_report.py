@@ -88,7 +88,7 @@ def _identified(
     side = row.side.value if row.side else "?"
     tail = row.tail_no or "tail not known"
     record = row.record_id or "record not known"
-    title = f"{tail} {side} – {j.verdict.words} – {record}"
+    title = f"{tail} {side} – {j.title} – {record}"
     footer = f"{short(tail, 20)} {side} · {short(record, 34)}"
     return {
         **head(title, footer, gear, provenance, lengths),
@@ -97,7 +97,7 @@ def _identified(
         "side_words": "side not known" if row.side is None else _SIDES[row.side],
         "tail": tail,
         "record": record,
-        "tone": j.verdict.value.lower().replace("_", "-"),
+        "tone": j.tone.value,
         "warnings": list(dict.fromkeys((*j.warnings, *row.warnings))),
     }
 
@@ -200,7 +200,7 @@ def batch_document(
     """
     lengths = Lengths(unit)
     source = ", ".join(Path(name).name for name in provenance.input_sha256) or "inspections"
-    counted = Counter(j.verdict for j in judgements)
+    counted = Counter((WORST_FIRST.index(j.verdict), j.title, j.verdict) for j in judgements)
     latest, earlier = latest_of_each_gear(listed(judgements))
     judged = [j for j in judgements if isinstance(j, Assessment)]
 
@@ -222,7 +222,7 @@ def batch_document(
         "gears_of": len({(j.inspection.tail_no, j.inspection.side) for j in judged}),
         "over_limit": sum(any(f.over_limit for f in j.joints) for j in judged),
         "failed": sum(j.inspection.outcome is Outcome.FAILED for j in judged),
-        "counts": [(v, counted[v]) for v in WORST_FIRST],
+        "counts": [(verdict, title, n) for (_at, title, verdict), n in sorted(counted.items())],
         "latest": linked(latest),
         "earlier": linked(earlier),
         "rejected": [j for j in judgements if isinstance(j, Rejected)],

@@ -26,6 +26,7 @@ from mlg_troubleshoot.json_outputs import (
     GearOutput,
     MisfitSize,
     NamedCauseOutput,
+    NextOutcome,
     ShownJoint,
     SuspectCell,
 )
@@ -132,7 +133,6 @@ def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:
     return {
         **dict.fromkeys(CheckedInspection.__annotations__),
         **_course(judgement.row, judgement),
-        "headline": judgement.next_action.text,
         "joints": [{**unknown, "joint": joint.number, "name": joint.name} for joint in gear.joints],
         "warnings": list(judgement.warnings),
     }
@@ -163,11 +163,9 @@ def assessment_as_json(a: Assessment) -> dict[str, Any]:
 
 def _assessment(a: Assessment) -> dict[str, Any]:
     """One gear of a check."""
-    said = [a.measured_statement] if a.measured_statement else []
     own = {
         "measured_displacement_in": a.inspection.measured_displacement_in,
         "joints": [_joint(finding) for finding in a.joints],
-        "warnings": [*said, *a.warnings],
     }
     return filled(CheckedInspection, a, **_course(a.inspection, a), **own)
 
@@ -179,8 +177,10 @@ def _course(row: Any, judgement: Judgement) -> dict[str, Any]:
         **{name: getattr(row, name) for name in ("record_id", "tail_no", "side")},
         "outcome": getattr(row, "outcome", None),
         "verdict": judgement.verdict,
+        "headline": judgement.headline,
         "next_action": steps[0],
         "in_brief": judgement.in_brief,
+        "then": [filled(NextOutcome, case, **{"if": case.outcome}) for case in judgement.plan.then],
         "plan": steps,
         "end": judgement.end,
         "open_question": judgement.plan.open_question,

@@ -75,7 +75,7 @@ def test_answers_lead_to_a_verdict_and_the_exit_code(start: Start) -> None:
     child = start("check")
     answer(child, "N123", "l", "i", "r", *FIRST_FIVE, "done", "f", *ENTERS, "")
     child.expect_exact("#3 short link inner")
-    child.expect_exact("OUTSIDE MARGIN")
+    child.expect_exact("COULD BE OUTSIDE")
     answer(child, "")
     assert finish(child) == 1
 

@@ -17,8 +17,8 @@ GERMAN = row(clearance_3_in=None, **{"Spiel Drei": "0.002"})
 
 def test_the_environment_says_the_unit_to_show(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MLG_SHOW", "mm")
-    assert "1.199 mm" in mlg("check", FAILURE).out
-    assert "0.0472 in" in mlg("check", FAILURE, "--show", "in").out
+    assert "1.199 of" in mlg("check", FAILURE).out
+    assert "0.0472 of" in mlg("check", FAILURE, "--show", "in").out
 
 
 def test_the_environment_says_the_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -35,10 +35,15 @@ def incomplete() -> str:
     return said(*HAND, *clearances)
 
 
+FAILED = ("--set", "outcome=FAILED")
+
+
 @pytest.fixture(scope="module")
 def explained() -> str:
     """A gear whose plunger stands off, two joints measured."""
-    return said(*HAND, "--set", "2=0.001in", "--set", "4=0.001in", "--set", "plunger=0.028in")
+    return said(
+        *HAND, "--set", "2=0.001in", "--set", "4=0.001in", "--set", "plunger=0.036in", *FAILED
+    )
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +52,12 @@ def failure() -> str:
     return said("check", FAILURE, "--detail")
 
 
-def test_the_next_joint_is_named_with_its_minutes(incomplete: str) -> None:
-    assert re.search(r"NEXT \(\d+ min\): Measure #5 short link outer bearing\.", incomplete)
+def test_a_gear_without_a_complaint_is_offered_one_reading(incomplete: str) -> None:
+    assert "NEXT (12 min): Nothing is required. To show that the gear is within" in incomplete
 
 
 def test_what_the_plan_expects_stands_below_with_its_minutes_and_its_end(failure: str) -> None:
-    assert re.search(r"Expected after that: measure #\d.* \(\d+ min\).* record the repair", failure)
+    assert re.search(r"Expected after that: .* Sign the repair off", failure)
 
 
 def test_the_quickest_repair_is_shown_with_what_it_leaves() -> None:
@@ -69,18 +74,13 @@ def test_the_quickest_repair_is_shown_with_what_it_leaves() -> None:
 
 
 def test_re_rigging_alone_is_shown_with_the_risk_that_stays(failure: str) -> None:
-    assert re.search(r"Re-rigging alone .* would leave a worst case of 0\.0450 in", failure)
-    assert "the joints stay worn" in failure
+    assert re.search(r"Re-rigging alone, .*, would leave a worst case of 0\.0450 in", failure)
 
 
 def test_the_joints_that_explain_a_reading_are_given_as_pairs_that_act_alike(
     explained: str,
 ) -> None:
     assert "#3 or #5" in explained
-
-
-def test_that_it_may_not_be_clearance_at_all_has_its_own_share(explained: str) -> None:
-    assert re.search(r"rigging or lock roller moved the plunger: [\d.<]+ ?[\d.]* %", explained)
 
 
 DAY = ("--set", "outcome=FAILED", "--set", "plunger=0.036in")

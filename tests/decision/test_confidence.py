@@ -7,7 +7,6 @@ import pytest
 from scipy.stats import norm
 
 from mlg_troubleshoot.decision.case import Cases, exact_chance
-from mlg_troubleshoot.decision.sentences import rigging_sentence
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
@@ -66,9 +65,3 @@ def test_re_rigging_cannot_clear_the_published_failure(judge: Judge) -> None:
 
 def test_a_gear_within_its_margin_has_no_rigging_alternative(judge: Judge) -> None:
     assert judge(every_joint(0.001), advice=True).rigging is None
-
-
-def test_the_sentence_on_re_rigging_says_that_the_joints_stay_worn(judge: Judge) -> None:
-    found = judge({3: 0.013, 5: 0.007}, advice=True).rigging
-    assert found is not None
-    assert rigging_sentence(found).endswith("the joints stay worn.")

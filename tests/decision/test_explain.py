@@ -128,12 +128,6 @@ def test_ninety_percent_intervals_cover_the_clearances_of_a_simulated_fleet(gear
     assert 0.86 < np.mean(inside) < 0.94
 
 
-def test_the_posterior_is_in_the_assessment_of_a_measured_gear(judge: Judge) -> None:
-    found = judge({3: 0.013, 5: 0.007}, advice=True, readings_in=(0.04,))
-    assert found.posterior is not None
-    assert found.posterior.groups[0].joints == (3, 5)
-
-
 def test_the_seed_decides_the_draws(gear: Gear) -> None:
     first, again = (explained(gear, {}, 0.02) for _ in range(2))
     assert first == replace(again)

@@ -9,11 +9,9 @@ import pytest
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
-from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.plan import Action, Basis, End
 from mlg_troubleshoot.decision.plunger_reading import compare
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.reporting.json_form import check_as_json
 from tests.decision.conftest import Judge, every_joint, inspected
 
@@ -27,28 +25,6 @@ def test_a_gear_that_failed_has_its_plunger_read_first(gear: Gear, judge: Judge)
     )
 
 
-def test_a_plunger_measured_beyond_its_margin_is_outside_whatever_is_predicted(
-    judge: Judge,
-) -> None:
-    found = judge(every_joint(0.001), readings_in=(0.060,))
-    assert (found.verdict, found.basis) == (Verdict.OUTSIDE_MARGIN, Basis.MEASURED)
-    assert found.headline.startswith(
-        "MEASURED: the plunger stands 0.0600 in beyond mid-position, outside"
-    )
-    assert found.probability_within_margin is not None
-    assert found.probability_within_margin > 0.95
-
-
-def test_what_the_joints_explain_and_what_they_cannot_add_up_to_what_was_measured(
-    judge: Judge,
-) -> None:
-    found = judge(every_joint(0.001), readings_in=(-0.060,))
-    assert found.explained_at_most_in == pytest.approx(-(found.under_travel_in or 0.0))
-    assert found.explained_at_most_in + (found.unexplained_in or 0.0) == pytest.approx(0.060)
-    most, rest = found.explained_at_most_in, found.unexplained_in or 0.0
-    assert f"explain at most {most:.4f} in of it; {rest:.4f} in has another cause" in found.headline
-
-
 def test_an_unmeasured_joint_may_explain_a_displacement_up_to_its_limit(judge: Judge) -> None:
     found = judge(every_joint(0.001) | {}, readings_in=(0.030,))
     some = judge(dict.fromkeys(range(1, 9), 0.001), readings_in=(0.030,))
@@ -56,42 +32,9 @@ def test_an_unmeasured_joint_may_explain_a_displacement_up_to_its_limit(judge: J
     assert some.explained_at_most_in == pytest.approx(min(0.030, some.predicted_upper_in or 0.0))
 
 
-@pytest.mark.parametrize(("third", "condition"), [(None, True), (0.016, False)])
-def test_what_only_joints_that_were_not_read_could_do_is_said_with_that_condition(
-    third: float | None, condition: bool, judge: Judge
-) -> None:
-    read = {1: 0.0035, 2: 0.004} | ({} if third is None else {3: third})
-    found = judge(read, readings_in=(0.045,))
-    assert "Joint clearances can explain all of it" in found.headline
-    assert ("if joints that were not read are worn" in found.headline) is condition
-
-
 def test_without_a_reading_nothing_is_explained(judge: Judge) -> None:
     found = judge(every_joint(0.001))
     assert (found.explained_at_most_in, found.unexplained_in) == (None, None)
-
-
-def test_a_displacement_beyond_what_the_joints_explain_is_not_explained(judge: Judge) -> None:
-    found = judge(every_joint(0.001), readings_in=(0.060,))
-    assert [step.action for step in found.plan.steps] == [Action.CHECK_RIGGING, Action.CONTINUE]
-    assert found.end is End.NOT_EXPLAINED
-
-
-def test_a_joint_over_its_limit_is_restored_before_a_displacement_counts_as_unexplained(
-    judge: Judge,
-) -> None:
-    found = judge(every_joint(0.0003, j7=0.0148), readings_in=(0.060,))
-    assert [(step.action, step.joints) for step in found.plan.steps] == [
-        (Action.RESTORE, (7,)),
-        (Action.CHECK_RIGGING, ()),
-        (Action.CONTINUE, ()),
-    ]
-
-
-def test_a_plan_ends_in_going_on_without_minutes(judge: Judge) -> None:
-    for clearance in (0.001, 0.002, 0.003):
-        last = judge(every_joint(clearance)).plan.steps[-1]
-        assert (last.action, last.minutes) == (Action.CONTINUE, 0.0)
 
 
 def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(
@@ -100,37 +43,6 @@ def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(
     form = check_as_json(gear, [judge({3: 0.013})], [], [])["inspections"][0]
     assert form["next_action"] == form["plan"][0]
     assert form["end"] in set(End)
-
-
-def test_joints_are_measured_again_where_a_better_gauge_likely_settles_the_verdict(
-    judge: Judge,
-) -> None:
-    found = judge(every_joint(0.0020))
-    assert found.verdict is Verdict.INCONCLUSIVE
-    first = found.next_action
-    assert (first.action, first.joints, first.gauge_u_needed_in) == (
-        Action.MEASURE_AGAIN,
-        (2, 4, 3, 5, 1),
-        0.0003,
-    )
-    assert found.end is End.WITHIN
-
-
-def test_far_from_both_verdicts_nothing_is_measured_again(judge: Judge) -> None:
-    found = judge(every_joint(0.0022))
-    assert (found.verdict, found.next_action.action, found.end) == (
-        Verdict.INCONCLUSIVE,
-        Action.CONTINUE,
-        End.TOO_CLOSE,
-    )
-
-
-def test_a_joint_whose_own_uncertainty_is_stated_is_not_measured_again(
-    gear: Gear, table: IndexTable
-) -> None:
-    read = inspected(every_joint(0.0020), gauge_u_by_joint_in=dict.fromkeys(range(1, 11), 0.0005))
-    (found,) = assess([read], gear, table)
-    assert found.next_action.action is Action.CONTINUE
 
 
 def test_before_any_reading_one_joint_is_expected_to_be_restored(judge: Judge) -> None:
@@ -224,24 +136,10 @@ def test_a_plunger_beyond_its_margin_is_a_complaint_only_of_a_gear_that_failed(
     assert (found.next_action.action, found.end) == (first, end)
 
 
-def test_no_better_gauge_is_asked_for_than_is_needed(judge: Judge) -> None:
-    coarse = judge(every_joint(0.0018), gauge_u_in=0.001).next_action
-    fine = judge(every_joint(0.0020), gauge_u_in=0.0005).next_action
-    assert coarse.action is fine.action is Action.MEASURE_AGAIN
-    assert (coarse.gauge_u_needed_in or 0.0) > (fine.gauge_u_needed_in or 0.0)
-
-
 def test_a_joint_at_its_limit_is_not_restored_even_if_read_in_millimetres(judge: Judge) -> None:
     at_limit = judge(every_joint(0.0005, j7=0.1905 / 25.4))
     assert Action.RESTORE not in [step.action for step in at_limit.plan.steps]
     assert at_limit.end is End.WITHIN
-
-
-def test_what_tells_least_is_left_for_a_second_round_of_readings(judge: Judge) -> None:
-    rounds = [
-        step.joints for step in judge(dict.fromkeys(range(1, 6), 0.0015)).plan.steps if step.joints
-    ]
-    assert [set(joints) for joints in rounds] == [{6, 9, 10}, {7, 8}]
 
 
 def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone(
@@ -298,20 +196,6 @@ def test_no_joint_is_read_that_could_not_spare_the_sound_ones(judge: Judge) -> N
     # All four of the link assembly, worn to twice their limits, move it less than is needed.
     found = judge(some, readings_in=(0.047, 0.047), **failed)
     assert found.next_action.action is Action.RESTORE
-
-
-def test_reading_ends_where_the_gear_will_be_too_close_anyway(judge: Judge) -> None:
-    close, open_still = (judge(dict.fromkeys(range(1, 8), c)) for c in (0.0022, 0.0019))
-    assert (close.verdict, close.end) == (Verdict.INCOMPLETE, End.TOO_CLOSE)
-    assert close.next_action.action is Action.CONTINUE
-    assert open_still.next_action.action is Action.MEASURE
-
-
-def test_the_expected_repair_says_which_joint_nobody_has_read(judge: Judge) -> None:
-    found = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED)
-    (repair,) = [step for step in found.plan.steps if step.action is Action.RESTORE]
-    assert repair.joints == (3, 2)
-    assert repair.text == "Restore #3 and what the readings find worn, perhaps #2."
 
 
 def test_joints_are_expected_to_be_the_cause_where_the_rigging_is_found_right(

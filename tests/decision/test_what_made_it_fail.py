@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
@@ -14,12 +13,9 @@ from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import Causes, believed
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
-from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.wear_levels import DENSITIES, PRIOR_OF_LEVELS, SHARES, level_chances
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import every_joint, inspected
 
 WORN = every_joint(0.004)
@@ -115,18 +111,6 @@ def test_a_second_repair_is_likelier_after_one_that_rests_on_a_reading_in_doubt(
         for again in ((), (3,))
     )
     assert once[0] > 1.2 * twice[0]
-
-
-@pytest.mark.parametrize(
-    ("accepted", "action"), [(0.02, Action.MEASURE_AGAIN), (0.2, Action.RESTORE)]
-)
-def test_a_reading_that_may_lead_to_a_second_repair_oftener_than_accepted_is_taken_again(
-    gear: Gear, table: IndexTable, accepted: float, action: Action
-) -> None:
-    shop = replace(gear, second_repair_chance=replace(gear.second_repair_chance, value=accepted))
-    row = inspected(IN_DOUBT, outcome=Outcome.FAILED, readings_in=(0.034,))
-    (found,) = assess([row], shop, table, advice=False)
-    assert (found.next_action.action, found.next_action.joints) == (action, (3,))
 
 
 def test_of_a_gear_of_which_nothing_was_read_the_joints_are_the_cause_as_often_as_usual(

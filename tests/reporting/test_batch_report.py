@@ -84,7 +84,7 @@ def test_each_verdict_is_counted_once(
 
 
 def test_each_verdict_is_counted_under_its_name(summary: tuple[str, bytes]) -> None:
-    assert re.search(r"3</span><span>OUTSIDE MARGIN", summary[0])
+    assert re.search(r"2</span><span>COULD BE OUTSIDE", summary[0])
 
 
 def test_every_gear_has_one_line(summary: tuple[str, bytes]) -> None:
@@ -241,7 +241,7 @@ def test_a_gear_that_cannot_be_cleared_has_no_probability_that_would_clear_it(
     )
     assert written.html is not None
     text = readable(written.html.read_text(encoding="utf-8"))
-    assert "INCOMPLETE" in text
+    assert "NOT ENOUGH READ" in text
     assert "99.9" not in text
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, word
-from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, Cell
+from mlg_troubleshoot.cli.views.tables import MARKS, TONES, Cell
 from mlg_troubleshoot.decision.assessment import Assessment, Verdict
 from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import percent
@@ -61,11 +61,15 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole) -> None:
     )
 
 
+# Titles that a narrow table has to shorten otherwise than to their first word.
+_SHORT = {"OUTSIDE MARGIN, MEASURED": "OUT, MEASURED", "COULD BE OUTSIDE": "COULD BE OUT"}
+
+
 def _cells(line: Listed, screen: DataConsole) -> dict[str, Cell]:
-    style = STYLES[line.verdict]
+    style = TONES[line.tone]
     cells: dict[str, Cell] = {
         "": MARKS[line.verdict],
-        "verdict": Text(line.verdict.value.removesuffix("_MARGIN"), style=style),
+        "verdict": Text(_SHORT.get(line.title, line.verdict.value.split("_")[0]), style=style),
         "tail": word(line.tail_no),
         "side": str(line.side or "?"),
         "record": word(line.record_id),
@@ -80,8 +84,6 @@ def _cells(line: Listed, screen: DataConsole) -> dict[str, Cell]:
             cells["worst"] = "open"
         cells["margin"] = screen.length(line.margin_in)
         cells["chance"] = "-" if line.chance is None else percent(line.chance)
-        if line.measured:
-            cells["verdict"] = Text("OUT, MEASURED", style=style)
     return cells
 
 
@@ -105,7 +107,7 @@ def show_before_and_after(before: Assessment, after: Assessment, screen: DataCon
         if read != [None, None]:
             lengths[f"#{found[0].joint} {found[0].name}"] = read
     chances = [a.probability_within_margin for a in both]
-    verdicts = [Text(a.verdict.value, style=STYLES[a.verdict]) for a in both]
+    verdicts = [Text(a.title, style=TONES[a.tone]) for a in both]
     within = ["-" if p is None else percent(p) for p in chances]
     rows: list[list[Cell]] = [["verdict", *verdicts, ""]]
     for label, values in lengths.items():

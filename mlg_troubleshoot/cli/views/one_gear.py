@@ -10,12 +10,11 @@ from rich.text import Text
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, text, word
 from mlg_troubleshoot.cli.views.tables import (
     MARKS,
-    STYLES,
-    measured_outside,
+    TONES,
     next_words,
     what_follows,
 )
-from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, VerdictTone
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
@@ -34,8 +33,7 @@ _DISCLAIMER = "Troubleshooting aid, not maintenance data; not an approval for re
 def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool) -> None:
     """Show one gear: the verdict and NEXT come last, so that they stay on a screen of 24 lines."""
     row = judgement.row
-    words = judgement.verdict.words + ", MEASURED" * measured_outside(judgement)
-    title = Text(f"[{MARKS[judgement.verdict]}] {words} ", style=STYLES[judgement.verdict])
+    title = Text(f"[{MARKS[judgement.verdict]}] {judgement.title} ", style=TONES[judgement.tone])
     identity = f" {row.tail_no or 'tail ?'}  {row.side or 'side ?'}"
     record = f"  {row.record_id or 'record ?'}"
     has_room = len(title) + len(identity) + len(record) + 6 <= screen.width
@@ -70,10 +68,7 @@ def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
     body = Text()
     lines: list[tuple[str, str]] = []
     if isinstance(judgement, Assessment):
-        lines.append((judgement.headline, "bold" if measured_outside(judgement) else ""))
-        lines += (
-            [(judgement.measured_statement, "")] if judgement.measured_statement is not None else []
-        )
+        lines.append((judgement.headline, "bold" if judgement.tone is VerdictTone.RED else ""))
         lines += [(said, "") for said in _numbers(judgement)] if detail else []
     lines.append((next_words(judgement), "bold"))
     if isinstance(judgement, Assessment):

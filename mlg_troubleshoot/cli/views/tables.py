@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from rich.text import Text
 
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
-from mlg_troubleshoot.decision.plan import Action, Basis, Step
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict, VerdictTone
+from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.units import Sentence
 
+TONES = {
+    VerdictTone.RED: "bold red",
+    VerdictTone.AMBER: "bold yellow",
+    VerdictTone.GREEN: "bold green",
+}
 STYLES = {
     Verdict.INVALID: "bold magenta",
     Verdict.OUTSIDE_MARGIN: "bold red",
@@ -39,12 +44,9 @@ def what_follows(a: Assessment) -> str | None:
     """
     if len(a.plan.steps) < 2:
         return None
-    unread = {finding.joint for finding in a.joints if finding.clearance_in is None}
 
     def words(step: Step) -> str:
-        guessed = step.action is Action.RESTORE and unread & set(step.joints)
-        said = step.text[0].lower() + step.text[1:].rstrip(".") if guessed else step.words
-        return said + f" ({step.minutes:.0f} min)" * bool(step.minutes)
+        return step.words + f" ({step.minutes:.0f} min)" * bool(step.minutes)
 
     rest = [words(step) for step in a.plan.steps[1:-1]]
     return Sentence.of(
@@ -53,8 +55,3 @@ def what_follows(a: Assessment) -> str | None:
         ". At the end: " if rest else "",
         a.plan.steps[-1].text,
     )
-
-
-def measured_outside(judgement: Judgement) -> bool:
-    """Tell whether the verdict rests on a plunger that was measured outside the margin."""
-    return isinstance(judgement, Assessment) and judgement.basis is Basis.MEASURED
