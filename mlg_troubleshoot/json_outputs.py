@@ -225,10 +225,18 @@ class LikelyCause(PossibleCause):
     class_probability: Probability
 
 
-class RivalTenTimesLikelier(TargetedCause):
-    """What the first cause would be worth if this rival were ten times as likely beforehand."""
+class LeftOutColumn(TypedDict):
+    """A column that only this table has and that is not compared, and why."""
 
-    probability_of_first: Probability
+    column: str
+    why: str
+
+
+class DetectableEffect(TypedDict):
+    """Root mean square from which an effect of a listed cause is detected with 80 % power."""
+
+    cause: str
+    rms_in: Size
 
 
 class NamedCauseOutput(DescribedCause):
@@ -337,13 +345,16 @@ class DiagnoseOutput(TypedDict):
     p_nothing: Probability
     p_unlisted: Probability
     sure: Probability
-    if_ten_times_likelier: list[RivalTenTimesLikelier]
     unlisted_variables: list[str]
+    unlisted_tails: list[str]
     unlisted_rms_in: Size | None
     not_testable: list[NotTestable]
     cannot_say: list[str]
     ruled_out: list[TargetedCause]
+    columns_used: list[str]
+    columns_left_out: list[LeftOutColumn]
     smallest_detectable_rms_in: Size | None
+    detectable: list[DetectableEffect]
     extension: FittedExtension | None
     gain: ExtensionGain
     data_condition: list[ConditionOfData]

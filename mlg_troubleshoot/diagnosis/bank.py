@@ -5,11 +5,11 @@ and which?
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, rms
+from mlg_troubleshoot.arrays import Array, Mask, rms
 from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
 from mlg_troubleshoot.diagnosis.noise import standardised
 from mlg_troubleshoot.misfit.columns import EffectColumns
@@ -31,17 +31,24 @@ class Bank:
     columns: shapes, each of unit root mean square over the rows in which it acts. [1]
     variables: names of the columns of the table behind each shape.
     smooth, shape (n,): the quantities, each of mean 0 and standard deviation 1. [1]
+    rarity: logarithm of the share that each is of all among which it was looked for.
     """
 
     columns: EffectColumns
     variables: tuple[tuple[str, ...], ...]
     smooth: Mapping[str, Array]
+    rarity: Array
 
 
 def build_bank(scene: Scene, catalogue: EffectColumns) -> Bank:
     """Build the shapes that the table allows and that no candidate of the catalogue already has."""
     smooth = _quantities(scene)
-    return _distinct(_shapes(scene, smooth), catalogue, smooth)
+    shapes = [*_shapes(scene, smooth)]
+    populations = [*_populations(scene)]
+    bank = _distinct([*shapes, *((own, ("tail_no",)) for own in populations)], catalogue, smooth)
+    tails = len(np.unique(scene.table.tails))
+    two = np.array([variables == ("tail_no",) for variables in bank.variables])
+    return replace(bank, rarity=np.where(two, (1.0 - tails) * np.log(2.0), 0.0))
 
 
 def _shapes(scene: Scene, smooth: Mapping[str, Array]) -> Iterator[tuple[Array, tuple[str, ...]]]:
@@ -98,6 +105,26 @@ def _shapes(scene: Scene, smooth: Mapping[str, Array]) -> Iterator[tuple[Array, 
         yield from ((shape, v) for shape, v in alone if np.any(shape))
 
 
+def _populations(scene: Scene) -> Iterator[Array]:
+    """The two groups of aircraft whose misfits lie furthest apart, three in each at least: of all
+    ways to part them one that may be so.
+    """
+    tails = scene.table.tails
+    names = np.unique(tails)
+    misfit = scene.table.measured_in - scene.over_in
+    level = np.array([np.median(misfit[tails == name]) for name in names])
+    order = names[np.argsort(level, kind="stable")]
+    splits = range(3, len(names) - 2)
+    if splits:
+        rows = [np.isin(tails, order[k:]) for k in splits]
+        apart = [np.var(misfit) - _within(misfit, own) for own in rows]
+        yield rows[int(np.argmax(apart))].astype(float)
+
+
+def _within(misfit: Array, rows: Mask) -> float:
+    return float(sum(np.mean(own) * np.var(misfit[own]) for own in (rows, ~rows)))
+
+
 def _quantities(scene: Scene) -> dict[str, Array]:
     table = scene.table
     raw = {"predicted": scene.over_in, **table.quantities}
@@ -119,7 +146,7 @@ def _distinct(
     smooth: Mapping[str, Array],
 ) -> Bank:
     """Drop shapes that are constant, or that a candidate of the catalogue has already."""
-    n = catalogue.n
+    n = len(catalogue.full)
     variables = list[tuple[str, ...]]()
     spreads = list[float]()
 
@@ -147,4 +174,5 @@ def _distinct(
         alike[places] = np.max(np.abs(product), axis=1, initial=0.0)
     # With few rows all may look like a candidate: then the least alike one is asked.
     use = np.flatnonzero(alike < max(0.97, 1.000001 * float(np.min(alike, initial=1.0))))
-    return Bank(columns.some(use), tuple(variables[k] for k in use.tolist()), smooth)
+    kept = EffectColumns.made(n, (columns.take([k])[:, 0] for k in use.tolist()))
+    return Bank(kept, tuple(variables[k] for k in use.tolist()), smooth, np.zeros(len(use)))

@@ -22,7 +22,6 @@ from mlg_troubleshoot.diagnosis.wear import (
     LEAST_VALUES,
     gears_of,
     read_in,
-    step_of,
     steps_of,
     visits,
 )
@@ -203,32 +202,41 @@ def _identical(table: DiagnosisTable) -> Mask:
 def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     """Values on a step of twice their standard uncertainty or more: half a step is as large."""
     used = table.take(rows)
-    known = used.plunger_gauge_u_in
-    plunger = 2.0 * (DEFAULT_PLUNGER_U_IN if known is None else np.nanmedian(known))
-    steps = steps_of(used)
-    for step in np.unique(steps[steps >= 2.0 * np.median(table.gauge_u_in)]).tolist():
-        who = {*used.people[steps == step]}
-        some = f", technician {', '.join(sorted(who))}" if {*used.people} - who else ""
+    steps = steps_of(used, read_in(used))
+    for step in np.unique(steps[steps >= 2.0 * np.median(used.gauge_u_in)]).tolist():
         share = float(np.mean(steps == step))
         # What rounding takes away depends on the values where the step is larger than twice their
         # standard deviation, that of the rounding taken out (Sheppard's corrections).
         spread = np.nanvar(used.clearance_in[steps == step]) - step**2 / 12.0
         yield DataCondition(
             "rounded",
-            f"clearances, to {step:.4g} in{some}",
+            f"clearances, to {step:.4g} in{_whose(used, steps == step)}",
             share,
             f"each is known to ± {0.5 * step:.4g} in only; small effects of joints are not seen",
             "the value as the gauge shows it, to 0.0005 in",
             bool(share > _MANY_CUT and step**2 > 4.0 * spread),
         )
-    if (step := step_of(used.readings_in)) >= plunger:
+    known = used.plunger_gauge_u_in
+    least = 2.0 * (DEFAULT_PLUNGER_U_IN if known is None else np.nanmedian(known))
+    steps = steps_of(used, used.readings_in)
+    for step in np.unique(steps[steps >= least]).tolist():
         yield DataCondition(
             "rounded",
-            f"plunger readings, to {step:.4g} in",
-            1.0,
+            f"plunger readings, to {step:.4g} in{_whose(used, steps == step)}",
+            float(np.mean(steps == step)),
             f"each is known to ± {0.5 * step:.4g} in only",
             "the plunger to 0.001 in",
         )
+
+
+def _whose(table: DiagnosisTable, rows: Mask) -> str:
+    """Name the technician, gauge, shop or aircraft whose rows these are, where they are not all."""
+    for name in table.writers if not rows.all() else ():
+        texts = table.texts(name)
+        own = {*texts[rows].tolist()}
+        if "" not in own and own.isdisjoint(texts[~rows].tolist()):
+            return f", {name.removesuffix('_id').removesuffix('_no')} {', '.join(sorted(own))}"
+    return ""
 
 
 def _ends(table: DiagnosisTable) -> Iterator[DataCondition]:
@@ -357,35 +365,24 @@ def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
 
 
 def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
-    """Landings of a gear that fall over time: at overhauls, where its wear begins anew, or not."""
+    """Landings of a gear that fall over time, but not at an overhaul, where its wear begins
+    anew.
+    """
     landings = table.numbers(LANDINGS.variable)
     numbers = gears_of(table)
     order = visits(table) if "day" in table.quantities else {}
-    fell: dict[str, int] = {}
-    renewed: dict[str, int] = {}
+    fell = list[str]()
     for name, rows in order.items():
         known = rows[np.isfinite(landings[rows])]
-        falls = np.diff(landings[known]) < 0.0
-        anew = falls & (np.diff(numbers[known]) != 0)
-        for found, count in ((fell, falls.sum() - anew.sum()), (renewed, anew.sum())):
-            found.update({name: int(count)} if count else {})
-    if not fell and not renewed:
-        return
-    named = f"gear{'s' * (len(fell) > 1)} {first_few([*fell])}: {_counted(fell, 'time')}"
-    at = f"at {_counted(renewed, 'overhaul')} of {len(renewed)} gear{'s' * (len(renewed) > 1)}"
-    slip = (
-        "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"
-        " before and after is taken as one"
-    )
-    yield DataCondition(
-        "landings_fall",
-        ", and ".join([named] * bool(fell) + [at] * bool(renewed)),
-        len({*fell, *renewed}) / len(order),
-        slip if fell else "the wear of a gear begins anew there",
-        "landings since overhaul, and the date of the overhaul",
-    )
-
-
-def _counted(found: dict[str, int], noun: str) -> str:
-    count = sum(found.values())
-    return f"{count} {noun}{'s' * (count > 1)}"
+        same = np.diff(numbers[known]) == 0
+        if np.any(same & (np.diff(landings[known]) < 0.0)):
+            fell.append(name)
+    if fell:
+        yield DataCondition(
+            "landings_fall",
+            f"gear{'s' * (len(fell) > 1)} {first_few(fell)}",
+            len(fell) / len(order),
+            "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"
+            " before and after is taken as one",
+            "landings since overhaul, and the date of the overhaul",
+        )

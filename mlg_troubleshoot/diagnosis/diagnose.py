@@ -202,6 +202,8 @@ class Diagnosis(Result):
         Statements that so few rows or gears cannot carry.
     unlisted_rms_in : float
         Root mean square of that effect. [in]
+    unlisted_tails : tuple of str
+        One of two groups of aircraft that differ, if it is that.
     probabilities : mapping of (str, str or None) to float
         Probability that each cause acts, by its name and target. [1]
     weighed : tuple of WeighedCause
@@ -214,9 +216,6 @@ class Diagnosis(Result):
     remainder_p : float
         p-value of the residual: of the shape of the bank that stands out most, as one of all of
         them (Bonferroni). [1]
-    ten_times : mapping of (str, str or None) to float
-        The probability of what is named, or likeliest, if its likeliest rival, by its name and
-        target, were ten times as likely beforehand. [1]
     ruled_out : tuple of (str, str or None)
         Rivals that would explain something alone, but hardly act.
     faults, corrected : tuple of DataFault
@@ -234,8 +233,9 @@ class Diagnosis(Result):
         Standard deviation of one reading. [in]
     repeatability_source : str
         repeat readings, declared or unknown.
-    smallest_rms_in : float
-        Smallest effect that is detected with 80 % power. [in]
+    detectable : tuple of (str, float)
+        Root mean square from which an effect of each listed cause is detected with 80 % power, the
+        easiest form first. [in]
     gain : Gain or None
         Gain of the extension on held-out rows.
     terms : tuple of Term
@@ -266,13 +266,13 @@ class Diagnosis(Result):
     further: FurtherInspections | None
     unlisted_variables: tuple[str, ...]
     unlisted_rms_in: float
+    unlisted_tails: tuple[str, ...]
     probabilities: Mapping[Key, float]
     weighed: tuple[WeighedCause, ...]
     p_nothing: float
     p_unlisted: float
     p_left: float
     remainder_p: float
-    ten_times: Mapping[Key, float]
     not_testable: tuple[tuple[str, str], ...]
     unsaid: tuple[str, ...]
     ruled_out: tuple[tuple[str, str | None], ...]
@@ -287,7 +287,7 @@ class Diagnosis(Result):
     rms_in: float
     repeatability_in: float | None
     repeatability_source: str
-    smallest_rms_in: float
+    detectable: tuple[tuple[str, float], ...]
     gain: Gain | None
     terms: tuple[Term, ...]
     residual_u_in: float
@@ -499,7 +499,7 @@ def _explained(
     context = finding.posterior.contexts[best.context]
     block = blocks[best.context - 1] if best.context and context.listed else None
     known = np.hstack([context.shared_in, every.kept.take(others)])
-    spread = block_diag(context.root_of @ context.root_of.T, np.diag(every.size[others] ** 2))
+    spread = block_diag(context.covariance, np.diag(every.size[others] ** 2))
     values, covariance = shrunk(
         context.behind(finding.noise), effects.take(chosen), known, spread, problem.expected
     )
@@ -532,7 +532,7 @@ def _answerable(table: DiagnosisTable) -> DiagnosisTable:
             "no row with a measured displacement has a clearance, so nothing can be predicted",
             "Record the clearances of joints 1 to 5 at least, at the same inspection.",
         )
-    return table.take(measured & some)
+    return table.take(measured & some).in_order()
 
 
 def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
@@ -667,13 +667,20 @@ def _report(
 ) -> Diagnosis:
     misfit = case.problem.misfit
     causes, open_ = _told(case)
-    variables, unlisted_rms_in = case.unlisted
+    variables, unlisted_in = case.unlisted
+    apart = table.tails[unlisted_in != 0.0] if variables == ("tail_no",) else ()
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
     as_read = np.where(read, table.clearance_in, case.scene.clearance_in)
     raw = worst_of_sense(model, as_read)[0]
     raw_misfit = table.measured_in - raw
-    gain = _gain(case) if case.follows.verdict is Verdict.NAMED else None
+    verdict = case.follows.verdict
+    gain = _gain(case, raw) if verdict is Verdict.NAMED else None
+    if gain is not None and gain.rms_after_in > gain.rms_before_in:
+        verdict = Verdict.AMBIGUOUS
+        open_ = (*causes, *open_)
+        causes = ()
+        gain = None
     left = misfit - np.sum([cause.effect_in for cause in causes], axis=0)
     repeatability, source = estimate_repeatability(table)
     residual = float(np.std(left))
@@ -681,13 +688,14 @@ def _report(
     far = case.far_off(left, expected or case.noise.scale_in)
     chances = case.posterior
     return Diagnosis(
-        verdict=case.follows.verdict,
+        verdict=verdict,
         causes=causes,
         also_possible=() if causes else open_,
         beside=open_ if causes else (),
         further=_further(case, open_),
         unlisted_variables=variables,
-        unlisted_rms_in=unlisted_rms_in,
+        unlisted_rms_in=rms(unlisted_in),
+        unlisted_tails=tuple(map(str, np.unique(apart))),
         probabilities=case.follows.listed,
         weighed=case.weighed,
         p_nothing=chances.nothing,
@@ -696,7 +704,6 @@ def _report(
         remainder_p=p_value_of(
             case.problem, left - case.problem.misfit + case.problem.expected, case.noise
         ),
-        ten_times=case.follows.ten_times,
         not_testable=not_testable,
         unsaid=_unsaid(table),
         ruled_out=case.ruled_out,
@@ -711,7 +718,7 @@ def _report(
         rms_in=rms(raw_misfit),
         repeatability_in=repeatability if np.isfinite(repeatability) else None,
         repeatability_source=source,
-        smallest_rms_in=case.smallest_rms_in,
+        detectable=case.detectable,
         gain=gain,
         # What predicts aircraft that it was not fitted to no better is not written.
         terms=(
@@ -731,7 +738,7 @@ def _report(
     )
 
 
-def _gain(case: _Case) -> Gain:
+def _gain(case: _Case, as_read: Array) -> Gain:
     """What the extension gains on tails that it was not fitted to, on rows if it is about one tail.
 
     What else acts, being one of a set, is noise of the size that it was found with.
@@ -753,6 +760,7 @@ def _gain(case: _Case) -> Gain:
         case.columns[:, firm],
         case.problem.misfit,
         case.scene.over_in,
+        as_read,
         case.scene.table,
         block,
     )

@@ -15,7 +15,7 @@ from math import erfc, sqrt
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Wholes, log_sum, numbered, rms
+from mlg_troubleshoot.arrays import Array, Wholes, log_sum, numbered
 from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
@@ -36,6 +36,8 @@ _MOST_SLIPS = 500
 _BY = " × "
 # Waves that stand for a random walk: nine tenths of its variance and more (Karhunen and Loève).
 _WAVES = 3
+# Computing only: of more aircraft it is not asked whether each wanders.
+_MOST_TAILS = 100
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,12 @@ class MisfitProblem:
             shares[c.cause.name] / (targets[c.cause.name] * variants[c.key])
             for c in self.candidates
         ]
-        rarity = np.array([c.rarity for c in self.candidates])
+        rarity = np.array(
+            [
+                c.rarity + (c.cause.name not in beliefs.rarer) * np.log(c.cause.often)
+                for c in self.candidates
+            ]
+        )
         acting = self.columns.acting
         causes = [c.cause for c in self.candidates]
         exact = np.array([cause.exact or 0.0 for cause in causes])
@@ -120,7 +127,11 @@ class MisfitProblem:
         named = [(UNLISTED, _BY.join(names)) for names in (*self.bank.variables, ("all rows",))]
         alike = Counter(named)
         share = np.log([shares[UNLISTED] / (len(alike) * alike[name]) for name in named])
-        free = Effects.free(self.shapes, named, share, beliefs.shape_size * scale)
+        searched = np.append(self.bank.rarity, 0.0)
+        free = replace(
+            Effects.free(self.shapes, named, share + searched, beliefs.shape_size * scale),
+            rarity=searched,
+        )
         far = np.sort(np.argsort(-np.abs(self.expected - np.median(self.expected)))[:_MOST_SLIPS])
         slip = float(np.log(beliefs.slips / n))
         slips = Effects.free(
@@ -141,8 +152,8 @@ class MisfitProblem:
                     (b.cause.name, None),
                     float(np.log(shares[b.cause.name] * b.share)),
                     b.columns,
-                    None if b.changes is None else b.skew,
                     b.root,
+                    b.mean,
                 )
                 for b in self.blocks
             ),
@@ -153,7 +164,7 @@ class MisfitProblem:
         """Each aircraft wanders in time on its own, as far on average as an effect on no list."""
         day = self.bank.smooth.get("day")
         tails = numbered(self.rows.tails)
-        if day is None or not tails.any():
+        if day is None or not 0 < tails.max() < _MOST_TAILS:
             return
         since = (day - day.min()) / np.ptp(day)
         turns = (np.arange(_WAVES) + 0.5) * np.pi
@@ -258,20 +269,29 @@ class Finding:
         hardly = [name for name, odds in alone.items() if odds > 0.0 and name not in said]
         return tuple(sorted(hardly, key=lambda name: -alone[name]))
 
-    @property
-    def smallest_rms_in(self) -> float:
-        """Root mean square of the smallest effect that is detected with 80 % power. [in]"""
-        n = len(self.problem.misfit)
+    @cached_property
+    def detectable(self) -> tuple[tuple[str, float], ...]:
+        """Root mean square from which an effect of each listed cause is detected with 80 % power,
+        the easiest form first. [in]
+        """
         effects = self.posterior.effects
-        beliefs = self.problem.beliefs
-        prior = effects.log_prior[effects.listed]
-        often = float(np.exp(np.median(prior))) if len(prior) else beliefs.expected
-        return beliefs.seen_from(often, n) * self.noise.scale_in / float(np.sqrt(n))
+        scale = self.noise.scale_in
+        square = self.noise.squares(effects.kept)[-1] / scale**2
+        often = np.exp(effects.log_prior)
+        size = self.problem.beliefs.seen_from(often, effects.size**2 * square) / np.sqrt(square)
+        needed = size * np.sqrt(effects.kept.squares / len(self.problem.misfit))
+        of_cause: dict[str, list[float]] = {}
+        for name, least in zip(effects.names, needed.tolist(), strict=True):
+            if name is not None and name[0] != UNLISTED:
+                of_cause.setdefault(name[0], []).append(least)
+        each = [(name, float(np.median(own))) for name, own in of_cause.items()]
+        return tuple(sorted(each, key=lambda own: (own[1], own[0])))
 
-    @property
-    def unlisted(self) -> tuple[tuple[str, ...], float]:
-        """What an unlisted effect moves with, and its root mean square, if one acts. [in]"""
-        return _unlisted(self.posterior) if self.follows.unlisted_acts else ((), 0.0)
+    @cached_property
+    def unlisted(self) -> tuple[tuple[str, ...], Array]:
+        """What an unlisted effect moves with, and what it does to each row, if one acts. [in]"""
+        none = np.zeros(len(self.problem.misfit))
+        return _unlisted(self.posterior) if self.follows.unlisted_acts else ((), none)
 
     @property
     def weighed(self) -> tuple[WeighedCause, ...]:
@@ -407,16 +427,14 @@ def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
     return float(min(1.0, shapes.p * erfc(largest / sqrt(2.0))))
 
 
-def _unlisted(found: MisfitPosterior) -> tuple[tuple[str, ...], float]:
-    """Variables of the likeliest effect that is on no list, and its root mean square. [in]"""
-    chances = {name: p for name, p in found.names.items() if name[0] == UNLISTED}
-    if not chances:
-        return (), 0.0
-    name = max(chances, key=lambda n: chances[n])
+def _unlisted(found: MisfitPosterior) -> tuple[tuple[str, ...], Array]:
+    """Variables of the likeliest effect that is on no list, and what it does to each row. [in]"""
+    name = next((name for name in found.names if name[0] == UNLISTED), None)
+    if name is None:
+        return (), np.zeros_like(found.expected_in)
     variables = tuple(str(name[1]).split(_BY))
     for explanation in found.likeliest:
-        for k, value in zip(explanation.members, explanation.values, strict=True):
+        for k, value in zip(explanation.members, explanation.values.tolist(), strict=True):
             if found.effects.names[k] == name:
-                column = found.effects.kept.take([k])
-                return variables, float(abs(value) * rms(column))
-    return variables, float(rms(found.expected_in))
+                return variables, value * found.effects.kept.take([k])[:, 0]
+    return variables, found.expected_in

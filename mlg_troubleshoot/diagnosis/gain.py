@@ -66,23 +66,25 @@ def measure_gain(
     columns: Array,
     misfit: Array,
     predicted: Array,
+    as_read: Array,
     table: DiagnosisTable,
     block: Block | None = None,
 ) -> Gain:
     """Cross-validate an extension; rows of one tail are never on both sides, unless the others
-    cannot teach it.
+    cannot teach it. It is fitted to the misfit of the likeliest clearances, and its gain is that of
+    a check, which predicts from clearances as they were read.
     """
     fold, held_out_by = folds(noise, columns)
     expected = less_expected(misfit, predicted)
     known = None if block is None else (block.columns, block.covariance)
     correction = held_out_part(noise, columns, expected, fold, known)
-    before = misfit
-    after = misfit - correction
-    drawn = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else np.arange(len(misfit))
     measured = predicted + misfit
+    before = measured - as_read
+    after = before - correction
+    drawn = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else np.arange(len(misfit))
     outside = np.abs(measured) > table.margin_in
-    said_before = np.abs(predicted) <= table.margin_in
-    said_after = np.abs(predicted + correction) <= table.margin_in
+    said_before = np.abs(as_read) <= table.margin_in
+    said_after = np.abs(as_read + correction) <= table.margin_in
     return Gain(
         rms_before_in=rms(before),
         rms_after_in=rms(after),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from datetime import datetime
 from functools import cached_property
 from typing import Any
 
@@ -29,8 +31,8 @@ Texts = NDArray[np.str_]
 
 _TEXTS = tuple(c for c in COVARIATES if c.holds in (Holds.TEXT, Holds.CHOICE))
 FACTORS = tuple(column.variable for column in _TEXTS)
-# Values from which on a column of a table's own does not group its rows. [1]
-_MOST_VALUES = 6
+# Rows that have one value of a column of a table's own, from which on it groups them.
+_LEAST_ROWS = 3
 QUANTITIES = tuple(c.variable for c in COVARIATES if c not in _TEXTS)
 
 
@@ -69,6 +71,8 @@ class DiagnosisTable(Result):
         Clearances of which only an upper end was read: half of it stands for them.
     doubt : str
         Why nothing that depends on the clearances can be named; empty if it can.
+    left_out : tuple of (str, str)
+        Columns that only this table has and that are not compared, and why.
     """
 
     clearance_in: Array
@@ -84,6 +88,7 @@ class DiagnosisTable(Result):
     plunger_gauge_u_in: Array | None = None
     below: Mask | None = None
     doubt: str = ""
+    left_out: tuple[tuple[str, str], ...] = ()
 
     def __len__(self) -> int:
         return len(self.clearance_in)
@@ -112,7 +117,16 @@ class DiagnosisTable(Result):
     @property
     def own_factors(self) -> tuple[str, ...]:
         """Names of the texts that only this table has: a modification, a base, a shop."""
-        return tuple(name for name in self.factors if name not in FACTORS)
+        return tuple(
+            name
+            for name, texts in self.factors.items()
+            if name not in FACTORS and _groups(texts.tolist())
+        )
+
+    @property
+    def writers(self) -> tuple[str, ...]:
+        """Names of the texts that may say how a row was written."""
+        return ("technician_id", "gauge_id", *self.own_factors, "tail_no")
 
     @cached_property
     def gears(self) -> Texts:
@@ -152,13 +166,57 @@ class DiagnosisTable(Result):
                 taken[field_of.name] = {name: each[places] for name, each in values.items()}
         return replace(self, **taken)
 
+    def in_order(self) -> DiagnosisTable:
+        """The rows in an order that is the same however they stand: by gear and date, then by what
+        was read; without dates as they stand, which is the order in which they were made.
+        """
+        if "day" not in self.quantities:
+            return self
+        read = np.nan_to_num(np.column_stack([self.clearance_in, self.readings_in]), nan=-1.0)
+        keys = (np.array(self.record_id), *read.T, self.numbers("day"), self.gears)
+        return self.take(np.lexsort(keys))
 
-def _own_texts(inspections: Sequence[Inspection]) -> dict[str, list[str]]:
-    """Columns that only this source has and that group its rows: few values, each written often."""
+
+def _groups(texts: Sequence[str]) -> bool:
+    """Tell whether a column has values that are written often: two at least, or one beside
+    blanks.
+    """
+    counts = Counter(texts)
+    often = [text for text, count in counts.items() if text and count >= _LEAST_ROWS]
+    return bool(often) and len(counts) > 1
+
+
+def _own_numbers(texts: Sequence[str]) -> list[float] | None:
+    """Cells of a column as numbers, or as days where all are dates; None if one is neither."""
+    for read in (float, _day_number):
+        try:
+            return [read(text) if text else np.nan for text in texts]
+        except ValueError:
+            continue
+    return None
+
+
+def _day_number(text: str) -> float:
+    return float(datetime.fromisoformat(text).toordinal())
+
+
+def _own_columns(
+    inspections: Sequence[Inspection],
+) -> tuple[dict[str, list[float]], dict[str, list[str]], tuple[tuple[str, str], ...]]:
+    """Columns that only this source has: numbers and dates, texts, and what cannot be compared,
+    each with the reason.
+    """
     known = {column.name for column in COLUMNS}
-    names = {name for i in inspections for name in i.carried} - known
-    texts = {name: [i.carried.get(name, "").strip() for i in inspections] for name in sorted(names)}
-    return {name: own for name, own in texts.items() if len({*own} - {""}) <= _MOST_VALUES}
+    names = sorted({name for i in inspections for name in i.carried} - known)
+    texts = {name: [i.carried.get(name, "").strip() for i in inspections] for name in names}
+    found = {name: _own_numbers(own) for name, own in texts.items()}
+    numbers = {name: own for name, own in found.items() if own is not None}
+    left_out = {
+        name: "the same in all rows" if len({*own}) < 2 else "no value repeats"
+        for name, own in texts.items()
+        if len({*own}) < 2 or not (name in numbers or _groups(own))
+    }
+    return numbers, texts, tuple(left_out.items())
 
 
 def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> DiagnosisTable:
@@ -198,7 +256,9 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> Dia
     given[DATE.variable] = [day and first and (day - first).days for day in dates]
     quantities = {name: np.array(values, float) for name, values in given.items()}
     factors = {c.variable: [str(i.value(c.filled) or "") for i in inspections] for c in _TEXTS}
-    factors |= _own_texts(inspections)
+    own_numbers, own_texts, left_out = _own_columns(inspections)
+    quantities |= {name: np.array(values) for name, values in own_numbers.items()}
+    factors |= own_texts
     declared = np.array([i.plunger_gauge_u_in for i in inspections], float)
     return DiagnosisTable(
         clearance_in=clearance,
@@ -215,4 +275,5 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> Dia
         first_day=None if first is None else first.isoformat(),
         plunger_gauge_u_in=declared if np.isfinite(declared).any() else None,
         below=below if below.any() else None,
+        left_out=left_out,
     )

@@ -246,14 +246,16 @@ def read_in(table: DiagnosisTable) -> Array:
     return np.where(False if table.below is None else table.below, np.nan, table.clearance_in)
 
 
-def steps_of(table: DiagnosisTable) -> Array:
-    """Step on which the clearances of each row's technician lie, 0 if on none, shape (n,). [in]"""
-    values = read_in(table)
+def steps_of(table: DiagnosisTable, values: Array) -> Array:
+    """Coarsest step on which the values of each row's technician, gauge, shop or aircraft lie, 0 if
+    on none, shape (n,). [in]
+    """
     found = np.full(len(table), step_of(values))
-    for person in np.unique(table.people):
-        own = table.people == person
-        if np.count_nonzero(np.nan_to_num(values[own])) >= LEAST_VALUES:
-            found[own] = step_of(values[own])
+    for name in table.writers:
+        texts = table.texts(name)
+        for text in np.unique(texts[texts != ""]):
+            own = texts == text
+            found[own] = np.maximum(found[own], step_of(values[own]))
     return found
 
 
@@ -300,7 +302,7 @@ def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
     dated = np.where(landed[:, None], readings, np.nan)[:, worn]
     dated = np.where(np.isfinite(dated).any(axis=0), dated, readings[:, worn])
     # Rounding to a step is an error that is even over it.
-    each = table.gauge_u_in**2 + steps_of(table) ** 2 / 12.0
+    each = table.gauge_u_in**2 + steps_of(table, read_in(table)) ** 2 / 12.0
     declared = np.broadcast_to(each[:, None], dated.shape)
     own = wear_history(dated, gears, kilo, declared)
     every = {f.name: np.zeros(readings.shape) for f in fields(own)}

@@ -37,8 +37,8 @@ class Beliefs:
     exact : float
         The same of a value that can only be one. [1]
     rarer : mapping of str to float
-        How often a cause is what is wrong, over how often any other one is; 1 where it is not
-        named. [1]
+        How often a cause is what is wrong, over how often any other one is; as the cause states it
+        (`often`) where it is not named. [1]
     plausible : mapping of str to float
         How large the parameter of a cause is where it acts, as one standard deviation; as the cause
         states it where it is not named. [unit of the parameter]
@@ -83,12 +83,13 @@ class Beliefs:
         square = np.asarray(distance) ** 2
         return np.asarray(np.log(share) - 0.5 * (np.log(wide) - square * (1.0 - 1.0 / wide)))
 
-    def seen_from(self, often: float, n: int) -> float:
-        """Size of an effect over the error of its mean, from which n rows make it likelier than
-        nothing with 80 % power, if it is expected so often in a table. [1]
+    def seen_from(self, often: Array, wide: Array) -> Array:
+        """Size of effects over the error of it, from which they are likelier than nothing with 80 %
+        power: how often each is expected in a table, and its expected variance over that of the
+        error. [1]
         """
-        bar = np.log1p(n * self.shape_size**2) - 2.0 * np.log(often)
-        return float(np.sqrt(max(bar, 0.0)) + _SHORT)
+        bar = np.log1p(wide) - 2.0 * np.log(often)
+        return np.asarray(np.sqrt(np.maximum(bar, 0.0)) + _SHORT)
 
     def apart_from(self, lead: float = 0.0) -> float:
         """Distance of two explanations over the error of a row, from which data make either as sure

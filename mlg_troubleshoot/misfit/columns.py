@@ -1,4 +1,5 @@
-"""Effects column by column, in blocks: those that act in few rows are kept by these rows alone.
+"""Effects column by column; in a large table those that act in few rows are kept by these rows
+alone.
 
 A table of ten thousand rows has thousands of effects that act in one aircraft each; written out
 they would fill the memory.
@@ -6,7 +7,7 @@ they would fill the memory.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +15,10 @@ from scipy.sparse import csc_array
 
 from mlg_troubleshoot.arrays import Array, Places
 
-ColumnBlock = Array | csc_array
-# Computing only: numbers from which a block is large; a column that acts in fewer than one row of
-# so many is kept by these rows.
-_LARGE = 200_000
+# Computing only: rows from which a table is large; a column that acts in fewer than one row of so
+# many is kept by these rows.
+_LARGE = 1_000
 _FEW = 5
-# Columns that are written out together.
-_AT_ONCE = 64
 
 
 @dataclass(frozen=True)
@@ -29,135 +27,96 @@ class EffectColumns:
 
     Attributes
     ----------
-    n : int
-        Number of rows.
-    blocks : tuple of (ndarray, ColumnBlock)
-        Places of k of the columns, shape (k,), and these columns, shape (n, k).
+    full : ndarray, shape (n, f)
+        Those that are written out.
+    few : csc_array, shape (n, p - f)
+        Those that act in few rows.
+    at : ndarray of int, shape (p,)
+        Place of each column among the two, those that are written out first.
     """
 
-    n: int
-    blocks: tuple[tuple[Places, ColumnBlock], ...]
+    full: Array
+    few: csc_array
+    at: Places
 
     @staticmethod
     def of(columns: Array | EffectColumns) -> EffectColumns:
         """Columns that are written out, or kept so already."""
         if isinstance(columns, EffectColumns):
             return columns
-        return EffectColumns(len(columns), ((np.arange(columns.shape[1]), columns),))
+        n, p = columns.shape
+        return EffectColumns(columns, csc_array((n, 0)), np.arange(p))
 
     @staticmethod
     def made(n: int, columns: Iterable[Array]) -> EffectColumns:
         """Columns as they come, each kept as is shorter."""
         full: list[Array] = []
         few: list[tuple[Places, Array]] = []
-        places: tuple[list[int], list[int]] = ([], [])
-        blocks: list[tuple[Places, ColumnBlock]] = []
-
-        def written_out() -> None:
-            blocks.append((np.array(places[0]), np.column_stack(full)))
-            places[0].clear()
-            full.clear()
-
-        for place, column in enumerate(columns):
+        places: list[int] = []
+        for column in columns:
             rows = np.flatnonzero(column)
-            short = _FEW * len(rows) < n and n * (place + 1) > _LARGE
-            places[short].append(place)
+            short = n > _LARGE and _FEW * len(rows) < n
+            places.append(-len(few) - 1 if short else len(full))
             if short:
                 few.append((rows, column[rows]))
             else:
                 full.append(column)
-            if len(full) == _AT_ONCE:
-                written_out()
-        if full:
-            written_out()
-        if few:
-            ends = np.cumsum([0, *(len(rows) for rows, _values in few)])
-            rows, values = (np.concatenate(part) for part in zip(*few, strict=True))
-            blocks.append((np.array(places[1]), csc_array((values, rows, ends), (n, len(few)))))
-        return EffectColumns(n, tuple(blocks))
+        at = np.array(places, np.intp)
+        at = np.where(at < 0, len(full) - 1 - at, at)
+        ends = np.cumsum([0, *(len(rows) for rows, _values in few)])
+        rows = np.concatenate([np.empty(0, np.intp), *(rows for rows, _values in few)])
+        values = np.concatenate([np.empty(0), *(values for _rows, values in few)])
+        written = np.column_stack([np.empty((n, 0)), *full])
+        return EffectColumns(written, csc_array((values, rows, ends), (n, len(few))), at)
 
     @staticmethod
     def joined(parts: Sequence[EffectColumns]) -> EffectColumns:
         """All columns of several, one after the other."""
-        begins = np.cumsum([0, *(part.p for part in parts)])
-        blocks = [
-            (begin + places, block)
-            for begin, part in zip(begins, parts, strict=False)
-            for places, block in part.blocks
-        ]
-        n = parts[0].n
-        if n * begins[-1] <= _LARGE:
-            return EffectColumns.of(np.hstack([part.take(np.arange(part.p)) for part in parts]))
-        return EffectColumns(n, tuple(blocks))
+        each = (part.take([k])[:, 0] for part in parts for k in range(part.p))
+        return EffectColumns.made(len(parts[0].full), each)
 
     @property
     def p(self) -> int:
         """Number of columns."""
-        return sum(len(places) for places, _block in self.blocks)
+        return len(self.at)
 
     def take(self, wanted: Sequence[int] | Places) -> Array:
         """Some of the columns written out, shape (n, k)."""
-        wanted = np.asarray(wanted, np.intp)
-        found = np.empty((self.n, len(wanted)))
-        for places, block in self.blocks:
-            at = np.searchsorted(places, wanted)
-            here = np.append(places, -1)[at] == wanted
-            if here.any():
-                some = block[:, at[here]]
-                found[:, here] = some if isinstance(some, np.ndarray) else some.toarray()
+        at = self.at[np.asarray(wanted, np.intp)]
+        f = self.full.shape[1]
+        if not self.few.shape[1]:
+            return self.full[:, at]
+        found = np.empty((len(self.full), len(at)))
+        found[:, at < f] = self.full[:, at[at < f]]
+        found[:, at >= f] = self.few[:, at[at >= f] - f].toarray()
         return found
-
-    def some(self, wanted: Places) -> EffectColumns:
-        """Some of the columns, in their order."""
-        blocks = []
-        for places, block in self.blocks:
-            kept = np.isin(places, wanted)
-            some = block if kept.all() else block[:, kept]
-            blocks.append((np.searchsorted(wanted, places[kept]), some))
-        return EffectColumns(self.n, tuple(blocks))
 
     def onto(self, rows: Array) -> Array:
         """Products of all columns with some vectors, shape (k, n): (k, p)."""
-        found = np.empty((len(rows), self.p))
-        for places, block in self.blocks:
-            found[:, places] = rows @ block
-        return found
+        if not self.few.shape[1]:
+            return rows @ self.full
+        return np.hstack([rows @ self.full, rows @ self.few])[:, self.at]
 
     def times(self, values: Array) -> Array:
         """Sum of all columns, each so many times, shape (n,)."""
-        found = np.zeros(self.n)
-        for places, block in self.blocks:
-            found += block @ values[places]
-        return found
+        placed = np.empty(self.p)
+        placed[self.at] = values
+        f = self.full.shape[1]
+        return np.asarray(self.full @ placed[:f] + self.few @ placed[f:])
 
-    def sums(self, of_block: Callable[[ColumnBlock], Array]) -> Array:
-        """A number of each column, asked for some columns at a time, shape (..., p)."""
-        found = [
-            (places[k : k + _AT_ONCE], of_block(block[:, k : k + _AT_ONCE]))
-            for places, block in self.blocks
-            for k in range(0, len(places), _AT_ONCE)
-        ]
-        if not found:
-            return of_block(np.empty((self.n, 0)))
-        every = np.empty((*found[0][1].shape[:-1], self.p))
-        for places, values in found:
-            every[..., places] = values
-        return every
+    def squared_onto(self, weight: Array) -> Array:
+        """Sum of the squares of each column, each row so many times, shape (p,)."""
+        squares = [weight @ self.full**2, weight @ self.few.power(2)]
+        return np.asarray(np.concatenate(squares)[self.at])
 
     @property
     def squares(self) -> Array:
         """Sum of squares of each column, shape (p,)."""
-        return self.sums(lambda block: np.asarray((block * block).sum(axis=0)))
+        return self.squared_onto(np.ones(len(self.full)))
 
     @property
     def acting(self) -> Array:
         """Root mean square of each column over the rows in which it acts, shape (p,)."""
-        rows = self.sums(_rows_of)
-        return np.sqrt(self.squares / np.maximum(rows, 1.0))
-
-
-def _rows_of(block: ColumnBlock) -> Array:
-    """Number of rows in which each column acts."""
-    if isinstance(block, np.ndarray):
-        return np.asarray(np.count_nonzero(block, axis=0), float)
-    return np.asarray(np.diff(block.indptr), float)
+        written = np.count_nonzero(self.full, axis=0)
+        rows = np.concatenate([written, np.diff(self.few.indptr)])[self.at]
+        return np.asarray(np.sqrt(self.squares / np.maximum(rows, 1)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.explanation import UNLISTED, Explanation, Key
-from mlg_troubleshoot.misfit.posterior import MisfitPosterior
+from mlg_troubleshoot.misfit.posterior import MisfitPosterior, by_probability
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 
@@ -39,7 +39,7 @@ class Conclusion:
         """Probability of each listed name, the likeliest first."""
         names = self.posterior.names
         listed = ((n, p) for n, p in names.items() if n[0] != UNLISTED)
-        return dict(sorted(listed, key=lambda item: (-item[1], str(item[0]))))
+        return dict(sorted(listed, key=by_probability))
 
     @cached_property
     def verdict(self) -> Verdict:
@@ -146,17 +146,3 @@ class Conclusion:
             if some and set(said) <= names:
                 return explanation
         return self.posterior.likeliest[0]
-
-    @property
-    def ten_times(self) -> dict[Key, float]:
-        """Probability of the likeliest cause if its likeliest rival were ten times likelier."""
-        order = list(self.listed)[:2]
-        if len(order) < 2:
-            return {}
-        first, rival = order
-        whole = with_first = 0.0
-        for names, p in self.posterior.together.items():
-            weighed = p * (10.0 if rival in names else 1.0)
-            whole += weighed
-            with_first += weighed if first in names else 0.0
-        return {rival: with_first / whole}

@@ -1,23 +1,24 @@
-"""Covariance of the rows when nothing is wrong, in a form that is cheap to invert."""
+"""Covariance of the rows when nothing is wrong, in a form that is cheap to invert.
+
+    V(r) = B (I + F S(r)² Fᵀ) Bᵀ                                                          (M2)
+
+in units of the common scatter: B what each row scatters by itself, a diagonal or, along a series, a
+process that forgets; F what rows have in common, over B: groups and loadings. S(r) is 1 but for the
+scatter between tails, whose ratio r is one of a few. With C Cᵀ = I + S Fᵀ F S and R = C⁻¹ S
+(Woodbury): V⁻¹ = B⁻ᵀ (I − F Rᵀ R Fᵀ) B⁻¹.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
-from mlg_troubleshoot.misfit.columns import ColumnBlock, EffectColumns
+from mlg_troubleshoot.misfit.columns import EffectColumns
 
-# Sums over the rows of each group, shape (groups, n).
-_Sums = csr_array | Array
-
-# Computing only: rows times gears up to which a table is small.
-_SMALL = 100_000
 # Rows further out than this many standard deviations count less, and may be entry errors.
 FAR = 3.0
 
@@ -132,7 +133,7 @@ class NoiseModel:
         return row, before, self.correlation ** (self.time[row] - self.time[before])
 
     def own(self, columns: Array) -> Array:
-        """What of some columns is new in each row, over its scatter: independent of the others."""
+        """What of some columns is new in each row, over its scatter: B⁻¹ x."""
         row, before, alike = self._steps
         scaled = columns / self.relative[:, None]
         fresh = scaled.copy()
@@ -140,15 +141,13 @@ class NoiseModel:
         fresh[row] /= np.sqrt(1.0 - alike**2)[:, None]
         return fresh
 
-    def _own_precision_times(self, columns: Array) -> Array:
-        """Multiply columns by the inverse covariance of the rows' own scatter."""
+    def _back(self, fresh: Array) -> Array:
+        """Multiply by B⁻ᵀ, shape (..., n, k)."""
         row, before, alike = self._steps
-        if not len(row):
-            return columns / self.relative[:, None] ** 2
-        fresh = self.own(columns)
-        fresh[row] /= np.sqrt(1.0 - alike**2)[:, None]
+        fresh = fresh.copy()
+        fresh[..., row, :] /= np.sqrt(1.0 - alike**2)[:, None]
         product = fresh.copy()
-        product[before] -= alike[:, None] * fresh[row]
+        product[..., before, :] -= alike[:, None] * fresh[..., row, :]
         return product / self.relative[:, None]
 
     def with_effects(self, effects_in: Array) -> NoiseModel:
@@ -167,7 +166,7 @@ class NoiseModel:
         return effects_in @ (effects_in.T @ product[:, 0]) / self.scale_in**2
 
     def share_of_groups(self, scatter_in: Array, group: Wholes, data: Array) -> Array:
-        """The same of what the rows of each group scatter alike, each in its own measure. [in]"""
+        """BLUP of what the rows of each group scatter alike, each in its own measure. [in]"""
         product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
         pull = np.bincount(group, scatter_in * product[:, 0])
         return scatter_in * pull[group] / self.scale_in**2
@@ -176,227 +175,65 @@ class NoiseModel:
         """What each row scatters by itself, all that rows have in common taken out, and the share
         of the rows that is left to tell it. [in, 1]
         """
-        if self.correlation:
-            held = self.own(self.factors(self.tail_ratios[-1]))
-            free = replace(NoiseModel.white(len(data)), loadings=held)
-            own, share = free.own_part(self.own(data[:, None])[:, 0])
-            return self.relative * own, share
-        inverse = self._inverse
-        last = inverse.at(-1)
-        low = last.root[0] @ (inverse.low.T - (last.across[0] @ inverse.tails))
-        taken = np.sum(low**2, axis=0) + sum(_squared(root).sum(axis=0) for root in inverse.fixed)
-        taken = taken + last.weight[0] @ _squared(inverse.tails)
-        own = self.relative**2 * self._times(data[:, None], last)[0, :, 0]
-        return own, float(1.0 - np.mean(self.relative**2 * taken))
+        common, roots, _log = self._common
+        low = roots[-1] @ common.T
+        own = self.own(data[:, None])[:, 0]
+        left = own - low.T @ (low @ own)
+        return self.relative * left, float(1.0 - np.mean(np.sum(low**2, axis=0)))
 
-    def factors(self, tail_ratio: float) -> Array:
-        """Low-rank part of the covariance, shape (n, k). [1]"""
-        kinds = [*self._groups, (self.tails, np.full(len(self.relative), tail_ratio))]
-        each = [
+    @cached_property
+    def _common(self) -> tuple[Array, Array, Array]:
+        """F, R of each ratio of the scatter between tails, (levels, k, k), and log |V|."""
+        one = np.ones(len(self.relative))
+        kinds = [(self.gears, self.gear_ratio * one)]
+        kinds += [] if self.of_gear is None else [(self.gears, self.of_gear)]
+        kinds += [] if self.of_tail is None else [(self.tails, own) for own in self.of_tail.T]
+        kinds += [(self.tails, float(any(self.tail_ratios)) * one)]
+        parts = [
             scatter[:, None] * (group[:, None] == np.arange(group.max() + 1))
             for group, scatter in kinds
             if scatter.any()
         ]
-        return np.hstack([*each, self.loadings])
-
-    @property
-    def _groups(self) -> list[tuple[Wholes, Array]]:
-        """Group of each row and what rows of one have in common, whatever tails scatter alike,
-        gears first. [1]
-        """
-        found = [(self.gears, np.full(len(self.relative), self.gear_ratio))]
-        if self.of_gear is not None:
-            found.append((self.gears, self.of_gear))
-        if self.of_tail is not None:
-            found.extend((self.tails, scatter) for scatter in self.of_tail.T)
-        return [(group, scatter) for group, scatter in found if scatter.any()]
-
-    def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
-        """Multiply columns by the inverse covariance with one ratio of the scatter between tails;
-        the logarithm of the covariance's determinant.
-        """
-        level = self._inverse.at(self.tail_ratios.index(tail_ratio))
-        return self._times(columns, level)[0], float(level.log_determinant[0])
+        common = self.own(np.hstack([self.loadings, *parts]))
+        size = np.ones((len(self.tail_ratios), common.shape[1]))
+        if any(self.tail_ratios):
+            size[:, -self.tails.max() - 1 :] = np.array(self.tail_ratios)[:, None]
+        inner = size[:, :, None] * (common.T @ common) * size[:, None, :]
+        lower = np.linalg.cholesky(np.eye(common.shape[1]) + inner)
+        log = 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+        log += 2.0 * np.sum(np.log(self.relative)) + np.sum(np.log1p(-(self._steps[2] ** 2)))
+        return common, np.linalg.inv(lower) * size[:, None, :], log
 
     def each_precision_times(self, columns: Array) -> tuple[Array, Array]:
-        """The same with each ratio, shapes (levels, n, k) and (levels,)."""
-        levels = self._inverse.levels
-        return self._times(columns, levels), levels.log_determinant
+        """Columns times V⁻¹, shape (levels, n, k), and log |V|, (levels,), of each ratio."""
+        common, roots, log = self._common
+        own = self.own(columns)
+        bent = roots @ (common.T @ own)
+        return self._back(own - common @ (roots.swapaxes(1, 2) @ bent)), log
 
-    def _times(self, columns: Array, levels: _Levels) -> Array:
-        """Multiply columns by the inverse covariance of some levels, (levels, n, k)."""
-        inverse = self._inverse
-        product = self._beside_tails(columns, inverse.fixed)
-        of_tails = inverse.tails @ columns
-        bent = levels.root @ (inverse.low.T @ columns - levels.across @ of_tails)
-        sizes = levels.root.swapaxes(1, 2) @ bent
-        in_tails = levels.weight[:, :, None] * (of_tails - inverse.low_of_tails @ sizes)
-        return np.array(
-            [
-                product - inverse.low @ own - inverse.tails.T @ alike
-                for own, alike in zip(sizes, in_tails, strict=True)
-            ]
-        )
-
-    def _beside_tails(self, columns: Array, fixed: Sequence[_Sums]) -> Array:
-        """Multiply columns by the inverse covariance of what rows scatter by themselves, and in
-        common with a group.
-        """
-        product = self._own_precision_times(columns)
-        for root in fixed:
-            product -= root.T @ (root @ columns)
-        return product
+    def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
+        """Columns times V⁻¹, and log |V|, of one ratio of the scatter between tails."""
+        common, roots, log = self._common
+        level = self.tail_ratios.index(tail_ratio)
+        own = self.own(columns)
+        bent = roots[level] @ (common.T @ own)
+        return self._back(own - common @ (roots[level].T @ bent)), float(log[level])
 
     def square(self, data: Array, tail_ratio: float) -> Array:
-        """Squared length of data sets under the inverse covariance."""
-        each: Array = self._squares(data)[self.tail_ratios.index(tail_ratio)]
+        """Squared length of data sets under V⁻¹."""
+        each: Array = self.squares(EffectColumns.of(data))[self.tail_ratios.index(tail_ratio)]
         return each
 
     def squares(self, columns: EffectColumns) -> Array:
-        """The same of many columns, for each ratio of the scatter between tails, (levels, p)."""
-        return columns.sums(self._squares)
-
-    def _squares(self, block: ColumnBlock) -> Array:
-        if self.correlation or isinstance(block, np.ndarray):
-            written = block if isinstance(block, np.ndarray) else block.toarray()
-            own = np.sum(self.own(written) ** 2, axis=0)
-        else:
-            own = np.asarray(self.relative**-2.0 @ (block * block))
-        inverse = self._inverse
-        levels = inverse.levels
-        for root in inverse.fixed:
-            own = own - _squared(root @ block).sum(axis=0)
-        of_tails = _written_out(inverse.tails @ block)
-        bent = levels.root @ (inverse.low.T @ block - levels.across @ of_tails)
-        return np.asarray(own - levels.weight @ of_tails**2 - np.sum(bent**2, axis=1))
-
-    @cached_property
-    def _nested(self) -> bool:
-        """True if the rows of a gear are of one tail, and none follows another: then what each
-        group has in common is taken out by sums over its rows.
+        """Squared length of many columns, for each ratio of the scatter between tails, (levels,
+        p).
         """
+        common, roots, _log = self._common
         if self.correlation:
-            return False
-        most = np.zeros(self.gears.max() + 1, np.int64)
-        np.maximum.at(most, self.gears, self.tails)
-        return bool(np.all(most[self.gears] == self.tails))
-
-    @property
-    def _small(self) -> bool:
-        """True if sums over groups are soonest had with all rows written out."""
-        return bool(len(self.relative) * (self.gears.max() + 1) <= _SMALL)
-
-    @cached_property
-    def _inverse(self) -> _Inverse:
-        ratios = np.array(self.tail_ratios)
-        alike = any(self.tail_ratios)
-        log = 2.0 * float(np.sum(np.log(self.relative)))
-        log += float(np.sum(np.log1p(-(self._steps[2] ** 2))))
-        fixed: list[_Sums] = []
-        tails: _Sums = np.empty((0, len(self.relative)))
-        low = self.loadings if self._nested else self.factors(float(alike))
-        # How much larger the loadings are in each level.
-        scale = np.ones((len(ratios), low.shape[1]))
-        if self._nested:
-            for group, scatter in self._groups:
-                # Of gears within tails no two groups of one kind share a row: one column holds all.
-                weighted = self._beside_tails(scatter[:, None], fixed)[:, 0]
-                inner = 1.0 + np.bincount(group, scatter * weighted)
-                log += float(np.sum(np.log(inner)))
-                fixed.append(_sums(group, weighted / np.sqrt(inner)[group]))
-            if alike:
-                one = np.ones((len(self.relative), 1))
-                tails = _sums(self.tails, self._beside_tails(one, fixed)[:, 0])
-        elif alike:
-            end = low.shape[1] - self.loadings.shape[1]
-            scale[:, end - self.tails.max() - 1 : end] = ratios[:, None]
-        if self._small:
-            fixed = [np.vstack([_written_out(root) for root in fixed])] if fixed else []
-            tails = _written_out(tails)
-        total = np.asarray(tails.sum(axis=1))
-        inner = 1.0 + ratios[:, None] ** 2 * total
-        weight = ratios[:, None] ** 2 / inner
-        beside = self._beside_tails(low, fixed)
-        low_of_tails = np.asarray(tails @ low)
-        across = low_of_tails.T * weight[:, None, :]
-        pairs = low.T @ beside - across @ low_of_tails
-        lower = np.linalg.cholesky(
-            np.eye(low.shape[1]) + scale[:, :, None] * pairs * scale[:, None, :]
-        )
-        determinant = np.log(inner).sum(axis=1)
-        determinant += 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
-        root = np.linalg.inv(lower) * scale[:, None, :]
-        levels = _Levels(weight, across, root, log + determinant)
-        return _Inverse(tuple(fixed), tails, beside, low_of_tails, levels)
-
-
-@dataclass(frozen=True)
-class _Levels:
-    """What the inverse covariances of some ratios of the scatter between tails do not share.
-
-    Attributes
-    ----------
-    weight : ndarray, shape (levels, tails)
-        What is taken off for each tail, times its sums.
-    across : ndarray, shape (levels, k, tails)
-        That of the loadings.
-    root : ndarray, shape (levels, k, k)
-        Root of the covariance of the sizes of the loadings.
-    log_determinant : ndarray, shape (levels,)
-        Logarithm of the covariance's determinant.
-    """
-
-    weight: Array
-    across: Array
-    root: Array
-    log_determinant: Array
-
-
-@dataclass(frozen=True)
-class _Inverse:
-    """Inverse covariances of all ratios of the scatter between tails (Woodbury).
-
-    With P the inverse of what rows scatter beside tails and loadings L, T the sums of P over each
-    tail, f its weight and S S' the covariance of the loadings' sizes:
-    V⁻¹ = P − T'f T − (P L − T'f T L) S S' (P L − T'f T L)'.
-
-    Attributes
-    ----------
-    fixed : tuple of _Sums
-        Roots of what P takes off for groups.
-    tails : _Sums
-        T.
-    low : ndarray, shape (n, k)
-        P L.
-    low_of_tails : ndarray, shape (tails, k)
-        T L.
-    levels : _Levels
-        What depends on the ratio.
-    """
-
-    fixed: tuple[_Sums, ...]
-    tails: _Sums
-    low: Array
-    low_of_tails: Array
-    levels: _Levels
-
-    def at(self, level: int) -> _Levels:
-        """One of the levels."""
-        each = (self.levels.weight, self.levels.across, self.levels.root)
-        one = [values[[level]] for values in (*each, self.levels.log_determinant)]
-        return _Levels(*one)
-
-
-def _sums(group: Wholes, values: Array) -> csr_array:
-    """Sums over the rows of each group, each row so many times."""
-    begins = np.r_[0, np.cumsum(np.bincount(group))]
-    rows = np.argsort(group, kind="stable")
-    return csr_array((values[rows], rows, begins), (len(begins) - 1, len(group)))
-
-
-def _squared(values: Any) -> Any:
-    return values * values
-
-
-def _written_out(values: Any) -> Array:
-    return values if isinstance(values, np.ndarray) else np.asarray(values.toarray())
+            columns = EffectColumns.of(self.own(columns.take(np.arange(columns.p))))
+            own = columns.squares
+            low = columns.onto(common.T)
+        else:
+            own = columns.squared_onto(self.relative**-2)
+            low = columns.onto((common / self.relative[:, None]).T)
+        return np.array([own - np.sum((root @ low) ** 2, axis=0) for root in roots])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -121,12 +121,11 @@ class Context:
         Logarithm of how often it is expected.
     shared_in : ndarray, shape (n, j)
         Its effects, each per unit of its size.
-    correction : callable, optional
-        What its true prior adds to the log-likelihood of the normal one, given what rows say of its
-        sizes, aᵀx − xᵀQx / 2.
     root : ndarray, shape (j, k), optional
         Root of the covariance of the sizes; None if they are independent, with one standard
         deviation each.
+    mean : float
+        Expected size of each.
     listed : bool
         True if it stands on the list of causes.
     of_tails_in : ndarray, shape (n, w), optional
@@ -136,8 +135,8 @@ class Context:
     name: Key | None
     log_prior: float
     shared_in: Array
-    correction: Callable[[Array, Array], float] | None = None
     root: Array | None = None
+    mean: float = 0.0
     listed: bool = True
     of_tails_in: Array | None = None
 
@@ -148,8 +147,14 @@ class Context:
 
     @property
     def independent_in(self) -> Array:
-        """Independent effects of one standard deviation each, shape (n, k)."""
-        return self.shared_in if self.root is None else self.shared_in @ self.root
+        """Independent effects about zero with the second moments of these, shape (n, k)."""
+        mean = self.mean * self.shared_in.sum(axis=1, keepdims=True)
+        return np.hstack([self.shared_in @ self.root_of, mean][: 1 + bool(self.mean)])
+
+    @property
+    def covariance(self) -> Array:
+        """Second moments of the sizes, shape (j, j)."""
+        return self.root_of @ self.root_of.T + self.mean**2
 
     def behind(self, noise: NoiseModel) -> NoiseModel:
         """Noise with what each tail has in a size of its own."""

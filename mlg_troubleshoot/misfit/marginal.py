@@ -7,7 +7,6 @@ causes of one table may share, and over the scatter between tails.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -122,17 +121,20 @@ class Marginal:
         root = context.root_of / noise.scale_in
         lower = np.linalg.cholesky(np.eye(root.shape[1]) + root.T @ inner @ root)
         taken = np.linalg.solve(lower, np.broadcast_to(root.T, (len(lower), *root.T.shape)))
+        mean = np.full(root.shape[0], context.mean)
+        along = products.along - mean @ held
+        rest = products.rest - 2.0 * data @ mean + (inner @ mean) @ mean
+        data = data - inner @ mean
         bent = taken @ held
         bent_data = (taken @ data[..., None])[..., 0]
         self.log = products.log + _log_determinant(lower)
         self.square = products.square - np.sum(bent**2, axis=1)
-        self.along = products.along - np.einsum("rk,rkp->rp", bent_data, bent)
-        self.rest = products.rest - np.sum(bent_data**2, axis=1)
+        self.along = along - np.einsum("rk,rkp->rp", bent_data, bent)
+        self.rest = rest - np.sum(bent_data**2, axis=1)
         # What the context takes off the products of two effects: their own with its columns, and
         # these with each other.
         self._held = held
         self._taken = taken.swapaxes(1, 2) @ taken
-        self._corrected = held, data, inner
 
     def _cross(self, members: Members, kept: list[int] | slice) -> Array:
         """Products of some effects with the members, shape (levels, kept, k)."""
@@ -210,7 +212,7 @@ class Marginal:
         level = self._likelihood(given.rest, given.log)
         whole = float(log_sum(level))
         values = np.exp(level - whole) @ given.values
-        likely = whole - np.log(len(level)) + self._prior(members) + self.corrected(members)
+        likely = whole - np.log(len(level)) + self._prior(members)
         return Explanation(number, members, likely, values)
 
     def extended(self, number: int, members: Members) -> tuple[Explanation, Array, Array]:
@@ -243,38 +245,7 @@ class Marginal:
         whole = most + np.log(total)
         values = np.sum(chance * value, axis=0) / total
         prior = self._prior(members) + effects.log_prior - np.log(len(level))
-        further = whole + prior + self.corrected(members)
-        return self.explanation(number, members, given), further, values
-
-    def corrected(self, members: Members) -> float:
-        """What the context's true prior adds to the normal one's likelihood, the members being as
-        large as expected.
-        """
-        if self.context.correction is None:
-            return 0.0
-        if members not in self._corrections:
-            # Under the largest scatter between tails; the members are part of the noise.
-            places = list(members)
-            scale = self.products.noise.scale_in
-            held, data, inner = (part[-1] for part in self._corrected)
-            size = self.effects.size[places] / scale
-            cross = held[:, places] * size
-            own = np.eye(len(places))
-            for row, k in enumerate(members):
-                own[row] += size[row] * self.products.cross(k)[-1, places] * size
-            along = size * self.products.along[-1, places]
-            product = np.column_stack([inner, data])
-            product -= cross @ np.linalg.solve(own, np.column_stack([cross.T, along]))
-            square = product[:, :-1]
-            along = product[:, -1]
-            self._corrections[members] = self.context.correction(
-                along / scale**2, square / scale**2
-            )
-        return self._corrections[members]
-
-    @cached_property
-    def _corrections(self) -> dict[Members, float]:
-        return {}
+        return self.explanation(number, members, given), whole + prior, values
 
 
 def _of_sign(sign: Array, value: Array, error: Array) -> Array:

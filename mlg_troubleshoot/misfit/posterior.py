@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, log_sum
+from mlg_troubleshoot.arrays import Array, Mask, log_sum
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation, Key
@@ -21,6 +21,9 @@ _LEADING = 6
 # Log-likelihood behind the likeliest set from which one is not extended. Of what lies twice as far
 # behind the sets are not kept.
 REACH = float(np.log(10_000))
+# Digits of a probability that neither the order of the rows nor that of the names changes.
+_DIGITS = 8
+_Place = tuple[int, frozenset[int]]
 _TRACE = float(np.exp(-2 * REACH))
 
 
@@ -73,6 +76,12 @@ class MisfitPosterior:
         return frozenset(
             name for name in (*own, self.contexts[found.context].name) if name is not None
         )
+
+
+def by_probability(item: tuple[Key, float]) -> tuple[float, str]:
+    """What orders names: the likeliest first, what rounding alone decides by the name."""
+    name, probability = item
+    return -round(probability, _DIGITS), str(name)
 
 
 def posterior(
@@ -128,123 +137,118 @@ class _Extended:
     leading: tuple[int, ...]
 
 
-@dataclass
 class _Search:
-    noise: NoiseModel
-    data: Array
-    effects: Effects
-    contexts: Sequence[Context]
-    beliefs: Beliefs
-    most: int
-    extended: dict[tuple[int, frozenset[int]], _Extended] = field(default_factory=dict)
-    _alone: dict[tuple[int, frozenset[int]], Explanation] = field(default_factory=dict)
+    """Sets that were looked at, by context and members."""
 
-    def __post_init__(self) -> None:
-        self.products = self._under(self.noise)
-        self.once, self.number = self.effects.numbered
+    def __init__(
+        self,
+        noise: NoiseModel,
+        data: Array,
+        effects: Effects,
+        contexts: Sequence[Context],
+        beliefs: Beliefs,
+        most: int,
+    ) -> None:
+        self.noise = noise
+        self.data = data
+        self.effects = effects
+        self.contexts = contexts
+        self.beliefs = beliefs
+        self.most = most
+        self.products = Products(noise, effects, data, beliefs)
+        self.once, self.number = effects.numbered
+        self.extended: dict[_Place, _Extended] = {}
         self._marginals: dict[int, Marginal] = {}
-
-    def _under(self, noise: NoiseModel) -> Products:
-        return Products(noise, self.effects, self.data, self.beliefs)
 
     def marginal(self, number: int) -> Marginal:
         """Likelihoods in one context, worked out when they are first asked for."""
         if number not in self._marginals:
             of = self.contexts[number]
-            wanders = of.of_tails_in is not None
-            products = self._under(of.behind(self.noise)) if wanders else self.products
+            products = self.products
+            if of.of_tails_in is not None:
+                products = Products(of.behind(self.noise), self.effects, self.data, self.beliefs)
             self._marginals[number] = Marginal(products, of)
         return self._marginals[number]
 
-    def alone(self, context: int, members: frozenset[int]) -> Explanation:
-        """One set on its own, exactly."""
-        key = context, members
-        if key not in self._alone:
-            places = tuple(sorted(members))
-            self._alone[key] = self.marginal(context).explanation(context, places)
-        return self._alone[key]
-
     def extend(self, context: int, members: frozenset[int]) -> None:
         """Ask for every further effect given a set; one variant of a name acts, not two."""
-        key = context, members
-        if key in self.extended:
+        if (context, members) in self.extended:
             return
-        places = tuple(sorted(members))
-        own, further, values = self.marginal(context).extended(context, places)
-        own = self._alone.setdefault(key, own)
+        own, further, values = self.marginal(context).extended(context, tuple(sorted(members)))
         taken = {int(self.number[k]) for k in members} - {0}
-        further[np.isin(self.number, list(taken))] = -np.inf
-        further[list(members)] = -np.inf
-        if len(members) >= self.most:
-            further[:] = -np.inf
+        *with_further, alone = self._cancelled(own, values)
+        if alone:
+            own = replace(own, log_posterior=-np.inf)
+        impossible = np.array(with_further) | np.isin(self.number, list(taken))
+        impossible[list(members)] = True
+        further[impossible | (len(members) >= self.most)] = -np.inf
         leading = tuple(np.argsort(-further)[: BEAM + 1].tolist())
-        self.extended[key] = _Extended(own, further, values, leading)
+        self.extended[context, members] = _Extended(own, further, values, leading)
 
-    @property
-    def best(self) -> float:
-        """Logarithmic posterior of the likeliest set so far."""
-        return max(found.own.log_posterior for found in self.extended.values())
+    def _cancelled(self, own: Explanation, values: Array) -> Mask:
+        """Tell with which further effects, and whether with none (last), those of a set cancel each
+        other by more than the data: Σ |x_k β_k|² − |Σ x_k β_k|² > |y|². (M7)
+        """
+        held = self.products.columns.take(own.members) * own.values
+        whole = held.sum(axis=1)
+        each = float(np.sum(held**2) - whole @ whole)
+        cancelled = each - 2.0 * values * self.products.columns.onto(whole[None])[0]
+        return np.append(cancelled, each) > float(self.data @ self.data)
 
-    def _best_of(self, kind: bool) -> float:
-        """The same of the sets in a context, or of those in none."""
-        own = (e.own for e in self.extended.values() if bool(e.own.context) == kind)
-        return max((found.log_posterior for found in own), default=-np.inf)
+    def _likeliest(self, kinds: Collection[bool] = (False, True)) -> list[_Extended]:
+        """Sets in a context, in none, or in either, the likeliest first."""
+        own = (e for e in self.extended.values() if bool(e.own.context) in kinds)
+        return sorted(own, key=lambda e: -e.own.log_posterior)
 
     def run(self, start: Sequence[Explanation]) -> None:
         """Extend the likeliest sets, with a context and without, then take every step from the
         leading ones.
         """
-        none = frozenset[int]()
         for context in range(len(self.contexts)):
-            self.extend(context, none)
+            self.extend(context, frozenset())
         for found in start:
             self.extend(found.context, frozenset(found.members))
         for _ in range(self.most):
-            self._beams()
-            if not self._neighbours():
+            for kind in (False, True):
+                for _ in range(BEAM):
+                    nearest = self._nearest(kind)
+                    if nearest is None:
+                        break
+                    self.extend(*nearest)
+            before = len(self.extended)
+            self._neighbours()
+            if len(self.extended) == before:
                 break
 
-    def _beams(self) -> None:
-        """Extend the likeliest sets that are not yet, those in a context and those in none."""
-        for kind in (False, True):
-            for _ in range(BEAM):
-                nearest = self._nearest(kind)
-                if nearest is None:
-                    break
-                self.extend(*nearest)
-
-    def _nearest(self, kind: bool) -> tuple[int, frozenset[int]] | None:
+    def _nearest(self, kind: bool) -> _Place | None:
         """The likeliest set that was not extended itself, in a context or in none."""
-        top = self._best_of(kind) - REACH
+        order = self._likeliest([kind])
+        top = order[0].own.log_posterior - REACH if order else np.inf
         found = None
-        for (context, members), at in self.extended.items():
-            if bool(context) != kind:
-                continue
+        for at in order:
             for k in at.leading:
+                place = at.own.context, frozenset((*at.own.members, k))
                 if at.further[k] <= top:
                     break
-                both = members | {k}
-                if (context, both) not in self.extended:
+                if place not in self.extended:
                     top = float(at.further[k])
-                    found = (context, both)
+                    found = place
                     break
         return found
 
-    def _neighbours(self) -> bool:
-        """Take every leading set into every context, leave each of its parts away, and put any
-        other in its place; True if there was something new to look at.
-        """
-        order = sorted(self.extended.values(), key=lambda e: -e.own.log_posterior)[:_LEADING]
-        before = len(self.extended)
-        for at in order:
-            context = at.own.context
+    def _neighbours(self) -> None:
+        """Take every leading set into every context, and leave each of its parts away."""
+        leading = self._likeliest()[:_LEADING]
+        least = leading[0].own.log_posterior - REACH
+        for at in leading:
             members = frozenset(at.own.members)
             for other in range(len(self.contexts)):
-                if self.alone(other, members).log_posterior > self.best - REACH:
-                    self.extend(other, members)
+                if (other, members) not in self.extended:
+                    alone = self.marginal(other).explanation(other, tuple(sorted(members)))
+                    if alone.log_posterior > least:
+                        self.extend(other, members)
             for k in members:
-                self.extend(context, members - {k})
-        return len(self.extended) > before
+                self.extend(at.own.context, members - {k})
 
     def _masked(self) -> Iterator[_Extended]:
         """Each extended set with what no other one has as well: no set is counted twice."""
@@ -309,7 +313,7 @@ class _Search:
             self.effects,
             self.contexts,
             tuple(replace(e, log_posterior=e.log_posterior - whole) for e in order),
-            names,
+            dict(sorted(names.items(), key=by_probability)),
             together,
             of_effect,
             over_nothing,

@@ -68,7 +68,7 @@ class Runner:
         except LookupError as error:
             error.add_note(f"The simulation is given: {', '.join(self.names)}.")
             raise
-        if self.channels:
+        if self.channels and hasattr(predicted, "keys"):
             for name in self.channels:
                 if name not in predicted:
                     raise UsageError(

@@ -121,6 +121,7 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
         If the arrays do not fit together, a name stands twice, a trial is 0, or the simulation
         gives no number.
     """
+    inputs.check_predict(predict)
     data, channels = inputs.read_measured(measured)
     inputs.check_suspects(suspects, nuisance, data)
     declared = inputs.read_declared(reading_u, data)
@@ -398,7 +399,10 @@ class _Study:
         fold, by = self.folds(final, causes)
         explained = held_out_part(final.noise, final.columns[:, causes], final.whole, fold, None)
         before = final.less_nuisance((run.reading - run.at(start)) / final.unit)
-        told = {k: self.describe(at, final, k, causes) for k in (*causes, *open_)}
+        told = {
+            k: self.describe(at, final, k, causes)
+            for k in {*causes, *open_, *(own[0] for own in at.classes)}
+        }
         _found, noise = at.linear(causes, at.likeliest.context if self.follow else 0)
         own, _spare = noise.own_part(at.rest)
         pairs = [own[index][1:] @ own[index][:-1] for index in self.outputs]
@@ -409,9 +413,10 @@ class _Study:
             verdict=verdict,
             causes=tuple(sorted((told[k] for k in causes), key=lambda c: -c.effect_rms)),
             also_possible=tuple(told[k] for k in open_ if k not in causes),
+            suspects=tuple(sorted(told.values(), key=lambda c: (-round(c.probability, 9), c.name))),
             aliases=tuple(tuple(names[k] for k in own) for own in at.classes if len(own) > 1),
             why_untestable={
-                names[k]: reason[bool(at.columns[:, k].any())]
+                names[k]: reason[bool(self.nuisance and at.columns[:, k].any())]
                 for k in range(self.count)
                 if k not in testable
             },

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC
+from inspect import signature
 from numbers import Real
 from typing import Any
 
@@ -15,9 +17,9 @@ from mlg_troubleshoot.misfit.simulation_result import Suspect
 
 
 def read_numbers(values: Any, name: str) -> Array:
-    """A copy of an array of numbers."""
+    """A copy of an array of numbers, NaN where it is masked."""
     try:
-        return np.array(values, float)
+        return np.array(np.ma.array(values, float).filled(np.nan))
     except (TypeError, ValueError) as error:
         raise UsageError(
             f"{name} is not an array of numbers: {error}", "give numbers, NaN where not read"
@@ -50,6 +52,8 @@ def read_labels(labels: ArrayLike | None, n: int, name: str) -> Wholes:
 def read_times(time: ArrayLike | None, chain: Wholes) -> Array:
     """When each row was read, in usual steps of a series; without time in the order given."""
     given = np.arange(len(chain)) if time is None else np.asarray(time)
+    if given.dtype == object:
+        given = np.array([_without_zone(moment) for moment in given])
     if given.dtype.kind == "M":
         given = (given - given.min()) / np.timedelta64(1, "s")
     when = read_numbers(given, "time")
@@ -66,6 +70,27 @@ def read_times(time: ArrayLike | None, chain: Wholes) -> Array:
             "give each a time of its own, or a series of its own",
         )
     return when / (np.median(step) if len(step) else 1.0)
+
+
+def _without_zone(moment: Any) -> Any:
+    """A date with a time zone as NumPy's in UTC."""
+    if getattr(moment, "tzinfo", None) is not None:
+        moment = moment.astimezone(UTC).replace(tzinfo=None)
+    return np.datetime64(moment) if hasattr(moment, "tzinfo") else moment
+
+
+def check_predict(predict: Callable[..., Any]) -> None:
+    """Refuse a simulation that does not take its parameters in one mapping."""
+    try:
+        signature(predict).bind({})
+    except TypeError as error:
+        raise UsageError(
+            f"the simulation cannot be called with one mapping of parameters: {error}",
+            "let it take one argument, the parameters by name: predict(p) with p['name']",
+        ) from error
+    except ValueError:
+        # What is written in C may have no signature.
+        return
 
 
 def read_declared(reading_u: ArrayLike | None, data: Array) -> Array | None:
@@ -87,6 +112,11 @@ def check_suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect], dat
     if not suspects:
         raise UsageError("No suspects were given", "name at least one parameter that may be wrong")
     every = [*suspects, *nuisance]
+    for s in every:
+        if not isinstance(s, Suspect):
+            raise UsageError(
+                f"{s!r} is not a Suspect", "write Suspect(name, nominal, trial) for each parameter"
+            )
     names = [s.name for s in every]
     for s in every:
         if not all(isinstance(value, Real) for value in (s.nominal, s.trial)):

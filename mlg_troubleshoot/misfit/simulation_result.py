@@ -83,6 +83,15 @@ class SuspectFound(Result):
         """Name of the suspect."""
         return self.suspect.name
 
+    def words(self) -> str:
+        """Say its value, its interval and how sure it is."""
+        low, high = self.interval
+        unit = f" {self.suspect.unit}" if self.suspect.unit else ""
+        return (
+            f"{' or '.join((self.name, *self.aliases))} = {self.value:.6g}{unit}"
+            f" (95 % {low:.6g} to {high:.6g}), probability {self.probability:.3f}"
+        )
+
     @property
     def separates(self) -> str:
         """The reading that would distinguish it from its aliases."""
@@ -123,6 +132,8 @@ class SimulationDiagnosis(Result):
     also_possible : tuple of SuspectFound
         The whole set that the data leave possible, where there are rivals that no alias class says,
         or what held-out rows speak against; else empty.
+    suspects : tuple of SuspectFound
+        All that can be tested, one of each alias class, by probability.
     aliases : tuple of tuple of str
         Classes of suspects that these rows cannot distinguish where the simulation fits best.
     why_untestable : mapping of str to str
@@ -157,6 +168,7 @@ class SimulationDiagnosis(Result):
     verdict: Verdict
     causes: tuple[SuspectFound, ...]
     also_possible: tuple[SuspectFound, ...]
+    suspects: tuple[SuspectFound, ...]
     aliases: tuple[tuple[str, ...], ...]
     why_untestable: Mapping[str, str]
     p_nothing: float
@@ -174,6 +186,23 @@ class SimulationDiagnosis(Result):
     def named(self) -> tuple[SuspectFound, ...]:
         """The causes that the verdict stands for."""
         return self.causes if self.verdict is Verdict.NAMED else ()
+
+    def summary(self) -> str:
+        """Say the verdict, each cause or what may be one, the gain and the notes, line by line."""
+        lines = [
+            f"{self.verdict}: nothing is wrong with probability {self.p_nothing:.3f}, something"
+            f" that no suspect explains acts with {self.p_unlisted:.3f}"
+        ]
+        lines += [f"cause: {cause.words()}" for cause in self.causes]
+        lines += [f"possible: {cause.words()}" for cause in self.also_possible]
+        lines += [f"not testable: {name}, {why}" for name, why in self.why_untestable.items()]
+        lines.append(
+            f"rms of held-out rows (by {self.gain.held_out_by}): {self.gain.rms_before:.4g} before,"
+            f" {self.gain.rms_after:.4g} after"
+        )
+        return "\n".join((*lines, *self.notes))
+
+    __str__ = summary
 
     @property
     def untestable(self) -> tuple[str, ...]:

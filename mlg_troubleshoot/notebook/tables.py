@@ -10,7 +10,7 @@ import pandas as pd
 from markupsafe import escape
 
 from mlg_troubleshoot.decision.assessment import Assessment
-from mlg_troubleshoot.diagnosis import Diagnosis
+from mlg_troubleshoot.diagnosis import Diagnosis, SimulationDiagnosis
 from mlg_troubleshoot.diagnosis.causes import Catalogue
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
@@ -38,7 +38,7 @@ from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
 from mlg_troubleshoot.workflows.history import Lives, show_fleet
 
 # The list that a result's table is of, the first one that it has.
-_MAIN = ("inspections", "gears", "causes", "joints", "also_possible")
+_MAIN = ("inspections", "gears", "suspects", "causes", "joints", "also_possible")
 # What says whose a row of a list within a row is.
 _WHOSE = ("record_id", "tail_no", "side")
 # What a notebook shows of a result.
@@ -63,12 +63,32 @@ def _worst_case_as_json(worst: WorstCase) -> dict[str, Any]:
     return {name: plain(getattr(worst, name)) for name in names}
 
 
+def _simulation_as_json(found: SimulationDiagnosis) -> dict[str, Any]:
+    suspects = [
+        {
+            "name": s.name,
+            "nominal": s.suspect.nominal,
+            "value": s.value,
+            "low": s.interval[0],
+            "high": s.interval[1],
+            "probability": s.probability,
+            "named": s in found.named,
+            "effect_rms": s.effect_rms,
+            "unit": s.suspect.unit,
+            "aliases": ", ".join(s.aliases),
+        }
+        for s in found.suspects
+    ]
+    return {**plain(found), "suspects": suspects}
+
+
 # What has a form of its own; any other result is written as it stands.
 _AS_JSON: dict[type, Callable[[Any], Any]] = {
     CheckResult: lambda r: check_as_json(r.gear, r.judgements, r.problems, r.notes),
     Assessment: assessment_as_json,
     DiagnoseResult: lambda r: diagnosis_as_json(r.diagnosis, r.extension, r.notes),
     Diagnosis: lambda r: diagnosis_as_json(r, None),
+    SimulationDiagnosis: _simulation_as_json,
     SurveyResult: lambda r: plain({"numbers": r.numbers, "joints": r.joints}),
     StudyFindings: study_as_json,
     WorstCase: _worst_case_as_json,

@@ -75,6 +75,8 @@ def _context(
     source = ", ".join(Path(name).name for name in provenance.input_sha256) or "inspections"
     residuals = Residuals(d, gear.joint_numbers, lengths.unit)
     words, tone = _WORDS[d.verdict]
+    if d.verdict == "UNLISTED" and d.p_nothing > 1.0 - d.beliefs.sure:
+        words = "PERHAPS SOMETHING NOT ON THE LIST"
     return {
         **head(
             f"Measured against predicted – {source}",

@@ -205,16 +205,15 @@ def diagnosis_as_json(
         also_possible=[_rival(c) for c in d.also_possible],
         beside=[_rival(c) for c in d.beside],
         sure=d.beliefs.sure,
-        if_ten_times_likelier=[
-            {"cause": cause, "target": target, "probability_of_first": chance}
-            for (cause, target), chance in d.ten_times.items()
-        ],
         not_testable=[
             {"cause": cause, "missing_column": column} for cause, column in d.not_testable
         ],
         cannot_say=d.unsaid,
         ruled_out=[{"cause": cause, "target": target} for cause, target in d.ruled_out],
-        smallest_detectable_rms_in=d.smallest_rms_in,
+        columns_used=d.used.columns,
+        columns_left_out=[{"column": name, "why": why} for name, why in d.used.left_out],
+        smallest_detectable_rms_in=d.detectable[0][1] if d.detectable else None,
+        detectable=[{"cause": name, "rms_in": size} for name, size in d.detectable],
         extension=None if extension is None else _extension(extension),
         gain=_gain(d),
         data_condition=[written(ConditionOfData, c) for c in d.condition],

@@ -73,6 +73,15 @@ class DiagnoseResult(TableResult):
     diagnosis: Diagnosis
     extension: ModelExtension | None
 
+    def summary(self, unit: str = "in") -> str:
+        """Say what was found, in the seven lines of the terminal."""
+        from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
+
+        lines = seven_lines(self.diagnosis, LengthUnit.parse(unit))
+        return "\n".join(f"{line.number} {line.word:7}{line.text}" for line in lines)
+
+    __str__ = summary
+
 
 # A check refuses an impossible length; a diagnosis keeps the row and looks for the entry error: any
 # number that a person may type for a clearance. [in]
@@ -139,9 +148,10 @@ def diagnose_files(
     once = _once(valid)
     # What a check says of single rows is said of the data as a whole: landings that fall.
     of_rows = {warning for inspection in valid for warning in inspection.warnings}
-    general = (note for note in read.notes if note not in of_rows)
+    carried = "unknown column, carried to the report"
+    general = (n for n in read.notes if n not in of_rows and carried not in n)
     whole = table_from_inspections(once, gear)
-    notes = (*general, *_evidence_notes(once, len(valid) - len(once), gear, whole.own_factors))
+    notes = (*general, *_evidence_notes(once, len(valid) - len(once), gear))
     condition, aside = data_condition(whole, gear)
     table = replace(whole.take(~aside), doubt=doubt_of(condition))
     unused = _unused(read, whole, condition, aside)
@@ -283,14 +293,8 @@ def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
     return replace(fault, column=column, value=entered.text, suggested=suggested)
 
 
-def _evidence_notes(
-    inspections: Sequence[Inspection], again: int, gear: Gear, groups: Sequence[str]
-) -> Iterator[str]:
-    """What a diagnosis uses beyond the known columns, and what it cannot use: duplicate
-    inspections, unmeasured joints.
-    """
-    if groups:
-        yield f"rows are also compared by {', '.join(groups)}"
+def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:
+    """What a diagnosis cannot use: duplicate inspections, unmeasured joints."""
     if again:
         yield f"duplicate inspections count once; rows left out: {again}"
     unread = [

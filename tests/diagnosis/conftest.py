@@ -18,6 +18,7 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies, Gear
 from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.misfit.covariance import NoiseModel
 
 Array = NDArray[np.float64]
 Shift = Callable[[DiagnosisTable, Array], Array]
@@ -73,6 +74,19 @@ def fleet(
     return replace(
         table, readings_in=measured[:, None] + common + rng.normal(0.0, noise_in / 2, (rows, 2))
     )
+
+
+def covariance_of(noise: NoiseModel, ratio: float) -> Array:
+    """V of Eq. M2 written out, row by row, with one ratio of the scatter between tails."""
+    gear = noise.gears[:, None] == noise.gears
+    tail = noise.tails[:, None] == noise.tails
+    whole = np.diag(noise.relative**2) + noise.loadings @ noise.loadings.T
+    whole += noise.gear_ratio**2 * gear + ratio**2 * tail
+    if noise.of_gear is not None:
+        whole += np.outer(noise.of_gear, noise.of_gear) * gear
+    for own in () if noise.of_tail is None else noise.of_tail.T:
+        whole += np.outer(own, own) * tail
+    return np.asarray(whole)
 
 
 def scene_of(model: LinkageModel, table: DiagnosisTable, where: Discrepancies) -> Scene:

@@ -32,6 +32,8 @@ NEEDS = {
     "rigging_offset": ("tail_no",),
     "date_step": ("day",),
     "gauge_bias": ("gauge_id",),
+    "gear_scale": ("tail_no",),
+    "gauge_scale": ("gauge_id",),
     "technician_bias": ("technician_id",),
     "modification": (),
     "side_difference": ("side",),

@@ -436,7 +436,7 @@ def test_a_linkage_that_does_not_close_with_what_was_read_is_not_the_gear_s(gear
     assert 0 < sum(closing) < len(others)
     counts = Counter(b.columns.shape[1] for b in blocks)
     assert counts == {10 + sum(closing): len(blocks) - sum(closing), 11: sum(closing)}
-    assert all(np.isfinite(b.effects_in).all() for b in blocks)
+    assert all(np.isfinite(b.columns @ np.linalg.cholesky(b.covariance)).all() for b in blocks)
 
 
 def test_a_member_of_the_ensemble_is_a_linkage_of_its_own(gear: Gear) -> None:
@@ -444,7 +444,7 @@ def test_a_member_of_the_ensemble_is_a_linkage_of_its_own(gear: Gear) -> None:
     (other,) = gear.ensemble_models[1:2]
     *_between, member = OtherGeometry().blocks(scene, [other])
     moved = worst_case(other, scene.clearance_in).over_in - scene.over_in
-    effects = member.effects_in
+    effects = member.columns @ np.linalg.cholesky(member.covariance)
     share = np.linalg.lstsq(effects, moved, rcond=None)[0]
     assert effects @ share == pytest.approx(moved, abs=1e-9)
     assert np.linalg.norm(share) == pytest.approx(1.0, rel=1e-2)

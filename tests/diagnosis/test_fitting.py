@@ -14,7 +14,7 @@ from mlg_troubleshoot.misfit.columns import EffectColumns
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.fitting import blocks_of, fit, shrunk
 
-from .conftest import Array
+from .conftest import Array, covariance_of
 
 RNG = np.random.default_rng(5)
 N = 60
@@ -41,17 +41,12 @@ NOISES = (
 @pytest.fixture(params=[0, 100_000], ids=["large", "small"], autouse=True)
 def size_of_table(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each fact holds of tables that are treated as large and as small."""
-    monkeypatch.setattr("mlg_troubleshoot.misfit.covariance._SMALL", request.param)
+    monkeypatch.setattr("mlg_troubleshoot.misfit.columns._LARGE", request.param)
 
 
 def dense(ratio: float, noise: NoiseModel = NOISE) -> Array:
     """The covariance written out."""
-    alike = noise.gears[:, None] == noise.gears
-    whole = np.diag(noise.relative**2) + noise.loadings @ noise.loadings.T
-    whole += noise.gear_ratio**2 * alike + ratio**2 * (noise.tails[:, None] == noise.tails)
-    if noise.of_gear is not None:
-        whole += alike * np.outer(noise.of_gear, noise.of_gear)
-    return np.asarray(whole)
+    return covariance_of(noise, ratio)
 
 
 @pytest.mark.parametrize("noise", NOISES)
@@ -119,8 +114,7 @@ def test_what_is_known_beforehand_shrinks_a_fit_as_bayes_says() -> None:
 def test_effects_of_unknown_size_explain_what_is_expected_of_them_given_the_data() -> None:
     effects, data = 0.6 * RNG.standard_normal((N, 2)), RNG.standard_normal(N)
     wide = replace(NOISE, scale_in=1.5).with_effects(effects)
-    low = wide.factors(wide.tail_ratios[-1])
-    whole = 1.5**2 * (np.diag(wide.relative**2) + low @ low.T)
+    whole = 1.5**2 * covariance_of(wide, wide.tail_ratios[-1])
     assert wide.share_of(effects, data) == pytest.approx(
         effects @ effects.T @ np.linalg.solve(whole, data)
     )
@@ -135,7 +129,7 @@ def gained(predicted: Array, misfit: Array, column: Array, tails: np.ndarray) ->
     table = DiagnosisTable(
         none[:, None], none[:, None], names, np.arange(n), none + 0.03, none, {}, {"tail_no": tail}
     )
-    return measure_gain(noise, column[:, None], misfit, predicted, table)
+    return measure_gain(noise, column[:, None], misfit, predicted, predicted, table)
 
 
 def test_decisions_after_are_those_of_the_extended_prediction_in_both_senses() -> None:

@@ -104,11 +104,13 @@ def test_a_column_with_many_values_does_not_group_the_rows(gear: Gear) -> None:
             Side.LH,
             Convention.RADIAL,
             {3: 0.002},
-            carried={"mod_status": "PRE", "squawk": f"note {k}"},
+            carried={"mod_status": ("PRE", "POST")[k % 2], "squawk": f"note {k}", "base": "LHR"},
         )
         for k in range(9)
     ]
-    assert table_from_inspections(rows, gear).own_factors == ("mod_status",)
+    table = table_from_inspections(rows, gear)
+    assert table.own_factors == ("mod_status",)
+    assert table.left_out == (("base", "the same in all rows"), ("squawk", "no value repeats"))
 
 
 def test_the_report_draws_the_residuals_against_every_column(tmp_path: Path) -> None:

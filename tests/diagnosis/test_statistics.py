@@ -131,22 +131,6 @@ def test_directions_have_the_mean_and_variance_of_the_cosine_of_their_angles(
     assert covariance[0, 1] == pytest.approx((1.0 - mean) ** 2, abs=1e-3)
 
 
-def test_a_skewed_prior_counts_the_mean_over_what_it_draws() -> None:
-    rng, covariance = np.random.default_rng(2), np.array([[0.3, 0.1], [0.1, 0.2]])
-    changes = np.cos(np.radians(45.0) * rng.standard_normal(1000)) - 1.0
-    block = Block(LoadDirections(), (3, 5), np.ones((4, 2)), covariance, 0.0, changes=changes)
-    # The first joint is known less well than the second.
-    along, square = np.array([-7.0, -150.0]), np.array([[40.0, 10.0], [10.0, 300.0]])
-    skewed = np.stack(np.meshgrid(changes, changes), axis=-1).reshape(-1, 2)
-    plain = rng.multivariate_normal(np.zeros(2), covariance, 400_000)
-    mean = [
-        np.mean(np.exp(x @ along - 0.5 * np.einsum("ij,ij->i", x @ square, x)))
-        for x in (skewed, plain)
-    ]
-    assert block.skew(along, square) == pytest.approx(float(np.log(mean[0] / mean[1])), abs=0.05)
-    assert replace(block, changes=None).skew(along, square) == 0.0
-
-
 def test_factors_of_all_joints_have_intervals_of_95_percent() -> None:
     block = Block(OtherGeometry(), (3, 5), np.ones((4, 2)), np.eye(2), 0.0)
     setting = block.candidate(np.array([0.1, -0.2]), np.diag([0.04, 0.01])).setting

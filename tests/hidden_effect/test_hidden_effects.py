@@ -141,7 +141,7 @@ def test_nothing_is_found_where_nothing_is_wrong(null: str) -> None:
 
 @pytest.mark.parametrize("null", NULLS)
 def test_nothing_found_comes_with_what_would_have_been_found(null: str) -> None:
-    assert 0.0 < case(null).diagnosis.smallest_rms_in < 0.004
+    assert 0.0 < case(null).diagnosis.detectable[0][1] < 0.004
 
 
 @pytest.mark.parametrize("effect", OFF_CATALOGUE)

@@ -126,8 +126,3 @@ def test_the_open_set_is_the_fewest_names_of_which_one_acts_as_surely_as_a_name(
 def test_the_explanation_that_is_shown_has_all_that_is_said() -> None:
     sets = {(B,): 0.3, (A, B): 0.26, (A, C): 0.44}
     assert concluded(sets).reported((A, B)).members == (0, 1)
-
-
-def test_a_rival_ten_times_likelier_beforehand_takes_as_much_of_the_probability() -> None:
-    found = concluded({(A,): 0.9, (B,): 0.1})
-    assert found.ten_times == pytest.approx({B: 0.9 / 1.9})

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from mlg_troubleshoot.diagnosis import Suspect, Verdict, diagnose_simulation
+from mlg_troubleshoot.diagnosis import (
+    SimulationDiagnosis,
+    Suspect,
+    Verdict,
+    diagnose_simulation,
+)
 from mlg_troubleshoot.errors import TroubleshootError
+from mlg_troubleshoot.misfit.runner import Predict
 from tests.simulation.rigs import RIGS, Rig, readings, slider_crank, thermal, two_link
 
 
@@ -381,3 +388,59 @@ def test_what_a_simulation_returns_is_copied() -> None:
     found = diagnose_simulation(predict, RAMP / 8.0 + noise, [Suspect("stiffness", 10.0, 0.5)])
     assert [cause.name for cause in found.named] == ["stiffness"]
     assert found.notes == ()
+
+
+FORCE = np.linspace(1.0, 20.0, 40)
+SCATTER = 0.02 * np.random.default_rng(1).standard_normal(40)
+HOURS = pd.date_range("2024", periods=40, freq="h")
+
+
+def sprung(p: Mapping[str, float]) -> np.ndarray:
+    return FORCE / p["stiffness"]
+
+
+def of_spring(stiffness: float = 8.0, **options: object) -> SimulationDiagnosis:
+    read = options.pop("measured", FORCE / stiffness + SCATTER)
+    return diagnose_simulation(sprung, read, [Suspect("stiffness", 10.0, 0.5)], **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("stiffness", [10.0, 8.0])
+def test_a_result_shows_its_suspects_and_its_verdict_whatever_it_is(stiffness: float) -> None:
+    found = of_spring(stiffness)
+    frame = found.to_frame()
+    assert frame["name"].tolist() == ["stiffness"]
+    assert frame.loc[0, "low"] < stiffness < frame.loc[0, "high"]
+    assert frame.loc[0, "named"] == (found.verdict is Verdict.NAMED) == (stiffness == 8.0)
+    assert "stiffness" in found._repr_html_()
+    assert str(found).startswith(f"{found.verdict}: nothing is wrong with probability")
+    assert ("cause: stiffness = 8.0" in found.summary()) == (stiffness == 8.0)
+
+
+def test_masked_readings_are_not_read() -> None:
+    read = FORCE / 8.0 + SCATTER
+    blank = np.arange(40) % 5 == 0
+    masked = np.ma.masked_array(np.where(blank, 99.0, read), blank)
+    assert of_spring(measured=masked) == of_spring(measured=np.where(blank, np.nan, read))
+
+
+@pytest.mark.parametrize("zone", [None, "UTC", "Europe/Berlin"])
+def test_times_may_have_a_zone(zone: str | None) -> None:
+    here = HOURS.tz_localize("UTC").tz_convert(zone) if zone else HOURS
+    rows = np.zeros(40)
+    assert of_spring(series=rows, time=here) == of_spring(series=rows, time=np.arange(40))
+
+
+@pytest.mark.parametrize(
+    ("predict", "suspects", "says"),
+    [
+        (lambda stiffness, mass: stiffness * mass, [Suspect("mass", 1.0, 0.1)], "one mapping"),
+        (lambda **p: FORCE * p["mass"], [Suspect("mass", 1.0, 0.1)], "one mapping"),
+        (sprung, [("stiffness", 10.0, 0.5)], "is not a Suspect"),
+        (sprung, {"stiffness": 10.0}, "is not a Suspect"),
+    ],
+)
+def test_another_form_of_simulation_or_suspects_is_refused_with_the_form_to_use(
+    predict: Predict, suspects: list[Suspect], says: str
+) -> None:
+    with pytest.raises(TroubleshootError, match=says):
+        diagnose_simulation(predict, FORCE, suspects)

@@ -142,6 +142,8 @@ class Cause(ABC):
     """How large the parameter plausibly is where the cause acts, as one standard deviation; None if
     nothing is known but how far a row scatters.
     """
+    often: ClassVar[float] = 1.0
+    """How often it is what is wrong, over how often any other cause is, whatever looks like it."""
     sign: ClassVar[int] = 0
     """+1 or −1 where physics allows one sign of the parameter only, else 0."""
     exact: ClassVar[float | None] = None

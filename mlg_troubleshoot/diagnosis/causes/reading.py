@@ -66,6 +66,11 @@ def _change_days(days: Array, least: int, most: int, before: int = 2) -> list[fl
     return [*map(float, days)]
 
 
+def _of_gear(candidate: Candidate) -> dict[str, str]:
+    side = candidate.setting.get("side")
+    return {"tail_no": candidate.setting["tail"]} | ({"side": side} if side else {})
+
+
 class RowShift(Cause):
     """An offset of some rows, of each a share of it."""
 
@@ -87,10 +92,14 @@ class RowShift(Cause):
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Shift each row by its share."""
+        return offset(scene, self.acts(scene, candidate), value)
+
+    def acts(self, scene: Scene, candidate: Candidate) -> Array:
+        """Share of the effect in each row, shape (n,). [1]"""
         where = np.nan_to_num(np.ones(len(scene.table)) * self.share(scene, candidate.setting))
         for column, text in self.rows(candidate).items():
             where = where * (scene.table.texts(column) == text)
-        return offset(scene, where, value)
+        return np.asarray(where)
 
 
 class _Level(RowShift):
@@ -122,6 +131,61 @@ class TechnicianBias(_Level):
     sentence = "Readings by {target} are shifted"
     inspect = "How that technician seats and zeroes the gauge"
     separates = "one gear measured by this technician and by another with the same gauge on one day"
+
+
+class _RowScale(RowShift):
+    """Some rows displace in proportion too much: rarer than a zero that slipped."""
+
+    often = 0.1
+
+    parameter = "scale_change"
+    trial = 0.05
+    plausible_values = (-0.9, 2.0)
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Scale the displacement of these rows."""
+        return Adjustment(scene.clearance_in, rate_factor=1.0 + value * self.acts(scene, candidate))
+
+
+class GaugeScale(_RowScale, _Level):
+    """One gauge shows more, or less, in proportion to what it reads."""
+
+    name = "gauge_scale"
+    needs = ("gauge_id",)
+    sentence = "Readings with {target} are too large or too small in proportion"
+    inspect = "Travel of that gauge against gauge blocks over its whole range"
+    separates = (
+        "a worn gear and a new one measured with this gauge and with another by one technician"
+    )
+    # A dial is off by some hundredths. [1]
+    plausible = 0.05
+
+
+class GearScale(_RowScale):
+    """The plunger of one gear moves more, or less, in proportion: a bent link, its linkage."""
+
+    name = "gear_scale"
+    needs = ("tail_no",)
+    sentence = "The plunger of {target} moves in proportion too far or too little"
+    inspect = "Links of that gear for bending; its linkage against the drawing"
+    separates = "the plunger of that gear read before and after a joint is restored"
+    # A bent link moves the plunger by some tenths more or less. [1]
+    plausible = 0.2
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield each single gear of which the joints that count were read."""
+        table = scene.table
+        for gear in levels(table.gears):
+            rows = table.gears == gear
+            if share_never_read(scene, rows) <= MOST_UNREAD:
+                setting = {"tail": str(table.tails[rows][0])}
+                if gear != setting["tail"]:
+                    setting["side"] = str(table.factors["side"][rows][0])
+                yield Candidate(self, f"tail {gear}", setting)
+
+    def rows(self, candidate: Candidate) -> Mapping[str, str]:
+        """Those of that gear."""
+        return _of_gear(candidate)
 
 
 class Modification(RowShift):
@@ -288,8 +352,7 @@ class RiggingOffset(RowShift):
 
     def rows(self, candidate: Candidate) -> Mapping[str, str]:
         """Those of that aircraft or gear."""
-        side = candidate.setting.get("side")
-        return {"tail_no": candidate.setting["tail"]} | ({"side": side} if side else {})
+        return _of_gear(candidate)
 
     def family(self, target: str | None) -> str | None:
         """Gather an aircraft and its single gears under one name."""

@@ -3,8 +3,7 @@ than the drawn one.
 
 Ten factors cannot be estimated separately from 200 rows. A prior with a covariance shrinks them as
 far as the data leave them open. The marginal likelihood then says whether all ten are worth it
-compared with one cause, or one scale for all. The prior of directions is skewed, as directions are:
-of joints near their worst direction, which lose little, and far from it.
+compared with one cause, or one scale for all.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import ndtri
 
-from mlg_troubleshoot.arrays import Array, log_sum
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import worst_of_sense
@@ -38,10 +37,8 @@ ALONE = 0.03
 # And in addition to the way from the drawn one to a member of the ensemble, supposed: a third of
 # that. [1]
 NEAR = ALONE / 3
-# Changes of one joint that stand for all; rounds that settle the evidence to 0.02, but of a spread
-# far behind another.
+# Changes of one joint that stand for all.
 _LIKELY = 250
-_ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -57,12 +54,11 @@ class Block:
     columns : ndarray, shape (n, k)
         For each joint, the effect of changing its factor by one; then further effects. [in]
     covariance : ndarray, shape (k, k)
-        Covariance of the changes of the factors, whose mean is zero. [1]
+        Second moments of the changes of the factors. [1]
     share : float
         Probability of this block among the blocks of its cause. [1]
-    changes : ndarray, shape (m,), optional
-        Equally likely changes of a joint. They are skewed: most joints lose little, a few lose
-        much. [1]
+    mean : float
+        Mean of the changes. [1]
     """
 
     cause: JointFactors
@@ -70,29 +66,12 @@ class Block:
     columns: Array
     covariance: Array
     share: float
-    changes: Array | None = None
-
-    def skew(self, along: Array, square: Array) -> float:
-        """Log-likelihood by which the skewed prior beats the normal one, for exp(aᵀx − xᵀQx/2) of
-        changes x.
-        """
-        if self.changes is None or not len(along):
-            return 0.0
-        inner = np.eye(len(along)) + self.covariance @ square
-        normal = (
-            along @ np.linalg.solve(inner, self.covariance @ along) - np.linalg.slogdet(inner)[1]
-        )
-        return _evidence(along, square, self.changes) - 0.5 * float(normal)
+    mean: float = 0.0
 
     @property
     def root(self) -> Array:
-        """Root of the covariance, shape (k, k). [1]"""
-        return np.asarray(np.linalg.cholesky(self.covariance), float)
-
-    @property
-    def effects_in(self) -> Array:
-        """Independent effects of one standard deviation each, shape (n, k). [in]"""
-        return self.columns @ self.root
+        """Root of the covariance about the mean, shape (k, k). [1]"""
+        return np.asarray(np.linalg.cholesky(self.covariance - self.mean**2), float)
 
     def candidate(self, change: Array, covariance: Array) -> Candidate:
         """The cause with fitted factors, their 95 % intervals, and the joints that only count
@@ -201,11 +180,10 @@ class LoadDirections(JointFactors):
         return [np.mean(change) ** 2 * alike + np.var(change) * own for change in _changes()]
 
     def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
-        """The same with the changes of normal angles, which are skewed."""
-        return [
-            replace(b, changes=c)
-            for b, c in zip(super().blocks(scene, ensemble), _changes(), strict=True)
-        ]
+        """All spreads of angles, each with the mean of what it takes off."""
+        found = super().blocks(scene, ensemble)
+        means = (float(np.mean(change)) for change in _changes())
+        return [replace(block, mean=mean) for block, mean in zip(found, means, strict=True)]
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Let each clearance act by its factor along its worst direction."""
@@ -289,43 +267,6 @@ def _changes() -> list[Array]:
     return [
         np.cos(np.pi * half if s >= np.pi else s * ndtri(0.5 + 0.5 * half)) - 1.0 for s in spreads
     ]
-
-
-def _evidence(along: Array, square: Array, changes: Array) -> float:
-    """Logarithm of the mean of exp(aᵀx − xᵀQx/2), each of x one of some equally likely changes.
-
-    By expectation propagation (T. P. Minka, "Expectation Propagation for approximate Bayesian
-    inference", 2001): each joint's changes are taken as normal, with the moments that they have
-    where the other joints are as they are.
-    """
-    precise, pull = (
-        np.full(len(along), size / np.var(changes)) for size in (1.0, np.mean(changes))
-    )
-    for _ in range(_ROUNDS):
-        inner = square + np.diag(precise)
-        spread = np.linalg.inv(inner)
-        mean = spread @ (along + pull)
-        own = np.diag(spread)
-        others = np.maximum(1.0 / own - precise, 0.0)
-        push = mean / own - pull
-        weight = push[:, None] * changes - 0.5 * others[:, None] * changes**2
-        size = log_sum(weight.T)[:, None]
-        chance = np.exp(weight - size)
-        at = chance @ changes
-        variance = np.maximum(chance @ changes**2 - at**2, 1e-8)
-        both = others + precise
-        level = float(
-            np.sum(
-                size[:, 0]
-                - np.log(len(changes))
-                + 0.5 * np.log(both)
-                - (push + pull) ** 2 / (2.0 * both)
-            )
-        )
-        level += 0.5 * float((along + pull) @ mean - np.linalg.slogdet(inner)[1])
-        precise = 0.3 * precise + 0.7 * np.maximum(1.0 / variance - others, 1e-4)
-        pull = 0.3 * pull + 0.7 * (at / variance - push)
-    return level
 
 
 def _apart(model: LinkageModel, ensemble: Sequence[LinkageModel]) -> Array:
