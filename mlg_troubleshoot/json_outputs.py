@@ -516,28 +516,31 @@ class FleetOutput(TypedDict):
 
 
 class LifeEvent(TypedDict):
-    """One record of a gear, in the order of the chain; further keys by its kind."""
+    """One line of the log book of a gear, in the order of time. value_in: of one joint, radial; of
+    the plunger, signed; of a verdict, the worst case. counts: false where it was voided.
+    """
 
-    kind: Literal["inspection", "repair", "rerig", "correction", "void", "outcome"]
-    record_id: str | None
+    kind: Literal[
+        "FAILED",
+        "RETRACTED",
+        "plunger",
+        "reading",
+        "restored",
+        "rigging",
+        "finding",
+        "verdict",
+        "correction",
+        "void",
+    ]
+    text: str
     date: str | None
+    joints: list[JointNumber]
+    value_in: float | None
+    verdict: Verdict | None
     gear_landings: float | None
+    record_id: str | None
     hash: Sha256
-    verdict: NotRequired[Verdict | None]
-    predicted_displacement_in: NotRequired[float | None]
-    margin_in: NotRequired[float | None]
-    counts: NotRequired[bool]
-    supersedes: NotRequired[Sha256 | None]
-    clearance_in: NotRequired[dict[str, float]]
-    at: NotRequired[str]
-    stated_by: NotRequired[str]
-    work_order: NotRequired[str | None]
-    joints: NotRequired[list[JointNumber]]
-    voids: NotRequired[Sha256]
-    why: NotRequired[str]
-    of: NotRequired[Sha256]
-    found: NotRequired[str]
-    joint: NotRequired[JointNumber | None]
+    counts: bool
 
 
 class LifeJoint(TypedDict):

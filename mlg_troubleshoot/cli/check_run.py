@@ -299,12 +299,6 @@ class Run:
             output.say(f"Annotated workbook: {out}")
 
     def _write_reports(self, result: task.CheckResult, directory: Path, unit: LengthUnit) -> None:
-        before = []
-        if self._place is not None:
-            from mlg_troubleshoot.life.looking_back import seen_before
-
-            table = load_index_table(result.gear)
-            before = seen_before(result.judgements, self._place, result.gear, table)
         formats = tuple(
             str(f)
             for f in self._wanted.formats or (options.ReportFormat.HTML, options.ReportFormat.PDF)
@@ -319,7 +313,6 @@ class Run:
                 self._wanted.page.value,
                 on_written=progress,
                 unit=unit,
-                before=before,
                 store=self._place,
                 # The prompts write the report of one inspection anew after each change.
                 replace_files=self._asks or self._wanted.force,

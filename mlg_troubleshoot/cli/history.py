@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import ExitCode, UsageError
-from mlg_troubleshoot.units import Length, LengthUnit
+from mlg_troubleshoot.units import LengthUnit, said_in
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
@@ -202,29 +202,27 @@ def show_warnings(console: output.DataConsole, found: Iterable[GearLife | FleetL
 
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
     from mlg_troubleshoot.life.landings_left import outlook_sentence
+    from mlg_troubleshoot.life.logbook import log_of, shortened
     from mlg_troubleshoot.reporting.life_json import life_as_json
 
     console = output.console(unit=unit)
-    values = life_as_json(life, ahead, gear)
     console.print(output.text(life.name, "bold"))
-    events = [
-        (
-            event["date"] or "no date",
-            _count(event["gear_landings"]),
-            event["record_id"] or event["hash"][:10],
-            event["hash"][:10],
-            _what(event, unit),
-        )
-        for event in values["events"]
-    ]
-    headings = ("date", "landings>", "record", "hash", "what")
-    output.print_table(console, headings, events, ("hash", "record"))
+    events = []
+    before: tuple[str, ...] = ()
+    for line in shortened(log_of(life, gear)):
+        # What was found together bears its day once.
+        visit = line.date or "no date", _count(line.gear_landings), line.hash[:10]
+        what = f"{said_in(line.full, unit)}{'' if line.counts else ' (void)'}"
+        events.append((*([""] * len(visit) if visit == before else visit), what))
+        before = visit
+    headings = ("date", "landings>", "hash", "what")
+    output.print_table(console, headings, events, ("hash",))
     show_warnings(console, [life])
     for note in life.notes:
         console.print(note)
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
-    _show_joints(console, life, values["joints"], ahead, gear)
+    _show_joints(console, life, life_as_json(life, ahead, gear)["joints"], ahead, gear)
 
 
 def _show_joints(
@@ -274,28 +272,6 @@ def _show_joints(
         console.print(
             f"Read, but without landings (gear_landings): {joint_list(placeless)}; no forecast."
         )
-
-
-def _what(event: dict[str, Any], unit: LengthUnit) -> str:
-    from mlg_troubleshoot.decision.sentences import joint_list
-
-    match event["kind"]:
-        case "repair":
-            return f"restored {joint_list(event['joints'])}"
-        case "void":
-            return f"void: {event['why']}"
-        case "outcome":
-            joint = "" if event["joint"] is None else f" (#{event['joint']})"
-            return f"found: {event['found']}{joint}"
-        case "inspection" if not event["counts"]:
-            return "inspection (corrected or void)"
-        case "inspection" | "correction" if event.get("verdict"):
-            found = event["predicted_displacement_in"]
-            # It is zero only where no joint has play, or none was read.
-            worst = f", worst case {Length(found).said_in(unit)}" if found else ""
-            return f"{event['kind']}: {event['verdict'].replace('_', ' ')}{worst}"
-        case kind:
-            return "re-rigged" if kind == "rerig" else str(kind)
 
 
 def _say_added(place: Store, what: str, record: Record) -> None:

@@ -79,7 +79,12 @@ def _judge_part(
 ) -> tuple[Judgement, ...]:
     valid = [row for row in part if isinstance(row, Inspection)]
     # Gears of which the same is known are judged once; to an extension it matters whose they are.
-    known = [n if extension is not None else _known_of(row) for n, row in enumerate(valid)]
+    known: list[object] = [
+        n
+        if extension is not None
+        else tuple(tuple(v.items()) if isinstance(v, Mapping) else v for v in _KNOWN(row))
+        for n, row in enumerate(valid)
+    ]
     alike = dict(zip(known, valid, strict=True))
     # Products of this size take twice as long where they wait for other threads.
     with threadpool_limits(1, "blas"):
@@ -107,11 +112,6 @@ def _judge_part(
 # What a judgement without an extension does not depend on.
 _IDENTITY = {"record_id", "tail_no", "side", "source", "carried", "other_columns"}
 _KNOWN = attrgetter(*(f.name for f in fields(Inspection) if f.name not in _IDENTITY))
-
-
-def _known_of(row: Inspection) -> object:
-    """All that is known of a gear but whose it is."""
-    return tuple(tuple(v.items()) if isinstance(v, Mapping) else v for v in _KNOWN(row))
 
 
 def _with_consequences(a: Assessment, cases: Cases, table: IndexTable) -> Assessment:

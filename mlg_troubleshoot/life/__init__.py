@@ -9,6 +9,7 @@ __all__ = [
     "forecast",
     "judged",
     "landings_left",
+    "logbook",
     "looking_back",
     "state",
     "unrecorded_work",

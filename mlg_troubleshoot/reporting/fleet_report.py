@@ -15,7 +15,7 @@ from mlg_troubleshoot.life.landings_left import (
     outlook_sentence,
     work_sentence,
 )
-from mlg_troubleshoot.life.looking_back import side_by_side
+from mlg_troubleshoot.life.logbook import as_found_as_left, log_of, shortened
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture, wear_figure
 from mlg_troubleshoot.reporting.formats import Lengths
@@ -74,10 +74,12 @@ def life_document(
     """Make one gear's life: its last inspections side by side, what was restored between, landings
     left.
     """
+    log = log_of(life, gear)
     shown = {
         "life": life_as_json(life, ahead, gear),
+        "log": list(shortened(log)),
+        "found_left": as_found_as_left(log),
         "outlook": outlook_sentence(life, ahead, gear),
-        "steps": side_by_side(life),
         "figure": wear_figure(life, ahead, gear, Lengths(unit)),
     }
     context = {**head(f"Life of {life.name}", life.name, gear, provenance, Lengths(unit)), **shown}

@@ -41,7 +41,7 @@ from mlg_troubleshoot.reporting.schematic import (
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.life.looking_back import PastInspection
+    from mlg_troubleshoot.life.logbook import AsFoundAsLeft
 
 _SIDES = {Side.LH: "left-hand main landing gear", Side.RH: "right-hand main landing gear"}
 _WARNINGS_ON_FRONT = 3
@@ -55,10 +55,10 @@ def inspection_document(
     provenance: ReportProvenance,
     problems: Iterable[Problem] = (),
     unit: LengthUnit = LengthUnit.INCH,
-    steps: Sequence[PastInspection] = (),
+    found_left: Sequence[AsFoundAsLeft] = (),
 ) -> Document:
-    """Make the document of one inspection; `steps` are the gear's inspections up to this one, side
-    by side.
+    """Make the document of one inspection; `found_left`: what was found and left at the last repair
+    of the gear.
     """
     lengths = Lengths(unit)
     if isinstance(judgement, Rejected):
@@ -76,7 +76,7 @@ def inspection_document(
         return Document("rejected.html.j2", context, stem)
     inspection = judgement.inspection
     stem = safe_stem(inspection.tail_no, inspection.side.value, inspection.record_id)
-    context = _inspection(judgement, gear, provenance, lengths) | {"steps": steps}
+    context = _inspection(judgement, gear, provenance, lengths) | {"found_left": found_left}
     return Document("inspection.html.j2", context, stem)
 
 

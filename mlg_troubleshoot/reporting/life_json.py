@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.json_outputs import FleetGear, FleetOutput, LifeOutput
+from mlg_troubleshoot.json_outputs import FleetGear, FleetOutput, LifeEvent, LifeOutput
 from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.landings_left import FleetLine, fleet_lines, work_sentence
+from mlg_troubleshoot.life.logbook import log_of
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.reporting.json_form import filled, written
-from mlg_troubleshoot.store import Record, RecordKind
 
 
 def fleet_as_json(
@@ -49,22 +50,17 @@ def fleet_table(gears: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[lis
 
 
 def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
-    """One gear's events in the order of the chain, and each joint's readings since it was last
+    """One gear's log book in the order of time, and each joint's readings since it was last
     restored.
     """
-    counting = {kept.record.digest for kept in life.inspections}
     tail_no, side = life.key
+    log = [replace(line, text=line.full) for line in log_of(life, gear)]
     return written(
         LifeOutput,
         ahead,
         tail_no=tail_no,
         side=side,
-        events=[
-            _event(record, life, counts=record.digest in counting)
-            for record in life.records
-            # What older programs kept of a verdict.
-            if record.kind is not RecordKind.ASSESSMENT
-        ],
+        events=[filled(LifeEvent, line) for line in log],
         joints=[
             {
                 "joint": number,
@@ -77,26 +73,3 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
         notes=life.notes,
         warnings=life.warnings,
     )
-
-
-def _event(record: Record, life: GearLife, *, counts: bool) -> dict[str, Any]:
-    body = record.body
-    inspection = body.get("inspection", {})
-    event = {
-        "kind": record.kind.value,
-        "record_id": record.record_id or None,
-        "date": record.day or None,
-        "gear_landings": body.get("landings", inspection.get("gear_landings")),
-        "hash": record.digest,
-    }
-    if record.kind in (RecordKind.INSPECTION, RecordKind.CORRECTION):
-        event |= {"counts": counts, "supersedes": body.get("supersedes")}
-        said = life.judged.get(record.digest)
-        if said is not None:
-            event |= {
-                "verdict": said.verdict.value,
-                "predicted_displacement_in": said.predicted_displacement_in,
-                "margin_in": said.margin_in,
-            }
-        return event | {"clearance_in": inspection.get("clearance_in", {})}
-    return event | {name: value for name, value in body.items() if name != "landings"}

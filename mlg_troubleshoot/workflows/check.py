@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from mlg_troubleshoot.arrays import Array
-    from mlg_troubleshoot.life.looking_back import PastInspection
+    from mlg_troubleshoot.life.logbook import AsFoundAsLeft
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.records.frames import Frame
     from mlg_troubleshoot.records.read import Source
@@ -526,7 +526,6 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
     on_written: Progress | None = None,
     *,
     unit: LengthUnit | str = LengthUnit.INCH,
-    before: Sequence[Sequence[PastInspection]] = (),
     store: Store | None = None,
     replace_files: bool = True,
 ) -> tuple[WrittenReport, ...]:
@@ -549,8 +548,6 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
         Called with reports written and their number.
     unit : LengthUnit or str
         The unit that its readers use.
-    before : sequence, optional
-        What each gear was like before, as `looking_back.seen_before` says it.
     store : Store, optional
         Where the inspections were kept: each report states its record and the head of the log.
     replace_files : bool
@@ -585,8 +582,8 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
     witness = None if store is None else _witness(result, store, extension)
     made = provenance_of(gear, result.inputs_sha256, extension=extension, witness=witness)
     alone = len(judgements) == 1
-    steps = before or [()] * len(judgements)
     places = [k for k, j in enumerate(judgements) if alone or isinstance(j, Assessment)]
+    found_left = _found_and_left(result, store)
     documents = (
         inspection_document(
             judgements[k],
@@ -594,7 +591,7 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
             made.about(judgements[k].row.tail_no, judgements[k].row.side),
             problems,
             unit,
-            steps[k],
+            found_left.get(k, ()),
         )
         for k in places
     )
@@ -617,6 +614,30 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
     summary = batch_document(judgements, problems, gear, made, result.notes, links, unit)
     whole = publish(summary, directory, formats=formats, page=page, replace_files=replace_files)
     return (whole, *reports)
+
+
+def _found_and_left(result: CheckResult, store: Store | None) -> dict[int, list[AsFoundAsLeft]]:
+    """What was found and left at the last repair of each gear that was repaired, up to the day of
+    its row, by the place of the row.
+    """
+    rows = {n: a.row for n, a in enumerate(result.judgements) if isinstance(a, Assessment)}
+    if store is None and not any(row.is_repaired for row in rows.values()):
+        return {}
+    from mlg_troubleshoot.life import logbook
+    from mlg_troubleshoot.life.folding import lives_of
+
+    gear = result.gear
+    if store is not None:
+        lives = lives_of(store, {key_of(row) for row in rows.values()})
+        logs = {key: logbook.log_of(life, gear) for key, life in lives.items()}
+    else:
+        logs = {}
+        for row in rows.values():
+            logs.setdefault(key_of(row), []).extend(logbook.visit_lines(row, gear))
+    return {
+        n: logbook.as_found_as_left(logbook.up_to(logs.get(key_of(row), ()), row))
+        for n, row in rows.items()
+    }
 
 
 def _witness(result: CheckResult, store: Store, extension: str | None) -> Witness:

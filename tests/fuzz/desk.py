@@ -72,7 +72,6 @@ LIFE = (
         STORE,
     ),
     ("history", "rerig", "N1", "LH", "--date", "2026-03-07", "--store", STORE),
-    ("history", "outcome", "R1", "--found", "worn bearing", "--joint", "3", "--store", STORE),
     ("history", "correct", "R2", "right.csv", "--store", STORE),
     ("history", "void", "R3", "--why", "wrong gear", "--store", STORE),
     ("history", "export", "old-chain.jsonl", "--store", STORE),

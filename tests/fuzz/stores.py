@@ -43,7 +43,6 @@ ADDS = (
     ["history", "import", "chain.jsonl"],
     ["history", "repair", "N1", "LH", "--joint", "5", "--date", "2026-04-01"],
     ["history", "rerig", "N1", "LH", "--date", "2026-04-01", "--landings", "2200"],
-    ["history", "outcome", "R2", "--found", "nothing"],
     ["history", "void", "R1", "--why", "wrong"],
     ["history", "correct", "R1", "in.csv"],
     ["check", "in.csv", "-q", "--keep"],

@@ -557,3 +557,33 @@ def test_a_reading_of_the_plunger_that_is_corrected_takes_the_place_of_both(
     visit(*GEAR, "y", ".0280")
     visit(*GEAR, "c", "more", "p .0400", "", "")
     assert life(store).inspections[-1].inspection.readings_in == (0.04,)
+
+
+def test_the_history_of_a_gear_reads_like_a_log_book(visit: Visit, store: SessionStore) -> None:
+    sign_off = ("", "", "", "4000", "J. Smith", "G1", "")
+    visit(*GEAR, "t", "t", "8", "11", "26", "6", "14", "done", "f p 46", *sign_off)
+    visit(*GEAR, "n 3 5", "1.5", "1")
+    visit(*GEAR, "p 12")
+    visit(*GEAR, "y", "r")
+    kept = ("--no-forecast", "--store", str(store.place), "--show", "thou")
+    by = "total play, measured by J. Smith"
+    told = mlg("history", "N1", "LH", "--json", *kept).json["events"]
+    assert [event["text"] for event in told if event["kind"] != "verdict"] == [
+        *("FAILED", "plunger +0.046 in", f"#3 26 thou (limit 15), {by}"),
+        *(f"#{n} {thou} thou, {by}" for n, thou in ((1, 8), (2, 11), (4, 6), (5, 14))),
+        *("restored #3, #5", f"#3 1.5 thou, {by}", f"#5 1 thou, {by}"),
+        *("plunger +0.012 in", "RETRACTED"),
+    ]
+    shown = mlg("history", "N1", "LH", *kept).out
+    assert "plunger +46 thou" in shown
+    assert "correct" not in shown
+
+
+def test_only_what_is_changed_by_hand_is_called_a_correction(
+    visit: Visit, store: SessionStore
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "c", "3", "2.6", "", "")
+    told = mlg("history", "N1", "LH", "--json", "--no-forecast", "--store", str(store.place)).json
+    corrections = [event["text"] for event in told["events"] if event["kind"] == "correction"]
+    assert corrections == ["correction: #3 18 thou → 2.6 thou"]

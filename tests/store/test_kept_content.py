@@ -124,7 +124,6 @@ def test_wrong_content_that_stands_in_a_store_ends_no_command_with_an_internal_e
         ("history", "N1", "LH", "--no-forecast"),
         ("history", "N1", "LH", "--no-forecast", "--json"),
         ("fleet", "--no-forecast"),
-        ("history", "outcome", "R2", "--found", "x", "--joint", "3"),
         ("history", "repair", "N1", "LH", "--joint", "3", *day),
         ("history", "export", tmp_path / "chain.jsonl"),
         ("check", places.table(tmp_path, row(tail_no="N1")), "--keep", "--report", tmp_path / "r"),
@@ -217,13 +216,12 @@ def test_every_kind_of_record_that_the_program_keeps_is_read_again(
         "805",
     )
     mlg("history", "rerig", "N123", "LH", "--date", "2025-04-02")
-    mlg("history", "outcome", "W1", "--found", "race scored", "--joint", "3")
     mlg(
         "history", "correct", "W1", places.table(tmp_path, row(record_id="W1", gear_landings="810"))
     )
     mlg("history", "void", "R2", "--why", "another aircraft")
     kept = {record.kind for record in Store(place).all()}
-    assert kept >= set(RecordKind) - {RecordKind.ASSESSMENT}
+    assert kept >= set(RecordKind) - {RecordKind.ASSESSMENT, RecordKind.OUTCOME}
     assert mlg("history", "verify").code == 0
 
 
@@ -239,7 +237,6 @@ COMMANDS: list[tuple[object, ...]] = [
     ("history", "N1", "LH", "--no-forecast"),
     ("fleet", "--no-forecast"),
     ("history", "void", "R2", "--why", "x"),
-    ("history", "outcome", "R2", "--found", "x"),
     ("history", "repair", "N1", "LH", "--joint", "3", "--date", "2026-02-01"),
 ]
 READ_WRONGLY: dict[str, tuple[str, tuple[object, ...]]] = {

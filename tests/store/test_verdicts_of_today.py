@@ -48,7 +48,7 @@ def test_a_repair_that_is_void_hides_nothing(place: Path) -> None:
     keep(place, visit("R0", "2026-01-01"))
     mlg("history", "repair", "N1", "LH", "--joint", "6", "--date", "2026-01-08")
     keep(place, visit("R1", "2026-01-05", **FAR))
-    (repair,) = (each for each in events() if each["kind"] == "repair")
+    (repair,) = (each for each in events() if each["kind"] == "restored")
     mlg("history", "void", repair["hash"], "--why", "wrong gear")
     assert line()["verdict"] == "OUTSIDE_MARGIN"
 
@@ -71,11 +71,11 @@ def test_a_corrected_date_puts_no_verdict_on_another_inspection(place: Path) -> 
     first = visit("R1", "2026-01-04", gear_landings="100")
     keep(place, first)
     keep(place, visit("R1", "2026-02-04", gear_landings="900", **FAR))
-    (wrong,) = (each for each in events() if each["date"] == "2026-01-04")
+    wrong = next(each for each in events() if each["date"] == "2026-01-04")
     moved = table(place, first | {"inspection_date": "2026-02-04", "gear_landings": "101"})
     assert mlg("history", "correct", wrong["hash"], moved).code == 0
     assert line()["verdict"] == "OUTSIDE_MARGIN"
-    said = {each["gear_landings"]: each.get("verdict") for each in events() if each.get("counts")}
+    said = {each["gear_landings"]: each["verdict"] for each in events() if each["verdict"]}
     assert said == {101.0: "WITHIN_MARGIN", 900.0: "OUTSIDE_MARGIN"}
 
 

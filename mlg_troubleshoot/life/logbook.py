@@ -1,0 +1,343 @@
+"""The log of a gear as a log book: one line per fact, in the order of time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+from itertools import groupby
+from typing import Any
+
+from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
+from mlg_troubleshoot.decision.sentences import joint_list
+from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
+from mlg_troubleshoot.life.folding import GearLife
+from mlg_troubleshoot.store import Record, RecordKind, inspection_from
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence
+
+_RERIGGED = "rigging corrected"
+_VISITS = (RecordKind.INSPECTION, RecordKind.CORRECTION)
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine:
+    """One line of a log book.
+
+    date: ISO 8601, None if it is not known. value_in: a radial clearance, the signed displacement
+    of the plunger, or the worst case of a verdict. [in] counts: false where it was voided.
+    """
+
+    kind: str
+    text: str
+    how: str = ""
+    date: str | None = None
+    joints: tuple[int, ...] = ()
+    value_in: float | None = None
+    verdict: str | None = None
+    gear_landings: float | None = None
+    record_id: str | None = None
+    hash: str = ""
+    counts: bool = True
+    is_over_limit: bool = False
+
+    @property
+    def full(self) -> str:
+        return Sentence.of("{}, {}", self.text, self.how) if self.how else self.text
+
+
+def shortened(lines: Iterable[LogLine]) -> Iterator[LogLine]:
+    """Lines with the readings of one visit that are within their limits together."""
+    for (_hash, _how, plain), same in groupby(
+        lines, lambda x: (x.hash, x.how, x.kind == "reading" and not x.is_over_limit)
+    ):
+        together = list(same)
+        if plain:
+            text = ", ".join(line.text for line in together)
+            together = [replace(together[0], text=text)]
+        yield from together
+
+
+AsFoundAsLeft = tuple[str, str, str]
+
+
+def as_found_as_left(lines: Iterable[LogLine]) -> list[AsFoundAsLeft]:
+    """Outcome, plunger and each joint before and after the last repair of a gear; nothing without
+    one. Repairs between which the gear failed or was found outside are one.
+    """
+    known = [line for line in lines if line.counts]
+    repairs = [n for n, line in enumerate(known) if _is_repair(line)]
+    if not repairs:
+        return []
+    first = repairs[-1]
+    for before in reversed(repairs[:-1]):
+        between = {line.kind for line in known[before:first]}
+        if Outcome.RETRACTED.value in between or Outcome.FAILED.value not in between:
+            break
+        first = before
+    found, left = _newest(known[:first]), _newest(known[first:])
+    restored: set[int] = set()
+    for line in known[first:]:
+        if _is_repair(line):
+            restored.update(line.joints)
+        elif line.kind == "reading" and line.joints[0] not in restored:
+            found.setdefault(line.joints[0], _value(line))
+    joints = {n for each in (found, left) for n in each if isinstance(n, int)}
+    return [
+        ("Outcome", found.get("outcome", "not tried"), left.get("outcome", "not tried")),
+        ("Plunger", found.get("plunger", "not read"), left.get("plunger", "not read")),
+        *(
+            (
+                f"#{n}",
+                found.get(n, "not read"),
+                left.get(n, "restored, not read" if n in restored else "as found"),
+            )
+            for n in sorted(joints | restored)
+        ),
+    ]
+
+
+def _is_repair(line: LogLine) -> bool:
+    return line.kind == "restored" or line.text == _RERIGGED
+
+
+def _value(line: LogLine) -> str:
+    return line.text.partition(" ")[2]
+
+
+def _newest(lines: Iterable[LogLine]) -> dict[str | int, str]:
+    """What was last said of the outcome, the plunger and each joint."""
+    found: dict[str | int, str] = {}
+    for line in lines:
+        if line.kind == "reading":
+            found[line.joints[0]] = _value(line)
+        elif line.kind == "plunger":
+            found["plunger"] = _signed(line.value_in or 0.0)
+        elif line.kind == "restored":
+            found = {what: said for what, said in found.items() if what not in line.joints}
+        elif line.kind in tuple(Outcome):
+            found["outcome"] = line.text
+    return found
+
+
+def log_of(life: GearLife, gear: Gear) -> list[LogLine]:
+    """Every fact of a gear, and what was corrected or voided, in the order of time; what has no
+    day stands where it was entered.
+    """
+    versions: dict[str, Inspection] = {}
+    void = _void(life.records)
+    lines: list[LogLine] = []
+    for record in life.records:
+        body = record.body
+        about: dict[str, Any] = {
+            "gear_landings": body.get("landings"),
+            "record_id": record.record_id or None,
+            "hash": record.digest,
+            "counts": record.digest not in void,
+        }
+        if record.kind in _VISITS:
+            row = versions[record.digest] = inspection_from(record)
+            about["gear_landings"] = row.gear_landings
+            found = visit_lines(row, gear, versions.get(body.get("supersedes", "")))
+            found += _verdict(life, record)
+        else:
+            found = _other_lines(record)
+        lines += [replace(line, **about) for line in found]
+    return _in_time(_without_corrected(lines))
+
+
+def _without_corrected(lines: Sequence[LogLine]) -> list[LogLine]:
+    """Lines, of which those that a correction took the place of no longer count."""
+    wrong: set[tuple[str | None, int]] = set()
+    kept = []
+    for line in reversed(lines):
+        at = [(line.record_id, joint) for joint in line.joints]
+        if line.kind == "correction":
+            wrong.update(at)
+        gone = line.kind == "reading" and at[0] in wrong
+        kept.append(replace(line, counts=False) if gone else line)
+    return kept[::-1]
+
+
+def _void(records: Sequence[Record]) -> set[str]:
+    """Hashes of what was voided, with the earlier versions of it."""
+    gone: set[str] = set()
+    for record in reversed(records):
+        if record.kind is RecordKind.VOID:
+            gone.add(record.body["voids"])
+        elif record.kind is RecordKind.CORRECTION and record.digest in gone:
+            gone.add(record.body["supersedes"])
+    return gone
+
+
+def _verdict(life: GearLife, record: Record) -> list[LogLine]:
+    """What the program says today of an inspection that counts."""
+    said = life.judged.get(record.digest)
+    if said is None:
+        return []
+    text = f"verdict: {said.verdict.value.replace('_', ' ')}"
+    # It is zero only where no joint has play, or none was read.
+    if said.predicted_displacement_in:
+        text = Sentence.of("{}, worst case {}", text, Length(said.predicted_displacement_in))
+    worst = said.predicted_displacement_in
+    found = said.verdict.value
+    return [LogLine("verdict", text, date=record.day or None, value_in=worst, verdict=found)]
+
+
+def up_to(lines: Iterable[LogLine], row: Inspection) -> list[LogLine]:
+    """What was found or done until the last day of a visit, in the order of time."""
+    dates = row.inspection_date, row.repair_date, row.plunger_date, row.outcome_date
+    last = max((day for day in map(_day, dates) if day), default="9999")
+    return _in_time([line for line in lines if (line.date or "") <= last])
+
+
+def _in_time(lines: Sequence[LogLine]) -> list[LogLine]:
+    """Sort lines by day; one without a day stays behind the line that it follows."""
+    days: list[str] = []
+    for line in lines:
+        days.append(line.date or (days[-1] if days else ""))
+    order = sorted(range(len(lines)), key=lambda n: days[n])
+    return [lines[n] for n in order]
+
+
+def _other_lines(record: Record) -> list[LogLine]:
+    body = record.body
+    day = record.day or None
+    match record.kind:
+        case RecordKind.REPAIR if "stated_by" not in body:
+            joints = tuple(body["joints"])
+            return [LogLine("restored", f"restored {joint_list(joints)}", date=day, joints=joints)]
+        case RecordKind.RERIG if "stated_by" not in body:
+            return [LogLine("rigging", _RERIGGED, date=day)]
+        case RecordKind.VOID:
+            return [LogLine("void", f"void: {body['why']}", date=day)]
+        case RecordKind.OUTCOME:
+            joints = () if body["joint"] is None else (body["joint"],)
+            where = f" ({joint_list(joints)})" if joints else ""
+            return [LogLine("finding", f"found: {body['found']}{where}", date=day, joints=joints)]
+    return []
+
+
+def visit_lines(row: Inspection, gear: Gear, before: Inspection | None = None) -> list[LogLine]:
+    """The facts of a visit; with the version of it that stood before, what this one adds, and what
+    it corrects.
+    """
+    old = before or replace(
+        row,
+        clearance_in={},
+        readings_in=(),
+        outcome=None,
+        restored_joints=(),
+        rigging_checked=None,
+    )
+    restored = tuple(n for n in row.restored_joints if n not in old.restored_joints)
+    fresh = [n for n in row.clearance_in if row.clearance_in[n] != old.clearance_in.get(n)]
+    since = [n for n in fresh if n in row.restored_joints]
+    found = [*_corrected(row, old)] if before else []
+    after = [*_readings(row, gear, since)]
+    for number, reading in enumerate(row.readings_in):
+        if reading not in old.readings_in[number : number + 1]:
+            plunger = _plunger(row, reading)
+            (after if _is_after(row, gear, reading) else found).append(plunger)
+    if row.outcome is not None and (row.outcome is not old.outcome or _failed_again(row, old)):
+        day = _day(row.outcome_date or row.inspection_date)
+        tried = LogLine(row.outcome.value, row.outcome.value, date=day)
+        newer = row.is_since_repair(row.outcome_date)
+        newer = row.is_repaired and (newer or row.outcome is Outcome.RETRACTED)
+        after.append(tried) if newer else found.insert(0, tried)
+    again = [n for n in fresh if n in old.clearance_in and n in row.measured_again]
+    found += _readings(row, gear, [n for n in fresh if n not in (*since, *again)])
+    found += _readings(row, gear, [n for n in again if n not in since], "measured again")
+    day = _day(row.repair_date or row.inspection_date)
+    if restored:
+        found.append(
+            LogLine("restored", f"restored {joint_list(restored)}", date=day, joints=restored)
+        )
+    checked = row.rigging_checked
+    if checked not in (None, RiggingCheck.NO, old.rigging_checked):
+        text = _RERIGGED if checked is RiggingCheck.CORRECTED else "rigging checked"
+        found.append(LogLine("rigging", text, date=day))
+    return [*found, *after]
+
+
+def _failed_again(row: Inspection, old: Inspection) -> bool:
+    """Whether a later version of a visit says of an outcome that it followed the repair."""
+    newer = row.is_repaired and row.is_since_repair(row.outcome_date)
+    return bool(newer) and not (old.is_repaired and old.is_since_repair(old.outcome_date))
+
+
+def _plunger(row: Inspection, reading: float) -> LogLine:
+    text = Sentence.of("plunger {}", _signed(reading))
+    day = _day(row.plunger_date or row.inspection_date)
+    return LogLine("plunger", text, date=day, value_in=reading)
+
+
+def _signed(value_in: float) -> Sentence:
+    return Sentence.of("{}", replace(Length.brief(value_in), sign=True))
+
+
+def _is_after(row: Inspection, gear: Gear, reading: float) -> bool:
+    """Whether a plunger reading follows the repair of its visit; where no day says so, one within
+    the margin does.
+    """
+    if not row.is_repaired:
+        return False
+    newer = row.is_since_repair(row.plunger_date)
+    margin = gear.margin.value if row.margin_in is None else row.margin_in
+    return abs(reading) <= margin + ROUNDING_IN if newer is None else newer
+
+
+def _corrected(row: Inspection, old: Inspection) -> Iterator[LogLine]:
+    """What a later version of a visit says instead of the one before."""
+
+    def line(what: str, was: object, now: object, *joints: int) -> LogLine:
+        text = f"correction: {what} {was} → {now}"
+        return LogLine("correction", text, date=_day(row.inspection_date), joints=joints)
+
+    names = {"inspection_date": "date", "gear_landings": "landings", "technician_id": "measured by"}
+    for name, what in names.items():
+        was, now = getattr(old, name), getattr(row, name)
+        if was is not None and was != now:
+            yield line(what, _shown(was), _shown(now))
+    for joint, was in old.clearance_in.items():
+        now = row.clearance_in.get(joint)
+        if now != was and joint not in (*row.restored_joints, *row.measured_again):
+            yield line(f"#{joint}", _entered(old, joint), _entered(row, joint), joint)
+    if old.outcome is not None and row.outcome is None:
+        yield line("outcome", old.outcome.value, "none")
+
+
+def _shown(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _entered(row: Inspection, joint: int) -> str:
+    """A reading as it was entered, or in inches where that is not known."""
+    if joint not in row.clearance_in:
+        return "not read"
+    entered = row.entered.get(joint)
+    return str(entered or f"{row.clearance_in[joint]:.4f} in")
+
+
+def _readings(
+    row: Inspection, gear: Gear, joints: Sequence[int], again: str = ""
+) -> Iterator[LogLine]:
+    """Readings as they were entered, with the limit as it would read where it is exceeded."""
+    convention = row.convention.value.replace("_", " ").lower()
+    by = f"measured by {row.technician_id}" if row.technician_id else ""
+    how = ", ".join(filter(None, (again, convention, by)))
+    # What is over its limit stands first.
+    for joint in sorted(joints, key=lambda n: not gear.joint(n).is_over_limit(row.clearance_in[n])):
+        value = row.clearance_in[joint]
+        text = f"#{joint} {_entered(row, joint)}"
+        limit = gear.joint(joint)
+        over = limit.is_over_limit(value)
+        if over:
+            unit = row.entered[joint].unit if joint in row.entered else LengthUnit.INCH
+            shown = unit.from_inches(limit.limit.value * row.convention.per_radial)
+            text += f" (limit {round(shown, unit.decimals):g})"
+        day = _day(row.inspection_date)
+        yield LogLine("reading", text, how, day, (joint,), value, is_over_limit=over)
+
+
+def _day(at: date | None) -> str | None:
+    return None if at is None else at.isoformat()[:10]

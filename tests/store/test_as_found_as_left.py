@@ -1,0 +1,92 @@
+"""The report of a gear that was repaired states it as found and as left, on page 1."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pypdf
+import pytest
+
+from tests.cli.conftest import mlg
+
+from .places import table
+
+IDENTITY = {"tail_no": "N1", "side": "LH", "clearance_convention": "TOTAL_PLAY"}
+FOUND = IDENTITY | {
+    "record_id": "A",
+    "inspection_date": "2026-10-10",
+    "clearance_1_thou": "8",
+    "clearance_3_thou": "26",
+    "clearance_5_thou": "14",
+    "outcome": "FAILED",
+    "plunger_displacement_thou": "46",
+}
+LEFT = IDENTITY | {
+    "record_id": "B",
+    "inspection_date": "2026-10-12",
+    "clearance_3_thou": "1.5",
+    "outcome": "RETRACTED",
+    "plunger_displacement_thou": "12",
+    "restored_joints": "3 5",
+    "repair_date": "2026-10-11",
+}
+ROWS = [
+    ("Outcome", "FAILED", "RETRACTED"),
+    ("Plunger", "+46 thou", "+12 thou"),
+    ("#1", "8 thou", "as found"),
+    ("#3", "26 thou (limit 15)", "1.5 thou"),
+    ("#5", "14 thou", "restored, not read"),
+]
+_ROW = re.compile(r'<tr><th scope="row">(.*?)</th><td>(.*?)</td><td>(.*?)</td></tr>')
+
+
+def written(folder: Path, pattern: str) -> list[tuple[str, ...]]:
+    (page,) = folder.glob(f"{pattern}.html")
+    text = page.read_text(encoding="utf-8")
+    begins = text.find('<table class="compact found-left">')
+    return _ROW.findall(text[begins : text.find("</table>", begins)]) if begins >= 0 else []
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_repaired_gear_is_stated_as_found_and_as_left(tmp_path: Path, *, kept: bool) -> None:
+    store = ("--keep", "--store", tmp_path / "s.sqlite") if kept else ()
+    asked = ("--report", tmp_path, "-q", "--show", "thou", *store)
+    mlg("check", table(tmp_path, FOUND, LEFT), *asked)
+    assert written(tmp_path, "mlg-N1-LH-B-*") == ROWS
+    assert written(tmp_path, "mlg-N1-LH-A-*") == []
+    (pdf,) = tmp_path.glob("mlg-N1-LH-B-*.pdf")
+    front = pypdf.PdfReader(pdf).pages[0].extract_text()
+    assert "As found" in front
+    assert "26 thou (limit 15)" in front
+
+
+def test_the_page_of_a_life_states_it_as_well(tmp_path: Path) -> None:
+    store = ("--store", tmp_path / "s.sqlite")
+    mlg("check", table(tmp_path, FOUND, LEFT), "--keep", "-q", *store)
+    asked = ("--no-forecast", "--report", tmp_path, "--show", "thou", *store)
+    assert mlg("history", "N1", "LH", *asked).code == 0
+    assert written(tmp_path, "mlg-life-*") == ROWS
+
+
+def test_repairs_between_which_the_gear_failed_again_are_one(tmp_path: Path) -> None:
+    again = IDENTITY | {
+        "record_id": "C",
+        "inspection_date": "2026-10-13",
+        "outcome": "FAILED",
+        "clearance_2_thou": "16",
+    }
+    second = LEFT | {
+        "record_id": "D",
+        "inspection_date": "2026-10-15",
+        "clearance_3_thou": "",
+        "restored_joints": "2",
+        "repair_date": "2026-10-14",
+    }
+    first = LEFT | {"outcome": "", "plunger_displacement_thou": ""}
+    asked = ("--report", tmp_path, "-q", "--show", "thou")
+    mlg("check", table(tmp_path, FOUND, first, again, second), *asked)
+    found = {row[0]: row[1:] for row in written(tmp_path, "mlg-N1-LH-D-*")}
+    assert found["Outcome"] == ("FAILED", "RETRACTED")
+    assert found["Plunger"] == ("+46 thou", "+12 thou")
+    assert found["#2"] == ("16 thou (limit 15)", "restored, not read")
