@@ -70,7 +70,7 @@ BUDGETS: dict[str, int] = {
     "misfit": 17975,
     "notebook": 2355,
     "paper": 6762,
-    "records": 43313,
+    "records": 44948,
     "reporting": 27789,
     "schemas": 771,
     "store": 7316,

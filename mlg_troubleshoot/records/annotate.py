@@ -70,6 +70,11 @@ def annotate_workbook(
         raise OutputError(
             f"{source} is no longer the workbook that was judged", "Check the workbook again."
         )
+    if any(layout.kind == "visits" for layout in result.layouts if layout.file == label):
+        raise OutputError(
+            f"{source} holds readings of several visits next to each other",
+            "Give each visit a row of its own, or use --csv for the results.",
+        )
     buffer = io.BytesIO()
     try:
         covered = sum(sheet.covered() for sheet in judged.sheets)

@@ -62,6 +62,12 @@ def written_day(text: str) -> date | None:
     return date(_year(worded["year"]), month, int(worded["day"] or worded["second"]))
 
 
+def find_day(text: str) -> str:
+    """The part of a text that is a day; empty without one."""
+    found = next(filter(None, (p.search(text) for p in (_ISO_DAY, _WORDED_DAY, _NUMBERS))), None)
+    return found[0] if found is not None else ""
+
+
 def readings(text: str) -> dict[DateOrder, date] | None:
     """Return the days that three numbers may mean, by their order; None for another text."""
     found = _NUMBERS.fullmatch(text)

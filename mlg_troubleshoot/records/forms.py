@@ -1,4 +1,4 @@
-"""Vertical forms: one sheet is one inspection, the label to the left and the value to the right."""
+"""Vertical forms: the label to the left, and in each column of values the readings of one visit."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from itertools import islice
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,
+    DATE,
     IDENTITY,
+    JOINT,
+    OUTCOME,
     PLUNGER_DISPLACEMENT,
     RECORD_ID,
     SIDE,
     UNIT,
     Column,
 )
-from mlg_troubleshoot.decision.inspection import Side
-from mlg_troubleshoot.records.cells import Cell, column_letters
+from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, column_letters, show
 from mlg_troubleshoot.records.headers import UNKNOWN, Field, recognise
-from mlg_troubleshoot.records.layout import ColumnReader
+from mlg_troubleshoot.records.layout import ColumnReader, mapped_to
 from mlg_troubleshoot.records.model import (
     CellPlace,
     ColumnReading,
@@ -32,11 +34,15 @@ from mlg_troubleshoot.records.model import (
 from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow
 from mlg_troubleshoot.records.tables import Collected
-from mlg_troubleshoot.records.values import written_number
+from mlg_troubleshoot.records.values import may_be_outcome, says_failed, written_number
+from mlg_troubleshoot.records.visits import ONE_VISIT, Heading, Occasion, take_apart, visits_of
 
 FORM_TITLE = "MLG inspection form"
 # What an untouched copy of the form may hold: it says how to read, not what was found.
 _DECLARATIONS = (UNIT, CONVENTION)
+_READ = (CLEARANCE, PLUNGER_DISPLACEMENT)
+# What is of one visit, below the headings of several.
+_MEASURED = (*_READ, OUTCOME)
 _NUMBER = re.compile(r"[^\w]*\d")
 
 
@@ -44,22 +50,40 @@ _NUMBER = re.compile(r"[^\w]*\d")
 class Form:
     """A form as found.
 
-    lines: row, label and value. gears: the columns that hold the values of a gear, if several do or
-    another one than that of the values. numbers: the columns that hold numbers next to joints.
+    lines: row, label and cells. value_column: of what is said once, above the row `measured_from`
+    of readings as well. columns: of numbers next to joints, each with its heading and how it is
+    called in a message.
     """
 
-    lines: Sequence[tuple[int, str, Cell]]
+    lines: Sequence[tuple[int, str, Cells]]
     label_column: int
     value_column: int
-    gears: Sequence[int] = ()
-    numbers: Sequence[int] = ()
+    columns: dict[int, tuple[Heading, str]]
+    measured_from: int
+    is_ours: bool
+
+    def value(self, row: int, cells: Cells, column: int, *, is_measured: bool) -> Cell:
+        """What a line says in a column, or else for all of them."""
+        own, shared = (cells[i] if i < len(cells) else None for i in (column, self.value_column))
+        is_own = is_measured and row >= self.measured_from
+        return own if own is not None or is_own else shared
 
     def is_untouched(self, options: ReadOptions) -> bool:
-        if self.gears:
-            return False
-        filled = [label for _, label, value in self.lines if value is not None]
-        fields = (recognise(label, options.joints).field for label in filled)
-        return all(field is not None and field.column in _DECLARATIONS for field in fields)
+        at = self.value_column
+        filled = [label for _, label, cells in self.lines if any(cells[at : at + 1])]
+        fields = (_field(label, options) for label in filled)
+        return not self.columns and all(
+            field is not None and field.column in _DECLARATIONS for field in fields
+        )
+
+    def visits(self) -> dict[int, Occasion]:
+        """The columns that are read, each with its visit; none where that cannot be decided."""
+        if not self.columns:
+            return {self.value_column: ONE_VISIT}
+        if self.is_ours and [*self.columns] != [self.value_column]:
+            return {}
+        visits = visits_of([heading for heading, _ in self.columns.values()])
+        return {i: v for i, v in zip(self.columns, visits, strict=False) if v is not None}
 
 
 def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
@@ -69,47 +93,97 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         for index, field in islice(((i, f) for i, f in fields if f is not None), 1):
             kinds.setdefault(index, []).append(field.column)
     column = max(kinds, key=lambda index: len(kinds[index]), default=0)
-    known = kinds.get(column, [])
-    if len(known) < 3 or not {*IDENTITY} & {*known} or CLEARANCE not in known:
-        return None
     labelled = [
         (number, label, cells)
-        for number, cells in rows
+        for number, cells in _with_joints(rows, column, options)
         if column < len(cells) and isinstance(label := cells[column], str)
     ]
+    known = [each.column for _, label, _ in labelled if (each := _field(label, options))]
+    if len(known) < 3 or not {*IDENTITY} & {*known} or CLEARANCE not in known:
+        return None
     value_column = column + 1
-    if not any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1]):
+    is_ours = any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1])
+    if not is_ours:
         filled = {
             i for *_, cells in labelled for i, c in enumerate(cells) if i > column and c is not None
         }
         # Merged labels push the values further to the right.
-        if filled and value_column not in filled:
-            value_column = min(filled)
-    lines = [
-        (number, label, cells[value_column] if value_column < len(cells) else None)
+        value_column = min(filled, default=value_column)
+    joints = [
+        (number, cells)
         for number, label, cells in labelled
-        if _is_line(label, options)
+        if (each := _field(label, options)) and each.column in _READ
     ]
-    held: dict[int, set[Column]] = {}
-    numbers: set[int] = set()
-    for _, label, cells in labelled:
-        named = _field(label, options)
-        if named is None:
-            continue
-        if named.column in (CLEARANCE, PLUNGER_DISPLACEMENT):
-            numbers |= {
-                i
-                for i, value in enumerate(cells)
-                if (_is_number(value) if i > column else _is_fraction(value))
-            }
-        for i, value in enumerate(cells):
-            is_side = isinstance(value, str) and Side.spelt(value)
-            if i > column and value is not None and (named.column is not SIDE or is_side):
-                held.setdefault(i, set()).add(named.column)
-    gears = [i for i in sorted(held) if {SIDE, CLEARANCE} <= held[i]]
-    beside = CLEARANCE not in held.get(value_column, ())
-    gears = gears if len(gears) > 1 or beside else []
-    return Form(lines, column, value_column, gears, sorted(numbers))
+    numbers = {
+        i
+        for _, cells in joints
+        for i, cell in enumerate(cells)
+        if (_is_number(cell) if i > column else _is_fraction(cell))
+    }
+    headings = _rows_of_headings(rows, joints[0][0], column, options)
+    lines = [
+        (number, label, cells)
+        for number, label, cells in labelled
+        if number not in headings and _is_line(label, cells[column + 1 :], options)
+    ]
+    columns = {
+        i: _heading(i, [*headings.values(), *_told_apart(lines, column, options)])
+        for i in sorted(numbers)
+    }
+    measured_from = min([joints[0][0], *headings])
+    return Form(lines, column, value_column, columns, measured_from, is_ours)
+
+
+def _with_joints(
+    rows: Sequence[NumberedRow], column: int, options: ReadOptions
+) -> Sequence[NumberedRow]:
+    """Rows with the numbers below a label that says joint as the names of joints."""
+    named: list[NumberedRow] = []
+    is_list = False
+    for number, cells in rows:
+        label = cells[column] if column < len(cells) else None
+        field = _field(label, options)
+        is_list = is_list or (field is not None and field.column is JOINT)
+        joint = show(label).strip()
+        if is_list and joint.isdecimal():
+            named.append((number, [*cells[:column], f"joint {joint}", *cells[column + 1 :]]))
+        else:
+            named.append((number, cells))
+    return named
+
+
+def _rows_of_headings(
+    rows: Sequence[NumberedRow], first: int, column: int, options: ReadOptions
+) -> dict[int, Cells]:
+    """The rows above the first joint that hold headings: up to three, none of them a line."""
+    found: dict[int, Cells] = {}
+    for number, cells in reversed([row for row in rows if row[0] < first]):
+        field = _field(cells[column] if column < len(cells) else None, options)
+        if len(found) == 3 or (field is not None and field.column is not JOINT):
+            break
+        found = {number: cells, **found}
+    return found
+
+
+def _told_apart(
+    lines: Sequence[tuple[int, str, Cells]], column: int, options: ReadOptions
+) -> list[Cells]:
+    """Lines of a side or a day that several columns fill."""
+    return [
+        cells
+        for _, label, cells in lines
+        if (field := _field(label, options))
+        and field.column in (SIDE, DATE)
+        and sum(cell is not None for cell in cells[column + 1 :]) > 1
+    ]
+
+
+def _heading(index: int, rows: Sequence[Cells]) -> tuple[Heading, str]:
+    cells = [cells[index] for cells in rows if index < len(cells)]
+    words = [cell.text if isinstance(cell, OddCell) else show(cell) for cell in cells]
+    text = " ".join(filter(None, words))
+    letters = column_letters(index)
+    return take_apart(text), f"{letters} ({text[:40]!r})" if text else letters
 
 
 def _field(cell: Cell, options: ReadOptions) -> Field | None:
@@ -127,56 +201,67 @@ def _is_fraction(cell: Cell) -> bool:
     return number % 1.0 > 0.0
 
 
-def _is_line(label: str, options: ReadOptions) -> bool:
+def _is_line(label: str, right: Cells, options: ReadOptions) -> bool:
     """Leave out titles, hints and signature lines, but not a label that may be a reading."""
-    found = recognise(label, options.joints)
-    return found is not UNKNOWN or label in options.column_map or label.rstrip().endswith(":")
+    is_known = recognise(label, options.joints) is not UNKNOWN
+    is_named = mapped_to(options, label, -1) is not None or label.rstrip().endswith(":")
+    return is_known or is_named or any(map(_is_answer, right))
+
+
+def _is_answer(cell: Cell) -> bool:
+    return cell is not None and (
+        _is_fraction(cell) or may_be_outcome(cell) or says_failed(show(cell))
+    )
 
 
 def read_form(
     form: Form, options: ReadOptions, *, file: str | None, sheet: str | None
 ) -> Collected:
     out = Collected()
-    if len(form.gears) == 1:
-        (beside,) = map(column_letters, form.gears)
-        meant = column_letters(form.value_column)
-        raise FileRefusedError(
-            "form_beside",
-            f"its values stand in column {beside}",
-            f"them in column {meant}, next to their labels",
-            f"Move what was entered to column {meant}.",
-            sheet=sheet,
-        )
-    if form.gears:
-        raise FileRefusedError(
-            "form_several",
-            f"it holds several gears, in columns {', '.join(map(column_letters, form.gears))}",
-            "one gear on a form, or a table with one gear in each row",
-            "Swap rows and columns (copy, then paste special: transpose), or give each gear a"
-            " sheet of its own.",
-            sheet=sheet,
-        )
-    if len(form.numbers) > 1:
+    visits = form.visits()
+    if not visits:
+        named = ", ".join(name for _, name in form.columns.values())
+        remedy = "Delete the columns that are not readings, or write found above those that are."
+        if form.is_ours:
+            remedy = f"Move the readings to column {column_letters(form.value_column)}."
         raise FileRefusedError(
             "form_columns",
-            f"it holds numbers next to its joints in columns"
-            f" {', '.join(map(column_letters, form.numbers))}",
-            "the readings of one gear on one day, in one column",
-            "Delete the columns that are not the readings, or give each its own sheet.",
+            f"it holds numbers next to its joints in columns {named}",
+            "one column of readings, or headings that tell found from limit, LH from RH, or the"
+            " days",
+            remedy,
             sheet=sheet,
         )
     labels = [CellPlace.at(row, form.label_column, label) for row, label, _ in form.lines]
-    values = [CellPlace.at(row, form.value_column, label) for row, label, _ in form.lines]
-    table = TableInHand(options, file, sheet, out.tell, options.decimal_comma)
+    side = next(iter(visits.values())).side
+    table = TableInHand(options, file, sheet, out.tell, options.decimal_comma, side)
     first = form.lines[0][0]
     columns = ColumnReader(table).place([label for _, label, _ in form.lines], first, places=labels)
-    reader = RowReader(columns.placed, table)
-    named = [(row, p) for (row, *_), p in zip(form.lines, columns.placed, strict=True)]
-    ids = [row for row, p in named if p.field is not None and p.field.column is RECORD_ID]
-    cells = tuple(value for *_, value in form.lines)
-    out.rows.append(reader.read(ids[0] if ids else first, cells, values))
-    out.notes += filter(None, [*columns.notes(), reader.settle_dates(out.rows)])
-    out.invalid_content[out.rows[0].source] = hash(cells)
-    read = tuple(ColumnReading(form.value_column, p.header, p.read_as, row) for row, p in named)
-    out.layouts.append(SheetLayout(file, sheet, "form", first, form.value_column + 1, read))
+    lines = [(row, p) for (row, *_), p in zip(form.lines, columns.placed, strict=True)]
+    ids = [row for row, p in lines if p.field is not None and p.field.column is RECORD_ID]
+    several = len(visits) > 1
+    out.notes += filter(None, columns.notes())
+    for column, visit in visits.items():
+        places = [CellPlace.at(row, column, label) for row, label, _ in form.lines]
+        cells = [
+            form.value(
+                row, line, column, is_measured=p.field is None or p.field.column in _MEASURED
+            )
+            for (row, _, line), p in zip(form.lines, columns.placed, strict=True)
+        ]
+        reader = RowReader(columns.placed, table.of_visit(visit, is_one_of_several=several))
+        read = [reader.read(ids[0] if ids else first, cells, places)]
+        said = reader.settle_dates(read)
+        out.notes += [said] * bool(said)
+        out.rows += read
+        out.invalid_content[read[0].source] = hash(tuple(cells))
+    if len(form.columns) > 1:
+        shown = [form.columns[column][1] for column in visits]
+        left = [name for column, (_, name) in form.columns.items() if column not in visits]
+        not_read = f"; not read: {', '.join(left)}" if left else ""
+        out.notes.append(f"the readings are those of column {', '.join(shown)}{not_read}")
+    column = next(iter(visits))
+    readings = tuple(ColumnReading(column, p.header, p.read_as, row) for row, p in lines)
+    kind = "visits" if several else "form"
+    out.layouts.append(SheetLayout(file, sheet, kind, first, max(visits) + 1, readings))
     return out

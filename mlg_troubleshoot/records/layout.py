@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, zip_longest
@@ -11,6 +12,8 @@ from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     IDENTITY,
     JOINT,
+    OUTCOME,
+    PLUNGER_DISPLACEMENT,
     RECORD_ID,
     SIDE,
     TAIL_NO,
@@ -19,6 +22,8 @@ from mlg_troubleshoot.decision.columns import (
 from mlg_troubleshoot.records.cells import Cell, Cells, column_letters, show, writable
 from mlg_troubleshoot.records.headers import (
     UNKNOWN,
+    Field,
+    Joints,
     Recognition,
     near_miss,
     nearest,
@@ -30,6 +35,14 @@ from mlg_troubleshoot.records.headers import (
 from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
 from mlg_troubleshoot.records.rows import PlacedField
 from mlg_troubleshoot.records.source import HEADER_SEARCH_ROWS, MergedRange, NumberedRow
+from mlg_troubleshoot.records.visits import (
+    ONE_VISIT,
+    Heading,
+    Kind,
+    Occasion,
+    take_apart,
+    visits_of,
+)
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
 
@@ -60,13 +73,14 @@ class Columns:
     """The columns of a table.
 
     mapped, carried: headers that are not canonical with what they were read as; headers of what is
-    only carried. ids_made: True without a column of record ids. is_long: True if one row is
-    one joint's reading.
+    only carried. visits: whose readings a row holds, one after the other. ids_made: True without a
+    column of record ids. is_long: True if one row is one joint's reading.
     """
 
     placed: list[PlacedField]
     mapped: list[str] = field(default_factory=list)
     carried: list[str] = field(default_factory=list)
+    visits: tuple[Occasion, ...] = (ONE_VISIT,)
     ids_made: bool = False
     is_long: bool = False
 
@@ -118,7 +132,7 @@ def header_score(cells: Cells, options: ReadOptions) -> int:
         nearest_field = parse_canonical(found.nearest or "", options.joints)
         meant |= set() if nearest_field is None else {nearest_field.quantity}
     columns = {column for column, _ in known}
-    core = len(columns & {*IDENTITY, CLEARANCE}) + bool(doubtful)
+    core = len(columns & {*IDENTITY, CLEARANCE, JOINT}) + bool(doubtful)
     # A table of clearances alone is also a table: what it lacks is then named column by column.
     clearances = sum(column is CLEARANCE and number is not None for column, number in known)
     if mapped < 2 and clearances < 2 and (core < 2 or len(known) + mapped + doubtful < 3):
@@ -132,17 +146,39 @@ def find_header(
     near = [(number, cells) for number, cells in rows if number <= HEADER_SEARCH_ROWS]
     scores = [header_score(cells, options) for _, cells in near]
     score = max(scores, default=0)
-    two_rows = _two_row_header(near, options, merged, score)
-    if two_rows is not None or not score:
-        return two_rows
-    place = scores.index(score)
-    number, cells = near[place]
-    header = Header(number, tuple(_text(c) for c in cells), (number,))
-    for below, units in near[place + 1 : place + 2]:
-        found = _unit_row(header, units, options) if below == number + 1 else None
-        if found is not None:
-            return replace(header, units=found, row=below, rows_used=(number, below))
+    header = _two_row_header(near, options, merged, score)
+    if header is None and not score:
+        return None
+    if header is None:
+        number, cells = near[scores.index(score)]
+        header = Header(number, tuple(map(_text, cells)), (number,))
+    for number, cells in near:
+        if number != header.row + 1 or len(header.rows_used) == 4:
+            continue
+        used = (*header.rows_used, number)
+        units = _unit_row(header, cells, options)
+        if units is not None:
+            return replace(header, units=units, row=number, rows_used=used)
+        # What names the gear stands in front, and says nothing in a row of headings.
+        texts = () if cells[0] is not None else _with_headings(header, cells)
+        if texts:
+            header = replace(header, texts=texts, row=number, rows_used=used)
     return header
+
+
+def _with_headings(header: Header, cells: Cells) -> tuple[str, ...]:
+    """The headers joined with the row below them, if that says what the columns of a joint are."""
+    words = [*map(_text, cells)]
+    headings = [take_apart(text) for text in words if text]
+    if not headings or not all(each.is_said and each.is_bare for each in headings):
+        return ()
+    joined: list[str] = []
+    above = ""
+    for upper, lower in zip_longest(header.texts, words, fillvalue=""):
+        # A joint stands once above its columns.
+        above = upper or (above if lower else "")
+        joined.append(f"{above} {lower}".strip())
+    return tuple(joined)
 
 
 def _text(cell: Cell) -> str:
@@ -189,14 +225,16 @@ def _joined(upper: int, above: Cells, below: Cells, ranges: Sequence[MergedRange
     return [" ".join(texts).strip() for texts in joined] if across else []
 
 
+# What stands in a row of units where a column has none that is read.
+_NO_UNIT = re.compile(r"[-–—/]*|psi|°?c|[ymdthj./-]{6,}|text|none|n/?a|ldgs?|landings|cycles|no\.?")
+
+
 def _unit_row(
     header: Header, cells: Cells, options: ReadOptions
 ) -> tuple[LengthUnit | None, ...] | None:
     """Read a row of units below the header; None if it is something else."""
     words = [_text(c).strip("()[]").lower() for c in cells]
-    if not any(words) or any(
-        w not in UNIT_SPELLINGS and w not in ("", "-", "psi", "°c", "c") for w in words
-    ):
+    if not any(words) or any(w not in UNIT_SPELLINGS and not _NO_UNIT.fullmatch(w) for w in words):
         return None
     for text, word in zip(header.texts, words, strict=False):
         known = recognise(text, options.joints).field if word in UNIT_SPELLINGS else None
@@ -204,6 +242,56 @@ def _unit_row(
             return None
     units = [UNIT_SPELLINGS.get(word) for word in words[: len(header.texts)]]
     return tuple(units) if any(units) else None
+
+
+_Group = list[tuple[PlacedField, Field, Heading]]
+
+
+def _tell_readings_apart(
+    placed: Sequence[PlacedField], units: Sequence[LengthUnit | None], joints: Joints
+) -> tuple[Occasion, ...]:
+    """Settle the columns whose headings name a reading, a number next to it, or a visit, where they
+    leave no doubt; return the visits.
+    """
+    fields = [p.field for p in placed if p.field is not None]
+    in_long = any(field.column is JOINT for field in fields)
+    has_sides = any(field.column is SIDE for field in fields)
+    groups: dict[tuple[Column, int | None], _Group] = {}
+    for p, unit in zip_longest(placed, units):
+        named = p.field
+        heading = Heading(Kind.READING)
+        if named is None and not p.is_settled:
+            heading = take_apart(p.header)
+            named = recognise(heading.rest, joints).field if heading.rest else None
+            bare = recognise(f"clearance {heading.rest}", joints).field
+            named = bare if in_long and heading.is_bare else named
+            if named is not None and named.column.is_length:
+                named = replace(named, unit=named.unit or unit)
+        is_measured = named is not None and (
+            named.column.needs_joint or named.column in (PLUNGER_DISPLACEMENT, OUTCOME)
+        )
+        if named is not None and is_measured and (heading.is_said or p.field is not None):
+            groups.setdefault(named.quantity, []).append((p, named, heading))
+    decided = []
+    for group in groups.values():
+        visits = visits_of([heading for *_, heading in group])
+        is_new = any(p.field is None for p, *_ in group)
+        if is_new and not (has_sides and any(visit and visit.side for visit in visits)):
+            decided += [(*each, visit) for each, visit in zip(group, visits, strict=False)]
+    for p, named, _, visit in decided:
+        p.is_settled = True
+        p.refused = False
+        p.field = None if visit is None else named
+        p.visit = visit
+    several = dict.fromkeys(visit for *_, visit in decided if visit is not None)
+    if not {*several} - {ONE_VISIT}:
+        return (ONE_VISIT,)
+    for p in [p for group in groups.values() for p, *_ in group]:
+        if p.visit is None and p.field is not None:
+            # Of the visit of the row, if other columns are.
+            p.visit = ONE_VISIT if ONE_VISIT in several else None
+            p.refused = p.visit is None
+    return tuple(several)
 
 
 def _understood(header: str, options: ReadOptions) -> Recognition:
@@ -230,6 +318,7 @@ class ColumnReader:
         """Read the headers; they stand in one row of a table, or where the labels of a form do."""
         at = places or [CellPlace.at(row, index, text) for index, text in enumerate(headers)]
         columns = Columns([])
+        doubts: list[Recognition] = []
         for index, (text, place, unit) in enumerate(zip_longest(headers, at, units)):
             target = mapped_to(self._options, text, index)
             if target is None:
@@ -239,10 +328,14 @@ class ColumnReader:
             known = found.field
             if known is not None:
                 known = replace(known, unit=known.unit or unit)
-            is_mapped = target is not None
-            placed = PlacedField(index, text, known, bool(found.reason), place, is_mapped)
+            is_settled = target is not None
+            placed = PlacedField(index, text, known, bool(found.reason), place, is_settled)
             placed.nearest = found.nearest
             columns.placed.append(placed)
+            doubts.append(found)
+        if any(p.field is None and not p.is_settled for p in columns.placed):
+            columns.visits = _tell_readings_apart(columns.placed, units, self._options.joints)
+        for placed, found in zip(columns.placed, doubts, strict=True):
             if placed.refused:
                 self._doubt(placed, found)
         self._joint_columns(columns)
@@ -258,6 +351,14 @@ class ColumnReader:
         self._table.tell(code, placed.header, expected, remedy, placed.place)
 
     def _doubt(self, placed: PlacedField, found: Recognition) -> None:
+        if placed.field is not None:
+            self._tell(
+                "visit_missing",
+                placed,
+                "a header that says whose reading it is, as those next to it do",
+                "Add LH or RH, the day, or as found or as left, or give each visit its own row.",
+            )
+            return
         target = found.nearest or "clearance_3_in"
         if found.code == "joint_unknown":
             expected = f"a joint from {self._options.joints.span}"
@@ -298,19 +399,19 @@ class ColumnReader:
             )
 
     def _duplicates(self, columns: Columns) -> None:
-        seen: dict[tuple[Column, int | None], PlacedField] = {}
+        seen: dict[tuple[Column, int | None, Occasion | None], PlacedField] = {}
         for placed in columns.placed:
             field = placed.field
             if field is None or placed.refused:
                 continue
-            first = seen.setdefault(field.quantity, placed)
+            first = seen.setdefault((*field.quantity, placed.visit), placed)
             if first is placed:
                 continue
             plain = [p for p in (first, placed) if _in_one_word(p.header) == field.name]
             if not field.column.is_length and len(plain) == 1:
                 # The column that bears the name is meant; the other one is another matter, such as
                 # the aircraft's type.
-                (seen[field.quantity],) = plain
+                (seen[*field.quantity, placed.visit],) = plain
                 other = placed if plain[0] is first else first
                 other.field = None
             elif field.column.carried:
@@ -329,15 +430,13 @@ class ColumnReader:
 
     def _missing(self, columns: Columns, row: int) -> None:
         fields = {p.field.column for p in columns.placed if p.field is not None}
+        is_known = self._table.side or all(visit.side for visit in columns.visits)
         missing = {
             column.name: f"a column {column.name}"
             for column in (RECORD_ID, TAIL_NO, SIDE)
-            if column not in fields and not (column is SIDE and self._table.side)
+            if column not in fields and not (column is SIDE and is_known)
         }
-        if RECORD_ID.name in missing and columns.is_long:
-            missing[RECORD_ID.name] += " that identifies the rows of one inspection"
-        else:
-            columns.ids_made = missing.pop(RECORD_ID.name, "") != ""
+        columns.ids_made = missing.pop(RECORD_ID.name, "") != ""
         clearance_refused = any(p.refused for p in columns.placed)
         if CLEARANCE not in fields and not clearance_refused:
             missing["clearance_1_in"] = "at least one clearance column, such as clearance_3_in"
@@ -367,10 +466,10 @@ def _note(columns: Columns, placed: PlacedField, *, in_form: bool) -> None:
     known = placed.field
     named = f'"{placed.header}"'
     if known is not None:
-        if placed.is_mapped or placed.header != (known.label if in_form else known.name):
+        if placed.is_settled or placed.header != (known.label if in_form else known.name):
             columns.mapped.append(f"{named} {known.name}")
         return
-    if placed.nearest and not placed.is_mapped:
+    if placed.nearest and not placed.is_settled:
         meant = placed.nearest
         named += f' (if it means {meant}, pass --map "{placed.header}={meant}")'
     columns.carried.append(named)

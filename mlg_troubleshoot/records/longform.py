@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from mlg_troubleshoot.decision.columns import JOINT, RECORD_ID
+from mlg_troubleshoot.decision.columns import DATE, JOINT, RECORD_ID, SIDE, TAIL_NO
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, plain_text, show, stored
 from mlg_troubleshoot.records.headers import tidy
-from mlg_troubleshoot.records.model import CellPlace, TableInHand, to_correct
+from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand, to_correct
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
 from mlg_troubleshoot.records.values import CellFaultError
 
@@ -27,16 +27,6 @@ class _Group:
     bad: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     questions: list[str] = field(default_factory=list)
-
-    def put(self, slot: int, place: CellPlace, cell: Cell) -> Cell:
-        """Put a cell where none stands yet; return the one that stands there and differs."""
-        there = self.cells[slot]
-        if cell is None or there == cell:
-            return None
-        if there is None:
-            self.cells[slot] = cell
-            self.places[slot] = place
-        return there
 
 
 class LongReader:
@@ -59,31 +49,44 @@ class LongReader:
         self._wide: list[PlacedField] = [
             p if p in self._shared else replace(p, field=None, refused=True) for p in placed
         ]
-        self._width = len(placed)
+        self._width = table.width
         self._slots: dict[tuple[int, int], int] = {}
         for p, of_any in per_joint:
             for number in joints.numbers:
-                slot = self._slots[p.index, number] = len(self._wide)
+                slot = self._slots[p.index, number] = table.width + len(self._slots)
                 self._wide.append(replace(p, index=slot, field=replace(of_any, number=number)))
-        self._groups: dict[str | int, _Group] = {}
-        self.reader = RowReader(self._wide, table, makes_ids=False)
+        self._groups: dict[object, _Group] = {}
+        # Without record ids the rows of one gear and day are one inspection.
+        self._identity = [
+            p.index
+            for p in placed
+            if p.field is not None and p.field.column in (TAIL_NO, SIDE, DATE)
+        ]
+        self._above: list[str] = [""] * len(self._identity)
+        makes_ids = self._record is None
+        self.reader = RowReader(self._wide, table, makes_ids=makes_ids)
+
+    def _record_of(self, row: int, cells: Cells) -> object:
+        """What the rows of one inspection have in common; a row with a blank record id stands
+        alone.
+        """
+        if self._record is not None:
+            return show(cells[self._record.index]).strip() or row
+        said = [show(cells[index]).strip() for index in self._identity]
+        self._above = [text or above for text, above in zip(said, self._above, strict=True)]
+        return tuple(self._above)
 
     def add(self, row: int, cells: Cells) -> None:
         filled = [*cells[: self._width], *[None] * (self._width - len(cells))]
-        record = show(filled[self._record.index]).strip() if self._record is not None else ""
-        # A row without a record id stands alone.
-        group = self._groups.get(record or row)
+        record = self._record_of(row, filled)
+        group = self._groups.get(record)
         if group is None:
-            places = [CellPlace.at(row, p.index, p.header) for p in self._wide]
-            group = self._groups[record or row] = _Group(row, [None] * len(places), places)
+            total = self._width + len(self._slots)
+            group = self._groups[record] = _Group(row, [None] * total, [NOWHERE] * total)
+            for p in self._wide:
+                group.places[p.index] = CellPlace.at(row, p.index, p.header)
         for p in self._shared:
-            place = CellPlace.at(row, p.index, p.header)
-            other = group.put(p.index, place, filled[p.index])
-            if other is not None and p.field is not None:
-                expected = f"{show(other)}, as in cell {group.places[p.index].cell}"
-                remedy = "All rows of one record must agree. Correct one of them, or the record id."
-                fault = CellFaultError("record_contradicts", expected, remedy)
-                self._fault(group, place, filled[p.index], fault)
+            self._put(group, p.index, p, row, filled, None)
         asked = self.reader.ask_about(filled, of_joint=True)
         group.questions += [each for each in asked if each not in group.questions]
         if self._joint is not None:
@@ -92,32 +95,44 @@ class LongReader:
     def _take_readings(self, group: _Group, row: int, filled: Cells, joint: PlacedField) -> None:
         said = filled[joint.index]
         readings = [p for p in self._readings if filled[p.index] is not None]
-        if said is None and not readings:
-            return
         number = self._joint_number(said)
-        if number is None:
+        if number is None and (said is not None or readings):
             code = "joint_missing" if said is None else "joint_unknown"
             expected = f"a joint number from {self._table.options.joints.span}"
             fault = CellFaultError(code, expected, "Enter the joint's number.")
             self._fault(group, CellPlace.at(row, joint.index, joint.header), said, fault)
-            return
-        for p in readings:
-            slot = self._slots[p.index, number]
-            place = CellPlace.at(row, p.index, p.header)
-            reading = filled[p.index]
-            if group.cells[slot] == reading:
-                group.warnings.append(
-                    f"joint {number} is given twice with the same reading (row {row})"
-                )
-            other = group.put(slot, place, reading)
-            if other is not None:
-                expected = (
-                    f"one reading of joint {number}; cell {group.places[slot].cell} says"
-                    f" {show(other)}"
-                )
+        for p in readings if number is not None else ():
+            self._put(group, self._slots[p.index, number or 0], p, row, filled, number)
+
+    def _put(
+        self,
+        group: _Group,
+        slot: int,
+        p: PlacedField,
+        row: int,
+        cells: Cells,
+        joint: int | None,
+    ) -> None:
+        """Put a cell where none stands yet; what is there and differs is a fault."""
+        cell = cells[p.index]
+        there = group.cells[slot]
+        place = CellPlace.at(row, p.index, p.header)
+        if cell is not None and there is None:
+            group.cells[slot] = cell
+            group.places[slot] = place
+        elif there == cell and cell is not None and joint is not None:
+            again = f"joint {joint} is given twice with the same reading (row {row})"
+            group.warnings.append(again)
+        elif there != cell and cell is not None and p.field is not None:
+            other = group.places[slot].cell
+            code = "record_contradicts"
+            expected = f"{show(there)}, as in cell {other}"
+            remedy = "All rows of one record must agree. Correct one of them, or the record id."
+            if joint is not None:
+                code = "joint_twice"
+                expected = f"one reading of joint {joint}; cell {other} says {show(there)}"
                 remedy = "Keep the right one, or correct the joint number."
-                fault = CellFaultError("joint_twice", expected, remedy)
-                self._fault(group, place, reading, fault)
+            self._fault(group, place, cell, CellFaultError(code, expected, remedy))
 
     def _joint_number(self, cell: Cell) -> int | None:
         cell = stored(cell)

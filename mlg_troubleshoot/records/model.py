@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 from mlg_troubleshoot.decision.columns import CLEARANCE, PLUNGER_DISPLACEMENT, Column
@@ -15,6 +15,7 @@ from mlg_troubleshoot.records.cells import Cell, column_letters, quote
 from mlg_troubleshoot.records.dates import DateOrder
 from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.records.values import CellFaultError
+from mlg_troubleshoot.records.visits import ONE_VISIT, Occasion
 from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
@@ -171,7 +172,8 @@ class TableInHand:
     """The table or form that is being read: how, where it stands, and who receives its
     problems.
 
-    side: of every row of a table that has no column of sides.
+    side: of every row of a table that has no column of sides. width: of the table. visit: whose
+    readings are read, and whether each row holds those of several.
     """
 
     options: ReadOptions
@@ -180,6 +182,13 @@ class TableInHand:
     report: Callable[[Problem], None]
     decimal_comma: bool
     side: Side | None = None
+    width: int = 0
+    visit: Occasion = ONE_VISIT
+    is_one_of_several: bool = False
+
+    def of_visit(self, visit: Occasion, *, is_one_of_several: bool) -> TableInHand:
+        side = visit.side or self.side
+        return replace(self, side=side, visit=visit, is_one_of_several=is_one_of_several)
 
     def source(self, row: int) -> RowSource:
         return RowSource(self.file, self.sheet, row)

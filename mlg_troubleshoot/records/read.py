@@ -12,10 +12,9 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, cast
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
-from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.parallel import Progress
-from mlg_troubleshoot.records.cells import writable
+from mlg_troubleshoot.records.cells import show, writable
 from mlg_troubleshoot.records.csvfile import csv_book
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
 from mlg_troubleshoot.records.frames import FRAME, FrameSheet, as_frame, in_frame, is_frame
@@ -23,7 +22,7 @@ from mlg_troubleshoot.records.layout import Header, find_header, header_score
 from mlg_troubleshoot.records.model import FileRead, ReadOptions, ReadResult
 from mlg_troubleshoot.records.row_consistency import (
     alike_tails,
-    history_warnings,
+    copies,
     order_warnings,
     settle_duplicates,
 )
@@ -72,24 +71,25 @@ File = str | Path | BinaryIO
 _Found = tuple[FileRead, Collected]
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Candidate:
-    """A sheet that may hold inspections."""
+    """A sheet that may hold inspections, with its first rows; `is_filled`: it holds some."""
 
     sheet: Sheet
+    peeked: list[NumberedRow]
     rows: Iterator[NumberedRow]
     header: Header | None
     form: Form | None
-    has_rows: bool
-    has_cells: bool
-    is_instructions: bool
-    # A header stands too far below to be looked for.
-    is_late: bool
+    is_filled: bool
 
-    def is_filled(self, options: ReadOptions) -> bool:
-        """Whether it holds an inspection."""
-        is_form = self.form is not None and not self.form.is_untouched(options)
-        return self.has_rows or is_form or self.is_late
+    @property
+    def is_table_or_form(self) -> bool:
+        return self.header is not None or self.form is not None
+
+    @property
+    def is_instructions(self) -> bool:
+        texts = (cell for _, cells in self.peeked[:1] for cell in cells if cell is not None)
+        return show(next(texts, None)).strip().lower().startswith(_INSTRUCTIONS)
 
 
 def read_many(
@@ -286,14 +286,17 @@ def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
 def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     rows = sheet.rows()
     peeked = list(islice(rows, _PEEKED_ROWS))
-    first = next((cell for _, cells in peeked[:1] for cell in cells if cell is not None), None)
-    is_instructions = isinstance(first, str) and first.strip().lower().startswith(_INSTRUCTIONS)
     header = find_header(peeked, options, sheet.merged)
     form = None if header is not None else find_form(peeked, options)
-    has_rows = header is not None and any(number > header.row for number, _ in peeked)
-    is_late = header is None and any(header_score(cells, options) for _, cells in peeked)
-    every = chain(peeked, rows)
-    return _Candidate(sheet, every, header, form, has_rows, bool(peeked), is_instructions, is_late)
+    # A form that nobody touched holds no inspection; a header may stand too far below to be seen.
+    is_filled = (
+        any(number > header.row for number, _ in peeked)
+        if header is not None
+        else not form.is_untouched(options)
+        if form is not None
+        else any(header_score(cells, options) for _, cells in peeked)
+    )
+    return _Candidate(sheet, peeked, chain(peeked, rows), header, form, is_filled)
 
 
 def _read_book(
@@ -321,93 +324,74 @@ def _read_book(
             )
         else:
             raise _no_header(candidate)
-        place = f"sheet {sheet.name!r}: " if len(chosen) > 1 else ""
-        found.rows += part.rows
-        found.problems += part.problems
-        found.notes += [place + note for note in part.notes]
-        found.unread += [place + note for note in part.unread]
-        found.layouts += part.layouts
-        found.invalid_content |= part.invalid_content
+        found.join(part, f"sheet {sheet.name!r}: " if len(chosen) > 1 else "")
     if not found.rows and not found.problems:
         raise FileRefusedError("no_rows", "it contains no inspection")
 
 
+def _names(candidates: Iterable[_Candidate]) -> str:
+    return ", ".join(repr(c.sheet.name) for c in candidates)
+
+
 def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Candidate]:
     """Choose the sheets to read: the named one, the only table, or all filled-in forms."""
-    if len(book.sheets) == 1 and book.sheets[0].name is None:
+    if book.delimiter is not None:
         return [_candidate(book.sheets[0], options)]
-    if options.sheet is not None and options.sheet != "*":
-        return [_named(book, options.sheet, options, found)]
-    visible = [sheet for sheet in book.sheets if not sheet.hidden]
+    wanted = None if options.sheet == "*" else options.sheet
+    if wanted is not None:
+        return [_named(book, wanted, options, found)]
     every = [_candidate(sheet, options) for sheet in book.sheets]
-    candidates = [c for c in every if not (c.sheet.hidden or c.is_instructions)]
-    tables = [c for c in candidates if c.header is not None]
-    filled = [c for c in tables if c.has_rows]
-    forms = [c for c in candidates if c.form is not None and not c.form.is_untouched(options)]
-    chosen = [c for c in candidates if c in filled or c in forms]
-    left = [c.sheet.name for c in every if c not in chosen and c.is_filled(options)]
-    found.unread_sheets += [f"sheet {name!r}" for name in left] if chosen else []
-    hidden = ", ".join(repr(sheet.name) for sheet in book.sheets if sheet.hidden)
-    if hidden:
-        found.notes.append(f"hidden sheets were not read: {hidden}")
-    instructions = [c.sheet.name for c in every if c.is_instructions and c.is_filled(options)]
-    if instructions:
-        names = ", ".join(map(repr, instructions))
-        found.notes.append(f"instructions by their first cell, not read: sheet {names}")
-    filled_otherwise = [
-        c.sheet.name for c in candidates if c.header is None and c.form is None and c.has_cells
-    ]
-    if filled_otherwise:
-        found.notes.append(
-            f"no header of inspections, not read: sheet {', '.join(map(repr, filled_otherwise))}"
-        )
-    if options.sheet == "*":
-        return chosen or tables
-    if len(filled) > 1:
-        names = ", ".join(repr(c.sheet.name) for c in filled)
+    hidden = [c for c in every if c.sheet.hidden]
+    instructions = [c for c in every if c.is_instructions]
+    candidates = [c for c in every if c not in hidden and c not in instructions]
+    chosen = [c for c in candidates if c.is_filled and c.is_table_or_form]
+    tables = [c for c in chosen if c.header is not None]
+    for note, left in (
+        ("hidden sheets were not read: ", hidden),
+        (
+            "instructions by their first cell, not read: sheet ",
+            [c for c in instructions if c.is_filled],
+        ),
+        (
+            "no header of inspections, not read: sheet ",
+            [c for c in candidates if c.peeked and not c.is_table_or_form],
+        ),
+    ):
+        found.notes += [note + _names(left)] if left else []
+    if len(tables) > 1 and options.sheet is None:
         raise FileRefusedError(
             "sheet_several",
-            f"several sheets hold inspections: {names}",
+            f"several sheets hold inspections: {_names(tables)}",
             "one table, or the sheet to read",
-            f'Name the sheet, for example --sheet "{filled[0].sheet.name}", or --sheet "*" for all'
+            f'Name the sheet, for example --sheet "{tables[0].sheet.name}", or --sheet "*" for all'
             " of them.",
         )
     if chosen:
-        if len(visible) > 1:
-            names = ", ".join(repr(c.sheet.name) for c in chosen)
-            found.notes.append(
-                f"read from sheet {names}" if len(chosen) == 1 else f"read from sheets {names}"
-            )
+        left = [c for c in every if c.is_filled and c not in chosen]
+        found.unread_sheets += [f"sheet {c.sheet.name!r}" for c in left]
+        if len(every) - len(hidden) > 1 and options.sheet is None:
+            found.notes.append(f"read from sheet{'s' * (len(chosen) > 1)} {_names(chosen)}")
         return chosen
-    if tables:
-        return tables[:1]
-    if any(c.form is not None for c in candidates):
-        return []
+    if any(c.is_table_or_form for c in candidates):
+        return [c for c in candidates if c.header is not None][:1]
     raise _nothing_found(every)
 
 
 def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) -> _Candidate:
-    by_name = [s for s in book.sheets if s.name == wanted]
-    by_name = by_name or [
-        s for s in book.sheets if (s.name or "").strip().casefold() == wanted.strip().casefold()
-    ]
-    if not by_name:
-        names = ", ".join(repr(s.name) for s in book.sheets)
-        known = f"one of its sheets: {names}"
+    by_name = {(sheet.name or "").strip().casefold(): sheet for sheet in reversed(book.sheets)}
+    by_name |= {sheet.name or "": sheet for sheet in book.sheets}
+    sheet = by_name.get(wanted) or by_name.get(wanted.strip().casefold())
+    if sheet is None:
+        known = f"one of its sheets: {', '.join(repr(sheet.name) for sheet in book.sheets)}"
         remedy = "Correct the name given with --sheet."
         raise FileRefusedError("sheet_unknown", f"no sheet {wanted!r}", known, remedy)
-    sheet = by_name[0]
     if sheet.hidden:
         found.notes.append(f"sheet {sheet.name!r} is hidden; it was read because it was named")
-    candidate = _candidate(sheet, options)
-    if candidate.header is None and candidate.form is None:
-        raise _no_header(candidate)
-    return candidate
+    return _candidate(sheet, options)
 
 
 def _nothing_found(every: Sequence[_Candidate]) -> FileRefusedError:
-    hidden = [c for c in every if c.sheet.hidden and (c.header is not None or c.form is not None)]
-    name = next((c.sheet.name for c in hidden), None)
+    name = next((c.sheet.name for c in every if c.sheet.hidden and c.is_table_or_form), None)
     if name is not None:
         return FileRefusedError(
             "sheet_hidden",
@@ -419,101 +403,66 @@ def _nothing_found(every: Sequence[_Candidate]) -> FileRefusedError:
     visible = [c for c in every if not c.sheet.hidden]
     if len(visible) == 1:
         return _no_header(visible[0])
-    names = ", ".join(repr(c.sheet.name) for c in visible)
-    return FileRefusedError(
-        "header_missing", f"no sheet holds a table of inspections (sheets: {names})"
-    )
+    what = f"no sheet holds a table of inspections (sheets: {_names(visible)})"
+    return FileRefusedError("header_missing", what)
 
 
 def _no_header(candidate: _Candidate) -> FileRefusedError:
-    first = next(iter(islice(candidate.rows, 1)), None)
     shown = "it holds nothing"
-    if first is not None:
-        texts = [str(cell) for cell in first[1] if isinstance(cell, str)][:8]
-        shown = (
-            f"row {first[0]} reads: {', '.join(texts)[:120]}"
-            if texts
-            else f"row {first[0]} holds no text"
-        )
+    for number, cells in candidate.peeked[:1]:
+        texts = ", ".join([str(cell) for cell in cells if isinstance(cell, str)][:8])
+        shown = f"row {number} {f'reads: {texts[:120]}' if texts else 'holds no text'}"
     found = f"no header of inspections was found ({shown})"
     return FileRefusedError("header_missing", found, sheet=candidate.sheet.name)
 
 
-def _asked_about(rows: Sequence[Inspection | InvalidRow]) -> str:
-    """Name the rows that do not fit, so that nobody must open every report to find them."""
-    one = len(rows) == 1
-    named = ", ".join(str(row.record_id) for row in rows[:_NAMED])
-    more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
-    return (
-        f"{len(rows)} inspection{' does' if one else 's do'} not fit the others of the gear, or"
-        f" repeat{'s' if one else ''} one: {named}{more}. The notes of each say why (--json,"
-        " --report)."
-    )
-
-
-def _elsewhere(what: str, count: int) -> str:
-    """How many more notes there are than those that are named."""
-    more = count - _NAMED
-    return f"{what} at {more} more place{'s' * (more > 1)}"
-
-
-def _falls_elsewhere(count: int) -> str:
-    return (
-        f"{_elsewhere('Landings fall', count)}, as after an overhaul; the notes of their rows name"
-        " them (--json, --report)."
-    )
-
-
 def _finish(results: Sequence[_Found]) -> ReadResult:
     """Join the files, compare the rows with each other, and put the problems in order."""
-    rows = [row for _, found in results for row in found.rows]
-    layouts = tuple(layout for _, found in results for layout in found.layouts)
-    problems = [p for _, found in results for p in found.problems]
-    contents = {
-        source: content for _, found in results for source, content in found.invalid_content.items()
-    }
-    problems += settle_duplicates(rows, layouts, contents)
-    slips = history_warnings(rows)
-    backwards = order_warnings(rows, layouts)
+    out = Collected()
+    for _, found in results:
+        out.join(found, "")
+    rows = out.rows
+    problems = out.problems
+    problems += settle_duplicates(rows, out.layouts, out.invalid_content)
+    repeated = copies(rows)
+    backwards = order_warnings(rows, out.layouts)
+    for place, said in (*repeated.items(), *backwards.items()):
+        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, said))
     tails: dict[str, RowSource] = {}
     for row in rows:
         if row.tail_no is not None:
             tails.setdefault(row.tail_no, row.source)
-    alike = alike_tails(tails) if len(tails) > 1 else []
-    said_backwards = [*dict.fromkeys(backwards.values())]
-    for place in {*slips, *backwards}:
-        said = filter(None, (slips.get(place), backwards.get(place)))
-        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *said))
-    problems.sort(key=_places(results))
+    files = {file.name: i for i, (file, _) in reversed([*enumerate(results)])}
+    sheets = dict.fromkeys((layout.file, layout.sheet) for layout in out.layouts)
+    places = {sheet: i for i, sheet in enumerate(sheets)}
+    problems.sort(
+        key=lambda p: (
+            files.get(p.file or "", len(results)),
+            places.get((p.file, p.sheet), -1),
+            p.row or 0,
+        )
+    )
     frames = {file.name: file.labels for file, _ in results if file.labels}
-    problems = [in_frame(p, frames[p.file]) if p.file in frames else p for p in problems]
+    named = [f"{rows[place].record_id}: {said}" for place, said in repeated.items()]
+    many = {
+        "Tails look alike": alike_tails(tails) if len(tails) > 1 else [],
+        "Landings fall": [*dict.fromkeys(backwards.values())],
+        "Clearances are repeated": named,
+    }
+    for what, notes in many.items():
+        out.notes += notes[:_NAMED]
+        more = len(notes) - _NAMED
+        if more > 0:
+            places_said = f"{more} more place{'s' * (more > 1)}"
+            out.notes.append(
+                f"{what} at {places_said}; the notes of their rows name them (--json, --report)."
+            )
     return ReadResult(
         tuple(rows),
-        tuple(problems),
-        (
-            *(note for _, found in results for note in found.notes),
-            *alike[:_NAMED],
-            *([_elsewhere("Tails look alike", len(alike))] if len(alike) > _NAMED else []),
-            *said_backwards[:_NAMED],
-            *([_falls_elsewhere(len(said_backwards))] if len(said_backwards) > _NAMED else []),
-            *([_asked_about([rows[place] for place in sorted(slips)])] if slips else []),
-        ),
-        layouts,
+        tuple(in_frame(p, frames[p.file]) if p.file in frames else p for p in problems),
+        tuple(out.notes),
+        tuple(out.layouts),
         tuple(file for file, _ in results),
-        tuple(note for _, found in results for note in found.unread),
-        tuple(sheet for _, found in results for sheet in found.unread_sheets),
-    )
-
-
-def _places(results: Sequence[_Found]) -> Callable[[Problem], tuple[int, int, int]]:
-    files = {file.name: i for i, (file, _) in reversed(list(enumerate(results)))}
-    layouts = (layout for _, found in results for layout in found.layouts)
-    sheets = {
-        sheet: i
-        for i, sheet in enumerate(dict.fromkeys((layout.file, layout.sheet) for layout in layouts))
-    }
-    return lambda p: (
-        files.get(p.file or "", len(results)),
-        sheets.get((p.file, p.sheet), -1),
-        p.row or 0,
+        tuple(out.unread),
+        tuple(out.unread_sheets),
     )

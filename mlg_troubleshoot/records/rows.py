@@ -80,6 +80,7 @@ from mlg_troubleshoot.records.values import (
     says_failed,
     written_number,
 )
+from mlg_troubleshoot.records.visits import Occasion
 from mlg_troubleshoot.units import (
     UNIT_SPELLINGS,
     ClearanceConvention,
@@ -118,7 +119,9 @@ _NO_END = "Measure with a gauge that reaches further, or leave it blank if it wa
 class PlacedField:
     """A column of a table in hand, or a line of a form: its header, and what that means.
 
-    nearest: the canonical column that an unknown header may mean.
+    nearest: the canonical column that an unknown header may mean. is_settled: what it means was
+    declared, or follows from the columns next to it. visit: whose readings it holds, where a table
+    holds those of several visits.
     """
 
     index: int
@@ -126,8 +129,9 @@ class PlacedField:
     field: Field | None
     refused: bool = False
     place: CellPlace = NOWHERE
-    is_mapped: bool = False
+    is_settled: bool = False
     nearest: str | None = None
+    visit: Occasion | None = None
 
     @property
     def read_as(self) -> str | None:
@@ -170,9 +174,10 @@ class RowReader:
         self, placed: Sequence[PlacedField], table: TableInHand, *, makes_ids: bool = True
     ) -> None:
         self._table = table
+        self._suffix = f" {table.visit}".rstrip() if table.is_one_of_several else ""
         self._options = table.options
         self._placed = {p.index: p for p in placed}
-        self._width = 0
+        self._width = table.width
         good = [(p.index, p.field) for p in placed if p.field is not None and not p.refused]
         self._refused = [p.index for p in placed if p.refused]
         self._at = {known.column: index for index, known in reversed(good)}
@@ -219,6 +224,12 @@ class RowReader:
         self._faults: list[tuple[int, CellFaultError]] = []
         # Somewhere it is tomorrow already.
         self._latest = min(date.today(), date.max - _A_DAY) + _A_DAY
+        self._day_of_visit: date | None = None
+        if day := table.visit.day:
+            try:
+                self._day_of_visit = read_date(day, table.options.dates, self._latest)
+            except CellFaultError as fault:
+                table.tell_fault(fault, day, CellPlace(None, DATE.name))
         # Which orders fit the dates that are written as numbers, and the dates of rows that wait
         # for the others.
         self._date_orders = set(DateOrder)
@@ -234,7 +245,7 @@ class RowReader:
             self._width = max(self._width, p.index + 1)
             if p.field is None or p.field.column.holds not in (Holds.LENGTH, Holds.NUMBER):
                 self._plain.append(p.index)
-            if (p.field is None or p.field.column.carried) and not (p.refused or p.is_mapped):
+            if (p.field is None or p.field.column.carried) and not (p.refused or p.is_settled):
                 self._unread_words.append(p)
             if p.field is not None or p.refused:
                 continue
@@ -243,7 +254,7 @@ class RowReader:
                 name = f"{name} (again)"
             taken.add(name)
             self._unread[p.index] = name
-            if not p.is_mapped:
+            if not p.is_settled:
                 nearest, is_sure = suspect(p.header, self._options.joints)
                 # A column without a header may only number the rows if it is the first one.
                 self._suspects.append((p, nearest, is_sure or (not p.header and p.index > 0)))
@@ -268,6 +279,10 @@ class RowReader:
         record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
         if SIDE not in self._at:
             side = self._table.side
+        if record_id is not None and not self._makes_ids:
+            record_id += self._suffix
+        if self._table.visit.day:
+            found.values[DATE] = self._day_of_visit
         identity = {"record_id": record_id, "tail_no": tail_no, "side": side}
         given = {**identity, "convention": found.convention, "source": source}
         if self._bad or None in given.values():
@@ -529,6 +544,7 @@ class RowReader:
         cells = [show(cell) for cell in self._cells]
         # Sheets of both sides may hold the same row.
         cells += [] if self._table.side is None else [self._table.side.value]
+        cells += [self._suffix] * bool(self._suffix)
         content = zlib.crc32("\x1f".join(cells).encode("utf-8", "replace"))
         name = PurePath(self._table.file or "-").stem
         return f"{'stdin' if name == '-' else name}-{self._row}-{content:08x}"

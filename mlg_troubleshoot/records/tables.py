@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import chain, islice
 from pathlib import PurePath
+from typing import Any
 
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
@@ -29,6 +31,7 @@ from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet
+from mlg_troubleshoot.records.visits import ONE_VISIT
 from mlg_troubleshoot.units import ClearanceConvention
 
 # So many in one table are one mistake: they would take memory and help nobody.
@@ -54,6 +57,16 @@ class Collected:
     unread_sheets: list[str] = field(default_factory=list)
     layouts: list[SheetLayout] = field(default_factory=list)
     invalid_content: dict[RowSource, int] = field(default_factory=dict)
+
+    def join(self, part: Collected, place: str) -> None:
+        """Take what a sheet or a file gave; its notes say the place."""
+        for own in fields(self):
+            if own.name == "invalid_content":
+                self.invalid_content |= part.invalid_content
+            else:
+                said = place if own.name in ("notes", "unread") else ""
+                kept: list[Any] = getattr(self, own.name)
+                kept += [said + each if said else each for each in getattr(part, own.name)]
 
     def tell(self, problem: Problem) -> None:
         """Take a problem; a table that has far too many of them is refused, with the first."""
@@ -113,6 +126,7 @@ def read_table(
         None, (against, "; ".join(filter(None, (placed, read, said))), carried, about)
     )
     kind = "long" if columns.is_long else "wide"
+    kind = "visits" if len(columns.visits) > 1 else kind
     readings = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
     out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, len(header.texts), readings))
     return out
@@ -205,11 +219,23 @@ class _Table:
     ) -> None:
         self._columns = columns.placed
         self._table = table
+        self._several = len(columns.visits) > 1
+        self._readers: list[RowReader | LongReader] = []
+        self._own: list[list[int]] = []
+        for visit in columns.visits:
+            placed = [p for p in columns.placed if p.visit in (None, visit)]
+            in_hand = replace(table, width=len(columns.placed))
+            if visit != ONE_VISIT or self._several:
+                in_hand = in_hand.of_visit(visit, is_one_of_several=self._several)
+            reader = LongReader if columns.is_long else RowReader
+            self._readers.append(reader(placed, in_hand))
+            self._own.append([p.index for p in placed if p.visit is not None])
         self._reader = RowReader(columns.placed, table)
-        self._long = LongReader(columns.placed, table) if columns.is_long else None
+        self._is_long = columns.is_long
+        self.not_measured: Counter[str] = Counter()
         self._faulty = sheet.facts.faulty
         self._texts = tuple(text or None for text in header.texts)
-        is_fixed = delimiter is not None or columns.is_long
+        is_fixed = delimiter is not None or columns.is_long or self._several
         self._width = len(header.texts) if is_fixed else None
         self._may_be_short = delimiter is None
         self._out = out
@@ -267,13 +293,25 @@ class _Table:
             collect(self._reader.ragged(number, cells, width))
         elif number in self._faulty:
             collect(self._reader.faulty(number, cells, self._faulty[number]))
-        elif self._long is not None:
-            self._long.add(number, cells)
         else:
-            read = self._reader.read(number, cells)
-            collect(read)
-            if read.__class__ is InvalidRow:
-                self._out.invalid_content[read.source] = hash(tuple(cells))
+            for reader in self._readers_of(cells) if self._several else self._readers:
+                if isinstance(reader, LongReader):
+                    reader.add(number, cells)
+                    continue
+                read = reader.read(number, cells)
+                collect(read)
+                if read.__class__ is InvalidRow:
+                    self._out.invalid_content[read.source] = hash(tuple(cells))
+
+    def _readers_of(self, cells: Cells) -> Sequence[RowReader | LongReader]:
+        """The readers of the visits that a row holds readings of."""
+        width = len(cells)
+        filled = [
+            reader
+            for reader, own in zip(self._readers, self._own, strict=True)
+            if any(i < width and cells[i] is not None for i in own)
+        ]
+        return filled or self._readers[:1]
 
     def _with_merged(self, number: int, cells: Cells) -> Cells:
         """Cells of a row, with those that are merged with a filled one above."""
@@ -398,19 +436,21 @@ class _Table:
 
     def finish(self) -> None:
         """Read what could be read only with all rows at hand."""
-        reader = self._reader
-        if self._long is not None:
-            self._out.rows[:] = sorted(
-                [*self._out.rows, *self._long.finish()], key=lambda row: row.source.row or 0
-            )
-            reader = self._long.reader
-        self._dates = reader.settle_dates(self._out.rows)
+        found = self._out.rows
+        for reader in self._readers:
+            if isinstance(reader, LongReader):
+                found += reader.finish()
+            of_rows = reader.reader if isinstance(reader, LongReader) else reader
+            self._dates = of_rows.settle_dates(found) or self._dates
+            self.not_measured += of_rows.not_measured
+        if self._is_long:
+            found.sort(key=lambda row: row.source.row or 0)
         if self._aside:
             self._judge_aside()
 
     def notes(self) -> list[str]:
         notes = []
-        if self._long is not None:
+        if self._is_long:
             notes.append(
                 "long layout: one row is one joint's reading; rows with one record id are one"
                 " inspection"
@@ -438,7 +478,7 @@ class _Table:
             self._out.unread.append(said)
         if self._dates:
             notes.append(self._dates)
-        words = self._reader.not_measured
+        words = self.not_measured
         if words:
             shown = ", ".join(repr(word) for word in list(words)[:4])
             cells = sum(words.values())

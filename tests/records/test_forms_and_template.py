@@ -210,11 +210,13 @@ def test_a_form_of_another_maker_is_read_and_its_labels_shown(read):
     assert any('"Joint 3 (in):" clearance_3_in' in note for note in result.notes)
 
 
-def test_a_form_with_two_gears_side_by_side_is_refused(read, xlsx):
+def test_a_form_of_two_gears_side_by_side_is_two_inspections(read, xlsx):
     lines = [("Tail", "N1", "N2"), ("Side", "LH", "RH"), ("J3 (in)", 0.001, 0.013)]
     result = read(xlsx(lines), "f.xlsx", convention="RADIAL")
-    assert not result.rows
-    assert [problem.code for problem in result.problems] == ["form_several"]
+    assert [(row.tail_no, row.side, dict(row.clearance_in)) for row in result.rows] == [
+        ("N1", "LH", {3: 0.001}),
+        ("N2", "RH", {3: 0.013}),
+    ]
 
 
 def test_a_form_filled_in_over_its_hints_says_where_the_values_belong(read, template):
@@ -224,7 +226,7 @@ def test_a_form_filled_in_over_its_hints_says_where_the_values_belong(read, temp
     buffer = io.BytesIO()
     book.save(buffer)
     (problem,) = read(buffer.getvalue(), "f.xlsx").problems
-    assert (problem.code, problem.remedy) == ("form_beside", "Move what was entered to column B.")
+    assert (problem.code, problem.remedy) == ("form_columns", "Move the readings to column B.")
 
 
 def test_the_template_has_lists_of_choices_and_explains_each_column(template):

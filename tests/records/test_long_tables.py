@@ -104,13 +104,17 @@ def test_axial_floats_are_also_read_in_a_long_table(read, table):
     assert dict(read(table(header, rows)).rows[0].axial_float_in) == {3: pytest.approx(0.1 / 25.4)}
 
 
-def test_without_a_column_of_record_ids_no_reading_is_judged_as_an_inspection_of_its_own(
-    read, table
-):
-    rows = [("N1", "LH", "RADIAL", 3, 0.013), ("N1", "LH", "RADIAL", 5, 0.007)]
+def test_without_record_ids_the_rows_of_one_gear_and_day_are_one_inspection(read, table):
+    rows = [
+        ("N1", "LH", "RADIAL", 3, 0.013),
+        ("", "", "", 5, 0.007),
+        ("N1", "RH", "RADIAL", 3, 0.001),
+        ("N1", "LH", "RADIAL", 7, 0.002),
+    ]
     result = read(table(HEADER[1:], rows))
-    assert [(p.code, p.column) for p in result.problems] == [("column_missing", "record_id")]
-    assert [row.correct for row in result.rows] == [("record_id",)] * 2
+    assert not result.problems
+    found = [(row.side, dict(row.clearance_in)) for row in result.rows]
+    assert found == [("LH", {3: 0.013, 5: 0.007, 7: 0.002}), ("RH", {3: 0.001})]
 
 
 def test_a_row_whose_unit_is_not_known_is_asked_for_that_unit_alone(read, table):
