@@ -73,7 +73,7 @@ BUDGETS: dict[str, int] = {
     "records": 44948,
     "reporting": 27789,
     "schemas": 771,
-    "store": 7316,
+    "store": 7930,
     "surveying": 5285,
     "wear": 7893,
     "workflows": 13137,

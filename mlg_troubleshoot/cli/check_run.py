@@ -199,7 +199,7 @@ class Run:
             SessionStore,
             ask_inspection,
         )
-        from mlg_troubleshoot.workflows.keep import under_a_free_id
+        from mlg_troubleshoot.workflows.keep import moved_where_corrected, under_a_free_id
 
         wanted = self._wanted
         gear = load_gear(self._asked.gear)
@@ -218,6 +218,9 @@ class Run:
             answers = entry.session.answers if visit is None else visit.answers
             before = None
             if visit is None and answers.continues:
+                place = self._records.kept
+                now = moved_where_corrected(place, answers.continues, inspection)
+                answers = replace(answers, continues=now)
                 before = find(inspection.tail_no, inspection.side)
                 inspection, before = by_hand.continued(inspection, answers, before, gear)
             elif visit is None and answers.record_id is None and self._place is not None:

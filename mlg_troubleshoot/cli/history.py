@@ -381,6 +381,22 @@ def void(
 
 
 @options.flat
+def move(
+    *,
+    record: RecordId,
+    tail: Tail,
+    side: Side,
+    why: Annotated[str, typer.Option(metavar="TEXT", help="Why it is moved.")],
+    records: options.Records,
+) -> None:
+    """Move an inspection to the gear that it is of: one inspection, never two."""
+    from mlg_troubleshoot.workflows import history
+
+    added = history.move_record(records.kept, record, (tail, side), why)
+    _say_added(records.kept, f"{record} is an inspection of {added.tail_no} {added.side}", added)
+
+
+@options.flat
 def verify(
     *,
     expect: Annotated[
@@ -442,7 +458,7 @@ def export(*, file: Chain, records: options.Records, force: options.Force = Fals
 
 @options.flat
 def import_chain(*, file: Chain, records: options.Records) -> None:
-    """Read an exported chain into an empty store, or its later records into the same store."""
+    """Add the records of an exported chain that the store lacks, of this store or another one."""
     from mlg_troubleshoot.workflows import history
 
     added = history.import_file(records.kept, file)
@@ -459,6 +475,6 @@ app = options.commands(
     epilog=EPILOG,
 )
 app.command(_SHOW, hidden=True)(show)
-for command in (repair, rerig, correct, void, verify, export):
+for command in (repair, rerig, correct, void, move, verify, export):
     app.command()(command)
 app.command("import")(import_chain)

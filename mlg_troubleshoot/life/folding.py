@@ -52,10 +52,9 @@ class KeptInspection:
     def moment(self) -> Moment:
         return Moment.of(self.inspection)
 
-    @property
-    def visit(self) -> GearVisit:
+    def visit(self, place: int) -> GearVisit:
         row = self.inspection
-        return GearVisit(row, self.record.seq, typed=row.source.file is None)
+        return GearVisit(row, place, typed=row.source.file is None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +88,25 @@ class Repair:
     def moment(self) -> Moment:
         return Moment(self.day, self.landings, restored=self.joints)
 
+    def visit(self, place: int) -> GearVisit:
+        """The visit of a repair that was recorded by itself."""
+        record = self.record
+        at = record.body.get("at")
+        day = date.fromisoformat(self.day) if self.day else None
+        row = Inspection(
+            record.record_id or record.digest[:LEAST_OF_A_HASH],
+            record.tail_no,
+            Side(record.side),
+            ClearanceConvention.RADIAL,
+            {},
+            inspection_date=day,
+            gear_landings=self.landings,
+            restored_joints=tuple(sorted(self.joints)),
+            rigging_checked=None if self.joints else RiggingCheck.CORRECTED,
+            repair_date=datetime.fromisoformat(at) if at else day,
+        )
+        return GearVisit(row, place, typed="stated_by" not in record.body)
+
 
 Event = KeptInspection | Repair
 
@@ -111,8 +129,8 @@ class TodaysVerdict:
 
 @dataclass(frozen=True)
 class GearLife:
-    """What stands of one gear: inspections and repairs in the order of time, outcomes, and every
-    record as it came.
+    """What stands of one gear: inspections and repairs in the order of time, and every record as it
+    came.
 
     warnings: the records whose dates and landings disagree, and how to correct them; with any of
     them nothing is forecast.
@@ -126,7 +144,6 @@ class GearLife:
     key: GearKey
     records: tuple[Record, ...]
     events: tuple[Event, ...]
-    outcomes: tuple[Record, ...]
     warnings: tuple[str, ...]
     overhauls: Mapping[int, frozenset[int]] = field(default_factory=dict)
     judged: Mapping[str, TodaysVerdict] = field(default_factory=dict)
@@ -160,12 +177,17 @@ class GearLife:
         return self.inspections[-1] if self.inspections else None
 
     @cached_property
+    def places(self) -> dict[str, int]:
+        """Place of each record in the order in which they were recorded, by its hash."""
+        return {record.digest: place for place, record in enumerate(self.records)}
+
+    @cached_property
     def visits(self) -> tuple[GearVisit, ...]:
         """The inspections, and the repairs that were recorded by themselves, in the order of
         time.
         """
         return tuple(
-            event.visit if isinstance(event, KeptInspection) else repair_visit(event.record)
+            event.visit(self.places[event.record.digest])
             for event in self.events
             if isinstance(event, KeptInspection) or event.record.kind in _WORK
         )
@@ -176,7 +198,7 @@ class GearLife:
         for record in reversed(self.records):
             if chain[-1].kind is not RecordKind.CORRECTION:
                 break
-            if record.digest == chain[-1].body["supersedes"]:
+            if record.key == chain[-1].body["supersedes"]:
                 chain.append(record)
         return chain[::-1]
 
@@ -242,7 +264,7 @@ def find(store: Store, record_id: str) -> Record:
     live = [
         record
         for life in lives(store).values()
-        for record in dict.fromkeys((*(event.record for event in life.events), *life.outcomes))
+        for record in dict.fromkeys(event.record for event in life.events)
     ]
     inspections = (RecordKind.INSPECTION, RecordKind.CORRECTION)
     found = [r for r in live if r.record_id == record_id and r.kind in inspections]
@@ -264,26 +286,6 @@ def find(store: Store, record_id: str) -> Record:
     )
 
 
-def repair_visit(record: Record) -> GearVisit:
-    """A repair that was recorded by itself."""
-    body = record.body
-    day = date.fromisoformat(record.day) if record.day else None
-    joints = tuple(body.get("joints", ()))
-    row = Inspection(
-        record.record_id or record.digest[:LEAST_OF_A_HASH],
-        record.tail_no,
-        Side(record.side),
-        ClearanceConvention.RADIAL,
-        {},
-        inspection_date=day,
-        gear_landings=body.get("landings"),
-        restored_joints=joints,
-        rigging_checked=None if joints else RiggingCheck.CORRECTED,
-        repair_date=datetime.fromisoformat(body["at"]) if "at" in body else day,
-    )
-    return GearVisit(row, record.seq, typed="stated_by" not in body)
-
-
 def is_readable(record: Record) -> bool:
     try:
         return bool(record.body)
@@ -294,44 +296,62 @@ def is_readable(record: Record) -> bool:
 def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     kept: dict[str, KeptInspection] = {}
     others: dict[str, Record] = {}
-    records = _readable_or_not_void(records)
+    records = _as_recorded(_readable_or_not_void(records))
+    # What was recorded in two chains before they were merged is one, by its first hash.
+    first_of: dict[tuple[object, ...], str] = {}
+    one = {r.key: first_of.setdefault((r.kind, *r.content), r.key) for r in records}
     for record in records:
+        key_of_record = one[record.key]
         if record.kind is RecordKind.INSPECTION:
-            kept[record.digest] = KeptInspection(record)
+            kept.setdefault(key_of_record, KeptInspection(record))
         elif record.kind is RecordKind.CORRECTION:
-            wrong = record.body["supersedes"]
-            first = next((k for k, s in kept.items() if wrong in (k, s.record.digest)), None)
+            wrong = one.get(record.body["supersedes"])
+            first = next((k for k, s in kept.items() if wrong in (k, one[s.record.key])), None)
             if first is not None:
                 kept[first] = KeptInspection(record)
         elif record.kind is RecordKind.VOID:
-            gone = record.body["voids"]
-            kept = {k: s for k, s in kept.items() if gone not in (k, s.record.digest)}
-            others.pop(gone, None)
+            gone = one.get(record.body["voids"])
+            kept = {k: s for k, s in kept.items() if gone not in (k, one[s.record.key])}
+            others = {k: r for k, r in others.items() if k != gone}
         elif record.kind is not RecordKind.ASSESSMENT:
-            others[record.digest] = record
+            others.setdefault(key_of_record, record)
     stated = [repair for each in kept.values() for repair in Repair.stated(each)]
-    # A repair that came with an inspection stands in it, and falls with it.
+    # A repair that an inspection states is that of the same day which was recorded by itself; one
+    # that came with an inspection falls with it.
     known = {(repair.day, repair.joints) for repair in stated}
     sound = {each.record.record_id for each in kept.values() if not each.inspection.is_repaired}
     alone = (Repair.of(r) for r in others.values() if r.kind in _WORK)
     repairs = [
         r
         for r in alone
-        if "stated_by" not in r.record.body
-        or ((r.day, r.joints) not in known and r.record.body["stated_by"] not in sound)
+        if (r.day, r.joints) not in known and r.record.body.get("stated_by") not in sound
     ]
     events: list[Event] = [*stated, *repairs, *kept.values()]
-    events.sort(key=lambda event: event.record.seq)
+    at = {record.digest: place for place, record in enumerate(records)}
+    events.sort(key=lambda event: at[event.record.digest])
     moments = [event.moment for event in events]
     order = in_order(moments)
     return GearLife(
         key,
         tuple(records),
         tuple(events[place] for place in order),
-        tuple(r for r in others.values() if r.kind is RecordKind.OUTCOME),
         _disagreements(key, events, moments),
         overhauls([moments[place] for place in order]),
     )
+
+
+def _as_recorded(records: Sequence[Record]) -> list[Record]:
+    """Records in the order in which they were recorded: that of the chain, and of two chains that
+    were merged by their clocks.
+    """
+    if not any(record.origin for record in records):
+        return [*records]
+
+    def when(record: Record) -> float:
+        stamp = record.recorded_at
+        return datetime.fromisoformat(stamp).timestamp() if stamp else -inf
+
+    return sorted(records, key=when)
 
 
 def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:
@@ -340,7 +360,7 @@ def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:
     kept = []
     # A record is void by a later one.
     for record in reversed(records):
-        if record.digest not in void or is_readable(record):
+        if record.key not in void or is_readable(record):
             kept.append(record)
             if record.kind is RecordKind.VOID:
                 void.add(record.body["voids"])

@@ -20,23 +20,20 @@ from mlg_troubleshoot.life.state import GearState, state_now, states
 def judge_lives(
     lives: Iterable[GearLife], gear: Gear, table: IndexTable, *, every: bool = False
 ) -> list[GearLife]:
-    """Judge what stands of each gear today, and what stood at the inspections that an outcome
-    names, or at every one.
-    """
+    """Judge what stands of each gear today and, with `every`, what stood at each inspection."""
     asked = list(lives)
     numbers = set(gear.joint_numbers)
     found: dict[tuple[int, str], GearState] = {}
     for place, life in enumerate(asked):
-        named = {record.record_id for record in life.outcomes}
         known = [v for v in life.visits if v.inspection.clearance_in.keys() <= numbers]
         if (now := state_now(known, gear)) is not None:
             found[place, _NOW] = now
-        if not every and not named:
+        if not every:
             continue
-        digests = {kept.record.seq: kept.record.digest for kept in life.inspections}
+        digests = {life.places[kept.record.digest]: kept.record.digest for kept in life.inspections}
         for state in states(known, gear):
             digest = digests.get(int(state.visit.place))
-            if digest and (every or state.visit.inspection.record_id in named):
+            if digest:
                 found[place, digest] = state
     said = dict(zip(found, _judged([*found.values()], gear, table), strict=True))
     return [

@@ -10,6 +10,7 @@ from mlg_troubleshoot.store.database import (
     StoreError,
     files_of,
     kept_otherwise,
+    login,
     own_file,
     packed,
 )
@@ -38,6 +39,7 @@ __all__ = [
     "inspection_from",
     "inspection_record",
     "kept_otherwise",
+    "login",
     "own_file",
     "packed",
     "same_inspection",

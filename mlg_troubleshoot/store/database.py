@@ -8,6 +8,7 @@ transaction, and writers wait for each other.
 
 from __future__ import annotations
 
+import getpass
 import hashlib
 import json
 import os
@@ -17,6 +18,7 @@ import zlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from enum import StrEnum
 from functools import partial
 from itertools import islice
@@ -34,7 +36,7 @@ from mlg_troubleshoot.store.place import Place
 if TYPE_CHECKING:
     import pandas as pd
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 # What SQLite writes into the head of a file so that it is recognised as this one's: "mlg1".
 # [1]
 APPLICATION_ID = 0x6D6C6731
@@ -44,15 +46,15 @@ _PATIENCE_S = 120
 # Any number that other programs on the same server hardly use for their advisory locks. [1]
 _ADVISORY_LOCK = 0x6D6C675F73746F72
 _AT_ONCE = 500
+_LONGEST_NAME = 100
 # The content of a record, packed and unpacked. [bytes]
 MOST_BYTES = 1_000_000
 # How many of the newest records are walked before another is added: 0.1 s and 6 MB from a server;
 # `verify` and `export` walk all of them. [1]
 _NEWEST = 10_000
 
-# What records of this schema version often say, given to zlib in advance: it belongs to the
-# version, as columns do.
-_OFTEN = Path(__file__).with_name(f"often-{SCHEMA_VERSION}.txt").read_bytes()
+# What records often say, given to zlib in advance: without the same text none can be read.
+_OFTEN = Path(__file__).with_name("often-1.txt").read_bytes()
 
 _tables = sql.MetaData()
 _meta = sql.Table("mlg_meta", _tables, sql.Column("schema_version", sql.Integer, nullable=False))
@@ -68,6 +70,11 @@ _records = sql.Table(
     sql.Column("identity", sql.LargeBinary(32), nullable=False, unique=True),
     sql.Column("body", sql.LargeBinary, nullable=False),
     sql.Column("hash", sql.LargeBinary(32), nullable=False),
+    # Since version 2. Local time with its offset, ISO 8601; who recorded it; of a record from
+    # another chain its hash there.
+    sql.Column("recorded_at", sql.String(40), nullable=False, server_default=""),
+    sql.Column("recorded_by", sql.Text, nullable=False, server_default=""),
+    sql.Column("origin", sql.String(64), nullable=False, server_default=""),
 )
 sql.Index("mlg_records_by_gear", _records.c.tail_no, _records.c.side)
 # Entries of the prompts that are not finished: no records, in no chain, and written over as answers
@@ -82,10 +89,6 @@ DRAFTS = sql.Table(
     sql.Column("complete", sql.Boolean, nullable=False),
     sql.Column("content", sql.Text, nullable=False),
 )
-# What brings a store of an older version forward by one: version it starts from, and what to run.
-_MIGRATIONS: Mapping[int, Callable[[sql.Connection], None]] = {}
-
-
 # What SQLite itself keeps records by; dropped or changed, nothing there refuses to change a record.
 _TRIGGERS = {
     f"mlg_no_{change.lower()}": (
@@ -113,16 +116,21 @@ class RecordKind(StrEnum):
     OUTCOME = "outcome"
 
 
+_SINCE_2 = ("recorded_at", "recorded_by", "origin")
 _KINDS = {kind.value: kind for kind in RecordKind}
 _TEXTS = ("kind", "record_id", "tail_no", "side", "day")
 _BYTES = ("identity", "body", "hash")
-_FIVE_TEXTS = (str,) * len(_TEXTS)
+_EIGHT_TEXTS = (str,) * (len(_TEXTS) + len(_SINCE_2))
 _THREE_BYTES = (bytes,) * len(_BYTES)
 # A body that is too large is not fetched at all.
 _BOUNDED = sql.case(
     (sql.func.length(_records.c.body) <= MOST_BYTES, _records.c.body), else_=None
 ).label("body")
 _COLUMNS = [_BOUNDED if column.name == "body" else column for column in _records.c]
+# Of a store that 0.2.0 made and nothing was added to since.
+_COLUMNS_OF_1 = [
+    sql.literal("").label(column.name) if column.name in _SINCE_2 else column for column in _COLUMNS
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +138,8 @@ class Record:
     """One record; ``day`` is ISO 8601 or empty, ``packed`` its content as compressed JSON.
 
     ``identity`` names what must not stand twice in the store; without one, the whole content does.
+    ``recorded_at`` (local time with its offset) and ``recorded_by`` are empty in records of 0.2.0;
+    ``origin`` is the hash in another chain from which a record was merged.
     ``judge`` says what is wrong with the content of a record that was read, empty if nothing is.
     """
 
@@ -143,6 +153,14 @@ class Record:
     seq: int = 0
     digest: str = ""
     judge: Judge | None = field(default=None, compare=False, repr=False)
+    recorded_at: str = ""
+    recorded_by: str = ""
+    origin: str = ""
+
+    @property
+    def key(self) -> str:
+        """The hash by which other records name this one: that of the chain where it began."""
+        return self.origin or self.digest
 
     @property
     def body(self) -> Any:
@@ -157,6 +175,11 @@ class Record:
         if wrong:
             raise StoreError(f"{self.named}: {wrong}", _VERIFY)
         return found
+
+    @property
+    def content(self) -> tuple[object, ...]:
+        """What it says of which gear, whenever and wherever it was recorded."""
+        return self.record_id, self.tail_no, self.side, self.day, self.packed
 
     @property
     def named(self) -> str:
@@ -227,9 +250,27 @@ def _unpacked(body: bytes) -> Any:
 def _chained(before: bytes, row: Mapping[str, Any]) -> bytes:
     """Hash of a record with all of its columns, and of the record before it."""
     texts = [row["seq"], *(row[name] for name in _TEXTS)]
+    since = [row[name] for name in _SINCE_2]
+    texts += since if any(since) else []
     return hashlib.sha256(
         before + _canonical(texts).encode() + row["identity"] + row["body"]
     ).digest()
+
+
+def login() -> str:
+    """Who types: by the environment, else by the system."""
+    stated = os.environ.get("USER") or os.environ.get("USERNAME")
+    try:
+        return stated or getpass.getuser()
+    except (KeyError, OSError):
+        return f"user {os.getuid()}"
+
+
+def _stamp() -> dict[str, str]:
+    """When and by whom something is recorded: ``MLG_BY``, else the login."""
+    by = os.environ.get("MLG_BY", "").strip() or login()
+    now = datetime.now().astimezone().isoformat()
+    return {"recorded_at": now, "recorded_by": by[:_LONGEST_NAME], "origin": ""}
 
 
 def own_file() -> str:
@@ -309,6 +350,7 @@ class Store:
         if not self._postgres:
             sql.event.listen(self._engine, "connect", _as_bytes_are)
         self._ready = False
+        self._columns = _COLUMNS
 
     def inspections(self) -> pd.DataFrame:
         """Return the inspections that stand, as a table of canonical columns."""
@@ -407,15 +449,27 @@ class Store:
                 f" {SCHEMA_VERSION}",
                 "Use the program that wrote it, or a newer one.",
             )
-        for version in range(found, SCHEMA_VERSION):
-            if not writing:
-                raise StoreError(
-                    f"store {self.place} has schema version {version}",
-                    "Run mlg check --keep once to upgrade it.",
-                )
-            _MIGRATIONS[version](connection)
-            connection.execute(_meta.insert().values(schema_version=version + 1))
+        self._columns = _COLUMNS_OF_1 if found == 1 else _COLUMNS
+        if found == 1 and writing:
+            self._bring_forward(connection)
         self._ready = True
+
+    def _bring_forward(self, connection: sql.Connection) -> None:
+        """Write a store of 0.2.0 forward, once its chain was checked."""
+        self._ready = True
+        try:
+            for _row in self._walk(connection):
+                pass
+        except _MisfitError as misfit:
+            raise self._broken(misfit) from None
+        for name in _SINCE_2:
+            column = _records.c[name]
+            kind = column.type.compile(connection.dialect)
+            connection.exec_driver_sql(
+                f"ALTER TABLE mlg_records ADD COLUMN {name} {kind} NOT NULL DEFAULT ''"
+            )
+        connection.execute(_meta.insert().values(schema_version=SCHEMA_VERSION))
+        self._columns = _COLUMNS
 
     def _mark(self, connection: sql.Connection, *, writing: bool) -> None:
         """Refuse a database of another program; mark one of ours, which has our tables or nothing
@@ -449,17 +503,17 @@ class Store:
 
     def _rows(self, connection: sql.Connection, *where: Any) -> Iterator[Any]:
         if self._ready:
-            wanted = sql.select(*_COLUMNS).where(*where)
+            wanted = sql.select(*self._columns).where(*where)
             found = connection.execute(wanted.order_by(_records.c.seq))
             for part in found.partitions(_AT_ONCE):
                 yield from part
 
     def _record(self, row: Any) -> Record:
         """A row as a record; a column that cannot be one is named."""
-        seq, kind, record_id, tail_no, side, day, identity, body, digest = row
-        texts = type(kind), type(record_id), type(tail_no), type(side), type(day)
+        seq, kind, record_id, tail_no, side, day, identity, body, digest, at, by, origin = row
+        texts = tuple(map(type, (kind, record_id, tail_no, side, day, at, by, origin)))
         exact = type(identity), type(body), type(digest)
-        if texts != _FIVE_TEXTS or exact != _THREE_BYTES or kind not in _KINDS:
+        if texts != _EIGHT_TEXTS or exact != _THREE_BYTES or kind not in _KINDS:
             self._refuse(row)
         # The records of a gear, and an inspection and its assessment, share what they repeat.
         return Record(
@@ -472,12 +526,16 @@ class Store:
             seq=seq,
             digest=bytes(digest).hex(),
             judge=self.judge,
+            recorded_at=at,
+            recorded_by=intern(by),
+            origin=origin,
         )
 
     def _refuse(self, row: Any) -> None:
         """Name a column that cannot be one of a record, if there is one."""
         columns = row._mapping
-        odd = next((name for name in _TEXTS if not isinstance(columns[name], str)), None)
+        texts = (*_TEXTS, *_SINCE_2)
+        odd = next((name for name in texts if not isinstance(columns[name], str)), None)
         odd = odd or next(
             (name for name in _BYTES if not isinstance(columns[name], bytes | memoryview)), None
         )
@@ -557,6 +615,7 @@ class Store:
         others: list[Record] = []
         with self.transaction(writing=True) as connection:
             seq, before = self._head(connection)
+            stamp = _stamp()
             each = iter(records)
             while block := list(islice(each, _AT_ONCE)):
                 distinct = {}
@@ -580,6 +639,7 @@ class Store:
                         **{name: getattr(record, name) for name in _TEXTS[1:]},
                         "identity": record.identity_hash,
                         "body": record.packed,
+                        **stamp,
                     }
                     row["hash"] = before = _chained(before, row)
                     rows.append(row)
@@ -642,7 +702,7 @@ class Store:
         with self.transaction(writing=False) as connection:
             if not self._ready:
                 return []
-            wanted = sql.select(*_COLUMNS).where(_records.c.kind == kind.value)
+            wanted = sql.select(*self._columns).where(_records.c.kind == kind.value)
             newest = wanted.order_by(_records.c.seq.desc()).limit(most)
             rows = connection.execute(newest)
             return [self._record(row) for row in rows]
@@ -710,6 +770,7 @@ class Store:
                     content = record.body
                     self._note(wrong, record, content, f"store {self.place}, nothing was exported")
                     columns = {name: getattr(row, name) for name in ("seq", *_TEXTS)}
+                    columns |= {n: text for n in _SINCE_2 if (text := getattr(row, n))}
                     exact = {name: bytes(getattr(row, name)).hex() for name in _BYTES}
                     yield _canonical({**columns, **exact, "content": content}) + "\n"
             except _MisfitError as misfit:
@@ -732,28 +793,34 @@ class Store:
             wrong.pop(content["voids"], None)
 
     def restore(self, lines: Iterable[str], name: str) -> Added:
-        """Add an exported chain to what is here: whole to an empty store, or the rest of the same
-        chain.
+        """Add the records of an exported chain that are not here, known by their hash.
 
         The chain must fit from its first record on, and its content be that of such records unless
-        a later one voids it; a line of which that is not true is named, and nothing is added.
+        a later one voids it; a line of which that is not true is named, and nothing is added. The
+        rest of the same chain is added as it stands; what comes from another one keeps its hash
+        there, its clock and its writer.
         """
         rows = list(self._fitting(lines, name))
         with self.transaction(writing=True) as connection:
-            self._head(connection)
-            hashes = connection.execute(
-                sql.select(_records.c.hash).order_by(_records.c.seq)
-            ).scalars()
-            here = [bytes(found) for found in hashes]
-            common = min(len(here), len(rows))
-            if here[:common] != [row["hash"] for row in rows[:common]]:
-                raise StoreError(
-                    f"{name} and the store are two different chains; nothing was imported",
-                    "Import into an empty store: --store NEW.sqlite",
-                )
-            if rows[common:]:
-                connection.execute(_records.insert(), rows[common:])
-        return Added(len(rows) - common, common)
+            seq, before = self._head(connection)
+            columns = _records.c.hash, _records.c.origin, _records.c.identity
+            here = [tuple(row) for row in connection.execute(sql.select(*columns))]
+            hashes = {bytes(digest) for digest, _origin, _identity in here}
+            known = {origin or bytes(digest).hex() for digest, origin, _identity in here}
+            identities = {bytes(identity) for *_, identity in here}
+            new = [row for row in rows if (row["origin"] or row["hash"].hex()) not in known]
+            if not hashes <= {row["hash"] for row in rows}:
+                for row in new:
+                    seq += 1
+                    row |= {"seq": seq, "origin": row["origin"] or row["hash"].hex()}
+                    if row["identity"] in identities:
+                        # The same was recorded in both: each stays, and they are one in the fold.
+                        own = row["identity"] + row["origin"].encode()
+                        row["identity"] = hashlib.sha256(own).digest()
+                    row["hash"] = before = _chained(before, row)
+            if new:
+                connection.execute(_records.insert(), new)
+        return Added(len(new), len(rows) - len(new))
 
     def _fitting(self, lines: Iterable[str], name: str) -> Iterator[dict[str, Any]]:
         """Rows of an exported chain, each judged; what is wrong and not void is refused at the
@@ -850,6 +917,9 @@ def _imported(line: str, place: str) -> tuple[dict[str, Any], Any]:
         for name in _TEXTS:
             row[name].encode()
         row |= {name: bytes.fromhex(given[name]) for name in _BYTES}
+        row |= {name: given.get(name, "") for name in _SINCE_2}
+        for name in _SINCE_2:
+            row[name].encode()
         content = _unpacked(row["body"])
         if content != given["content"]:
             raise ValueError("content and body differ")

@@ -8,7 +8,7 @@ import os
 import stat
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date
+from datetime import date, datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -33,6 +33,7 @@ from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.store import Added, Broken, Record, RecordKind, Store, StoreError, packed
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.index_tables import load_index_table
+from mlg_troubleshoot.workflows.keep import move, voids, with_its_repairs
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
@@ -247,8 +248,16 @@ def void(store: Store, record_id: str, why: str) -> Record:
     """Void a record: it stays in the chain but does not count."""
     judge_text("--why", why, "State why the record does not count.")
     wrong = _unreadable(store, record_id) or find(store, record_id)
-    body = {"voids": wrong.digest, "why": why}
-    return _added(store, replace(wrong, kind=RecordKind.VOID, packed=packed(body), identity=()))
+    beside = with_its_repairs(store, wrong) if is_readable(wrong) else [wrong]
+    records = [voids(each, why) for each in beside]
+    store.add(records)
+    return records[0]
+
+
+def move_record(store: Store, record_id: str, gear: GearKey, why: str) -> Record:
+    """Move an inspection to the gear that it is of."""
+    judge_text("--why", why, "State why it is moved.")
+    return move(store, find(store, record_id), key_of(*gear), why)
 
 
 def _unreadable(store: Store, digest: str) -> Record | None:
@@ -301,7 +310,7 @@ class Verified:
 
     ``count`` records fit, the hash of the last of them is ``last``, and that of number ``expected``
     is the one that was asked for (None without such a record); ``wrong`` says what else departs
-    from a store as it should be.
+    from a store as it should be, ``clocks`` which records were recorded before the one before.
     """
 
     count: int
@@ -309,6 +318,7 @@ class Verified:
     broken: Broken | None
     expected: int | None
     wrong: tuple[str, ...]
+    clocks: tuple[str, ...] = ()
 
 
 def verify(
@@ -322,10 +332,16 @@ def verify(
     last = ""
     expected = None
     wrong: dict[str, str] = {}
+    clocks: list[str] = []
+    clock = ""
 
     def visit(record: Record) -> None:
-        nonlocal last, expected
+        nonlocal last, expected, clock
         last = record.digest
+        at = "" if record.origin else record.recorded_at
+        if clock and at and datetime.fromisoformat(at) < datetime.fromisoformat(clock):
+            clocks.append(f"record {record.seq} was recorded at {at}, the one before at {clock}")
+        clock = at or clock
         if record.seq % _AT_ONCE == 0:
             progress(record.seq, None)
         expected = record.seq if last == expect else expected
@@ -336,4 +352,6 @@ def verify(
             wrong[last] = error.message
 
     count, broken = store.verify(visit)
-    return Verified(count, last, broken, expected, (*store.departures(), *wrong.values()))
+    return Verified(
+        count, last, broken, expected, (*store.departures(), *wrong.values()), (*clocks,)
+    )

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
+from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
 from mlg_troubleshoot.decision.inspection import (
     Inspection,
     RiggingCheck,
     RowSource,
+    Side,
     plain_tail,
     surely_later,
 )
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.life.folding import find, is_readable, warnings_of
-from mlg_troubleshoot.life.state import key_of
+from mlg_troubleshoot.life.state import GearKey, key_of
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.rows import is_made_for_row
 from mlg_troubleshoot.store import (
@@ -207,9 +209,53 @@ def supersede(store: Store, wrong: Record, result: CheckResult) -> Record:
             f" {wrong.side}",
             "Void the record (mlg history void) and keep the corrected one: mlg check FILE --keep",
         )
-    record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.digest)
+    record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.key)
     store.add([*_former_repair(wrong, right), record])
     return record
+
+
+def with_its_repairs(store: Store, record: Record) -> list[Record]:
+    """A record, and the repairs that 0.2.0 kept beside the inspection that states them."""
+    own = store.of_gear(record.tail_no, record.side)
+    return [
+        record,
+        *(
+            each
+            for each in own
+            if each.kind in (RecordKind.REPAIR, RecordKind.RERIG)
+            and is_readable(each)
+            and each.body.get("stated_by") == record.record_id
+        ),
+    ]
+
+
+def voids(record: Record, why: str, **more: Any) -> Record:
+    """What makes a record not count; it stays in the chain."""
+    body = {"voids": record.key, "why": why, **more}
+    return replace(record, kind=RecordKind.VOID, packed=packed(body), identity=())
+
+
+def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
+    """Move an inspection to the gear that it is of: it counts there, and no longer where it was."""
+    if wrong.kind not in _ENTERED:
+        raise UsageError(f"record {wrong.record_id!r} is a {wrong.kind}", "Give an inspection.")
+    if gear == (wrong.tail_no, wrong.side):
+        raise UsageError(
+            f"{wrong.record_id} is of {' '.join(gear)} already", "Give another tail or side."
+        )
+    row = replace(inspection_from(wrong), tail_no=gear[0], side=Side(gear[1]))
+    moved = inspection_record(under_a_free_id(row, store), moved_from=wrong.key)
+    gone = [voids(each, why, moved_to=gear) for each in with_its_repairs(store, wrong)]
+    store.add([*gone, moved])
+    return store.known([moved.identity_hash])[moved.identity_hash]
+
+
+def moved_where_corrected(store: Store, digest: str, row: Inspection) -> str:
+    """The hash of a kept inspection that is continued, moved if its tail or side was corrected."""
+    found = [r for r in store.all() if r.digest == digest]
+    if not found or key_of(row) == (found[0].tail_no, found[0].side):
+        return digest
+    return move(store, found[0], key_of(row), "tail or side corrected at the prompts").digest
 
 
 def _former_repair(wrong: Record, right: Inspection) -> list[Record]:

@@ -452,6 +452,18 @@ def test_a_gear_is_followed_over_four_visits_to_done_with_half_the_keys(
     assert keys <= 261 / 2
 
 
+@pytest.mark.parametrize(
+    ("corrected", "gear"), [(("side", "r"), "N1 RH"), (("tail", "N2"), "N2 LH")]
+)
+def test_a_corrected_tail_or_side_moves_the_inspection(
+    visit: Visit, store: SessionStore, corrected: tuple[str, ...], gear: str
+) -> None:
+    visit(*FIRST)
+    visit(*GEAR, "c", *corrected, "")
+    fleet = mlg("fleet", "--json", "--no-forecast", "--store", store.place).json["gears"]
+    assert [f"{each['tail_no']} {each['side']}" for each in fleet] == [gear]
+
+
 def test_a_visit_that_changes_nothing_appends_nothing(visit: Visit, store: SessionStore) -> None:
     visit(*FIRST)
     records = len(life(store).records)

@@ -124,6 +124,7 @@ def test_wrong_content_that_stands_in_a_store_ends_no_command_with_an_internal_e
         ("history", "N1", "LH", "--no-forecast"),
         ("history", "N1", "LH", "--no-forecast", "--json"),
         ("fleet", "--no-forecast"),
+        ("history", "move", "R2", "N9", "LH", "--why", "x"),
         ("history", "repair", "N1", "LH", "--joint", "3", *day),
         ("history", "export", tmp_path / "chain.jsonl"),
         ("check", places.table(tmp_path, row(tail_no="N1")), "--keep", "--report", tmp_path / "r"),
@@ -237,6 +238,7 @@ COMMANDS: list[tuple[object, ...]] = [
     ("history", "N1", "LH", "--no-forecast"),
     ("fleet", "--no-forecast"),
     ("history", "void", "R2", "--why", "x"),
+    ("history", "move", "R2", "N9", "LH", "--why", "x"),
     ("history", "repair", "N1", "LH", "--joint", "3", "--date", "2026-02-01"),
 ]
 READ_WRONGLY: dict[str, tuple[str, tuple[object, ...]]] = {
@@ -356,7 +358,7 @@ def test_a_schema_version_that_is_not_valid_is_named(place: Path, version: objec
     tampered(place, "UPDATE mlg_meta SET schema_version = ?", version)
     run = mlg("history")
     assert run.code == 5
-    assert f"has schema version {version!r}, and this program knows 1" in run.err
+    assert f"has schema version {version!r}, and this program knows 2" in run.err
 
 
 def measured(*arguments: object) -> tuple[Run, float, float]:

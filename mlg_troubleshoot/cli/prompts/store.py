@@ -4,9 +4,7 @@ resumed.
 
 from __future__ import annotations
 
-import getpass
 import json
-import os
 import secrets
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -30,7 +28,7 @@ from mlg_troubleshoot.datafile import walk
 from mlg_troubleshoot.decision.columns import MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
-from mlg_troubleshoot.store import Draft, Drafts, Store, own_file
+from mlg_troubleshoot.store import Draft, Drafts, Store, login, own_file
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _SCHEMA: Literal[2] = 2
@@ -71,15 +69,6 @@ def new_session(gear_id: str, started: datetime, answers: Answers) -> Session:
     return Session(f"{started:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}", gear_id, started, answers)
 
 
-def _login() -> str:
-    """Who types: by the environment, else by the system."""
-    stated = os.environ.get("USER") or os.environ.get("USERNAME")
-    try:
-        return stated or getpass.getuser()
-    except (KeyError, OSError):
-        return f"user {os.getuid()}"
-
-
 @dataclass(slots=True)
 class SessionStore:
     """The sessions of a user in the store where finished inspections are kept; made with the first
@@ -90,7 +79,7 @@ class SessionStore:
 
     place: str | Path | None = None
     run: str = field(default_factory=lambda: secrets.token_hex(4))
-    owner: str = field(default_factory=_login)
+    owner: str = field(default_factory=login)
     away: str = ""
 
     _kept: Drafts = field(init=False)

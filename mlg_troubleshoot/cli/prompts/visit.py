@@ -131,7 +131,7 @@ def _visit(life: GearLife, latest: KeptInspection, gear: Gear) -> Visit | None:
     if not set(stood.clearance_in) <= set(gear.joint_numbers):
         return None
     state = state_now(life.visits, gear)
-    if state is None or state.visit.place != latest.record.seq:
+    if state is None or state.visit.place != life.places[latest.record.digest]:
         return None
     (found,) = assess([state.inspection], gear, load_index_table(gear))
     since = set(state.inspection.restored_joints) - set(stood.restored_joints)
