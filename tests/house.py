@@ -60,13 +60,13 @@ WAYS = {
 # writes it down again.
 BUDGETS: dict[str, int] = {
     "(top)": 9621,
-    "cli": 40012,
+    "cli": 40090,
     "decision": 33628,
     "diagnosis": 36408,
     "gear": 11306,
     "geometry": 5881,
     "indices": 5102,
-    "life": 15608,
+    "life": 15747,
     "misfit": 17975,
     "notebook": 2355,
     "paper": 6762,
@@ -76,7 +76,7 @@ BUDGETS: dict[str, int] = {
     "store": 7930,
     "surveying": 5285,
     "wear": 7893,
-    "workflows": 13137,
+    "workflows": 13650,
 }
 _NO_CODE = {
     tokenize.COMMENT,
