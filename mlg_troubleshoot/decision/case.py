@@ -5,7 +5,7 @@ handed on.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -212,11 +212,13 @@ def plunger_u(inspection: Inspection) -> float:
     return one / math.sqrt(max(len(inspection.standing_readings_in), 1))
 
 
-def predict_batch(cases: Cases, exceeds: Array | None = None) -> BatchPrediction:
+def predict_batch(
+    cases: Cases, chance_of_unread: Callable[[Cases], Array] | None = None
+) -> BatchPrediction:
     """Predict with unmeasured joints at 0 and at their limit, and the chance with random
     directions.
 
-    exceeds: that chance with unmeasured joints by their wear; None takes them at 0. [1]
+    chance_of_unread: that chance with unmeasured joints by their wear; None takes them at 0. [1]
     """
     at_zero = cases.filled(0.0)
     lower = upper = cases.predict(at_zero)
@@ -224,16 +226,18 @@ def predict_batch(cases: Cases, exceeds: Array | None = None) -> BatchPrediction
     if len(open_rows):
         some = cases.take(open_rows)
         upper = with_rows(lower, some.predict(some.filled(cases.gear.limits_in)), open_rows)
-    if exceeds is None or cases.extension is not None:
-        return BatchPrediction(lower, upper, _chance(cases, at_zero))
-    chance = exceeds.copy()
+    if chance_of_unread is None or cases.extension is not None:
+        return BatchPrediction(lower, upper, chance_at(cases, at_zero))
+    chance = np.empty(len(cases))
+    if len(open_rows):
+        chance[open_rows] = chance_of_unread(cases.take(open_rows))
     rows = np.flatnonzero(cases.measured.all(axis=1))
     if len(rows):
-        chance[rows] = _chance(cases.take(rows), at_zero[rows])
+        chance[rows] = chance_at(cases.take(rows), at_zero[rows])
     return BatchPrediction(lower, upper, chance)
 
 
-def _chance(cases: Cases, clearance_in: Array) -> Array:
+def chance_at(cases: Cases, clearance_in: Array) -> Array:
     """Chance of exceeding the margin with random directions: by the expansion where clearances are
     small.
     """

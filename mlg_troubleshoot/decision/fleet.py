@@ -18,7 +18,7 @@ class Fleet:
     loaded : float
         Chance that loads hold its pins near their worst directions. [1]
     levels : tuple of float
-        Chances of the levels of wear of `wear_levels`; empty if each is as likely. [1]
+        Chances of the levels of wear of `belief`; empty if each is as likely. [1]
     text : str
         What was learned and from how many gears, in words; empty if nothing was.
     """

@@ -24,8 +24,8 @@ from mlg_troubleshoot.decision.assessment import (
     UncertaintyBudget,
     Verdict,
 )
-from mlg_troubleshoot.decision.case import Cases, predict_batch
-from mlg_troubleshoot.decision.causes import believed
+from mlg_troubleshoot.decision.belief import Belief, believe, chance_random
+from mlg_troubleshoot.decision.case import Cases, chance_at, predict_batch
 from mlg_troubleshoot.decision.consequences import consequences
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
@@ -171,14 +171,19 @@ def _never_relaxed(plain: Assessment, extended: Assessment) -> Assessment:
 
 
 def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessment]:
-    causes = believed(cases)
-    batch = predict_batch(cases, causes.exceeds)
+    batch = predict_batch(cases, chance_random)
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
     plunger = plunger_reading.compare(cases, batch.upper)
     closes = np.isfinite(batch.lower.displacement_in)
     questions = np.array([bool(i.unit_question) for i in cases.inspections])
-    verdicts = _verdicts(cases, plunger, (p_lower, p_upper), batch.chance_random, questions)
+    # A reading clears a gear by what is known of its joints: those that were not read count as 0.
+    known = batch.chance_random.copy()
+    rows = np.flatnonzero(plunger.clears & ~cases.measured.all(axis=1))
+    if len(rows):
+        some = cases.take(rows)
+        known[rows] = chance_at(some, some.filled(0.0))
+    verdicts = _verdicts(cases, plunger, (p_lower, p_upper), known, questions)
     found = [verdict for verdict, _basis in verdicts]
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes
     sets = repair_sets(cases, batch.upper, np.flatnonzero(wanted))
@@ -199,10 +204,41 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
         p_lower,
         batch.lower.standard_uncertainty(cases.margin_u_in),
     )
-    planned = plans(cases, judged, causes, causes.with_chances(sets))
+    beliefs = _beliefs(cases)
+    planned = plans(cases, judged, beliefs, _with_chances(cases, beliefs, sets))
     return [
         _assessment(cases, judged, i, findings[i], *planned[i], advice) for i in range(len(cases))
     ]
+
+
+def _beliefs(cases: Cases) -> list[Belief | None]:
+    """What is believed of each gear that failed, or was repaired."""
+    repaired = np.array([i.is_repaired for i in cases.inspections])
+    rows = np.flatnonzero(cases.failed | repaired)
+    found: list[Belief | None] = [None] * len(cases)
+    for row, belief in zip(rows.tolist(), believe(cases.take(rows)), strict=True):
+        found[row] = belief
+    return found
+
+
+def _with_chances(
+    cases: Cases, beliefs: Sequence[Belief | None], sets: Sequence[tuple[RepairSet, ...]]
+) -> list[tuple[RepairSet, ...]]:
+    """Repair sets with the chance of a second repair after each, of gears whose plunger was read
+    beyond its margin.
+    """
+    numbers = np.array(cases.gear.joint_numbers)
+    found = list(sets)
+    for row in np.flatnonzero(cases.beyond_margin).tolist():
+        belief = beliefs[row]
+        if belief is not None and sets[row]:
+            members = np.array([np.isin(numbers, each.joints) for each in sets[row]])
+            second = belief.states.second_repair(members).tolist()
+            found[row] = tuple(
+                replace(each, second_repair_probability=chance)
+                for each, chance in zip(sets[row], second, strict=True)
+            )
+    return found
 
 
 def _verdicts(
@@ -332,7 +368,7 @@ def _detail(
         worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
         detail["rigging"] = rigging_alternative(one, worst_in, budget)
     if np.isfinite(one.plunger_in[0]) and one.failed[0]:
-        detail["posterior"] = explain(one, believed(one))
+        detail["posterior"] = explain(one)
     return detail
 
 

@@ -14,13 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import betaincinv
 
+from mlg_troubleshoot.decision.belief import LEVELS, SHARES, WEAR, believe, level_chances
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.sentences import percent
-from mlg_troubleshoot.decision.wear_levels import MEAN, PRIOR_OF_LEVELS, level_chances
 from mlg_troubleshoot.gear.gear import Gear
 
 # Quantiles of the share of gears whose pins are held, and rounds in which shares of levels settle.
@@ -45,25 +44,23 @@ def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:
     """
     known = Cases.of(gear, inspections)
     read = known.measured.any(axis=1)
-    fits = level_chances(known)[read] / PRIOR_OF_LEVELS
-    levels = PRIOR_OF_LEVELS
+    fits = level_chances(known)[read] / LEVELS
+    levels = LEVELS
     for _ in range(_ROUNDS):
         each = fits * levels
         each /= each.sum(axis=1, keepdims=True)
-        levels = (len(PRIOR_OF_LEVELS) * PRIOR_OF_LEVELS + each.sum(axis=0)) / (
-            len(PRIOR_OF_LEVELS) + len(fits)
-        )
+        levels = (len(LEVELS) * LEVELS + each.sum(axis=0)) / (len(LEVELS) + len(fits))
     whole = np.flatnonzero(known.measured.all(axis=1) & np.isfinite(known.plunger_in))
     share = betaincinv(PRIORS.loaded, 1.0 - PRIORS.loaded, _QUANTILES)
     likely = np.zeros(len(share))
     if len(whole):
-        ratio = believed(known.take(whole)).held
+        ratio = np.array([each.held for each in believe(known.take(whole))])
         likely = np.log1p(share[:, None] * (ratio - 1.0)).sum(axis=1)
     weight = np.exp(likely - likely.max())
     loaded = float(np.sum(share * weight) / np.sum(weight))
     text = (
         f"Expected from {len(fits)} gears kept: an unread joint is worn to"
-        f" {percent(float(levels @ MEAN))} of its limit on average; the chance that loads hold the"
-        f" pins near their worst directions is {percent(loaded)}"
+        f" {percent(float(levels @ WEAR @ SHARES))} of its limit on average; the chance that loads"
+        f" hold the pins near their worst directions is {percent(loaded)}"
     )
     return Fleet(loaded, tuple(levels.tolist()), text)

@@ -1,6 +1,6 @@
 """The plan of each gear: the quickest way in expected minutes from what is known now to an end.
 
-A gear that failed is followed by what is believed of it (`causes`): the joints, the rigging or
+A gear that failed is followed by what is believed of it (`belief`): the joints, the rigging or
 something else. A gear without a complaint is read until there is a verdict, and what is over its
 limit is restored, nothing else. What comes after the first step is the expected course.
 """
@@ -16,8 +16,8 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision import sentences
 from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Verdict
+from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.causes import Causes
 from mlg_troubleshoot.decision.inspection import InvalidRow, RiggingCheck
 from mlg_troubleshoot.decision.plan import (
     Action,
@@ -33,6 +33,7 @@ from mlg_troubleshoot.decision.plunger_reading import Compared
 from mlg_troubleshoot.decision.prediction import BatchPrediction
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.repair import removable
+from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
 
@@ -52,17 +53,19 @@ _SURELY_WORN = 1.5
 _FOR_ONE_REPAIR = 4
 
 
-def _doubted(cases: Cases, worn: Array) -> Mask:
+def _doubted(cases: Cases, beliefs: Sequence[Belief | None]) -> Mask:
     """Readings over their limits that are taken again: within two standard uncertainties of the
     limit, or, on a gear that failed, at odds with the plunger; of no joint far beyond its limit.
     """
     gear = cases.gear
     read = cases.filled(0.0)
     near = read - gear.limits_in <= 2.0 * cases.gauge_u_in
-    complaint = (cases.failed | cases.complained)[:, None]
-    sound = 1.0 - worn
-    contradicts = complaint & (sound > gear.second_repair_chance.value)
-    contradicts &= np.isfinite(cases.plunger_in)[:, None]
+    contradicts = np.zeros_like(near)
+    rows = np.flatnonzero(cases.over_limit.any(axis=1) & np.isfinite(cases.plunger_in))
+    for row in rows.tolist():
+        belief = beliefs[row]
+        if belief is not None:
+            contradicts[row] = 1.0 - belief.worn > gear.second_repair_chance.value
     may_be = cases.over_limit & cases.reachable & ~cases.own_gauge
     may_be &= read <= _SURELY_WORN * gear.limits_in
     return np.asarray(may_be & (near | contradicts))
@@ -103,10 +106,13 @@ class Judged:
 
 
 def plans(
-    cases: Cases, judged: Judged, causes: Causes, sets: Sequence[tuple[RepairSet, ...]]
+    cases: Cases,
+    judged: Judged,
+    beliefs: Sequence[Belief | None],
+    sets: Sequence[tuple[RepairSet, ...]],
 ) -> list[tuple[Plan, tuple[RepairSet, ...]]]:
     """The plan of each gear, and the repairs that it chose from."""
-    facts = _BatchContext(cases, judged, causes)
+    facts = _BatchContext(cases, judged, beliefs)
     courses = [_PlanBuilder(facts, i, sets[i]) for i in range(len(cases))]
     planned = [course.plan() for course in courses]
     _predict_tried(cases, courses)
@@ -139,11 +145,14 @@ def _predict_tried(cases: Cases, courses: Sequence[_PlanBuilder]) -> None:
 class _BatchContext:
     """What the plans of a batch are made from, worked out for all gears at once."""
 
-    def __init__(self, cases: Cases, judged: Judged, causes: Causes) -> None:
+    def __init__(self, cases: Cases, judged: Judged, beliefs: Sequence[Belief | None]) -> None:
         gear = cases.gear
         self.cases = cases
         self.judged = judged
-        self.causes = causes
+        self.beliefs = beliefs
+        amplification = responses(gear)[0].amplification
+        # Amplification of each joint as a share of the largest. [1]
+        self.leverage: Array = np.asarray(amplification / amplification.max())
         self.numbers = gear.joint_numbers
         self.restore_min = np.array([joint.restore.value for joint in gear.joints])
         self.access_min = np.array([area.access.value for area in gear.areas])
@@ -154,7 +163,7 @@ class _BatchContext:
         self.over = cases.over_limit & cases.restorable
         self.removable = removable(cases)
         self.open: Mask = np.asarray(~cases.measured & cases.reachable)
-        self.doubted = _doubted(cases, causes.worn)
+        self.doubted = _doubted(cases, beliefs)
         u = np.hypot(cases.plunger_u_in, cases.margin_u_in)
         apart = np.abs(np.abs(cases.plunger_in) - cases.margin_in)
         self.at_edge: Mask = np.asarray(apart < 2.0 * u)
@@ -182,6 +191,13 @@ class _PlanBuilder:
         self.over = self._joints(facts.over[row])
         self.read_plunger = bool(np.isfinite(self.cases.plunger_in[row]))
         self.looked = self.inspection.rigging_checked not in (None, RiggingCheck.NO)
+
+    @property
+    def belief(self) -> Belief:
+        """What is believed of a gear that failed, or failed before its repair."""
+        found = self.facts.beliefs[self.row]
+        assert found is not None
+        return found
 
     def plan(self) -> Plan:
         """The steps in their order."""
@@ -248,15 +264,15 @@ class _PlanBuilder:
 
     def _failed(self) -> Plan:
         """A gear that failed: the plunger first, then whatever is likeliest per minute."""
-        causes = self.facts.causes
-        i = self.row
-        joints = float(causes.joints[i])
-        rigging = float(causes.rigging[i])
+        joints, rigging, elsewhere = self.belief.chances
         if not self.read_plunger or self._again():
             self._read_the_plunger(again=self.read_plunger)
         if not self.read_plunger:
-            if causes.before_plunger[i] < 1.0:
+            if joints < elsewhere:
                 return self._restore_over_limit()._end(End.NOT_EXPLAINED)
+            following = self._worth_reading(None)
+            if following:
+                return self._read_and_restore(following)
             return self._to_repair(joints, rigging)
         if joints + rigging < _EXCLUDED:
             return self._elsewhere()
@@ -300,7 +316,7 @@ class _PlanBuilder:
             return self._read_and_restore(following)
         # A failure of the joints that is sent away stays outside its margin: against a rigging
         # that was looked at, the likelier cause decides.
-        likely = joints >= 0.5 and float(f.causes.elsewhere[i]) <= 1.0 - PRIORS.usual
+        likely = joints >= 0.5 and self.belief.chances[2] <= 1.0 - PRIORS.usual
         if best is not None and (likely or set(best.joints) <= set(self.over_limit)):
             return self._try(best.joints)
         if best is not None:
@@ -313,7 +329,7 @@ class _PlanBuilder:
     def _read_and_restore(self, following: tuple[int, ...]) -> Plan:
         """Read joints, then the expected repair."""
         self._measure(following)
-        worn = self.facts.causes.worn[self.row] * self.facts.causes.leverage
+        worn = self.belief.worn * self.facts.leverage
         numbers = self.numbers
         likely = sorted(following, key=lambda n: -worn[numbers.index(n)])
         # What is over its limit already does not suffice, or there would be nothing to read: one
@@ -337,7 +353,9 @@ class _PlanBuilder:
         over_limit = self.cases.over_limit[i]
         over = np.flatnonzero(over_limit)
         more = np.flatnonzero(f.removable[i] & ~over_limit)
-        more = more[np.argsort(-f.causes.reach_in[i, more], kind="stable")][:_MOST_TRIED]
+        more = more[
+            np.argsort(-np.abs(self.belief.states.moved_in[:, more]).mean(axis=0), kind="stable")
+        ][:_MOST_TRIED]
         chosen = [
             (*over, *extra)
             for count in range(_MOST_EXTRA + 1)
@@ -349,7 +367,7 @@ class _PlanBuilder:
         members = np.zeros((len(chosen), len(self.gear.joints)), bool)
         for row, places in enumerate(chosen):
             members[row, list(places)] = True
-        second = f.causes.second_repair(i, members)
+        second = self.belief.states.second_repair(members)
         shut = [k for k, area in enumerate(self.gear.areas) if area.name not in self.opened]
         opened = (members[:, None, :] & f.inside[shut]).any(axis=2)
         minutes = members @ f.restore_min + opened @ f.access_min[shut]
@@ -393,7 +411,7 @@ class _PlanBuilder:
         i = self.row
         # A worn joint that hardly moves the plunger is hardly the cause.
         # Rounded: both ends of one link are worth the same, and noise must not order them.
-        worn = np.round(f.causes.worn[i] * f.causes.leverage, 9)
+        worn = np.round(self.belief.worn * f.leverage, 4)
         chosen: tuple[int, ...] = ()
         most = -1.0
         for area in self.gear.areas:
@@ -427,8 +445,8 @@ class _PlanBuilder:
         # none, after which what is over its limit may be enough. It opens no area that the repair
         # opens anyway.
         places = np.array([self.numbers.index(n) for n in chosen])
-        second = f.causes.second_once_read(i, self.cases.over_limit[i], places)
-        worn = f.causes.worn[i, places]
+        second = self.belief.states.second_once_read(self.cases.over_limit[i], places)
+        worn = self.belief.worn[places]
         spared = 1.0 - float(np.prod(1.0 - worn * (1.0 - second[:-1])))
         if second[-1] <= self.accepted:
             spared += float(np.prod(1.0 - worn))

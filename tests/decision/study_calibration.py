@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from mlg_troubleshoot.decision.belief import believe
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.life.looking_back import expected_of
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
@@ -49,7 +49,7 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
     fleet = None if hangar.store is None else expected_of(hangar.store, result.gear)
     rows = [judgement.inspection for judgement in result.judgements]
     cases = Cases.of(result.gear, rows, fleet=fleet)
-    causes = believed(cases)
+    causes = [belief.chances for belief in believe(cases)]
     for i, (gear, said) in enumerate(zip(gears, unread, strict=True)):
         read = cases.measured[i]
         if read.all():
@@ -65,9 +65,9 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
         chance = float(np.mean(np.abs(moved) > MARGIN_IN))
         pairs[name].append((said["probability_exceed_random_directions"], chance))
         if gear.kind != NONE:
-            pairs["the joints"].append((causes.joints[i], gear.kind == CLEARANCE))
-            pairs["rigging"].append((causes.rigging[i], gear.kind == MISRIGGED))
-            pairs["something else"].append((causes.elsewhere[i], gear.kind == OTHER))
+            pairs["the joints"].append((causes[i][0], gear.kind == CLEARANCE))
+            pairs["rigging"].append((causes[i][1], gear.kind == MISRIGGED))
+            pairs["something else"].append((causes[i][2], gear.kind == OTHER))
         if gear.kind in (CLEARANCE, MISRIGGED):
             found = explain(cases.take(np.array([i])))
             for each in found.intervals:

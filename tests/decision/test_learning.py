@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mlg_troubleshoot.decision.belief import SHARES, WEAR, believe, level_chances
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.learning import learned
@@ -61,7 +61,7 @@ def test_unread_joints_are_worn_as_the_fleet_is(
 ) -> None:
     fleet = learned(gear, [inspected(every_joint(clearance_in))] * 20)
     expected = [
-        believed(Cases.of(gear, [inspected({})], fleet=known)).mean_in[0, 0]
+        (level_chances(Cases.of(gear, [inspected({})], fleet=known)) @ WEAR @ SHARES)[0]
         for known in (Fleet(), fleet)
     ]
     assert bool(expected[1] > expected[0]) is more
@@ -78,11 +78,11 @@ def test_a_failure_near_the_bound_is_repaired_again_less_often_in_a_fleet_that_i
     reading = float(0.8 * gear.model.plunger_amplification() @ np.full(10, 0.0035))
     row = inspected(every_joint(0.0035), readings_in=(reading,))
     least, most = (
-        believed(Cases.of(gear, [row], fleet=Fleet(loaded))) for loaded in (0.001, 0.999)
+        believe(Cases.of(gear, [row], fleet=Fleet(loaded)))[0].states for loaded in (0.001, 0.999)
     )
     shut = np.zeros((1, 10), bool)
-    shut[0, :5] = True
-    assert most.second_repair(0, shut)[0] < least.second_repair(0, shut)[0]
+    shut[0, :2] = True
+    assert most.second_repair(shut)[0] < least.second_repair(shut)[0]
 
 
 @pytest.fixture(scope="module")

@@ -9,23 +9,13 @@ import pytest
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.belief import SHARES, WEAR, believe, level_chances
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.plan import minutes_to_measure
-from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.second_order import expand, responses
 from mlg_troubleshoot.decision.verdict_rule import normal_cdf, tabled_normal_cdf
-from mlg_troubleshoot.decision.wear_levels import (
-    DENSITIES,
-    MEAN,
-    SHARES,
-    VARIANCE,
-    Doubted,
-    Unread,
-    level_chances,
-)
 from mlg_troubleshoot.gear.directions import random_directions, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
@@ -36,16 +26,6 @@ MARGIN_IN = 0.03
 
 def levels_of(gear: Gear, clearance_in: dict[int, float]) -> Array:
     return level_chances(Cases.of(gear, [inspected(clearance_in)]))[0]
-
-
-def drawn_wear(gear: Gear, read: dict[int, float], n: int, rng: np.random.Generator) -> Array:
-    """Clearances of gears as the prior has them, the joints that were read as they read. [in]"""
-    level = rng.choice(len(MEAN), n, p=levels_of(gear, read))
-    clearance = np.array([rng.choice(SHARES, 10, p=DENSITIES[k]) for k in level])
-    clearance *= gear.limits_in
-    for joint, value in read.items():
-        clearance[:, joint - 1] = value
-    return clearance
 
 
 def test_the_second_order_worst_case_is_within_one_percent_up_to_the_limit(gear: Gear) -> None:
@@ -93,7 +73,7 @@ def test_a_gear_whose_measured_joints_are_worn_is_expected_to_be_worn_elsewhere(
     gear: Gear,
 ) -> None:
     worn, tight = (levels_of(gear, dict.fromkeys((1, 2, 3), c)) for c in (0.0068, 0.0007))
-    assert worn @ MEAN > 1.5 * tight @ MEAN
+    assert worn @ WEAR @ SHARES > 1.5 * tight @ WEAR @ SHARES
 
 
 def test_readings_unlike_each_other_speak_for_joints_that_each_have_their_own_level(
@@ -106,38 +86,18 @@ def test_readings_unlike_each_other_speak_for_joints_that_each_have_their_own_le
     assert alike[-1] < 1.0 - PRIORS.alike < unlike[-1]
 
 
-def test_mean_and_variance_of_wear_are_those_of_its_density() -> None:
-    drawn = np.random.default_rng(3).choice(SHARES, 40_000, p=DENSITIES[4])
-    assert drawn.mean() == pytest.approx(MEAN[4], rel=0.02)
-    assert drawn.var() == pytest.approx(VARIANCE[4], rel=0.03)
-
-
-def test_the_uncertainty_of_the_advice_is_that_of_the_verdict(gear: Gear, judge: Judge) -> None:
-    measured = every_joint(0.0028)
-    one = Cases.of(gear, [inspected(measured)])
-    unread = Unread(one, one.predict(one.filled(0.0)), level_chances(one))
-    assert unread.u_in[0] == pytest.approx(judge(measured).standard_uncertainty_in, rel=0.02)
-
-
 def doubt(gear: Gear, clearance_in: dict[int, float], joint: int, **more: Any) -> float:
     """Chance that a joint that reads over its limit is within it."""
-    one = Cases.of(gear, [inspected(clearance_in, **more)])
-    readings = Doubted.of(one, level_chances(one))
-    (place,) = np.flatnonzero(readings.joints == joint - 1)
-    chances = readings.chances[place]
-    return float(chances[SHARES <= 1.0].sum() / chances.sum())
+    (belief,) = believe(Cases.of(gear, [inspected(clearance_in, **more)]))
+    return float(1.0 - belief.worn[joint - 1])
 
 
 def test_a_plunger_that_needs_the_worn_joint_confirms_its_reading(gear: Gear) -> None:
     read = every_joint(0.0015, j3=0.0095)
-    alone, by_rigging, needed = (
-        believed(Cases.of(gear, [inspected(read, outcome=Outcome.FAILED, readings_in=at)])).worn[
-            0, 2
-        ]
-        for at in ((), (0.05,), (0.032,))
+    alone, needed = (
+        doubt(gear, read, 3, outcome=Outcome.FAILED, readings_in=at) for at in ((), (0.032,))
     )
-    assert alone == pytest.approx(by_rigging, abs=0.02)
-    assert needed > alone + 0.08
+    assert needed < alone - 0.05
 
 
 def test_a_reading_little_over_its_limit_is_in_doubt(gear: Gear) -> None:
@@ -173,27 +133,6 @@ def test_an_area_that_is_open_costs_no_minutes_again(gear: Gear) -> None:
     assert minutes_to_measure(gear, [5]) == 23
     assert minutes_to_measure(gear, [5], frozenset({gear.joint(3).area})) == 8
     assert minutes_to_measure(gear, [6], frozenset({gear.joint(3).area})) == 26
-
-
-@pytest.mark.parametrize("read_in", [0.0016, 0.0020, 0.0024])
-def test_the_chance_of_being_too_close_is_that_of_gears_drawn_from_the_same_distribution(
-    gear: Gear, read_in: float
-) -> None:
-    measured = dict.fromkeys(range(1, 6), read_in)
-    clearance = drawn_wear(gear, measured, 3000, np.random.default_rng(12))
-    found = predict(
-        gear,
-        [inspected(measured)] * 3000,
-        clearance,
-        np.ones((3000, 10), bool),
-        np.full(3000, 0.0005),
-    )
-    p = found.probability_within(np.full(3000, MARGIN_IN), np.zeros(3000))
-    truth = np.mean((p > 0.05) & (p < 0.95))
-    # A few joints that are worn out make the sum less normal than it is taken to be.
-    one = Cases.of(gear, [inspected(measured)])
-    ahead = Unread(one, one.predict(one.filled(0.0)), level_chances(one))
-    assert ahead.too_close()[0] == pytest.approx(truth, abs=0.06)
 
 
 def test_an_expectation_never_becomes_a_verdict(judge: Judge) -> None:

@@ -1,19 +1,19 @@
 """What is believed of a gear that failed, against plain draws from docs/reference/models.md.
 
-Nothing of `decision.causes` is used to draw: the equations stand here a second time, term by term.
+Nothing of `decision.belief` is used to draw: the equations stand here a second time, term by term.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.decision.belief import believe
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.second_order import responses
@@ -35,6 +35,16 @@ def wear_by_level() -> Array:
         beyond = np.where(CENTRES > 1.0, 1.0, 0.0)
         found.append((1.0 - worn_out) * usual / usual.sum() + worn_out * beyond / beyond.sum())
     return np.array([*found, np.mean(found, axis=0)])
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Chances of the causes, of worn joints, and of a second repair once each set is new."""
+
+    causes: Array
+    worn: Array
+    second: Array
+    effective: float
 
 
 def drawn_shares(rng: np.random.Generator, gear: Gear, read: Mapping[int, float], n: int) -> Array:
@@ -83,11 +93,9 @@ def usual_chances(gear: Gear) -> tuple[Array, float]:
 
 
 def simulated(
-    gear: Gear, read: Mapping[int, float], y: float, n: int, seed: int
-) -> tuple[Array, float]:
-    """Chances of the causes (9), each draw weighed by the reading of the plunger (5) to (8); how
-    many draws they rest on.
-    """
+    gear: Gear, read: Mapping[int, float], y: float, sets: Array, n: int, seed: int
+) -> Truth:
+    """Draw everything, and weigh each draw by the reading of the plunger (5) to (8)."""
     rng = np.random.default_rng(seed)
     response = responses(gear)[0]
     reach = response.amplification * gear.limits_in
@@ -104,14 +112,44 @@ def simulated(
     of_joints = likely * out / often
     of_else = likely * ~out / (1.0 - often) / PRIORS.joints_for_one_elsewhere
     even = 1.0 / (1.0 + (y / (PRIORS.offset * MARGIN_IN)) ** 8)
+    from scipy.stats import norm
+
     width = 2.0 * (PRIORS.offset - 1.0) * MARGIN_IN
     density = even * norm.cdf((abs(y) - MARGIN_IN) / PLUNGER_U_IN) / width
     left = PRIORS.overlooked ** (share > 1.0).sum(axis=1) / overlooked
     of_rigging = left * density * PLUNGER_U_IN * np.sqrt(2.0 * np.pi)
     of_rigging /= PRIORS.joints_for_one_misrigged
     weight = of_joints + of_else + of_rigging
+    fresh = response.amplification * gear.new_parts_in * drawn_pins(rng, n, 10, held)
+    stays = np.abs(x[:, None] - (moved - fresh) @ sets.T.astype(float)) > MARGIN_IN
     causes = np.array([of_joints.sum(), of_rigging.sum(), of_else.sum()]) / weight.sum()
-    return causes, float(of_joints.sum() ** 2 / np.sum(of_joints**2))
+    return Truth(
+        causes,
+        weight @ (share > 1.0) / weight.sum(),
+        of_joints @ stays / of_joints.sum(),
+        float(of_joints.sum() ** 2 / np.sum(of_joints**2)),
+    )
+
+
+def believed(gear: Gear, read: Mapping[int, float], y: float, sets: Array) -> Truth:
+    row = inspected(
+        dict(read),
+        readings_in=(y,),
+        outcome=Outcome.FAILED,
+        plunger_gauge_u_in=PLUNGER_U_IN,
+        gauge_u_in=GAUGE_U_IN,
+    )
+    (found,) = believe(Cases.of(gear, [row]))
+    return Truth(np.array(found.chances), found.worn, found.states.second_repair(sets), np.inf)
+
+
+def some_sets(worn: Array) -> Array:
+    """Sets of joints that a plan may restore: the likeliest alone, and the two likeliest."""
+    order = np.argsort(-worn)
+    sets = np.zeros((2, len(worn)), bool)
+    sets[0, order[0]] = True
+    sets[1, order[:2]] = True
+    return sets
 
 
 @pytest.mark.parametrize(
@@ -124,17 +162,13 @@ def simulated(
         ({3: 0.004, 4: 0.0013, 5: 0.0021}, 0.036),
     ],
 )
-def test_the_chances_of_the_causes_are_those_of_plain_draws(
+def test_belief_is_what_plain_draws_of_the_model_say(
     gear: Gear, read: dict[int, float], y: float
 ) -> None:
-    row = inspected(
-        dict(read),
-        readings_in=(y,),
-        outcome=Outcome.FAILED,
-        plunger_gauge_u_in=PLUNGER_U_IN,
-        gauge_u_in=GAUGE_U_IN,
-    )
-    found = believed(Cases.of(gear, [row]))
-    truth, effective = simulated(gear, read, y, 400_000, 9)
-    said = [found.joints[0], found.rigging[0], found.elsewhere[0]]
-    assert said == pytest.approx(truth, abs=0.015 + 1.5 / np.sqrt(effective))
+    sets = some_sets(believed(gear, read, y, np.zeros((1, 10), bool)).worn)
+    truth = simulated(gear, read, y, sets, 600_000, 9)
+    found = believed(gear, read, y, sets)
+    error = 3.0 / np.sqrt(truth.effective)
+    assert found.causes == pytest.approx(truth.causes, abs=0.02 + error)
+    assert found.worn == pytest.approx(truth.worn, abs=0.02 + error)
+    assert found.second == pytest.approx(truth.second, abs=0.02 + error)

@@ -158,7 +158,7 @@ def test_an_invalid_row_is_rejected_with_what_to_correct(gear: Gear, table: Inde
     (found,) = assess([row], gear, table)
     assert isinstance(found, Rejected)
     assert found.verdict is Verdict.INVALID
-    assert found.next_action.text == "Do not use. Correct: clearance_3_in, side."
+    assert found.next_action.text == "CANNOT BE JUDGED. Correct: clearance_3_in, side."
 
 
 def test_every_row_is_judged_once_in_its_order_with_invalid_rows_between(

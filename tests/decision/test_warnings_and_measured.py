@@ -42,7 +42,7 @@ def test_a_margin_up_to_that_of_the_gear_file_is_taken_without_a_word(
 @pytest.mark.parametrize(("c3", "asked"), [(0.0075, True), (0.0074, False)])
 def test_limits_in_place_of_readings_are_asked_about(judge: Judge, c3: float, asked: bool) -> None:
     found = judge(every_joint(0.0075, j3=c3))
-    assert said(found.warnings, "limits were written in place of readings") is asked
+    assert said(found.warnings, "limits written in place of readings") is asked
 
 
 @pytest.mark.parametrize(
