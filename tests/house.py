@@ -61,7 +61,7 @@ WAYS = {
 BUDGETS: dict[str, int] = {
     "(top)": 9621,
     "cli": 40090,
-    "decision": 33628,
+    "decision": 32724,
     "diagnosis": 36408,
     "gear": 11306,
     "geometry": 5881,
