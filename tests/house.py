@@ -60,7 +60,7 @@ WAYS = {
 # writes it down again.
 BUDGETS: dict[str, int] = {
     "(top)": 9621,
-    "cli": 40090,
+    "cli": 28960,
     "decision": 32724,
     "diagnosis": 36408,
     "gear": 11306,
@@ -70,13 +70,13 @@ BUDGETS: dict[str, int] = {
     "misfit": 17975,
     "notebook": 2355,
     "paper": 6762,
-    "records": 44948,
-    "reporting": 27789,
+    "records": 45109,
+    "reporting": 27950,
     "schemas": 771,
-    "store": 7930,
+    "store": 7926,
     "surveying": 5285,
     "wear": 7893,
-    "workflows": 13650,
+    "workflows": 13677,
 }
 _NO_CODE = {
     tokenize.COMMENT,

@@ -5,7 +5,6 @@ verdicts and the problems of the file.
 from __future__ import annotations
 
 import re
-from functools import cache
 from typing import Any
 
 import pandas as pd
@@ -14,24 +13,17 @@ import pytest
 import mlg_troubleshoot as mlg
 from mlg_troubleshoot.cli.by_hand import from_flags
 from mlg_troubleshoot.cli.check import Flags
-from mlg_troubleshoot.cli.prompts import Answers
-from mlg_troubleshoot.cli.prompts.conversation import answer
-from mlg_troubleshoot.cli.prompts.flow import Ask, Flow
+from mlg_troubleshoot.cli.prompts import Entry
+from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from mlg_troubleshoot.workflows.check import CheckOptions, check_inspection
-from tests.prompts.scripted import text_of
 from tests.test_frames import as_csv, sheet
 
 # Where a refusal stands, a joint or a column, and what was expected there; or the verdict.
 Came = dict[int | str, str] | tuple[Any, ...]
 OPTIONS = CheckOptions(advice=False)
 TYPED = ("record_id", "tail_no", "side", "inspection_date", "gear_landings")
-
-
-@cache
-def flow() -> Flow:
-    return Flow(mlg.load_gear())
 
 
 def came_of(result: mlg.CheckResult) -> Came:
@@ -80,26 +72,26 @@ def by_flags(row: pd.DataFrame) -> Came:
 
 
 def by_prompts(row: pd.DataFrame) -> Came:
-    """A row typed at the prompts: where an answer is refused, another is given."""
+    """A row typed at the prompts; what is refused there."""
     cells, refused = row.iloc[0], dict[int | str, str]()
-    turn = flow().begin(Answers(record_id=cells["record_id"]))
-    for text in (cells["tail_no"], cells["side"], unit_of(row), cells["clearance_convention"]):
-        asked = turn.state.ask
-        turn = answer(flow(), turn.state, text)
-        if turn.state.ask is asked:
-            refused[str(asked)] = "LH or RH"
-            turn = answer(flow(), turn.state, "lh")
+    gear = mlg.load_gear()
+    head = {name: cells[name] for name in ("record_id", "tail_no")}
+    head["clearance_convention"] = ClearanceConvention.parse(cells["clearance_convention"]).value
+    entry = Entry.new(gear, head | {"unit": unit_of(row)})
+    side = Side.spelt(cells["side"])
+    if side is None:
+        refused["side"] = "LH or RH"
+    entry.give("side", side or "LH")
     for joint, text in readings(row).items():
-        turn = answer(flow(), turn.state, text or "s")
-        if turn.state.ask is Ask.CONFIRM:
-            turn = answer(flow(), turn.state, "y")
-        elif turn.state.at == joint:
-            (refused[joint],) = re.findall(r"expected (.*?)\.(?!\d)", text_of(turn.lines))
-            turn = answer(flow(), turn.state, "s")
+        try:
+            entry.take(gear, [(f"clearance_{joint}", text)] if text else [])
+        except UsageError as error:
+            (refused[joint],) = re.findall(r"expected (.*?)$", error.message)
     if refused:
         return refused
-    dated = turn.state.answers.with_more(**{name: cells[name] for name in TYPED[3:]})
-    return came_of(check_inspection(dated.inspection(mlg.load_gear(), cells["record_id"]), OPTIONS))
+    for name in TYPED[3:]:
+        entry.give(name, cells[name])
+    return came_of(check_inspection(entry.inspection(gear), OPTIONS))
 
 
 # A table takes 0.2 s: the everyday run takes one of ten.

@@ -7,9 +7,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from inspect import cleandoc
-from types import ModuleType, SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import typer
 from typer.core import TyperGroup
@@ -17,45 +15,60 @@ from typer.core import TyperGroup
 from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.boundary import Boundary
 from mlg_troubleshoot.cli.gone import refuse_gone
-from mlg_troubleshoot.errors import ExitCode
+from mlg_troubleshoot.errors import ExitCode, UsageError
 
 # In the order of the help; each stands in the module of its name, as `app`.
-_COMMANDS = ("check", "diagnose", "template", "fleet", "study", "history", "gear")
-_ASK_FOR_HELP = frozenset(("--help", "-h"))
+_COMMANDS = {
+    "check": "a gear, or tables: verdict, joints and what to do next",
+    "template": "an empty workbook, or a form to fill in by hand",
+    "history": "the log of each gear; repairs and corrections",
+    "fleet": "the gears that need attention, first things first",
+    "diagnose": "measured against predicted: what is wrong, by name",
+    "study": "the sensitivity and amplification indices again",
+    "gear": "the model in use, and every number of the paper",
+}
+_HELP = "\n".join(
+    [
+        "Start: mlg check            asks for one gear, joint by joint",
+        "       mlg check FILE       judges a table",
+        "",
+        *(f"  {name:<10}{what}" for name, what in _COMMANDS.items()),
+        "",
+        "Options of a command: mlg help COMMAND. Version: mlg --version.",
+        "Troubleshooting aid, not maintenance data: the manual decides.",
+    ]
+)
+_ALL = "--help-all"
 
 
-def _load_help_pages() -> None:
-    """Load what typer lays out help with, but not the Markdown and the tracebacks that it can also
-    show and this program does not: they take as long as the rest.
-    """
-    unused = SimpleNamespace(Markdown=None, Traceback=None)
-    names = {"rich.markdown", "rich.traceback"} - sys.modules.keys()
-    sys.modules.update(dict.fromkeys(names, cast(ModuleType, unused)))
-    import_module("typer.rich_utils")
-    for name in names:
-        del sys.modules[name]
-
-
-def _unwrap_help(command: Any) -> None:
-    """Leave the line breaks within a paragraph to the screen: typer keeps those of a docstring."""
-    paragraphs = cleandoc(command.help or "").split("\n\n")
-    command.help = "\n\n".join(each.replace("\n", " ") for each in paragraphs)
-    for each in getattr(command, "commands", {}).values():
-        _unwrap_help(each)
+def _understood(given: list[str]) -> list[str]:
+    """The command line with what else people type for help and reports."""
+    if given[:1] == ["help"]:
+        return [*given[1:], "--help"]
+    if given[:1] == ["report"]:
+        if len(given) < 3:
+            raise UsageError("mlg report needs a gear", "Write for example mlg report N123AB LH.")
+        return ["history", *given[1:], *["--report", "report"] * ("--report" not in given)]
+    return given
 
 
 class CommandGroup(TyperGroup):
     """All commands behind one boundary; without a command the help is shown."""
 
+    shows_all = False
+
     def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
         given = list(sys.argv[1:] if args is None else args)
-        if not given or _ASK_FOR_HELP.intersection(given):
-            _load_help_pages()
-            _unwrap_help(self)
         with Boundary():
             refuse_gone(given)
+            given = _understood(given)
+            self.shows_all = _ALL in given
+            given = ["--help" if each == _ALL else each for each in given]
             code = super().main(given or ["--help"], *more, **{**named, "standalone_mode": False})
             raise SystemExit(code if given else ExitCode.USAGE)
+
+    def get_help(self, _ctx: Any) -> str:
+        return _HELP
 
     def list_commands(self, _ctx: Any) -> list[str]:
         return [*_COMMANDS]
@@ -63,10 +76,12 @@ class CommandGroup(TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         # One that is not known is compared with all of them.
         for name in (cmd_name,) if cmd_name in _COMMANDS else _COMMANDS:
-            if name not in self.commands:
-                module = import_module(f"mlg_troubleshoot.cli.{name}")
-                self.commands[name] = typer.main.get_command(module.app)
-                _unwrap_help(self.commands[name])
+            module = import_module(f"mlg_troubleshoot.cli.{name}")
+            found: Any = self.commands.get(name) or typer.main.get_command(module.app)
+            common = getattr(module, "COMMON", ())
+            for option in found.params if common else ():
+                option.hidden = not self.shows_all and option.name not in common
+            self.commands[name] = found
         return super().get_command(ctx, cmd_name)
 
     def invoke(self, ctx: Any) -> Any:
@@ -80,15 +95,10 @@ class CommandGroup(TyperGroup):
 app = typer.Typer(
     name="mlg",
     cls=CommandGroup,
-    help=(
-        "Do worn joints push the reversing-valve plunger of a main landing gear outside its margin?"
-        " Which joint next? Where is the model wrong?\n\nTroubleshooting aid, not maintenance data:"
-        " it does not replace the maintenance manual."
-    ),
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=options.HELP,
     pretty_exceptions_enable=False,
     add_completion=False,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,
 )
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import webbrowser
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli import output
@@ -13,24 +16,23 @@ from mlg_troubleshoot.decision.columns import (
     RECORD_ID,
     SIDE,
     TAIL_NO,
+    UNIT,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.plan import Action
-from mlg_troubleshoot.errors import OutputError, UsageError
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.decision.ranking import listed
+from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.cli.check import Flags
-    from mlg_troubleshoot.cli.prompts import (
-        Answers,
-        RichTerminal,
-        Session,
-        SessionStore,
-        Visit,
-    )
-    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.cli.check_run import Run
+    from mlg_troubleshoot.cli.prompts import Entry, Visit
+    from mlg_troubleshoot.store import Record, Store
+
+# Where the prompts write reports that were not asked for by a flag.
+_REPORTS = Path("report")
 
 
 def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = None) -> Inspection:
@@ -75,99 +77,131 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
     return under_a_free_id(read, place)
 
 
-def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
+def given_cells(flags: Flags, declared: task.CheckOptions) -> dict[str, str]:
     """What the flags answer already of the questions on a terminal."""
-    from mlg_troubleshoot.cli.prompts.answers import Answers
     from mlg_troubleshoot.records import ReadOptions, admit
     from mlg_troubleshoot.records.gate import NOBODY
 
-    if flags.tail is not None:
-        given = {**NOBODY, CONVENTION.name: "RADIAL", TAIL_NO.name: flags.tail}
-        options = ReadOptions.of(load_gear(declared.gear), declared)
-        admit(given, options, {TAIL_NO.name: f"--tail {flags.tail!r}"})
-    return Answers(
-        tail_no=flags.tail,
-        side=declared.side,
-        unit=declared.unit,
-        convention=declared.convention,
-    )
+    cells: dict[str, str | None] = {UNIT.name: declared.unit, CONVENTION.name: declared.convention}
+    cells[SIDE.name] = declared.side
+    cells[TAIL_NO.name] = flags.tail and flags.tail.upper()
+    given = {name: str(text) for name, text in cells.items() if text is not None}
+    options = ReadOptions.of(load_gear(declared.gear), declared)
+    labels = {TAIL_NO.name: f"--tail {flags.tail!r}"}
+    admit({**NOBODY, CONVENTION.name: "RADIAL", **given}, options, labels)
+    return given
 
 
-def unfinished(store: SessionStore, terminal: RichTerminal, gear: Gear, flags: Flags) -> Session:
-    """The unfinished entry to resume: the last one, or the one of the gear that flags name."""
-    from mlg_troubleshoot.cli.prompts.answers import Answers
-    from mlg_troubleshoot.cli.prompts.flow import contradictions
-    from mlg_troubleshoot.cli.prompts.pages import unfinished_lines
+class Sitting:
+    """One gear after the other at the prompts: asked for, judged, kept and shown."""
 
-    found, damaged = store.unfinished(gear.id)
-    for message in damaged:
-        output.say(message)
-    asked = Answers(tail_no=flags.tail, side=Side.spelt(flags.side or ""))
-    named = (each for each in found if not contradictions(each.answers, asked))
-    saved = next(named, None) or (None if flags.tail else store.latest())
-    if saved is None:
-        raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
-    others = tuple(each for each in found if each.answers.joints and each.id != saved.id)
-    if others:
-        terminal.say(unfinished_lines(others))
-        output.say("Resume another one: mlg check --resume --tail TAIL --side LH|RH")
-    return saved
+    def __init__(self, run: Run, place: Store) -> None:
+        from mlg_troubleshoot.cli import prompts
 
-
-def kept_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
-    """The last visit to a gear; records that cannot be read are reported and do not prevent a new
-    visit."""
-    from mlg_troubleshoot.cli.prompts import last_visit
-    from mlg_troubleshoot.store import StoreError
-
-    try:
-        return last_visit(store, gear, tail, side)
-    except (OutputError, StoreError) as error:
-        output.say(f"The records of {tail} {side} cannot be read: {error.message}. {error.remedy}")
-        return None
-
-
-def continued(
-    read: Inspection, answers: Answers, visit: Visit | None, gear: Gear
-) -> tuple[Inspection, Visit | None]:
-    """An entry that continues a kept inspection, and that inspection.
-
-    What another window changed meanwhile stands next to what was typed here; where what it
-    continues is no longer kept the entry is a new inspection.
-    """
-    if visit is not None and visit.record.digest == answers.continues:
-        return visit.completed(read), visit
-    begun = None if visit is None else visit.versions.get(answers.continues)
-    if visit is None or begun is None:
-        from mlg_troubleshoot.records import made_record_id
-
-        output.say(
-            "Note: the inspection that this entry continues is no longer kept: the entry is kept as"
-            " a new inspection."
+        self._run = run
+        self._place = place
+        self._gear = load_gear(run.asked.gear)
+        self._saved = prompts.SavedEntries(place.place)
+        self._asker = prompts.Asker(
+            self._gear,
+            prompts.Terminal(),
+            self._saved,
+            self._visit,
+            partial(prompts.reading_order, self._gear),
         )
-        made = made_record_id(read.tail_no, read.side, datetime.now())
-        return replace(read, record_id=made), None
-    output.say(
-        "Note: the inspection that this entry continues was changed meanwhile: what was entered"
-        " there stands next to what was entered here."
-    )
-    merged = visit.answers.with_changes(begun, answers)
-    return visit.completed(merged.inspection(gear, visit.record.record_id)), visit
 
+    def hold(self, given: Mapping[str, str]) -> task.CheckResult:
+        """Ask until the user ends; what was found last is returned."""
+        from mlg_troubleshoot.cli.prompts import Entry, Visit
 
-def advice_for(
-    gear: Gear,
-) -> Callable[[Mapping[int, float], Sequence[int]], tuple[str, int | None] | None]:
-    """Say after each critical joint which reading is most useful next, or that one may stop."""
+        found: Entry | Visit | str = self._asker.begin(given)
+        result = None
+        visit: Visit | None = None
+        while True:
+            if isinstance(found, Entry):
+                result, visit = self._compute(found)
+                if self._run.stops_after_one or visit is None:
+                    return result
+            elif isinstance(found, Visit):
+                visit, result = found, found.result
+                self._run.publish(result, visit.row.unit_entered)
+                self._show_other_side(visit)
+            elif result is None or visit is None or not found:
+                break
+            elif found == "u" and visit.before is not None:
+                result, visit = self._supersede(visit, visit.before)
+                if visit is None:
+                    return result
+            else:
+                self._show(found, result, visit.row.unit_entered)
+            found = self._asker.follow(visit)
+        if result is None:
+            raise TypeError("a sitting ends with a result")
+        return result
 
-    def advise(measured: Mapping[int, float], left: Sequence[int]) -> tuple[str, int | None] | None:
-        step = task.next_step(gear, measured)
-        if step.action not in (Action.MEASURE, Action.MEASURE_AGAIN):
-            said = f"No measurement is needed now. Next: {step.words}. Type done."
-            return (said, None) if left else None
-        joint = next((joint for joint in step.joints if joint in left), None)
-        if joint is None:
+    def _visit(self, tail: str, side: Side) -> Visit | None:
+        """What is kept of a gear; records that cannot be read do not prevent a new entry."""
+        from mlg_troubleshoot.cli.prompts import find_visit
+
+        try:
+            return find_visit(self._place, tail, side, self._judged)
+        except OutputError as error:
+            output.say(f"The records of {tail} {side} cannot be read: {error}. {error.remedy}")
             return None
-        return f"Most useful next reading: {gear.joint(joint).label}.", joint
 
-    return advise
+    def _judged(self, row: Inspection) -> task.CheckResult:
+        return task.check_inspection(row, self._run.asked, self._place)
+
+    def _compute(self, entry: Entry) -> tuple[task.CheckResult, Visit | None]:
+        """Judge an entry, keep it, and show the verdict last; the entry stays open until then."""
+        from mlg_troubleshoot.cli.prompts import with_sitting
+        from mlg_troubleshoot.records import made_record_id
+        from mlg_troubleshoot.workflows.keep import moved_where_corrected, under_a_free_id
+
+        typed = entry.inspection(self._gear)
+        if entry.continues:
+            moved_where_corrected(self._place, entry.continues, typed)
+        visit = self._visit(typed.tail_no, typed.side) if entry.continues else None
+        if visit is not None:
+            found = self._supersede(visit, with_sitting(visit, typed, entry))
+        else:
+            made = made_record_id(typed.tail_no, typed.side, entry.started)
+            row = under_a_free_id(replace(typed, record_id=made), self._place)
+            result = self._judged(row)
+            found = self._kept(result, None, entry.unit), self._visit(row.tail_no, row.side)
+        self._saved.finish(entry)
+        return found
+
+    def _supersede(self, visit: Visit, row: Inspection) -> tuple[task.CheckResult, Visit | None]:
+        result = self._kept(self._judged(row), visit.record, row.unit_entered)
+        return result, self._visit(row.tail_no, row.side)
+
+    def _kept(
+        self, result: task.CheckResult, before: Record | None, unit: LengthUnit
+    ) -> task.CheckResult:
+        """Keep a result and show it, whatever becomes of the records."""
+        try:
+            self._run.keep(result, before)
+        finally:
+            self._run.publish(result, unit)
+        return result
+
+    def _show(self, word: str, result: task.CheckResult, unit: LengthUnit) -> None:
+        if word == "d":
+            self._run.show(result, unit, detail=True)
+            return
+        try:
+            paths = self._run.write_reports(result, _REPORTS, unit)
+        except TroubleshootError as error:
+            output.say(f"No report was written: {error.message}. {error.remedy}")
+            return
+        if word == "open":
+            webbrowser.open(paths[0].resolve().as_uri())
+
+    def _show_other_side(self, visit: Visit) -> None:
+        """Say what is open on the other side of an aircraft."""
+        side = next(each for each in Side if each is not visit.row.side)
+        other = self._visit(visit.row.tail_no, side)
+        if other is not None and not listed(other.result.judgements)[0].is_fine:
+            brief = other.result.judgements[0].in_brief
+            output.say(f"Open on {other.row.tail_no} {side}: {brief}.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import typer
 
@@ -12,17 +12,19 @@ from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.options import ReportFormat
 
 EPILOG = (
-    "Example: [b]mlg check inspections.xlsx --report out[/b] · one gear by hand: [b]mlg check[/b] ·"
-    " scripted: [b]mlg check --tail N123 --side LH --convention RADIAL --set 3=0.013in --set"
-    " 5=0.007in[/b]"
+    "Examples: mlg check · mlg check N123AB LH · mlg check inspections.xlsx --report out · mlg"
+    " check --tail N123 --side LH --convention RADIAL --set 3=0.013in --set outcome=FAILED"
+)
+# What --help shows; --help-all shows every option.
+COMMON = (
+    *("files", "values", "tail", "side", "unit", "convention"),
+    *("report", "csv", "annotate", "as_json", "keep", "help"),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Flags:
     """One gear that is entered by flags."""
-
-    panel: ClassVar = "One gear by hand"
 
     values: Annotated[
         list[str] | None,
@@ -51,8 +53,6 @@ class Flags:
 @dataclass(frozen=True, slots=True)
 class CheckOutputs(options.OutputOptions):
     """What ``mlg check`` shows and writes."""
-
-    panel: ClassVar = "Output"
 
     formats: Annotated[
         list[ReportFormat] | None,
@@ -83,8 +83,6 @@ class CheckOutputs(options.OutputOptions):
 class Wanted(CheckOutputs):
     """What ``mlg check`` predicts with, shows, writes and keeps."""
 
-    panel: ClassVar = "This run"
-
     extension: Annotated[
         list[Path] | None,
         typer.Option(
@@ -93,26 +91,11 @@ class Wanted(CheckOutputs):
         ),
     ] = None
     causes: options.Causes = None
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Continue the last unfinished entry.")
-    ] = False
     keep: Annotated[
         bool,
         typer.Option("--keep", help="Add the inspections to the store; the prompts always do."),
     ] = False
     store: options.Place = None
-    tails: Annotated[
-        str | None,
-        typer.Option(
-            metavar="same|apart",
-            help="Whether tails that differ only in case, blanks, dashes or O for 0 are one"
-            " aircraft.",
-        ),
-    ] = None
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Processor cores for more than 512 rows; all if not given."),
-    ] = None
 
 
 @options.flat
@@ -121,8 +104,8 @@ def check(
     files: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[FILE|-]...",
-            help="Inspection tables (CSV, xlsx, xls), folders, or - for stdin.",
+            metavar="[FILE|-]... | TAIL SIDE",
+            help="Inspection tables (CSV, xlsx, xls), folders, or - for stdin; or one gear.",
         ),
     ] = None,
     flags: Flags,
@@ -131,12 +114,16 @@ def check(
 ) -> None:
     """Check gears: clearances in, verdict and ranked joints out.
 
-    Without FILE on a terminal it asks, joint by joint. Exit codes: 0 every gear within margin · 1
-    something needs attention · 3 no row could be judged · 2 usage.
+    Without FILE it asks for one gear. Exit codes: 0 every gear within margin · 1 something needs
+    attention · 3 no row could be judged · 2 usage.
     """
     from mlg_troubleshoot.cli.check_run import Run
 
     raise typer.Exit(Run(files or [], flags, tables, wanted).run())
 
 
-app = options.alone(check, EPILOG)
+app = options.alone(
+    check,
+    f"{EPILOG} · All options: mlg check --help-all · Defaults from the environment: MLG_UNIT,"
+    " MLG_CONVENTION, MLG_SHOW, MLG_PAGE, MLG_GEAR, MLG_STORE; MLG_PLAIN=1 for plain text",
+)

@@ -6,14 +6,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import typer
 
 from mlg_troubleshoot.cli import by_hand, options, output
 from mlg_troubleshoot.cli.progress import stages
@@ -35,8 +34,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.reporting.json_form import CheckText
     from mlg_troubleshoot.store import Record
 
-# Where the prompts write a report that was not asked for by a flag.
-_ASKED_FOR = Path("report")
 # One gear, and one before and after a repair, are shown in full.
 _FEW = 2
 # Inspections that --report writes at most: HTML and PDF of one take 0.1 s, and their judgements
@@ -61,6 +58,8 @@ class Run:
     def __init__(
         self, files: Sequence[str], flags: Flags, tables: options.Tables, wanted: Wanted
     ) -> None:
+        if len(files) == 2 and Side.spelt(files[1]) and not Path(files[0]).exists():
+            flags, files = replace(flags, tail=files[0], side=files[1]), []
         if wanted.annotate is not None and (len(files) != 1 or files[0] == "-"):
             raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
         if wanted.formats and wanted.report is None:
@@ -83,11 +82,11 @@ class Run:
                 "--causes was given without the extension that its causes are for",
                 "Give --extension EXT.toml as well, or leave out --causes.",
             )
-        self._asked = task.CheckOptions(
+        self.asked = task.CheckOptions(
             side=None if flags.side is None else Side.parse(flags.side),
             **tables.declared(),
             extension=load_model_extension(extensions, tables.gear, causes),
-            workers=wanted.workers or os.cpu_count() or 1,
+            workers=os.cpu_count() or 1,
         )
         self._records = options.Records(wanted.store, tables.gear)
         # A store that is not asked for is not opened: SQLAlchemy is a third of a check.
@@ -96,17 +95,17 @@ class Run:
 
     def run(self) -> int:
         """Judge, show and keep; the exit code is returned."""
-        load_index_table(load_gear(self._asked.gear), lambda said: output.say(f"Note: {said}"))
+        load_index_table(load_gear(self.asked.gear), lambda said: output.say(f"Note: {said}"))
         if self._files:
             return self._check_files()
         if self._asks:
             return self._ask().exit_code
-        typed = by_hand.from_flags(self._flags, self._asked, self._place)
-        result = task.check_inspection(typed, self._asked, self._place)
+        typed = by_hand.from_flags(self._flags, self.asked, self._place)
+        result = task.check_inspection(typed, self.asked, self._place)
         try:
-            self._keep(result)
+            self.keep(result)
         finally:
-            self._publish(result, LengthUnit.INCH)
+            self.publish(result, LengthUnit.INCH)
         return result.exit_code
 
     def _check_files(self) -> int:
@@ -116,6 +115,12 @@ class Run:
                 "--set and --tail describe one gear entered by hand, and a FILE was given as well",
                 "Give either a FILE or the values of one gear.",
             )
+        for file in map(Path, self._files):
+            if file.name == "-" or file.exists() or not file.parent.is_dir():
+                continue
+            near = get_close_matches(file.name, [each.name for each in file.parent.iterdir()], 1)
+            if near:
+                output.say(f"There is no file {file}. Did you mean {file.with_name(near[0])}?")
         wanted = self._wanted
         unit = wanted.unit()
         # On one terminal a bar would stand between the lines of the result.
@@ -125,7 +130,7 @@ class Run:
             with stages(quiet=quiet) as bar:
                 result = task.check_files(
                     [Path(name) for name in self._files],
-                    self._asked,
+                    self.asked,
                     on_read=partial(bar, "Reading"),
                     on_judged=partial(bar, "Judging"),
                     store=self._place,
@@ -137,13 +142,13 @@ class Run:
             elif wanted.as_json:
                 self._write_json(result)
             else:
-                self._show(result, unit, found.lines, detail=wanted.detail)
+                self.show(result, unit, found.lines, detail=wanted.detail)
         if wanted.annotate is not None and result.read is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
         # A report states what was kept.
-        self._keep(result, judged=found.entries)
+        self.keep(result, judged=found.entries)
         if wanted.report is not None:
-            self._write_reports(result, wanted.report, unit)
+            self.write_reports(result, wanted.report, unit)
         if result.problems and not wanted.as_json and not found.lines:
             output.say("No row could be judged.")
         return task.exit_code_of(found.lines, result.unread_files)
@@ -193,74 +198,28 @@ class Run:
                 " --convention.",
             )
 
-        from mlg_troubleshoot.cli.prompts import (
-            Effect,
-            RichTerminal,
-            SessionStore,
-            ask_inspection,
-        )
-        from mlg_troubleshoot.workflows.keep import moved_where_corrected, under_a_free_id
+        if self._place is None:
+            raise TypeError("the prompts keep what they find")
+        given = by_hand.given_cells(self._flags, self.asked)
+        return by_hand.Sitting(self, self._place).hold(given)
 
-        wanted = self._wanted
-        gear = load_gear(self._asked.gear)
-        store = SessionStore(wanted.store)
-        terminal = RichTerminal()
-        saved = by_hand.unfinished(store, terminal, gear, self._flags) if wanted.resume else None
-        given = by_hand.answers_of(self._flags, self._asked)
-        find = partial(by_hand.kept_visit, self._records.kept, gear)
-        ask = partial(
-            ask_inspection, gear, terminal, store, advice=by_hand.advice_for(gear), find_visit=find
-        )
-        entry = ask(given, saved=saved)
-        while True:
-            inspection = entry.inspection
-            visit = entry.visit
-            answers = entry.session.answers if visit is None else visit.answers
-            before = None
-            if visit is None and answers.continues:
-                place = self._records.kept
-                now = moved_where_corrected(place, answers.continues, inspection)
-                answers = replace(answers, continues=now)
-                before = find(inspection.tail_no, inspection.side)
-                inspection, before = by_hand.continued(inspection, answers, before, gear)
-            elif visit is None and answers.record_id is None and self._place is not None:
-                inspection = under_a_free_id(inspection, self._place)
-            unit = answers.unit or self._asked.unit or LengthUnit.INCH
-            result = task.check_inspection(inspection, self._asked, self._place)
-            match entry.effect:
-                case Effect.COMPUTE:
-                    # The verdict is shown whatever becomes of the records, and stands last.
-                    try:
-                        self._keep(result, None if before is None else before.record)
-                    finally:
-                        self._publish(result, unit)
-                    # The entry stays open until its result was kept and shown.
-                    store.finish(entry.session)
-                    if wanted.report is not None or wanted.as_json:
-                        return result
-                case Effect.SHOW:
-                    self._show(result, wanted.unit(unit), detail=True)
-                case Effect.REPORT:
-                    self._write_reports(result, _ASKED_FOR, wanted.unit(unit))
-                case _:
-                    return result
-            visit = find(inspection.tail_no, inspection.side)
-            if visit is None:
-                return result
-            entry = ask(given, visit=visit.read_in(answers.unit))
+    @property
+    def stops_after_one(self) -> bool:
+        """Whether a script asked for the result of one entry."""
+        return self._wanted.report is not None or self._wanted.as_json
 
-    def _publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
+    def publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
         """Show and write one gear that was entered by hand."""
         wanted = self._wanted
         unit = wanted.unit(entered_in)
         if wanted.as_json:
             self._write_json(result)
         else:
-            self._show(result, unit, detail=wanted.detail)
+            self.show(result, unit, detail=wanted.detail)
         if wanted.csv is not None:
             task.write_verdicts(result, wanted.csv)
         if wanted.report is not None:
-            self._write_reports(result, wanted.report, unit)
+            self.write_reports(result, wanted.report, unit)
 
     def _write_json(self, result: task.CheckResult) -> None:
         from mlg_troubleshoot.reporting.json_form import check_as_json
@@ -268,7 +227,7 @@ class Run:
         said = result.problems, result.notes
         output.write_json(check_as_json(result.gear, result.judgements, *said))
 
-    def _show(
+    def show(
         self,
         result: task.CheckResult,
         unit: LengthUnit,
@@ -301,7 +260,10 @@ class Run:
         if not self._wanted.quiet:
             output.say(f"Annotated workbook: {out}")
 
-    def _write_reports(self, result: task.CheckResult, directory: Path, unit: LengthUnit) -> None:
+    def write_reports(
+        self, result: task.CheckResult, directory: Path, unit: LengthUnit
+    ) -> list[Path]:
+        """Write the reports of what was found; their files are returned."""
         formats = tuple(
             str(f)
             for f in self._wanted.formats or (options.ReportFormat.HTML, options.ReportFormat.PDF)
@@ -310,7 +272,7 @@ class Run:
             progress = partial(bar, "Writing reports")
             written = task.write_reports(
                 result,
-                self._asked,
+                self.asked,
                 directory,
                 formats,
                 self._wanted.page.value,
@@ -320,9 +282,9 @@ class Run:
                 # The prompts write the report of one inspection anew after each change.
                 replace_files=self._asks or self._wanted.force,
             )
-        output.say_written(written, quiet=self._wanted.quiet)
+        return output.say_written(written, quiet=self._wanted.quiet)
 
-    def _keep(
+    def keep(
         self,
         result: task.CheckResult,
         before: Record | None = None,
@@ -345,7 +307,7 @@ class Run:
                 added = keep(
                     result,
                     self._place,
-                    self._same_tail(),
+                    _is_same_aircraft,
                     progress,
                     judged,
                 )
@@ -356,16 +318,8 @@ class Run:
         for warning in added.warnings:
             output.say(f"Warning: {warning}")
 
-    def _same_tail(self) -> Callable[[str, str], bool] | None:
-        """Who says whether two spellings of a tail number are one aircraft."""
-        if self._wanted.tails is not None:
-            same = options.one_of(options.Tails, self._wanted.tails, "--tails")
-            return lambda _new, _kept: same is options.Tails.SAME
-        # A command with a FILE never waits for a key.
-        return _ask_tail if self._asks else None
 
-
-def _ask_tail(tail: str, kept: str) -> bool:
-    return typer.confirm(
-        f"Tail {tail!r} differs from {kept!r} only in spelling. Is it the same aircraft?", err=True
-    )
+def _is_same_aircraft(new: str, kept: str) -> bool:
+    """Spellings that differ in case, blanks, dashes or O for 0 are one aircraft."""
+    output.say(f"Note: {new} is kept as {kept}: one aircraft.")
+    return True

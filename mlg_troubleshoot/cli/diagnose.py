@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.errors import ExitCode, InconclusiveDataError
+from mlg_troubleshoot.errors import ExitCode, InconclusiveDataError, UsageError
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
 
 EPILOG = (
-    "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE"
-    " --extension EXT.toml[/b]"
+    "Example: mlg diagnose fleet.csv --write-extension EXT.toml, then mlg check FILE"
+    " --extension EXT.toml"
 )
 
 
@@ -35,28 +35,16 @@ def diagnose(
         Path | None,
         typer.Option(metavar="EXT.toml", help="Write the extended model to this file."),
     ] = None,
-    causes: options.Causes = None,
-    sure: Annotated[
-        float,
+    causes: Annotated[
+        list[Path] | None,
         typer.Option(
-            min=0.5,
-            max=0.999,
-            help=(
-                "Lowest probability at which a cause is named; at 0.9, nine of ten named causes are"
-                " right."
-            ),
-        ),
-    ] = 0.9,
-    beliefs: Annotated[
-        Path | None,
-        typer.Option(
-            "--beliefs",
-            metavar="FILE.toml",
-            help="Prior probabilities and sizes of effects in your fleet.",
+            metavar="FILE.py|FILE.toml",
+            help="Your own causes (runs this file: give only one that you trust), or prior"
+            " probabilities and sizes of effects in your fleet.",
         ),
     ] = None,
     tables: options.Tables,
-    shown: options.OutputOptions,
+    shown: options.Shown,
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
 
@@ -69,13 +57,15 @@ def diagnose(
     from mlg_troubleshoot.reporting.json_form import diagnosis_as_json, written
     from mlg_troubleshoot.workflows import diagnose as task
 
-    inputs = [*files, *(causes or ()), *tables.map_files, beliefs]
+    inputs = [*files, *(causes or ()), *tables.map_files]
+    priors = [file for file in causes or () if file.suffix == ".toml"]
+    if len(priors) > 1:
+        raise UsageError("two files of prior probabilities", "Give one --causes FILE.toml.")
     shown.claim(tables.gear, inputs, [("--write-extension", write_extension)])
     asked = task.DiagnoseOptions(
         **tables.declared(),
-        cause_files=tuple(causes or ()),
-        sure=sure,
-        beliefs_file=beliefs,
+        cause_files=tuple(file for file in causes or () if file not in priors),
+        beliefs_file=priors[0] if priors else None,
     )
     try:
         with stages(quiet=shown.quiet) as bar:
@@ -109,7 +99,7 @@ def diagnose(
         made = task.write_diagnosis_report(
             result,
             shown.report,
-            shown.page.value,
+            options.paper_size(),
             unit=shown.unit(),
             replace_files=shown.force,
         )

@@ -10,7 +10,7 @@ import typer
 
 from mlg_troubleshoot.cli import history, options, output
 
-EPILOG = "Example: [b]mlg fleet[/b] · [b]mlg fleet --only OUTSIDE_MARGIN --csv outside.csv[/b]"
+EPILOG = "Example: mlg fleet · mlg fleet --only OUTSIDE_MARGIN --csv outside.csv"
 
 
 def _verdict(text: str) -> StrEnum:

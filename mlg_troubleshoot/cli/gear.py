@@ -76,10 +76,8 @@ def _number(n: Computed) -> dict[str, object]:
 
 app = options.commands(
     name="gear",
-    help=(
-        "Show the model in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it."
-    ),
+    help=("Show the model in use: joints, coordinates, provenance; mlg gear verify checks it."),
     invoke_without_command=True,
 )
-app.callback(epilog="Example: [b]mlg gear verify[/b]")(show)
-app.command(epilog="Example: [b]mlg gear verify[/b]")(verify)
+app.callback(epilog="Example: mlg gear verify")(show)
+app.command(epilog="Example: mlg gear verify")(verify)

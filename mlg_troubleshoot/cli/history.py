@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.workflows.history import Lives
 
 EPILOG = (
-    "Example: [b]mlg history N123 LH[/b] · [b]mlg history repair N123 LH --joint 3 --date"
-    " 2026-05-04[/b] · [b]mlg history verify[/b]"
+    "Example: mlg history N123 LH · mlg history repair N123 LH --joint 3 --date"
+    " 2026-05-04 · mlg history verify"
 )
 _SHOW = "show"
 
@@ -469,8 +469,8 @@ app = options.commands(
     name="history",
     cls=HistoryGroup,
     help=(
-        "Show the records of each gear ([b]mlg history[/b], [b]mlg history TAIL LH[/b]) and add"
-        " repairs and corrections."
+        "Show the records of each gear (mlg history, mlg history TAIL LH) and add repairs and"
+        " corrections."
     ),
     epilog=EPILOG,
 )

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from copy import copy
 from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
 from functools import partial, wraps
-from inspect import Parameter, Signature, get_annotations, signature
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
@@ -49,16 +48,14 @@ def one_of(kind: type[_Word], text: str, flag: str) -> _Word:
         ) from None
 
 
-class Tails(StrEnum):
-    """Whether two spellings of a tail number are one aircraft."""
-
-    SAME = "same"
-    APART = "apart"
-
-
 class PaperSize(StrEnum):
     A4 = "A4"
     LETTER = "Letter"
+
+
+def paper_size() -> str:
+    """The paper of a command without a flag for it."""
+    return one_of(PaperSize, os.environ.get("MLG_PAGE", PaperSize.A4), "MLG_PAGE").value
 
 
 def _show_version(wanted: bool) -> None:
@@ -155,7 +152,9 @@ Force = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes.")]
+Quiet = Annotated[
+    bool, typer.Option("--quiet", "-q", help="No progress; of the notes only what was not read.")
+]
 
 
 Place = Annotated[
@@ -174,13 +173,10 @@ NoForecast = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class OutputOptions:
+class Shown:
     """What a command writes in addition to its screen, and how it shows lengths."""
 
-    panel: ClassVar = "Output"
-
     report: Report = None
-    page: Paper = PaperSize.A4
     force: Force = False
     show: Show = None
     as_json: Json = False
@@ -205,6 +201,13 @@ class OutputOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class OutputOptions(Shown):
+    """What a command shows and writes, with the size of the paper."""
+
+    page: Paper = PaperSize.A4
+
+
+@dataclass(frozen=True, slots=True)
 class Records:
     """Where records are kept, and the gear that says what their joints are."""
 
@@ -224,8 +227,6 @@ class Records:
 @dataclass(frozen=True, slots=True)
 class Tables:
     """The gear, and what is declared about the tables that are read."""
-
-    panel: ClassVar = "Input"
 
     gear: Gear = DEFAULT_GEAR
     unit: Unit = None
@@ -275,23 +276,6 @@ class Tables:
         return mapped
 
 
-def _panel(group: type, name: str) -> str | None:
-    """The panel of the help for an option that a group defines."""
-    owners = (each for each in group.__mro__ if name in get_annotations(each))
-    panel: str | None = next(owners).__dict__.get("panel")
-    return panel
-
-
-def _in_panel(hint: Any, panel: str | None) -> Any:
-    """An option in a panel of the help."""
-    if panel is None:
-        return hint
-    kind = hint.__origin__
-    option = copy(hint.__metadata__[0])
-    option.rich_help_panel = panel
-    return Annotated[kind, option]
-
-
 def flat(command: Callable[..., None]) -> Callable[..., None]:
     """Let a command take options as dataclasses: on the command line each field of one is an
     option.
@@ -310,8 +294,7 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
         own = get_type_hints(groups[name], include_extras=True)
         # What all commands share stands last.
         for each in sorted(fields(groups[name]), key=lambda each: each in fields(OutputOptions)):
-            panel = _panel(groups[name], each.name)
-            show(each.name, each.default, _in_panel(own[each.name], panel))
+            show(each.name, each.default, own[each.name])
 
     @wraps(command)
     def run(**given: Any) -> None:
@@ -324,7 +307,9 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-commands = partial(typer.Typer, add_completion=False, rich_markup_mode="rich")
+# The help is plain everywhere, and no wider than reads well.
+HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+commands = partial(typer.Typer, add_completion=False, rich_markup_mode=None, context_settings=HELP)
 
 
 def alone(command: Callable[..., None], epilog: str) -> typer.Typer:

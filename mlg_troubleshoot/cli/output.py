@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.cells import cell_len
@@ -152,11 +153,16 @@ class DataConsole(Console):
             yield Segment(text if control else visible(text), style, control)
 
 
+def is_plain() -> bool:
+    """Whether the environment asks for text without colour, boxes and lines."""
+    plain = os.environ.get("NO_COLOR") or os.environ.get("MLG_PLAIN") == "1"
+    return bool(plain) or os.environ.get("TERM") in ("dumb", "unknown")
+
+
 def console(
     *,
     to_stderr: bool = False,
     unit: LengthUnit = LengthUnit.INCH,
-    plain: bool = False,
     elsewhere: int = _WIDTH_ELSEWHERE,
 ) -> DataConsole:
     """Return a console for stdout or stderr, as wide as the terminal, COLUMNS, or `elsewhere`."""
@@ -168,7 +174,7 @@ def console(
         markup=False,
         emoji=False,
         width=given,
-        color_system=None if plain else "auto",
+        color_system=None if is_plain() else "auto",
     )
     if given is None and not found.is_terminal:
         found.width = elsewhere
@@ -271,8 +277,10 @@ def say(message: str) -> None:
         print(visible(message), file=sys.stderr, flush=True)
 
 
-def say_written(written: Iterable[WrittenReport], *, quiet: bool = False) -> None:
-    """Name the reports that were written, and what the user must know about them."""
+def say_written(written: Iterable[WrittenReport], *, quiet: bool = False) -> list[Path]:
+    """Name the reports that were written, and what the user must know about them; their files are
+    returned.
+    """
     reports = list(written)
     for note in dict.fromkeys(note for report in reports for note in report.notes):
         say(f"Note: {note}")
@@ -284,6 +292,7 @@ def say_written(written: Iterable[WrittenReport], *, quiet: bool = False) -> Non
             say(f"Report: {path}")
         if len(files) > 4:
             say(f"Reports: {len(files)} files in {files[0].parent}, first {files[0].name}")
+    return files
 
 
 def write(result: str) -> None:

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from mlg_troubleshoot.cli.output import is_plain
+
 Advance = Callable[[str, int, int | None], None]
 
 # A bar that would be gone before it is read is not shown. [s]
@@ -16,7 +18,7 @@ _WORTH_SHOWING_AFTER_S = 0.5
 @contextmanager
 def stages(*, quiet: bool) -> Iterator[Advance]:
     """Show how far each stage of a run is, once it has run long enough to be worth it."""
-    if quiet or not sys.stderr.isatty():
+    if quiet or is_plain() or not sys.stderr.isatty():
         yield lambda _name, _done, _total: None
         return
     start = time.monotonic()

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.paper.study import StudyFindings
 
 EPILOG = (
-    "Example: [b]mlg study[/b] · the paper's design: [b]mlg study --design lhs[/b] · the table"
-    " that mlg check uses: [b]mlg study --write-table[/b]"
+    "Example: mlg study · the paper's design: mlg study --design lhs · the table"
+    " that mlg check uses: mlg study --write-table"
 )
 # Bar of the largest first-order index. [characters]
 _LONGEST_BAR = 50

@@ -10,7 +10,6 @@ import typer
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.units import LengthUnit
 
 
 def template(
@@ -23,7 +22,11 @@ def template(
     gear: options.Gear = DEFAULT_GEAR,
     force: options.Force = False,
     page: options.Paper = options.PaperSize.A4,
-    show: options.Show = None,
+    unit: options.Unit = None,
+    convention: options.Convention = None,
+    columns: Annotated[
+        str, typer.Option(metavar="usual|all", help="Columns of the workbook.")
+    ] = "all",
 ) -> None:
     """Write an empty inspection workbook, or a one-page form (.pdf, .html) to fill in by hand."""
     from mlg_troubleshoot.cli.claims import claim
@@ -34,12 +37,19 @@ def template(
             f"{file.name!r} is not the name of a workbook or a form",
             "Give a name that ends in .xlsx, .pdf or .html.",
         )
+    if columns not in ("usual", "all"):
+        raise UsageError(f"--columns {columns!r} is not known", "Give usual or all.")
     claim(gear, (), [("the template", file)], force=force)
-    task.write_template(file, gear, page=page.value, unit=show or LengthUnit.INCH)
+    task.write_template(
+        file, gear, page=page.value, unit=unit, convention=convention, every_column=columns == "all"
+    )
     if file.suffix.lower() == ".xlsx":
         output.write(f"Written: {file}. Fill it in, then: mlg check {file} --report DIR")
     else:
         output.write(f"Written: {file}. Print it, fill it in, then enter it: mlg check")
 
 
-app = options.alone(template, "Example: [b]mlg template inspections.xlsx[/b]")
+app = options.alone(
+    template,
+    "Examples: mlg template fleet.xlsx · mlg template form.pdf --unit thou --convention TOTAL_PLAY",
+)

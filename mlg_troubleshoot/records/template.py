@@ -8,7 +8,8 @@ from pathlib import Path
 
 from openpyxl import Workbook
 from openpyxl.comments import Comment
-from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
+from openpyxl.styles import Alignment, Border, Font, PatternFill
+from openpyxl.styles import Side as Edge
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.properties import PageSetupProperties
@@ -17,8 +18,14 @@ from openpyxl.worksheet.worksheet import Worksheet
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     COLUMNS,
+    CONVENTION,
+    DATE,
     MARGIN_U,
+    OUTCOME,
+    PLUNGER_DISPLACEMENT,
     REMARKS,
+    SIDE,
+    TAIL_NO,
     UNIT,
     Column,
     Holds,
@@ -33,6 +40,8 @@ from mlg_troubleshoot.records.headers import Field
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _ROWS = 500
+# The columns that people fill in; the others stand there on request.
+USUAL = (TAIL_NO, SIDE, CONVENTION, CLEARANCE, DATE, OUTCOME, PLUNGER_DISPLACEMENT)
 # The fonts and the colour of headers of what this program writes into workbooks.
 FONT = "Calibri"
 BOLD = Font(name=FONT, bold=True)
@@ -40,7 +49,7 @@ HEADER_FILL = "FFD9E2EC"
 _TITLE = Font(name=FONT, bold=True, size=14)
 _WRAPPED = Alignment(wrap_text=True, vertical="top")
 _LINE_PT = 15
-_LINE = Side(style="thin", color="FF9AA5B1")
+_LINE = Edge(style="thin", color="FF9AA5B1")
 _REQUIRED_FILL = "FFFFE9A8"
 _FORMATS = {Holds.TEXT: "@", Holds.DATE: "yyyy-mm-dd"}
 _INSTRUCTIONS = (
@@ -80,13 +89,19 @@ _INSTRUCTIONS = (
 )
 
 
-def write_template(path: str | Path, gear: Gear, *, unit: LengthUnit = LengthUnit.INCH) -> None:
+def write_template(
+    path: str | Path,
+    gear: Gear,
+    *,
+    unit: LengthUnit = LengthUnit.INCH,
+    every_column: bool = True,
+) -> None:
     """Write the workbook of a gear: columns in a unit, and in it the numbers that explain them."""
     book = Workbook()
     book.properties.title = "Main landing gear: joint clearance inspections"
     _instructions(book, gear.joints)
-    _table(book, gear, unit)
-    _form(book, gear, unit)
+    _table(book, gear, unit, every_column=every_column)
+    _form(book, gear, unit, every_column=every_column)
     book.active = 1
     write_book(path, book)
 
@@ -97,22 +112,24 @@ def write_book(path: str | Path, book: Workbook) -> None:
     write_bytes(path, buffer.getvalue())
 
 
-def _fields(gear: Gear, unit: LengthUnit | None) -> list[Field]:
+def _fields(gear: Gear, unit: LengthUnit | None, *, every_column: bool) -> list[Field]:
     """Return the columns in one unit, or the lines of the form: these say their unit on a line of
     its own.
     """
+    wanted = COLUMNS if every_column else (*USUAL, UNIT)
     return [
         Field(column, number, unit if column.is_length else None)
-        for column in COLUMNS
+        for column in wanted
         if column.in_template and (column is not UNIT or unit is None)
-        for number in _numbers_of(column, gear)
+        for number in _numbers_of(column, gear, every_column=every_column)
     ]
 
 
-def _numbers_of(column: Column, gear: Gear) -> Sequence[int | None]:
+def _numbers_of(column: Column, gear: Gear, *, every_column: bool) -> Sequence[int | None]:
     if column.needs_joint:
         return gear.joint_numbers
-    return range(1, column.copies + 1) if column.copies > 1 else (None,)
+    copies = column.copies if every_column else 1
+    return range(1, copies + 1) if column.copies > 1 else (None,)
 
 
 def _explain(field: Field, gear: Gear, unit: LengthUnit) -> str:
@@ -162,12 +179,15 @@ def _fit_to_width(sheet: Worksheet) -> None:
     sheet.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
 
 
-def _table(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
+def _table(book: Workbook, gear: Gear, unit: LengthUnit, *, every_column: bool) -> None:
     sheet = book.create_sheet("Inspections")
-    fields = _fields(gear, unit)
+    fields = _fields(gear, unit, every_column=every_column)
     for index, field in enumerate(fields):
         letters = column_letters(index)
-        cell = sheet.cell(1, index + 1, field.name)
+        name = field.name
+        if field.column is CLEARANCE and field.number is not None and not every_column:
+            name = f"{gear.joint(field.number).label}, {unit}"
+        cell = sheet.cell(1, index + 1, name)
         cell.font = BOLD
         cell.fill = PatternFill(
             "solid", fgColor=_REQUIRED_FILL if _is_must(field.column) else HEADER_FILL
@@ -187,7 +207,7 @@ def _table(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     sheet.page_setup.paperSize = 9
     sheet.page_setup.orientation = "landscape"
     sheet.page_setup.scale = 53
-    for after in (CLEARANCE, MARGIN_U, REMARKS):
+    for after in (CLEARANCE, MARGIN_U, REMARKS) if every_column else ():
         sheet.col_breaks.append(
             Break(id=max(i for i, field in enumerate(fields, 1) if field.column is after))
         )
@@ -219,7 +239,7 @@ def _validate(sheet: Worksheet, column: Column, cells: str) -> None:
     rule.add(cells)
 
 
-def _form(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
+def _form(book: Workbook, gear: Gear, unit: LengthUnit, *, every_column: bool) -> None:
     sheet = book.create_sheet("Form")
     sheet["A1"] = FORM_TITLE
     sheet["A1"].font = _TITLE
@@ -228,7 +248,7 @@ def _form(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     )
     for letters, width in (("A", 28), ("B", 24), ("C", 66)):
         sheet.column_dimensions[letters].width = width
-    for row, field in enumerate(_fields(gear, None), 4):
+    for row, field in enumerate(_fields(gear, None, every_column=every_column), 4):
         label = sheet.cell(row, 1, field.label)
         value = sheet.cell(row, 2)
         hint = sheet.cell(row, 3)

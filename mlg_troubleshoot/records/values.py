@@ -64,7 +64,6 @@ _USUAL = {
         "The formula has never been calculated. Open the file in a spreadsheet program, save it, "
         "read it again."
     ),
-    "fraction": "Fractions are not read. Enter a decimal number, for example 0.125.",
     "length_negative": (
         "It cannot be less than zero. Enter the value as measured, or leave it blank if it was not "
         "measured."
@@ -199,8 +198,11 @@ def _comma_fault(text: str, expected: str) -> CellFaultError:
 def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) -> CellFaultError:
     if _COMMA_NUMBER.fullmatch(body):
         return _comma_fault(text, expected)
-    if re.fullmatch(r"\d+\s*/\s*\d+.*", body):
-        return CellFaultError("fraction", expected)
+    fraction = re.fullmatch(r"(\d+)\s*/\s*(\d*[1-9]\d*)(.*)", body)
+    if fraction:
+        thou = LengthUnit.THOU.from_inches(int(fraction[1]) / int(fraction[2]))
+        value = f"{fraction[1]}/{fraction[2]} in = {thou:.1f} thou"
+        return CellFaultError("fraction", expected, f"Fractions are not read: {value}.")
     # A unit beside the number is refused where the header states another: the example is in the
     # header's.
     example = (

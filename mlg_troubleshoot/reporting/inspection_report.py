@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
-from mlg_troubleshoot.decision.columns import SIGN_OFF
 from mlg_troubleshoot.decision.inspection import Outcome, RowSource, Side
 from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear, listed
@@ -243,21 +242,48 @@ def _place_of(a: Assessment) -> GearInPicture:
     )
 
 
+def _limit_as_read(
+    limit_in: float, units: Sequence[LengthUnit], conventions: Sequence[ClearanceConvention]
+) -> str:
+    """A limit as the readings of a form show it: ``15.0 thou total play``."""
+    factors = {each.per_radial: each.lower().replace("_", " ") for each in conventions}
+    # Total play and diametral are the same number.
+    shown = {2.0: "total play or diametral"} if len(conventions) > 1 else {}
+    return "; ".join(
+        " = ".join(f"{unit.shown(limit_in * factor)} {unit}" for unit in units)
+        + f" {shown.get(factor, name)}"
+        for factor, name in sorted(factors.items(), reverse=True)
+    )
+
+
 def write_form(
-    file: Path, gear: Gear, *, page: str = "A4", unit: LengthUnit = LengthUnit.INCH
+    file: Path,
+    gear: Gear,
+    *,
+    page: str = "A4",
+    unit: LengthUnit | None = None,
+    convention: ClearanceConvention | None = None,
 ) -> None:
-    """Write the form as PDF or HTML, as the name ends; limits stand in `unit`."""
+    """Write the form as PDF or HTML, as the name ends.
+
+    Its limits stand in the unit and the convention that its boxes are filled in with; without them
+    in each.
+    """
+    units = tuple(LengthUnit) if unit is None else (unit,)
+    conventions = tuple(ClearanceConvention) if convention is None else (convention,)
+    limits = {j.number: _limit_as_read(j.limit.value, units, conventions) for j in gear.joints}
     context = {
         **head(
             f"Joint clearances – {gear.name}",
             gear.name,
             gear,
             provenance_of(gear, {}),
-            Lengths(unit),
+            Lengths(units[0]),
         ),
-        "conventions": tuple(ClearanceConvention),
+        "units": units,
+        "conventions": conventions,
+        "limits": limits,
         "drawing": blank_schematic(gear),
-        "sign_off": SIGN_OFF,
     }
     document = Document("form.html.j2", context, file.stem)
     if file.suffix.lower() == ".html":

@@ -11,7 +11,6 @@ from mlg_troubleshoot.store.database import (
     files_of,
     kept_otherwise,
     login,
-    own_file,
     packed,
 )
 from mlg_troubleshoot.store.drafts import Draft, Drafts
@@ -40,7 +39,6 @@ __all__ = [
     "inspection_record",
     "kept_otherwise",
     "login",
-    "own_file",
     "packed",
     "same_inspection",
 ]

@@ -650,7 +650,13 @@ def _witness(result: CheckResult, store: Store, extension: str | None) -> Witnes
 
 
 def write_template(
-    file: Path, gear: str = DEFAULT_GEAR, *, page: str = "A4", unit: LengthUnit = LengthUnit.INCH
+    file: Path,
+    gear: str = DEFAULT_GEAR,
+    *,
+    page: str = "A4",
+    unit: LengthUnit | None = None,
+    convention: ClearanceConvention | None = None,
+    every_column: bool = True,
 ) -> None:
     """Write an empty inspection workbook or, where the name ends in .pdf or .html, a form to fill
     in by hand.
@@ -659,11 +665,11 @@ def write_template(
     if file.suffix.lower() != ".xlsx":
         from mlg_troubleshoot.reporting.inspection_report import write_form
 
-        write_form(file, loaded, page=page, unit=unit)
+        write_form(file, loaded, page=page, unit=unit, convention=convention)
         return
     from mlg_troubleshoot.records.template import write_template as write
 
-    write(file, loaded, unit=unit)
+    write(file, loaded, unit=unit or LengthUnit.INCH, every_column=every_column)
 
 
 # Wrong cells that an error names at most.

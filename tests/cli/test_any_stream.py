@@ -20,7 +20,7 @@ pexpect = pytest.importorskip("pexpect")
 STORE = ROOT / "tests" / "store" / "data" / "version-1.sqlite"
 COMMANDS = {
     "help": (("--help",), 0),
-    "check help": (("check", "--help"), 0),
+    "check help": (("check", "--help-all"), 0),
     "check": (("check", str(FAILURE), "--detail"), 1),
     "batch": (("check", str(FLEET)), 1),
     "check json": (("check", str(FAILURE), "--json"), 1),

@@ -46,8 +46,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, ...], P
 @pytest.mark.parametrize(
     ("program", "arguments"),
     [
-        (MLG, "check table.csv --workers 2 --csv verdicts.csv"),
-        (AS_A_MODULE, "check table.csv --workers 2"),
+        (MLG, "check table.csv --csv verdicts.csv"),
+        (AS_A_MODULE, "check table.csv"),
         (MLG, "check few.csv --report report --keep"),
         (AS_A_MODULE, "check few.csv --json"),
         (MLG, "fleet"),

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
 from mlg_troubleshoot import Inspection, Side
 from mlg_troubleshoot.cli.output import console
-from mlg_troubleshoot.cli.prompts import RichTerminal, pages
 from mlg_troubleshoot.cli.views import one_gear
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
 from mlg_troubleshoot.units import ClearanceConvention
@@ -50,45 +47,65 @@ SAID = {
 }
 
 
-@pytest.mark.parametrize("width", [60, 80])
 @pytest.mark.parametrize("gear", SAID)
-def test_verdict_next_and_keys_fit_on_24_lines_with_all_joints_read(
-    gear: str, width: int, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+def test_one_gear_takes_twenty_lines_with_verdict_and_next_last(
+    gear: str, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("COLUMNS", str(width))
+    monkeypatch.setenv("COLUMNS", "80")
     result = task.check_inspection(SAID[gear], task.CheckOptions(), None)
     one_gear.show(result.judgements[0], result.gear, console(), detail=False)
-    day = SimpleNamespace(more={"no_spare": "3"})
-    said = result.judgements[0].next_action.text
-    visit: Any = SimpleNamespace(todo=(3,), before=object(), action=None, next=said, answers=day)
-    page = pages.next_page(visit)
-    RichTerminal().say(page.lines)
-    shown = capsys.readouterr()
-    panel = shown.out[shown.out.index("╭─") :].splitlines()
-    assert len(panel) + len(shown.err.splitlines()) + 1 <= 24
-    assert len(page.prompt) < width
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 20
+    (title,) = (place for place, line in enumerate(lines) if line.startswith("N1 LH  ["))
+    assert any(line.startswith("NEXT") for line in lines[title:])
 
 
-def test_a_key_and_its_meaning_stay_on_one_line(
-    capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+def test_the_help_is_one_screen_and_says_where_to_start() -> None:
+    lines = mlg("--help").out.splitlines()
+    assert lines[0].startswith("Start: mlg check")
+    assert len(lines) <= 14
+
+
+def test_the_help_of_check_has_twelve_options_and_says_where_the_others_are() -> None:
+    common, every = (mlg("check", flag).out for flag in ("--help", "--help-all"))
+    assert len(re.findall(r"^  -", common, re.MULTILINE)) <= 12
+    assert "All options: mlg check --help-all" in " ".join(common.split())
+    assert len(re.findall(r"^  -", every, re.MULTILINE)) > 20
+
+
+@pytest.mark.parametrize(
+    ("typed", "same"),
+    [
+        (("help",), ("--help",)),
+        (("help", "fleet"), ("fleet", "--help")),
+        ((), ("--help",)),
+    ],
+)
+def test_help_is_understood_as_it_is_asked_for(
+    typed: tuple[str, ...], same: tuple[str, ...]
 ) -> None:
-    for width in range(40, 81):
-        monkeypatch.setenv("COLUMNS", str(width))
-        RichTerminal().say([pages.JOINT_KEYS])
-    for line in capsys.readouterr().err.splitlines():
-        assert not line.endswith("=")
-        assert not line.strip().startswith("=")
+    assert mlg(*typed).out == mlg(*same).out
 
 
-@pytest.mark.parametrize("command", [("check",), ("diagnose",), ("history", "verify")])
-def test_a_line_of_the_help_is_broken_where_the_screen_ends(
-    command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+def test_a_report_is_asked_for_by_its_gear(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MLG_STORE", str(tmp_path / "store.sqlite"))
+    mlg("check", table(tmp_path, row()), "--keep")
+    assert mlg("report", "N123", "LH").code == 0
+    assert [*(tmp_path / "report").glob("*.html")]
+    assert "Write for example mlg report N123AB LH" in mlg("report").err
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [(("chek",), "check"), (("check", "--jsn"), "--json"), (("check", "tabel.csv"), "table.csv")],
+)
+def test_what_is_nearly_a_command_an_option_or_a_file_is_named(
+    typed: tuple[str, ...], meant: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "70")
-    lines = mlg(*command, "--help").out.partition("╭")[0].rstrip().splitlines()
-    for line, following in pairwise(map(str.strip, lines)):
-        if line and following:
-            assert len(f" {line} {following.split()[0]}") > 68
+    monkeypatch.chdir(tmp_path)
+    table(tmp_path, row())
+    assert meant in mlg(*typed).err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
@@ -97,7 +114,7 @@ def test_a_command_with_a_file_never_waits_for_a_key(tmp_path: Path) -> None:
     pexpect = pytest.importorskip("pexpect")
     store = tmp_path / "store.sqlite"
     mlg("check", table(tmp_path, row(record_id="A")), "--keep", "--store", store)
-    other = table(tmp_path, row(record_id="B", tail_no="n-123"))
+    other = table(tmp_path, row(record_id="B", side=""))
     child = pexpect.spawn(
         sys.executable,
         ["-m", "mlg_troubleshoot", "check", str(other), "--keep", "--store", str(store)],
@@ -106,7 +123,7 @@ def test_a_command_with_a_file_never_waits_for_a_key(tmp_path: Path) -> None:
     )
     child.expect(pexpect.EOF)
     child.close()
-    assert child.exitstatus == 5
+    assert child.exitstatus == 3
 
 
 def test_a_life_is_not_cut_at_60_columns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,6 @@ import pytest
 from tests.benchmarks.bench_check import write_inspections
 from tests.cli.conftest import FLEET, ROOT
 from tests.keys import interrupt
-from tests.prompts.scripted import ENTERS
 
 pexpect = pytest.importorskip("pexpect")
 pytestmark = [
@@ -73,84 +72,35 @@ def finish(child: pexpect.spawn) -> int:
 
 def test_answers_lead_to_a_verdict_and_the_exit_code(start: Start) -> None:
     child = start("check")
-    answer(child, "N123", "l", "i", "r", *FIRST_FIVE, "done", "f", *ENTERS, "")
-    child.expect_exact("#3 short link inner")
+    answer(child, "N123 LH", "in", "radial", "f", "", *FIRST_FIVE, "done", "", "")
     child.expect_exact("COULD BE OUTSIDE")
     answer(child, "")
     assert finish(child) == 1
 
 
-def test_a_shown_result_is_reported_and_corrected_and_shown_in_the_unit_of_entry(
-    start: Start, tmp_path: Path
-) -> None:
-    child = start(
-        "check",
-        "--tail",
-        "N77",
-        "--side",
-        "RH",
-        "--unit",
-        "thou",
-        "--convention",
-        "RADIAL",
-        cwd=tmp_path,
-    )
-    answer(child, "13", "done", *ENTERS, "")
-    child.expect_exact(" thou")
-    child.expect_exact("butes")
-    answer(child, "c")
-    child.expect_exact("check before computing")
-    answer(child, "1", "1", "", "r")
-    child.expect_exact("Report: report")
-    answer(child, "")
-    assert finish(child) == 1
-    (page,) = (tmp_path / "report").glob("*.html")
-    assert re.search(r"\d thou", page.read_text(encoding="utf-8"))
-    again = start("check", "--resume")
-    again.expect_exact("there is no unfinished entry")
-
-
 def test_a_result_that_was_shown_is_kept_while_the_last_question_stands(start: Start) -> None:
-    child = start(
-        "check", "--tail", "N77", "--side", "RH", "--unit", "in", "--convention", "RADIAL"
-    )
-    answer(child, ".001", "done", *ENTERS, "")
-    child.expect_exact("Enter = done")
+    child = start("check", "N77", "RH", "--unit", "in", "--convention", "RADIAL")
+    answer(child, "n", "", ".001", "done", "", "")
+    child.expect_exact("Enter ends")
     child.kill(signal.SIGHUP)
     child.expect(pexpect.EOF)
-    again = start("check", "--tail", "N77", "--side", "RH")
-    again.expect_exact("N77 RH, last inspected")
-    again.expect_exact(PROMPT)
-    interrupt(again)
-    finish(again)
+    again = start("check", "N77", "RH")
+    again.expect_exact("N77 RH")
+    answer(again, "")
+    assert finish(again) == 1
 
 
 def test_an_interrupt_says_how_to_go_on_and_exits_130(start: Start) -> None:
     child = start("check")
-    answer(child, "N123", "l")
+    answer(child, "N123", "lh")
     child.expect_exact(PROMPT)
-    interrupt(child, "mlg check --resume")
+    interrupt(child, "Continue it with: mlg check")
     assert finish(child) == 130
 
 
-def test_an_interrupted_entry_goes_on_where_it_stopped(start: Start) -> None:
-    child = start("check")
-    answer(child, "N123", "l", "i", "r", "0.001")
-    child.expect_exact("joint 2 of 10")
-    interrupt(child)
-    finish(child)
-    again = start("check", "--resume")
-    again.expect_exact("joint 2 of 10")
-    interrupt(again)
-    assert finish(again) == 130
-
-
 def test_flags_answer_questions_beforehand(start: Start) -> None:
-    child = start(
-        "check", "--tail", "N77", "--side", "RH", "--unit", "thou", "--convention", "TOTAL_PLAY"
-    )
-    child.expect_exact("N77 RH")
-    child.expect_exact("joint 1 of 10")
+    child = start("check", "N77", "RH", "--unit", "thou", "--convention", "TOTAL_PLAY")
+    child.expect_exact("Did it retract?")
     interrupt(child)
     assert finish(child) == 130
 
@@ -161,14 +111,14 @@ def test_a_tail_from_a_flag_that_is_none_is_refused_before_anything_is_asked(sta
     assert finish(child) == 2
 
 
-def test_a_joint_that_was_just_skipped_is_not_asked_for_next(start: Start) -> None:
-    child = start(
-        "check", "--tail", "N77", "--side", "RH", "--unit", "in", "--convention", "RADIAL"
-    )
-    answer(child, ".001", ".001", ".001", ".001", "s")
-    child.expect_exact("joint 6 of 10")
-    assert "Most useful next reading: #5" not in child.before
-    interrupt(child)
+@pytest.mark.parametrize("plain", [{"NO_COLOR": "1"}, {"TERM": "dumb"}, {"MLG_PLAIN": "1"}])
+def test_a_plain_terminal_has_the_same_words_without_colour_and_boxes(
+    start: Start, plain: dict[str, str]
+) -> None:
+    child = start("check", FLEET, **plain)
+    child.expect_exact("Model:")
+    assert "\x1b" not in child.before
+    assert not re.search(r"[─│╭╰━]", child.before)
     finish(child)
 
 

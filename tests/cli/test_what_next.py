@@ -41,9 +41,8 @@ FAILED = ("--set", "outcome=FAILED")
 @pytest.fixture(scope="module")
 def explained() -> str:
     """A gear whose plunger stands off, two joints measured."""
-    return said(
-        *HAND, "--set", "2=0.001in", "--set", "4=0.001in", "--set", "plunger=0.036in", *FAILED
-    )
+    values = ("2=0.001in", "4=0.001in", "plunger=0.036in")
+    return said(*HAND, *(f"--set={each}" for each in values), *FAILED, "--detail")
 
 
 @pytest.fixture(scope="module")

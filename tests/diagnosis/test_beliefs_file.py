@@ -1,4 +1,4 @@
-"""``mlg diagnose --beliefs``: what is believed beforehand, from a file."""
+"""``mlg diagnose --causes``: what is believed beforehand, from a file."""
 
 from __future__ import annotations
 
@@ -77,14 +77,14 @@ def named(*more: str) -> dict[str, float]:
 def test_a_cause_that_is_all_but_unknown_in_this_fleet_is_not_named(tmp_path: Path) -> None:
     (cause,) = named()
     rarer = written(tmp_path, f"schema = 1\n[rarer]\n{cause} = 1e-12\n")
-    assert cause not in named("--beliefs", str(rarer))
+    assert cause not in named("--causes", str(rarer))
 
 
 @pytest.mark.slow
 def test_a_cause_that_is_only_plausible_at_far_larger_sizes_is_not_named(tmp_path: Path) -> None:
     (cause,) = named()
     larger = written(tmp_path, f"schema = 1\n[plausible]\n{cause} = 1e9\n")
-    assert cause not in named("--beliefs", str(larger))
+    assert cause not in named("--causes", str(larger))
 
 
 def probability_of_another_linkage(gear: Path | str, beliefs: Path | None = None) -> float:

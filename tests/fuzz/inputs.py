@@ -7,20 +7,18 @@ from __future__ import annotations
 import os
 import zipfile
 
-from mlg_troubleshoot.cli.prompts.store import SessionStore
+from mlg_troubleshoot.cli.prompts import SavedEntries
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.store import Draft, Drafts, Store
 from tests.fuzz.case import Case
 from tests.fuzz.damage import HOSTILE, NUMBERS, damaged
 from tests.fuzz.desk import DATA, GEAR_FILES, HEADERS, Desk
 
-DRAFT = """{"schema_version": 1, "id": "draft", "gear": "hawker-800xp",
-"started": "2026-03-04T10:00:00",
-"complete": false, "record_id": "R1", "tail_no": "N1", "side": "LH",
-"unit": "in", "convention": "RADIAL",
-"joints": {"3": {"text": ".013", "unit": "in", "confirmed": true}, "5": null},
-"plunger_in": 0.02, "margin_in": null,
-"outcome": null}"""
+DRAFT = """{"id": "draft", "gear": "hawker-800xp", "started": "2026-03-04T10:00:00",
+"cells": {"tail_no": "N1", "side": "LH", "unit": "in", "clearance_convention": "RADIAL",
+"outcome": "FAILED", "plunger_displacement": "0.02 in", "clearance_3": ".013 in",
+"clearance_5": "", "inspection_date": "2026-03-04"},
+"given": [], "todo": null, "confirmed": ["clearance_3"], "continues": ""}"""
 FAILURE = str(DATA / "failure_case.csv")
 
 
@@ -86,12 +84,12 @@ def draft(desk: Desk) -> Case:
     """A damaged draft: it is read, or refused with words."""
     place = desk.work / "drafts.sqlite"
     text = damaged(DRAFT, desk.rng).decode("utf-8", "replace")
-    owner = SessionStore(place).owner
-    Drafts(Store(place)).save(Draft("draft", owner, "", False, text), ("",))
+    saved = SavedEntries(place)
+    Drafts(Store(place)).save(Draft("draft", saved.owner, "", False, text), ("",))
 
     def read() -> int:
         try:
-            SessionStore(place).latest()
+            saved.unfinished("hawker-800xp")
         except TroubleshootError:
             return 2
         return 0

@@ -4,22 +4,24 @@ from pathlib import Path
 
 import pytest
 
-from mlg_troubleshoot.cli.prompts import SessionStore
-from mlg_troubleshoot.cli.prompts.flow import Flow
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import load_gear
-
-
-@pytest.fixture(scope="session")
-def gear() -> Gear:
-    return load_gear()
+from mlg_troubleshoot.life.folding import GearLife, life_of
+from mlg_troubleshoot.store import Store
+from tests.prompts.scripted import Sit, sitting
 
 
 @pytest.fixture
-def flow(gear: Gear) -> Flow:
-    return Flow(gear)
+def store(tmp_path: Path) -> Path:
+    return tmp_path / "store.sqlite"
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> SessionStore:
-    return SessionStore(tmp_path / "store.sqlite")
+def sit(store: Path, monkeypatch: pytest.MonkeyPatch) -> Sit:
+    return sitting(store, monkeypatch)
+
+
+@pytest.fixture
+def life(store: Path):
+    def of(side: str = "LH", tail: str = "N1") -> GearLife:
+        return life_of(Store(store), tail, side)
+
+    return of

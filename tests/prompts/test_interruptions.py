@@ -31,19 +31,17 @@ _ENDS = (signal.SIGKILL, signal.SIGHUP, signal.SIGINT)
 # Every question by the beginning of its prompt, and what is typed there.
 _ANSWERS = {
     "Tail number": "N{gear}",
-    "Side": "l",
-    "Unit": "t",
-    "Reading is": "t",
+    "Side": "LH",
+    "Unit": "thou",
+    "Readings are": "",
+    "A clearance": "play",
+    "Did it retract": "f",
+    "Plunger": "4{gear}",
     **{f"#{n} ": f"{n + 2}" for n in range(1, 11)},
-    "f, r, p": "",
-    "Work order": "WO-{gear}",
-    "Date": "2026-10-05",
-    "Landings": "21{gear:02d}",
     "Measured by": "A. Smith",
     "Gauge": "G-7",
-    "Enter computes": "",
 }
-_RESULT = "Enter = done"
+_RESULT = "Enter ends"
 
 
 @dataclass
@@ -83,7 +81,7 @@ class Trial:
 
     def asked(self, child: pexpect.spawn) -> str | None:
         """The question that stands at the prompt; None after the end."""
-        if child.expect_exact(["> ", pexpect.EOF]) == 1:
+        if child.expect_exact([" > ", pexpect.EOF]) == 1:
             return None
         prompt = child.before.rpartition("\n")[2].strip()
         if _RESULT in prompt:
@@ -92,8 +90,7 @@ class Trial:
 
     def run(self) -> None:
         """One start of the program, and its end at a random moment."""
-        gear = ("--resume", "--tail", f"N{self.gear}", "--side", "LH")
-        child = self.start(*gear if self.acknowledged else ())
+        child = self.start(*(f"N{self.gear}", "LH") if self.acknowledged else ())
         pending = ""
         for _ in range(self.chance.randint(1, 6)):
             question = self.asked(child)
@@ -103,10 +100,10 @@ class Trial:
                 self.ended[self.gear] = child.before
                 self.next_gear(child)
                 return
-            if question in self.acknowledged and question != "Enter computes":
+            if question in self.acknowledged:
                 self.asked_again.append(f"N{self.gear}: {question}")
             pending = question
-            child.sendline(_ANSWERS[question].format(gear=self.gear))
+            child.sendline(_ANSWERS[question].format(gear=self.gear % 10))
         time.sleep(self.chance.choice((0.0, 0.002, 0.01, 0.05, 0.2)))
         child.kill(self.chance.choice(_ENDS))
         # Ctrl-C between a prompt and the wait for a key is seen with the next key only.
@@ -132,10 +129,10 @@ class Trial:
             if (
                 found is None
                 or len(found.clearance_in) != 10
-                or any(found.entered[n].text != str(n + 2) for n in range(1, 11))
-                or found.carried.get("work_order") != f"WO-{gear}"
-                or found.gear_landings != 2100 + gear
-                or str(found.inspection_date) != "2026-10-05"
+                or any(str(found.entered[n]) != f"{n + 2} thou" for n in range(1, 11))
+                or found.outcome != "FAILED"
+                or abs(found.readings_in[0] - 0.040 - 0.001 * (gear % 10)) > 1e-9
+                or found.technician_id != "A. Smith"
             ):
                 lost.append(f"N{gear}: {found}, after {self.ended[gear][-600:]!r}")
         return lost
@@ -154,8 +151,8 @@ def test_two_hundred_interruptions_lose_no_answer(tmp_path: Path) -> None:
     assert trial.missing() == []
 
 
-# What is typed at a second visit, and what the inspection is then.
-_SECOND = ("n 3 5", "4", "5")
+# What is typed at a second visit.
+_SECOND = ("restored 3 5", "", "4", "5")
 
 
 @pytest.mark.parametrize("end", _ENDS)
@@ -167,23 +164,22 @@ def test_a_second_visit_loses_no_answer_at_any_question(
     entered = [f"--set={n}={n + 2}thou" for n in range(1, 11)]
     gear = ("--tail", "N1", "--side", "LH")
     mlg("check", *gear, "--convention", "TOTAL_PLAY", *entered, "--keep", "--store", trial.store)
-    child = trial.start(*gear)
+    child = trial.start(*gear, "--unit", "thou", "--convention", "TOTAL_PLAY")
     for text in _SECOND[:place]:
-        child.expect_exact("> ")
+        child.expect_exact(" > ")
         child.sendline(text)
-    child.expect_exact("> ")
+    child.expect_exact(" > ")
     child.kill(end)
     child.expect([pexpect.EOF, pexpect.TIMEOUT], timeout=5)
     child.close(force=True)
-    is_open = 0 < place < len(_SECOND)
-    child = trial.start(*["--resume"] * is_open, *gear)
+    child = trial.start("N1", "LH")
     for text in _SECOND[place:]:
-        child.expect_exact("> ")
+        child.expect_exact(" > ")
         child.sendline(text)
-    child.expect_exact("Enter = done > ")
+    child.expect_exact("Enter ends > ")
     child.close(force=True)
     found = lives(Store(trial.store))["N1", "LH"].inspections[-1].inspection
-    assert [found.entered[n].text for n in (3, 4, 5)] == ["4", "6thou", "5"]
+    assert [str(found.entered[n]) for n in (3, 4, 5)] == ["4 thou", "6thou", "5 thou"]
 
 
 if __name__ == "__main__":

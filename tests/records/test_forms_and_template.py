@@ -310,7 +310,7 @@ def headers_and_comments(path):
 
 @pytest.mark.parametrize("unit", list(LengthUnit))
 def test_a_template_is_in_the_unit_that_is_asked_for(tmp_path, unit):
-    assert mlg("template", tmp_path / "t.xlsx", "--show", unit.value).code == 0
+    assert mlg("template", tmp_path / "t.xlsx", "--unit", unit.value).code == 0
     lengths = [
         name
         for name in headers_and_comments(tmp_path / "t.xlsx")

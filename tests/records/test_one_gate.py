@@ -14,7 +14,7 @@ import pytest
 from mlg_troubleshoot import Inspection, Side, TroubleshootError, check
 from mlg_troubleshoot.cli.by_hand import from_flags
 from mlg_troubleshoot.cli.check import Flags
-from mlg_troubleshoot.cli.prompts.answers import Answers, JointAnswer, judge, read_more
+from mlg_troubleshoot.cli.prompts import Entry
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions, judge_again
@@ -130,20 +130,22 @@ def words(error: TroubleshootError) -> str:
 
 
 def by_prompt(gear: Gear, value: str, margin: str, convention: Convention) -> Found:
-    judged = judge(value, 3, LengthUnit.INCH, convention, gear)
-    refused = [judged.said.removeprefix("expected ").replace(". ", " ", 1)]
-    answers = Answers(tail_no="N1", side=Side.LH, unit=LengthUnit.INCH, convention=convention)
-    try:
-        answers, _ = read_more(answers, f"m {margin}", gear)
-        refused = refused if judged.refused else []
-    except UsageError as error:
-        refused = [*(refused if judged.refused else []), words(error)]
+    head = {"tail_no": "N1", "side": "LH", "unit": "in", "clearance_convention": convention.value}
+    entry = Entry.new(gear, head)
+    refused = []
+    warned = ""
+    for name, text in (("clearance_3", value), ("margin", margin)):
+        try:
+            _, said = entry.judge(gear, name, text)
+        except UsageError as error:
+            refused.append(words(error))
+            continue
+        warned = warned or said
+        entry.give(name, f"{text} in" if text[-1:].isdigit() or text[-1:] == "." else text)
     if refused:
         return Found(refused=" ".join(refused))
-    assert judged.written is not None
-    answers = answers.with_joint(3, JointAnswer(judged.written))
-    row = answers.inspection(gear, "R1")
-    assert bool(judged.said) == bool(row.warnings)
+    row = entry.inspection(gear)
+    assert bool(warned) == bool(row.warnings)
     return Found(row.clearance_in[3], row.margin_in, row.warnings)
 
 

@@ -7,21 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from mlg_troubleshoot.cli.prompts.answers import DAY, LENGTHS
-from mlg_troubleshoot.cli.prompts.conversation import answer
-from mlg_troubleshoot.cli.prompts.flow import Ask, Flow
+from mlg_troubleshoot.cli.prompts.entry import FIRST, LAST
 from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import pdf
 from mlg_troubleshoot.reporting.inspection_report import write_form
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-from tests.prompts.scripted import ENTERS, NOTHING
 
 from .conftest import readable
 from .test_pdf import opened
-
-# The optional answers by the letters that are typed for them.
-OPTIONAL = {**dict(zip("pm", LENGTHS, strict=True)), **DAY}
 
 
 @pytest.mark.parametrize("page", ["A4", "Letter"])
@@ -33,18 +27,39 @@ def test_the_form_is_one_page(page: str, gear: Gear, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def form(gear: Gear, tmp_path_factory: pytest.TempPathFactory) -> str:
     file = tmp_path_factory.mktemp("form") / "form.html"
-    write_form(file, gear, unit=LengthUnit.THOU)
+    write_form(file, gear, unit=LengthUnit.THOU, convention=ClearanceConvention.TOTAL_PLAY)
     return readable(file.read_text(encoding="utf-8"))
 
 
 def test_the_form_has_a_line_for_each_joint_with_its_place_and_limit(gear: Gear, form: str) -> None:
     for joint in gear.joints:
-        assert (
-            f"#{joint.number} {joint.name} {joint.location} {1000 * joint.limit.value:.1f}" in form
-        )
+        assert f"#{joint.number} {joint.name} {joint.location} 15.0 thou total play" in form
 
 
-def test_the_form_asks_for_side_unit_and_convention_and_fills_in_none(form: str) -> None:
+@pytest.mark.parametrize(
+    ("unit", "convention", "limit"),
+    [
+        (LengthUnit.MILLIMETRE, ClearanceConvention.RADIAL, "0.190 mm radial"),
+        (None, ClearanceConvention.DIAMETRAL, "0.0150 in = 15.0 thou = 0.381 mm diametral"),
+        (LengthUnit.THOU, None, "15.0 thou total play or diametral; 7.5 thou radial"),
+    ],
+)
+def test_a_limit_stands_in_the_unit_and_the_convention_of_its_boxes(
+    unit: LengthUnit | None,
+    convention: ClearanceConvention | None,
+    limit: str,
+    gear: Gear,
+    tmp_path: Path,
+) -> None:
+    write_form(tmp_path / "form.html", gear, unit=unit, convention=convention)
+    assert limit in readable((tmp_path / "form.html").read_text(encoding="utf-8"))
+
+
+def test_the_form_asks_for_side_unit_and_convention_and_fills_in_none(
+    gear: Gear, tmp_path: Path
+) -> None:
+    write_form(tmp_path / "form.html", gear)
+    form = readable((tmp_path / "form.html").read_text(encoding="utf-8"))
     for words in (
         "LH",
         "RH",
@@ -58,25 +73,21 @@ def test_the_form_asks_for_side_unit_and_convention_and_fills_in_none(form: str)
 
 
 def test_the_form_has_the_boxes_of_the_prompts_in_their_order(gear: Gear, tmp_path: Path) -> None:
-    typed = ("N1", "l", "t", "t", *["3"] * len(gear.joints), *ENTERS)
-    flow = Flow(gear)
-    turn = flow.begin(NOTHING)
-    asked: list[str] = []
-    for text in typed:
-        ask, at = turn.state.ask, turn.state.at
-        if ask is Ask.MORE:
-            letters = flow.page(turn.state, 80).prompt.partition(" or ")[0].split(",")
-            found = [
-                OPTIONAL.get(letter.strip(), "outcome") for letter in letters if letter.strip()
-            ]
-            asked += dict.fromkeys(found)
-        else:
-            asked.append(str(ask.value if at is None else at))
-        turn = answer(flow, turn.state, text)
-    assert turn.state.ask is Ask.REVIEW
     write_form(tmp_path / "form.html", gear)
     boxes = re.findall(r'data-asks="(\w+)"', (tmp_path / "form.html").read_text(encoding="utf-8"))
-    assert boxes == asked
+    joints = [f"clearance_{n}" for n in gear.joint_numbers]
+    assert boxes == [*FIRST, *joints, *LAST]
+
+
+@pytest.mark.parametrize(
+    "label",
+    [
+        *("Plunger, as found", "Second reading", "Date of the repair", "Plunger after the repair"),
+        *("Rigging and lock roller", "Restored joints", "Cannot reach", "Landings"),
+    ],
+)
+def test_the_form_has_a_box_for_what_else_is_found(label: str, form: str) -> None:
+    assert label in form
 
 
 def test_without_an_engine_the_form_says_what_to_do(

@@ -125,17 +125,8 @@ def test_the_same_identity_with_other_content_is_refused_with_what_to_do(
 def test_a_tail_in_another_spelling_is_not_merged_in_silence(tmp_path: Path, place: Path) -> None:
     keep(tmp_path, visit(1, 0.001))
     other = visit(2, 0.002, tail="n-123")
-    refused = keep(tmp_path, other)
-    assert refused.code == 5
-    assert "'n-123' differs from 'N123'" in refused.err
-    assert keep(tmp_path, other, more=("--tails", "same")).code == 0
+    assert "n-123 is kept as N123" in keep(tmp_path, other).err
     assert Store(place).gears() == [("N123", "LH")]
-
-
-def test_two_aircraft_whose_tails_look_alike_can_be_kept_apart(tmp_path: Path, place: Path) -> None:
-    keep(tmp_path, visit(1, 0.001))
-    assert keep(tmp_path, visit(2, 0.002, tail="N 123"), more=("--tails", "apart")).code == 0
-    assert Store(place).gears() == [("N 123", "LH"), ("N123", "LH")]
 
 
 def test_a_repair_starts_the_wear_of_its_joints_again(tmp_path: Path, place: Path) -> None:

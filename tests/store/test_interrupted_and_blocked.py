@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sql
 
-from mlg_troubleshoot.cli.prompts import SessionStore
+from mlg_troubleshoot.cli.prompts import SavedEntries
 from mlg_troubleshoot.records import rows
 from mlg_troubleshoot.store import Store, StoreError
 from mlg_troubleshoot.store.database import _ADVISORY_LOCK
@@ -75,7 +75,7 @@ def test_drafts_have_an_owner_where_the_environment_names_none(
 ) -> None:
     for name in ("USER", "USERNAME", "LOGNAME", "LNAME"):
         monkeypatch.delenv(name, raising=False)
-    assert SessionStore(tmp_path / "store.sqlite").owner
+    assert SavedEntries(tmp_path / "store.sqlite").owner
 
 
 def test_a_clock_at_the_end_of_all_days_ends_no_command(

@@ -1,23 +1,19 @@
-"""The questions of ``mlg check`` on a terminal: one inspection, joint by joint."""
+"""The questions of ``mlg check`` on a terminal: one sitting at one gear."""
 
-from mlg_troubleshoot.cli.prompts.answers import Answers
-from mlg_troubleshoot.cli.prompts.ask import EntryInterruptedError, ask_inspection
-from mlg_troubleshoot.cli.prompts.conversation import Effect
-from mlg_troubleshoot.cli.prompts.lines import Line
-from mlg_troubleshoot.cli.prompts.store import Session, SessionFileError, SessionStore
-from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
-from mlg_troubleshoot.cli.prompts.visit import Visit, last_visit
+from mlg_troubleshoot.cli.prompts.ask import Asker, EntryInterruptedError
+from mlg_troubleshoot.cli.prompts.drafts import SavedEntries
+from mlg_troubleshoot.cli.prompts.entry import Entry
+from mlg_troubleshoot.cli.prompts.terminal import Terminal
+from mlg_troubleshoot.cli.prompts.visit import Visit, find_visit, reading_order, with_sitting
 
 __all__ = [
-    "Answers",
-    "Effect",
+    "Asker",
+    "Entry",
     "EntryInterruptedError",
-    "Line",
-    "RichTerminal",
-    "Session",
-    "SessionFileError",
-    "SessionStore",
+    "SavedEntries",
+    "Terminal",
     "Visit",
-    "ask_inspection",
-    "last_visit",
+    "find_visit",
+    "reading_order",
+    "with_sitting",
 ]

@@ -1,211 +1,612 @@
-"""Asks for one inspection on a terminal and saves every answer."""
+"""The questions of ``mlg check`` on a terminal: the gate of tables judges each answer, and it is
+saved at once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from datetime import datetime
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Protocol
 
-from mlg_troubleshoot.cli.prompts import pages
-from mlg_troubleshoot.cli.prompts.answers import Answers
-from mlg_troubleshoot.cli.prompts.conversation import Conversation, Effect, Turn
-from mlg_troubleshoot.cli.prompts.flow import Advice, Ask, FindVisit, Flow, State
-from mlg_troubleshoot.cli.prompts.lines import BLANK, Tone, line, warning
-from mlg_troubleshoot.cli.prompts.store import Session, SessionStore, SessionTakenError, new_session
-from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
+from mlg_troubleshoot.cli.prompts.drafts import SavedEntries
+from mlg_troubleshoot.cli.prompts.entry import (
+    FIRST,
+    HEADING,
+    LAST,
+    PLUNGER,
+    REPAIR_DATE,
+    WORDS,
+    Entry,
+    column_of,
+    joint_of,
+    split_words,
+)
 from mlg_troubleshoot.cli.prompts.visit import Visit
+from mlg_troubleshoot.decision.columns import (
+    CLEARANCE,
+    CONVENTION,
+    DATE,
+    OUTCOME,
+    RESTORED_JOINTS,
+    RIGGING_CHECKED,
+    SIDE,
+    SMALL_READINGS_TRUE,
+    TAIL_NO,
+    UNIT,
+)
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records.values import is_no_name
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+_FOLLOW_HELP = (
+    "y: you did NEXT; only its answers are asked for. report writes the report and shows where;"
+    " open opens it. u takes the last answers back. new: a new inspection of this gear. gear:"
+    " another gear. f, r and the words below add an answer."
+)
+_EXAMPLES_IN = {"plunger": 0.041, "margin": 0.028}
+_UNUSUAL = "unusual"
+_HOW = {
+    ClearanceConvention.RADIAL: "half of a dial reading from limit to limit, or of hole minus pin.",
+    ClearanceConvention.DIAMETRAL: "hole by a bore gauge where it is worn most, minus pin by a"
+    " micrometer.",
+    ClearanceConvention.TOTAL_PLAY: "set a dial indicator on the part next to the pin and move the"
+    " joint by hand from one stop to the other, across the pin; type the whole reading.",
+}
+_CONVENTION_WORDS = {
+    "radial": ClearanceConvention.RADIAL,
+    "diametral": ClearanceConvention.DIAMETRAL,
+    "play": ClearanceConvention.TOTAL_PLAY,
+}
+_SPELLINGS = {"total": "play", "dial": "play", "tir": "play", "bore": "diametral"}
+_QUESTIONS = {
+    TAIL_NO.name: ("Tail number", "As painted, for example N123AB; N123AB LH names the side too."),
+    SIDE.name: ("Side, LH or RH", "LH is the left gear as the pilot sees it, RH the right one."),
+    UNIT.name: ("Unit of your readings: in, thou or mm", "1 thou is 0.001 in."),
+    CONVENTION.name: (
+        "A clearance reading is: radial, diametral or play",
+        "\n".join(
+            f"{word}: {kind.meaning}. {_HOW[kind]}" for word, kind in _CONVENTION_WORDS.items()
+        )
+        + "\nDiametral and play are twice radial: the wrong word can reverse the verdict.",
+    ),
+    OUTCOME.name: ("Did it retract? r retracted, f failed, n not tried", "What the gear did."),
+    PLUNGER: (
+        "Plunger reading, {unit} (Enter: not read)",
+        "Plunger position minus mid-position with the Down Lock released, + over-travel."
+        " Two readings: 41; 43.",
+    ),
+    RIGGING_CHECKED.name: (
+        "Rigging and roller: yes = checked and right, corrected = set right",
+        "Corrected counts as a repair.",
+    ),
+    RESTORED_JOINTS.name: ("Restored joints", "The joints that got new parts, for example 3 5."),
+    REPAIR_DATE: ("Date of the repair", "For example 20 Nov, 2026-11-20, yesterday."),
+    LAST[0]: ("Measured by", "The name on the sign-off."),
+    LAST[1]: ("Gauge", "The gauge set that was used."),
+}
+
+
+class Screen(Protocol):
+    """Where questions are shown and lines are typed."""
+
+    def say(self, text: str, style: str = "") -> None: ...
+
+    def ask(self, prompt: str) -> str: ...
+
+
+class BackError(Exception):
+    """The last answer is to be taken back."""
 
 
 class EntryInterruptedError(KeyboardInterrupt):
-    """The user stopped (exit code 130); the answers are saved as `session_id`, or nothing could
-    be.
+    """The user stopped before the result (exit code 130)."""
+
+
+@dataclass
+class Asker:
+    """Asks for one sitting, and for what follows its result.
+
+    order: joints in the order in which NEXT of an entry reads them. visit: the kept state of a
+    gear.
     """
 
-    def __init__(self, session_id: str | None) -> None:
-        super().__init__("the entry was interrupted")
-        self.session_id = session_id
+    gear: Gear
+    screen: Screen
+    saved: SavedEntries
+    visit: Callable[[str, Side], Visit | None] = lambda _tail, _side: None
+    order: Callable[[Entry], tuple[int, ...]] = lambda _entry: ()
+    entry: Entry = field(init=False)
+    _jump: str = ""
+    _known: Visit | None = None
+    _day: str = ""
+    _messages: set[str] = field(default_factory=set)
 
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """A finished entry; it is kept as unfinished, and can be corrected, until its result was
-    shown.
-    """
-
-    inspection: Inspection
-    session: Session
-    effect: Effect = Effect.COMPUTE
-    visit: Visit | None = None
-
-
-class _Saver:
-    """Keeps the session in the store in step with the answers; says once if it cannot."""
-
-    def __init__(
-        self, gear: Gear, terminal: RichTerminal, store: SessionStore, session: Session
-    ) -> None:
-        self._gear = gear
-        self._terminal = terminal
-        self._store = store
-        self._begun_with = session.answers
-        self._said: set[str] = set()
-        self.session = session
-        self.saved = False
-
-    def save(self, answers: Answers) -> None:
-        changed = answers != self.session.answers
-        self.session = replace(self.session, answers=answers)
-        if not changed and (self.saved or answers == self._begun_with):
-            return
-        try:
-            self.session = self._store.save(self.session)
-        except SessionTakenError as error:
-            self._say_once(f"{error.message}. {error.remedy}")
-            self.session = new_session(self._gear.id, self.session.started, answers)
-            self.session = self._store.save(self.session)
-        except OutputError as error:
-            self.saved = False
-            self._say_once(f"{error.message}. {error.remedy} You can continue.")
-            return
-        if self._store.away:
-            self._say_once(self._store.away)
-        self.saved = True
-
-    def resume(self, session: Session) -> None:
-        """Resume another session instead of the one just begun."""
-        self.forget()
-        self.session = session
-        self.saved = True
-
-    def forget(self) -> None:
-        """Delete what was begun: what is offered stands in the store already."""
-        if self.saved:
-            self._store.discard(self.session.id)
-        self.saved = False
-        self._begun_with = self.session.answers
-
-    def put_away(self, session: Session) -> None:
-        try:
-            self._store.finish(session)
-        except (OutputError, SessionTakenError) as error:
-            self._say_once(f"{error.message}. {error.remedy}")
-
-    def unfinished(self) -> tuple[Session, ...]:
-        """The other unfinished sessions with readings of this gear type, the last one first."""
-        found, damaged = self._store.unfinished(self._gear.id)
+    def begin(self, given: Mapping[str, str]) -> Entry | Visit:
+        """Ask for a new entry with what flags gave already; the visit of a gear that is known."""
+        unfinished, damaged = self.saved.unfinished(self.gear.id)
         for message in damaged:
-            self._say_once(message)
-        return tuple(each for each in found if each.answers.joints and each.id != self.session.id)
+            self._once(message)
+        self._known = None
+        self.entry = Entry.new(self.gear, dict(given))
+        with self._interrupted():
+            if not {*HEADING[:2]} <= given.keys():
+                self._say(f"{self.gear.name}. Every answer is saved. ? help, u undo, q stop.")
+            while not {*HEADING[:2]} <= self.entry.cells.keys():
+                self._turn(self._open(), unfinished)
+            return self._opened(unfinished)
 
-    def find_saved(self, tail_no: str, side: Side) -> Session | None:
-        gear = (tail_no.casefold(), side)
-        found = (
-            s
-            for s in self.unfinished()
-            if ((s.answers.tail_no or "").casefold(), s.answers.side) == gear
+    def follow(self, visit: Visit) -> Entry | Visit | str:
+        """Ask for what follows a result: another entry, another gear, or a word for what to show;
+        empty for the end.
+        """
+        self._known = visit
+        keys = ["y = I did NEXT"] * bool(visit.todo) + ["d = details", "report"]
+        keys += [f"u = undo {visit.undoes}"] * bool(visit.undoes)
+        self._say("   ".join([*keys, "new", "gear", "?"]), "dim")
+        while True:
+            try:
+                typed = self._typed("Enter ends", _FOLLOW_HELP)
+            except (EOFError, KeyboardInterrupt):
+                self._say("")
+                return ""
+            except BackError:
+                if visit.undoes:
+                    return "u"
+                self._say("   Nothing is left to undo.", "magenta")
+                continue
+            word = typed.lower()
+            if word in ("", "d", "report", "open"):
+                return word
+            if word == "gear":
+                return self.begin({})
+            self.entry = self._next_entry(visit, word)
+            try:
+                is_known = word == "new" or (word == "y" and visit.todo) or self._take(typed)
+            except UsageError as error:
+                self._refuse(error)
+                continue
+            if not is_known:
+                self._say(f"   {typed!r} is not understood. Type ? for the words.", "magenta")
+            elif self.entry.typed == [DATE.name]:
+                self._day = self.entry.cells[DATE.name]
+            else:
+                with self._interrupted():
+                    self._save()
+                    entry = self._ask_all()
+                if any(entry.cells[name] for name in entry.typed):
+                    return entry
+                self.saved.discard(entry.id)
+                self._say("   Nothing was entered.", "magenta")
+
+    # The course of the questions.
+
+    def _opened(self, unfinished: list[Entry]) -> Entry | Visit:
+        """Continue the unfinished entry of the gear, show its records, or ask on."""
+        gear = [self.entry.cells[name] for name in HEADING[:2]]
+        if self.entry in unfinished:
+            return self._ask_all()
+        for other in unfinished:
+            if [other.cells.get(name) for name in HEADING[:2]] == gear:
+                self._resume(other)
+                return self._ask_all()
+        self._known = self.visit(gear[0], Side(gear[1]))
+        if self._known is None:
+            return self._ask_all()
+        self.saved.discard(self.entry.id)
+        return self._known
+
+    def _resume(self, saved: Entry) -> None:
+        self.saved.discard(self.entry.id)
+        self.entry = saved
+        if saved.continues:
+            self._known = self.visit(*saved.gear_key)
+        read = sum(bool(text) for name, text in saved.cells.items() if joint_of(name))
+        self._say(
+            f"Continued: {saved.identity}, begun {saved.started:%Y-%m-%d %H:%M}, {read} joints"
+            " read. new = begin anew.",
+            "green",
         )
-        return next(found, None)
 
-    def _say_once(self, message: str) -> None:
-        if message not in self._said:
-            self._said.add(message)
-            self._terminal.say((line((message, Tone.WARN), indent=3),))
+    def _next_entry(self, visit: Visit, word: str) -> Entry:
+        """An entry that adds to the records of a gear, or a new inspection of it."""
+        cells = {TAIL_NO.name: visit.row.tail_no, SIDE.name: visit.row.side.value}
+        if self._day:
+            cells[DATE.name] = self._day
+        if word == "new":
+            return Entry.new(self.gear, cells)
+        todo = [*visit.todo] if word == "y" else []
+        cells |= {UNIT.name: visit.row.unit_entered.value, CONVENTION.name: visit.row.convention}
+        cells |= self.saved.offered()
+        return Entry.new(self.gear, cells, todo=todo, continues=visit.record.digest)
 
+    def _ask_all(self) -> Entry:
+        """Ask what is open, then confirm what is unusual; the entry is complete."""
+        while True:
+            name = self._open()
+            if name:
+                self._turn(name, [])
+                continue
+            try:
+                self.entry.inspection(self.gear)
+            except UsageError as error:
+                # Answers that contradict each other: the last one is asked for again.
+                self._refuse(error)
+                if not self.entry.typed:
+                    raise
+                self._undo()
+            else:
+                return self.entry
 
-def ask_inspection(
-    gear: Gear,
-    terminal: RichTerminal,
-    store: SessionStore,
-    given: Answers,
-    *,
-    saved: Session | None = None,
-    visit: Visit | None = None,
-    find_visit: FindVisit | None = None,
-    advice: Advice | None = None,
-    now: Callable[[], datetime] = datetime.now,
-) -> Entry:
-    """Ask for one inspection, joint by joint; a saved one is continued, and after a result, its
-    `visit`, what follows is asked.
-    """
-    if given.tail_no is not None and not (given.tail_no.strip() and given.tail_no.isprintable()):
-        raise UsageError(
-            f"{given.tail_no!r} is not a tail number", "Give for example --tail N123AB."
+    def _open(self) -> str:
+        """The next open question; empty if none is."""
+        cells = self.entry.cells
+        if self._jump:
+            return self._jump
+        columns: list[str] = [*HEADING]
+        if self.entry.todo is None:
+            columns += [*FIRST, *self._joints(), *LAST]
+        else:
+            columns += self.entry.todo
+            if cells.get(RESTORED_JOINTS.name):
+                restored = self._judged(RESTORED_JOINTS.name).restored_joints
+                columns += [REPAIR_DATE, *map(CLEARANCE.header, restored)]
+        # A unit is asked for where something is read in it.
+        is_reading = self.entry.todo is None or any(map(_is_length, columns[len(HEADING) :]))
+        skipped = () if is_reading else HEADING[2:]
+        open_ones = [name for name in columns if name not in cells and name not in skipped]
+        return next(iter(open_ones), _UNUSUAL if self._unusual() else "")
+
+    def _joints(self) -> list[str]:
+        """Joints in the order of NEXT, then the critical ones, then as in the gear file."""
+        names = [CLEARANCE.header(n) for n in self.gear.joint_numbers]
+        if all(name in self.entry.cells for name in names):
+            return names
+        if not {*FIRST} <= self.entry.cells.keys():
+            return names
+        rest = sorted(self.gear.joints, key=lambda joint: not joint.critical)
+        order = (*self.order(self.entry), *(joint.number for joint in rest))
+        return [CLEARANCE.header(n) for n in dict.fromkeys(order)]
+
+    def _turn(self, name: str, unfinished: list[Entry]) -> None:
+        """Ask one question and take what is typed."""
+        prompt, help_text = self._question(name)
+        if name == TAIL_NO.name and unfinished:
+            prompt += f" (Enter continues {unfinished[0].identity})"
+        try:
+            typed = self._typed(prompt, help_text)
+            if name == TAIL_NO.name and not typed and unfinished:
+                self._resume(unfinished[0])
+            elif typed.lower() == "new" and self.entry.typed:
+                self.saved.discard(self.entry.id)
+                kept = {key: self.entry.cells[key] for key in HEADING[:2]}
+                self.entry = Entry.new(self.gear, kept)
+            else:
+                self._answer(name, typed)
+        except BackError:
+            self._undo()
+        except UsageError as error:
+            self._refuse(error)
+        self._save()
+
+    def _undo(self) -> None:
+        if not self.entry.typed:
+            self._say("   Nothing was typed yet.", "magenta")
+            return
+        name = self.entry.typed[-1]
+        text = self.entry.cells.pop(name)
+        self._jump = ""
+        self.entry.confirmed = [each for each in self.entry.confirmed if each != name]
+        self._say(f"– undone: {_label(name)} {text or 'no answer'}", "magenta")
+
+    def _answer(self, name: str, typed: str) -> None:
+        """Take an answer; a line of words counts at every question but those of a name."""
+        if joint_of(name) and typed.lower() == "done":
+            self._jump = ""
+            for each in self._joints():
+                if each not in self.entry.cells:
+                    self.entry.give(each, "")
+            return
+        if name == _UNUSUAL and PLUNGER in dict(split_words(typed)):
+            # It is typed again, not once more.
+            self.entry.cells.pop(PLUNGER, None)
+        if name in (TAIL_NO.name, *LAST) or not self._take(typed):
+            special = getattr(self, f"_answer_{name}", None)
+            if special is not None:
+                special(typed)
+            elif joint_of(name):
+                self._answer_joint(name, typed)
+            else:
+                self._answer_column(name, typed)
+
+    def _answer_tail_no(self, typed: str) -> None:
+        text = typed.upper()
+        first, _, last = text.rpartition(" ")
+        side = Side.spelt(last) if first else None
+        tail = first if side else text
+        if is_no_name(tail):
+            raise UsageError(f"{typed!r} is not a tail number", "Type for example N123AB.")
+        self.entry.judge(self.gear, TAIL_NO.name, tail)
+        self.entry.give(TAIL_NO.name, tail)
+        if side is not None:
+            self.entry.give(SIDE.name, side.value)
+
+    def _answer_side(self, typed: str) -> None:
+        side = Side.spelt(typed)
+        if side is None:
+            raise UsageError(f"{typed!r} is not a side", "Type LH for the left gear or RH.")
+        self.entry.give(SIDE.name, side.value)
+
+    def _answer_unit(self, typed: str) -> None:
+        """Take a unit, a convention or both; Enter takes those of the last entry."""
+        offered = self.saved.offered()
+        found = {name: offered[name] for name in HEADING[2:] if name in offered}
+        if not typed and not found:
+            raise UsageError("Enter alone is not an answer", "Type in, thou or mm.")
+        for word in typed.lower().replace("total play", "play").split():
+            kinds = [k for w, k in _CONVENTION_WORDS.items() if _SPELLINGS.get(word, word) == w]
+            if word.upper() == "TOTAL_PLAY" or kinds:
+                found[CONVENTION.name] = (kinds or [ClearanceConvention.TOTAL_PLAY])[0].value
+            else:
+                found[UNIT.name] = LengthUnit.parse(word).value
+        if UNIT.name not in found:
+            raise UsageError("the unit is still missing", "Type in, thou or mm.")
+        for name, text in found.items():
+            self.entry.give(name, text)
+        if typed and found != offered:
+            said = f"   Readings are in {self.entry.unit}"
+            kind = f", {_plain(self.entry.convention)}" * (CONVENTION.name in found)
+            was = [offered[name] for name in HEADING[2:] if name in offered]
+            before = f" (last time: {', '.join(map(_plain, was))})" * bool(was)
+            self._say(f"{said}{kind}{before}.", "magenta" if was else "")
+
+    def _answer_clearance_convention(self, typed: str) -> None:
+        word = _SPELLINGS.get(typed.lower().replace("_", " ").split(" ")[0], typed.lower())
+        if word not in _CONVENTION_WORDS:
+            raise UsageError(f"{typed!r} is not known", "Type radial, diametral or play.")
+        self.entry.give(CONVENTION.name, _CONVENTION_WORDS[word].value)
+
+    def _answer_unusual(self, typed: str) -> None:
+        if typed.lower() not in ("y", "yes"):
+            raise UsageError(f"{typed!r} is not understood", "Type y, #3 13 or p 41.")
+        self.entry.give(SMALL_READINGS_TRUE.name, "yes")
+
+    def _answer_column(self, name: str, typed: str) -> None:
+        """Take the answer to a question that has a default or may be left open."""
+        text = typed or self._enters(name)
+        if name == OUTCOME.name:
+            raise UsageError(f"{typed!r} is not an answer", "Type r, f or n.")
+        if text:
+            self._give([(name, text)])
+        elif name in (RESTORED_JOINTS.name, RIGGING_CHECKED.name):
+            raise UsageError("Enter alone is not an answer", "Type the answer, or u to go back.")
+        else:
+            self.entry.give(name, "")
+
+    def _answer_joint(self, name: str, typed: str) -> None:
+        """Take a clearance; one that can hardly be is confirmed."""
+        number = joint_of(name) or 0
+        if not typed:
+            self._jump = ""
+            self.entry.give(name, "")
+            self._say(f"– #{number} not read", "dim")
+            return
+        read, said = self.entry.judge(self.gear, name, typed)
+        if said:
+            self._jump = name
+            self._say(f"#{number}: {said}", "magenta")
+            again = self._typed(f"y = it is right, or #{number} again", said)
+            if again.lower() not in ("y", "yes"):
+                second = None if split_words(again) else self.entry.judge(self.gear, name, again)
+                if second is None or second[0].clearance_in != read.clearance_in:
+                    self._answer(name, again)
+                    return
+            self.entry.confirmed.append(name)
+        self._jump = ""
+        entered = read.entered.get(number)
+        self.entry.give(name, str(entered) if entered else "")
+        self._echo(number, read)
+
+    # Lines of words.
+
+    def _take(self, line: str) -> bool:
+        """Take a line of words; false if it is not one."""
+        words = split_words(line)
+        for name, text in words:
+            number = joint_of(name)
+            if number is None:
+                continue
+            if number not in self.gear.joint_numbers:
+                raise UsageError(f"there is no joint #{number}", "Type for example #3 13.")
+            self._jump = name
+            if text:
+                self._answer_joint(name, text)
+        others = [each for each in words if not joint_of(each[0])]
+        if others:
+            self._give(others)
+        return bool(words)
+
+    def _give(self, words: list[tuple[str, str]]) -> None:
+        """Give columns, and say what was taken."""
+        before = {**self.entry.cells}
+        taken = self.entry.take(self.gear, words)
+        if PLUNGER in taken and not self._is_sure_of_plunger():
+            self.entry.cells = before
+            return
+        said = (f"{column_of(name).plain} {self.entry.cells[name] or 'none'}" for name in taken)
+        self._say(f"✓ {', '.join(said)}", "green")
+
+    def _is_sure_of_plunger(self) -> bool:
+        """Confirm a plunger reading beyond what all joints at their limits could cause."""
+        readings_in = self._judged(PLUNGER).readings_in
+        most_in = float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
+        if max(map(abs, readings_in)) <= most_in:
+            return True
+        self._say(
+            f"Plunger {self.entry.cells[PLUNGER]}: all joints at their limits could move it"
+            f" {self._length(most_in)} at most.",
+            "magenta",
         )
-    session = (
-        new_session(gear.id, now(), Answers()) if saved is None else replace(saved, complete=False)
-    )
-    saver = _Saver(gear, terminal, store, session)
-    flow = Flow(gear, saver.find_saved, advice, now().date(), find_visit)
-    try:
-        if visit is not None:
-            fresh = Answers(tail_no=visit.row.tail_no, side=visit.row.side)
-            turn = Turn(State(Ask.NEXT, fresh, visit=visit))
-        elif saved is None:
-            flow = replace(flow, unfinished=saver.unfinished())
-            terminal.say(pages.welcome(gear, terminal.width, flow.unfinished))
-            turn = flow.begin(given)
-        else:
-            saver.saved = True
-            turn = flow.resume(saved, given)
-        return _converse(flow, turn, terminal, saver)
-    except (EOFError, KeyboardInterrupt) as stopped:
-        if visit is not None and not saver.saved and isinstance(stopped, EOFError):
-            return Entry(visit.row, session, Effect.DONE, visit)
-        raise _stopped(terminal, saver, is_kept=visit is not None) from None
+        again = self._typed("y = it is right; anything else: asked again", "")
+        return again.lower() in ("y", "yes")
 
+    def _judged(self, name: str) -> Inspection:
+        return self.entry.judge(self.gear, name, self.entry.cells[name])[0]
 
-def _converse(flow: Flow, turn: Turn[State], terminal: RichTerminal, saver: _Saver) -> Entry:
-    conversation = Conversation(flow, terminal)
-    while True:
-        if turn.state.offers:
-            saver.forget()
-        else:
-            saver.save(turn.state.answers)
-        if turn.effect is not Effect.COMPUTE:
-            turn = conversation.next(turn)
-        visit = turn.state.visit
-        match turn.effect:
-            case Effect.SHOW | Effect.REPORT | Effect.DONE | Effect.STOP if visit is not None:
-                return Entry(visit.row, saver.session, turn.effect, visit)
-            case Effect.STOP:
+    # What is shown.
+
+    def _question(self, name: str) -> tuple[str, str]:
+        if name == _UNUSUAL:
+            asked = f"{self._unusual()}\ny = it is right; or type it again, as #3 13 or p 41"
+            return asked, "A wrong unit changes the verdict."
+        if number := joint_of(name):
+            return self._joint_question(number)
+        prompt, help_text = _QUESTIONS[name]
+        enter = self._enters(name)
+        if name == UNIT.name and enter:
+            prompt, enter = f"Readings are {enter}", "yes; or type the change, as mm radial"
+        prompt = prompt.format(unit=self.entry.unit)
+        return prompt + f" (Enter: {enter})" * bool(enter), help_text
+
+    def _joint_question(self, number: int) -> tuple[str, str]:
+        joint = self.gear.joint(number)
+        unit, kind = self.entry.unit, self.entry.convention
+        limit = self._length(joint.limit.value * kind.per_radial)
+        last = self._known.last.get(number) if self._known else None
+        prompt = f"#{number} {joint.name}, limit {limit}" + f", last {last}" * (last is not None)
+        area = next(each.description for each in self.gear.areas if each.name == joint.area)
+        alike = " and ".join(f"#{other}" for other in self.gear.alike.get(number, ()))
+        lines = [
+            f"{joint.label}. {joint.location}. Area: {joint.area} ({area}).",
+            f"Limit {limit} {_plain(kind)} = {unit.shown(joint.limit.value)} {unit} radial,"
+            f" {joint.limit.kind.value}.",
+            f"How: {_HOW[kind]} Only play across the pin counts.",
+            f"Moves the plunger like {alike}: the other end of the same link." * bool(alike),
+            "Make the gear safe as the maintenance manual says before you reach in.",
+            "Enter: not read. done: no more joints. #7: joint 7. #7 13: its reading.",
+        ]
+        return prompt, "\n".join(filter(None, lines))
+
+    def _enters(self, name: str) -> str:
+        """What Enter answers."""
+        if name == UNIT.name:
+            found = self.saved.offered()
+            known = [_plain(found[each]) for each in HEADING[2:] if each in found]
+            return ", ".join(known) if len(known) == 2 else ""
+        if name == REPAIR_DATE:
+            return self.entry.day.isoformat()
+        if name == RESTORED_JOINTS.name and self._known:
+            return " ".join(map(str, self._known.joints))
+        return self.saved.offered().get(name, "") if name in LAST else ""
+
+    def _unusual(self) -> str:
+        """What is unusual and not confirmed, in one line."""
+        if self.entry.todo is None and not self.entry.has_findings:
+            return "nothing was read and no outcome is stated: there is nothing to judge."
+        if SMALL_READINGS_TRUE.name in self.entry.cells:
+            return ""
+        found = [self.entry.unit_question(self.gear)]
+        for name, text in self.entry.cells.items():
+            number = joint_of(name)
+            if number and text and self._known and name not in self.entry.confirmed:
+                was_in = self._known.row.clearance_in.get(number)
+                is_in = self._judged(name).clearance_in[number]
+                # Two combined standard uncertainties of the readings.
+                apart_in = 2.0 * math.sqrt(2.0) * self._known.row.gauge_u_of(number)
+                if was_in and is_in < was_in - apart_in and not self._is_restored(number):
+                    last = self._known.last[number]
+                    found.append(f"#{number} {text} is tighter than {last}: restored?")
+        return " ".join(filter(None, found))
+
+    def _is_restored(self, number: int) -> bool:
+        given = self.entry.cells.get(RESTORED_JOINTS.name)
+        return bool(given) and number in self._judged(RESTORED_JOINTS.name).restored_joints
+
+    def _echo(self, number: int, read: Inspection) -> None:
+        joint = self.gear.joint(number)
+        radial_in = read.clearance_in[number]
+        factor = self.entry.convention.per_radial
+        shown = f"✓ #{number} {self._length(radial_in * factor)}"
+        if factor != 1.0:
+            shown += f" {_plain(self.entry.convention)} = {self._length(radial_in)} radial"
+        self._say(shown, "green")
+        if joint.is_over_limit(radial_in):
+            self._say(
+                f"  Over the limit of {self._length(joint.limit.value * factor)}"
+                f" ({joint.limit.kind.value}): look up the manual's.",
+                "bold red",
+            )
+
+    def _typed(self, prompt: str, help_text: str) -> str:
+        """Ask, and return what is typed; the words for help, undo and stop are the same
+        everywhere.
+        """
+        shown, _, prompt = prompt.rpartition("\n")
+        if shown:
+            self._say(f"{shown[:1].upper()}{shown[1:]}", "magenta")
+        while True:
+            typed = self.screen.ask(f"{prompt} > ").strip()
+            word = typed.lower()
+            if not typed.isprintable() or "\ufffd" in typed:
+                self._say("   That key (an arrow?) does nothing here. Type the line again.")
+            elif word in ("q", "quit"):
                 raise EOFError
-            case Effect.RESUME if turn.state.saved is not None:
-                saver.resume(turn.state.saved)
-            case Effect.PUT_AWAY if turn.state.saved is not None:
-                saver.put_away(turn.state.saved)
-            case Effect.COMPUTE:
-                terminal.say(turn.lines)
-                saver.save(turn.state.answers)
-                try:
-                    return Entry(
-                        turn.state.answers.inspection(flow.gear, _record_id(saver.session)),
-                        saver.session,
-                    )
-                except UsageError as error:
-                    said = line((f"{error.message}. {error.remedy}", Tone.BAD))
-                    turn = Turn(turn.state, (said,))
+            elif word in ("u", "undo", "b", "back"):
+                raise BackError
+            elif word in ("?", "help"):
+                self._say(f"{help_text}\n{self._word_help()}")
+            else:
+                return typed
+
+    def _word_help(self) -> str:
+        unit = self.entry.unit
+        examples = {name: f"{unit.from_inches(x):.3g}" for name, x in _EXAMPLES_IN.items()}
+        rows = [f"  {f'{w} {e}'.format(**examples):<26}{meaning}" for w, _, e, meaning in WORDS]
+        return "\n".join(("At any question:", *rows))
+
+    def _refuse(self, error: UsageError) -> None:
+        said = f"{error.message[:1].upper()}{error.message[1:]}"
+        self._say(f"✗ {said}. {error.remedy}", "red")
+
+    def _save(self) -> None:
+        if self.entry.typed:
+            self._once(self.saved.save(self.entry))
+
+    def _once(self, message: str) -> None:
+        if message and message not in self._messages:
+            self._messages.add(message)
+            self._say(message, "magenta")
+
+    def _say(self, text: str, style: str = "") -> None:
+        self.screen.say(text, style)
+
+    def _length(self, length_in: float) -> str:
+        return f"{self.entry.unit.shown(length_in)} {self.entry.unit}"
+
+    @contextmanager
+    def _interrupted(self) -> Iterator[None]:
+        try:
+            yield
+        except (EOFError, KeyboardInterrupt):
+            if self.entry.typed:
+                self._say("\nSaved. Continue it with: mlg check", "green")
+            else:
+                self._say("\nNothing was typed. Begin again with: mlg check")
+            raise EntryInterruptedError from None
 
 
-def _stopped(terminal: RichTerminal, saver: _Saver, *, is_kept: bool) -> EntryInterruptedError:
-    if saver.saved:
-        said = line(("Saved. ", Tone.GOOD), "Resume it with:  ", ("mlg check --resume", Tone.KEY))
-        terminal.say((BLANK, said))
-        return EntryInterruptedError(saver.session.id)
-    if is_kept:
-        return EntryInterruptedError(None)
-    lost = (
-        "The answers could not be saved."
-        if saver.session.answers.radial_in
-        else "Nothing was saved."
-    )
-    terminal.say((BLANK, warning(lost, " Begin again with:  ", ("mlg check", Tone.KEY))))
-    return EntryInterruptedError(None)
+def _label(name: str) -> str:
+    number = joint_of(name)
+    return f"#{number}" if number else column_of(name).plain
 
 
-def _record_id(session: Session) -> str:
-    from mlg_troubleshoot.records import made_record_id
+def _plain(text: str) -> str:
+    return text.lower().replace("_", " ")
 
-    return made_record_id(session.answers.tail_no, session.answers.side, session.started)
+
+def _is_length(name: str) -> bool:
+    return name == PLUNGER or joint_of(name) is not None

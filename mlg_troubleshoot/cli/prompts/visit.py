@@ -1,266 +1,214 @@
-"""What is kept of a gear when its technician comes back: the last inspection, and what it asked
-for.
-"""
+"""What is kept of a gear when somebody comes back to it, and what a sitting adds to it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from datetime import date
-from types import MappingProxyType
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from typing import Any
 
-from mlg_troubleshoot.cli.prompts.answers import (
-    CONFIRMED,
-    MORE,
-    NOT_MEASURED,
-    Answers,
-    JointAnswer,
-    parse_reading,
-)
+from mlg_troubleshoot.cli.prompts.entry import PLUNGER, Entry, column_of, joint_of
 from mlg_troubleshoot.decision.columns import (
-    BY_NAME,
+    CLEARANCE,
+    CONVENTION,
     DATE,
     OUTCOME,
-    PLUNGER_DISPLACEMENT,
     RESTORED_JOINTS,
     RIGGING_CHECKED,
+    SIDE,
+    TAIL_NO,
+    UNIT,
 )
-from mlg_troubleshoot.decision.inspection import Inspection, Side, plain_tail
+from mlg_troubleshoot.decision.inspection import Inspection, RiggingCheck, Side, plain_tail
 from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.plan import Action
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.decision.plan import Action, Step
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearLife, KeptInspection, lives
-from mlg_troubleshoot.life.state import state_now
-from mlg_troubleshoot.store import Record, Store, inspection_from
-from mlg_troubleshoot.units import LengthUnit, Sentence, parse_length
+from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.store import (
+    Record,
+    Store,
+    inspection_from,
+    same_inspection,
+)
+from mlg_troubleshoot.workflows.check import CheckResult
 from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
 _ASKS = {
-    Action.READ_PLUNGER: PLUNGER_DISPLACEMENT.name,
+    Action.READ_PLUNGER: PLUNGER,
     Action.CHECK_RIGGING: RIGGING_CHECKED.name,
     Action.RESTORE: RESTORED_JOINTS.name,
     Action.RETRACT: OUTCOME.name,
 }
-_WITH_JOINTS = (Action.MEASURE, Action.MEASURE_AGAIN)
+_TO_READ = (Action.MEASURE, Action.MEASURE_AGAIN)
+_MICROSECOND = timedelta(microseconds=1)
 
 
 @dataclass(frozen=True, slots=True)
 class Visit:
-    """The last inspection of a gear as it counts today.
+    """What is kept of a gear, and what is said of it today.
 
-    `read_on` is the day on which each reading was entered, `before` the answers before the last
-    change that was not undone, `todo` what NEXT asks for,
-    `stays_open` what was not settled, `versions` the answers of each version by its hash.
+    last: the last reading of each joint with its day. before: the inspection before the last
+    change that was not undone, None where there is none.
     """
 
     record: Record
     row: Inspection
-    answers: Answers
-    read_on: Mapping[int, str]
-    verdict: str
-    next: Sentence
-    action: Action | None
-    todo: tuple[int | str, ...]
-    joints: tuple[int, ...]
-    before: Answers | None = None
-    stays_open: Sentence | None = None
-    versions: Mapping[str, Answers] = field(default_factory=dict)
+    result: CheckResult
+    last: Mapping[int, str]
+    before: Inspection | None = None
 
-    def begun(self, today: date | None) -> Answers:
-        """The answers with what NEXT asks for still to come, on the day of this visit."""
-        inspected = self.row.inspection_date
-        answers = replace(self.answers, todo=self.todo)
-        if self.action is Action.MEASURE_AGAIN:
-            names = " ".join(map(str, {*self.row.measured_again, *self.joints}))
-            answers = answers.with_more(measured_again=names)
-        if today is None or inspected is None:
-            return answers
-        return answers.with_more(inspection_date=max(today, inspected).isoformat())
+    @property
+    def step(self) -> Step:
+        return self.result.judgements[0].next_action
 
-    def with_both_readings(self, answers: Answers) -> Answers:
-        """The answers with the plunger's first reading too, where NEXT asked for a second one."""
-        name = PLUNGER_DISPLACEMENT.name
-        first = self.answers.more.get(name)
-        if first is None or self.todo != (name,) or len(self.row.standing_readings_in) != 1:
-            return answers
-        return answers.with_more(**{name: f"{first}; {answers.more[name]}"})
+    @property
+    def joints(self) -> tuple[int, ...]:
+        return self.step.joints
 
-    def read_in(self, unit: LengthUnit | None) -> Visit:
-        """The visit in the unit that was just chosen, where no clearance says which."""
-        unit = self.answers.unit or unit
-        before = self.before and replace(self.before, unit=self.before.unit or unit)
-        return replace(self, answers=replace(self.answers, unit=unit), before=before)
+    @property
+    def todo(self) -> tuple[str, ...]:
+        """The columns that NEXT asks for."""
+        if self.step.action in _TO_READ:
+            return tuple(map(CLEARANCE.header, self.joints))
+        asked = _ASKS.get(self.step.action)
+        return () if asked is None else (asked,)
 
-    def completed(self, read: Inspection) -> Inspection:
-        """What was typed, with what only the kept inspection says: prompts do not ask for all."""
-        asked = {BY_NAME[name].filled for name in MORE} | {"warnings", "unit_question"}
-        kept = {
-            field.name: getattr(self.row, field.name)
-            for field in fields(Inspection)
-            if field.name not in asked
-            and getattr(read, field.name) in (field.default, None, {}, ())
-            and field.name not in ("clearance_in", "entered")
-        }
-        typed = PLUNGER_DISPLACEMENT.name
-        unit = self.answers.unit or LengthUnit.INCH
-        if self.answers.more.get(typed) == _more(read, unit).get(typed):
-            kept["readings_in"] = self.row.readings_in
-        if not self.row.gauge_u_is_default:
-            kept |= {"gauge_u_in": self.row.gauge_u_in, "gauge_u_is_default": False}
-        kept["carried"] = {**self.row.carried, **read.carried}
-        return replace(read, **kept)
+    @property
+    def undoes(self) -> str:
+        """What an undo takes back; empty if nothing."""
+        if self.before is None:
+            return ""
+        found = [
+            f"#{n} {self.row.entered.get(n, 'not read')}"
+            for n in sorted({*self.row.clearance_in, *self.before.clearance_in})
+            if self.row.clearance_in.get(n) != self.before.clearance_in.get(n)
+        ]
+        if self.row.readings_in != self.before.readings_in:
+            unit = self.row.unit_entered
+            read = "; ".join(unit.shown(each, sign=True) for each in self.row.readings_in)
+            found.append(f"plunger {read or 'not read'} {unit}")
+        for name in (OUTCOME.name, RESTORED_JOINTS.name, RIGGING_CHECKED.name):
+            value = getattr(self.row, name)
+            if value != getattr(self.before, name):
+                shown = " ".join(map(str, value)) if isinstance(value, tuple) else value
+                found.append(f"{column_of(name).plain} {shown or 'none'}")
+        return ", ".join(found) or "the last change"
 
 
-def last_visit(store: Store, gear: Gear, tail: str, side: Side) -> Visit | None:
-    """The last inspection of a gear, under whichever spelling of its tail number it is kept."""
+def find_visit(
+    store: Store,
+    tail: str,
+    side: Side,
+    judge: Callable[[Inspection], CheckResult],
+) -> Visit | None:
+    """What is kept of a gear, under whichever spelling of its tail number."""
     if store.is_new:
         return None
     kept = [t for t, s in store.gears() if s == side and plain_tail(t) == plain_tail(tail)]
-    if not kept or (tail not in kept and len(kept) > 1):
+    if not kept:
         return None
     key = (tail if tail in kept else kept[0], side.value)
     life = lives(store, *key)[key]
-    return None if life.latest is None else _visit(life, life.latest, gear)
-
-
-def _visit(life: GearLife, latest: KeptInspection, gear: Gear) -> Visit | None:
-    stood = latest.inspection
-    if not set(stood.clearance_in) <= set(gear.joint_numbers):
+    if life.latest is None:
         return None
-    state = state_now(life.visits, gear)
-    if state is None or state.visit.place != life.places[latest.record.digest]:
-        return None
-    (found,) = assess([state.inspection], gear, load_index_table(gear))
-    since = set(state.inspection.restored_joints) - set(stood.restored_joints)
-    restored = tuple(sorted(since - state.inspection.clearance_in.keys()))
-    row = _with_repairs(stood, state.inspection, since)
-    step = found.next_action
-    action = step.action
-    asked = _ASKS.get(action)
-    todo = step.joints if action in _WITH_JOINTS else () if asked is None else (asked,)
-    said = Sentence.of("{}", step.text)
-    question = found.plan.open_question
-    if restored:
-        names = ", ".join(f"#{joint}" for joint in restored)
-        action = Action.MEASURE
-        todo = restored
-        said = Sentence(f"Restored since, as the records say: {names}. Enter the new clearances.")
-    versions = life.versions(latest.record)
-    by_version = {v.digest: answers_of(inspection_from(v), gear, "") for v in versions}
-    standing = _not_undone([*by_version.values()])
-    return Visit(
-        latest.record,
-        row,
-        answers_of(row, gear, latest.record.digest),
-        _read_on(versions),
-        found.verdict.words,
-        said,
-        action,
-        todo,
-        step.joints,
-        replace(standing[-2], continues=latest.record.digest) if len(standing) > 1 else None,
-        Sentence.of("{}", question) if question and not restored else None,
-        by_version,
-    )
+    row = life.latest.inspection
+    versions = life.versions(life.latest.record)
+    standing = _not_undone(versions)
+    before = inspection_from(standing[-2]) if len(standing) > 1 else None
+    return Visit(life.latest.record, row, judge(row), _last_readings(versions), before)
 
 
-def _with_repairs(stood: Inspection, counts: Inspection, since: set[int]) -> Inspection:
-    """An inspection with the repairs that were recorded after it."""
-    if not since and counts.rigging_checked is stood.rigging_checked:
-        return stood
-    day = stood.inspection_date
-    return replace(
-        stood,
-        clearance_in={j: c for j, c in stood.clearance_in.items() if j in counts.clearance_in},
-        restored_joints=counts.restored_joints,
-        rigging_checked=counts.rigging_checked,
-        repair_date=counts.repair_date,
-        plunger_date=stood.plunger_date or (day if stood.readings_in else None),
-        outcome_date=stood.outcome_date or (day if stood.outcome else None),
-    )
-
-
-def _not_undone(versions: list[Answers]) -> list[Answers]:
+def _not_undone(versions: Sequence[Record]) -> list[Record]:
     """The versions that lead to the last one, a change and its undoing left out."""
-    standing: list[Answers] = []
+    standing: list[Record] = []
     for version in versions:
-        if version in standing[-2:-1]:
+        if standing[-2:-1] and same_inspection(standing[-2], version):
             standing.pop()
         else:
             standing.append(version)
     return standing
 
 
-def _read_on(versions: list[Record]) -> Mapping[int, str]:
-    """The day of the entry that each reading came with."""
-    days: dict[int, str] = {}
-    readings: Mapping[int, Any] = {}
+def _last_readings(versions: Sequence[Record]) -> Mapping[int, str]:
+    """The last reading of each joint, with the day of the entry that it came with."""
+    shown: dict[int, str] = {}
+    read: Mapping[int, object] = {}
     for version in versions:
-        entered = inspection_from(version).entered
-        days = {
-            joint: days[joint] if readings.get(joint) == text else version.day
-            for joint, text in entered.items()
-        }
-        readings = entered
-    return days
+        row = inspection_from(version)
+        for joint, entered in row.entered.items():
+            if read.get(joint) != entered:
+                shown[joint] = f"{entered} on {version.day}" if version.day else str(entered)
+        read = row.entered
+    return shown
 
 
-def answers_of(row: Inspection, gear: Gear, continues: str) -> Answers:
-    """An inspection as answers, each as it was typed."""
+def with_sitting(visit: Visit, typed: Inspection, entry: Entry) -> Inspection:
+    """The kept inspection of a gear with what was typed since.
+
+    A day that was stated stays; what is typed after a repair is dated after it.
+    """
+    row = _read_as(visit.row, typed)
+    begin = datetime.combine(entry.day, datetime.now().time())
+    # What is typed later happened later.
+    moments = {name: begin + place * _MICROSECOND for place, name in enumerate(entry.typed, 1)}
+    work = [RESTORED_JOINTS.name, RIGGING_CHECKED.name]
+    changed: dict[str, Any] = {}
+    carried = {**row.carried}
+    for name in entry.typed:
+        column = column_of(name)
+        if column.carried:
+            carried[name] = entry.cells[name]
+        elif not joint_of(name) and name not in (TAIL_NO.name, SIDE.name, UNIT.name, DATE.name):
+            changed[column.filled] = getattr(typed, column.filled)
+    for field, name in (("plunger_date", PLUNGER), ("outcome_date", OUTCOME.name)):
+        given = name in entry.typed and bool(entry.cells[name])
+        if given and getattr(typed, field) is None and (row.is_repaired or row.inspection_date):
+            changed[field] = moments[name]
+    is_second = visit.step.action is Action.READ_PLUNGER and len(row.standing_readings_in) == 1
+    if typed.readings_in and is_second:
+        changed["readings_in"] = (*row.readings_in, *typed.readings_in)
+    gone: tuple[int, ...] = ()
+    is_repair = typed.restored_joints or typed.rigging_checked is RiggingCheck.CORRECTED
+    if is_repair and not {*work}.isdisjoint(entry.typed):
+        last = max(moments[name] for name in work if name in moments)
+        at = datetime.combine(typed.repair_date or entry.day, last.time())
+        changed["repair_date"] = at
+        gone = typed.restored_joints
+        for field, value in (("plunger_date", row.readings_in), ("outcome_date", row.outcome)):
+            if value and getattr(row, field) is None and field not in changed:
+                changed[field] = at - _MICROSECOND
+    if visit.step.action is Action.MEASURE_AGAIN:
+        again = {*row.measured_again, *(set(visit.joints) & set(typed.clearance_in))}
+        changed["measured_again"] = tuple(sorted(again))
+    kept = {n: value for n, value in row.clearance_in.items() if n not in gone}
+    return replace(
+        row,
+        **changed,
+        convention=typed.convention if CONVENTION.name in entry.cells else row.convention,
+        clearance_in={**kept, **typed.clearance_in},
+        entered={**{n: e for n, e in row.entered.items() if n in kept}, **typed.entered},
+        carried=carried,
+        inspection_date=row.inspection_date or entry.day,
+        warnings=tuple(each for each in typed.warnings if each.startswith("asked again")),
+    )
+
+
+def _read_as(row: Inspection, typed: Inspection) -> Inspection:
+    """The kept inspection, its readings in the convention of those that were typed."""
+    if typed.convention is row.convention or not typed.clearance_in:
+        return row
+    factor = typed.convention.per_radial
     unit = row.unit_entered
-    joints = {
-        joint: _answer(row, joint) if joint in row.clearance_in else NOT_MEASURED
-        for joint in gear.joint_numbers
+    entered = {
+        n: replace(each, text=f"{unit.from_inches(row.clearance_in[n] * factor):.4g}", unit=unit)
+        for n, each in row.entered.items()
     }
-    return Answers(
-        tail_no=row.tail_no,
-        side=row.side,
-        # Without a clearance the unit of the next ones is asked for again.
-        unit=unit if row.entered else None,
-        convention=row.convention,
-        record_id=row.record_id,
-        joints=MappingProxyType(joints),
-        todo=(),
-        continues=continues,
-    ).with_more(**_more(row, unit))
+    return replace(row, entered=entered, convention=typed.convention)
 
 
-def _answer(row: Inspection, joint: int) -> JointAnswer:
-    entered = row.entered.get(joint)
-    if entered is not None:
-        try:
-            written = parse_reading(entered.bound + entered.text)
-            said = next((each for each in row.warnings if each.startswith(CONFIRMED)), "")
-            named = said.removeprefix(CONFIRMED).split(", ")
-            return JointAnswer(replace(written, unit=entered.unit), f"#{joint}" in named)
-        except UsageError:
-            pass
-    read_in = row.clearance_in[joint] * row.convention.per_radial
-    return JointAnswer(parse_length(f"{read_in:.6g} in"))
-
-
-def _more(row: Inspection, unit: LengthUnit) -> dict[str, str]:
-    """The optional answers of an inspection, by column."""
-    found = {}
-    for name in MORE:
-        column = BY_NAME[name]
-        value = getattr(row, column.filled, None) if not column.carried else row.carried.get(name)
-        if column.copies > 1 and value:
-            found[name] = "; ".join(f"{unit.from_inches(float(each)):.6g} {unit}" for each in value)
-            continue
-        if value in (None, (), "", False):
-            continue
-        if column.is_length:
-            found[name] = f"{unit.from_inches(float(value)):.6g} {unit}"
-        elif isinstance(value, tuple):
-            found[name] = ("; " if isinstance(value[0], str) else " ").join(map(str, value))
-        elif value is True:
-            found[name] = "yes"
-        elif name != DATE.name and hasattr(value, "isoformat"):
-            found[name] = value.isoformat(" ") if hasattr(value, "hour") else value.isoformat()
-        else:
-            found[name] = f"{value:g}" if isinstance(value, float) else str(value)
-    return found
+def reading_order(gear: Gear, entry: Entry) -> tuple[int, ...]:
+    """The joints to read next, as the plan of an unfinished entry has them."""
+    (judged,) = assess([entry.inspection(gear)], gear, load_index_table(gear))
+    step = next((s for s in judged.plan.steps if s.action is Action.MEASURE), None)
+    return () if step is None else step.joints

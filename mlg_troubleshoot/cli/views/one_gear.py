@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
-from rich.panel import Panel
 from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, text, word
@@ -25,62 +24,61 @@ from mlg_troubleshoot.decision.sentences import (
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, Length, Sentence
 
-_JOINTS = 5
-_NOTES = 4
-_DISCLAIMER = "Troubleshooting aid, not maintenance data; not an approval for return to service"
+# Joints that are listed at least and at most. [1]
+_JOINTS = 3, 5
+# Lines of one gear, so that a terminal of 24 has room for the question below. [1]
+_LINES = 20
+_DISCLAIMER = "Troubleshooting aid, not maintenance data; not an approval for return to service."
 
 
 def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool) -> None:
-    """Show one gear: the verdict and NEXT come last, so that they stay on a screen of 24 lines."""
+    """Show one gear: joints and notes as far as there is room, then the verdict and NEXT."""
+
+    def lines_of(texts: Sequence[Text]) -> int:
+        return sum(len(each.wrap(screen, screen.width)) for each in texts)
+
     row = judgement.row
-    title = Text(f"[{MARKS[judgement.verdict]}] {judgement.title} ", style=TONES[judgement.tone])
-    identity = f" {row.tail_no or 'tail ?'}  {row.side or 'side ?'}"
-    record = f"  {row.record_id or 'record ?'}"
-    has_room = len(title) + len(identity) + len(record) + 6 <= screen.width
-    panel = Panel(
-        _body(judgement, screen, detail=detail),
-        title=title.append_text(word(identity + record * has_room, "not bold default")),
-        title_align="left",
-        subtitle=word(gear.provenance, "dim"),
-        subtitle_align="right",
-    )
+    title = word(f"{row.tail_no or 'tail ?'} {row.side or 'side ?'}  ", "bold")
+    title.append(f"[{MARKS[judgement.verdict]}] {judgement.title}", TONES[judgement.tone])
+    origin = word(f"{row.record_id or 'record ?'}: {gear.provenance}. {_DISCLAIMER}", "dim")
+    body = [origin, title, *_body(judgement, screen, detail=detail)]
+    notes = [text(f"* {screen.said(note)}") for note in judgement.warnings]
+    room = _LINES - 1 - lines_of(body)
     if isinstance(judgement, Assessment) and detail:
         _show_detail(judgement, gear, screen)
     elif isinstance(judgement, Assessment):
-        _show_joints(judgement, screen, detail=False)
-    notes = judgement.warnings if detail else judgement.warnings[:_NOTES]
-    for note in notes:
-        screen.sentence(Sentence.of("* {}", note))
+        joints = min(max(room - 2 - lines_of(notes), _JOINTS[0]), _JOINTS[1])
+        _show_joints(judgement, screen, detail=False, most=joints)
+        room -= joints + 2
+    shown = len(notes)
+    while not detail and lines_of(notes[:shown]) > max(room, 0):
+        shown -= 1
+    for note in notes[:shown]:
+        screen.print(note)
     if not detail:
-        more = len(judgement.warnings) - len(notes)
-        screen.print(
-            f"{more} more {'note' if more == 1 else 'notes'}; " * (more > 0)
-            + "--detail: all joints, repairs, uncertainty",
-            style="dim",
-        )
-    if not has_room:
-        screen.print(word(f"Record{record}"))
-    screen.print(_DISCLAIMER, style="dim")
-    screen.print(panel)
+        more = len(notes) - shown
+        left = f"{more} more note{'s' if more > 1 else ''}, " * (more > 0)
+        screen.print(f"{'d' if screen.asks else '--detail'}: {left}all that is known", style="dim")
+    for line in body:
+        screen.print(line)
 
 
-def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
-    body = Text()
+def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> list[Text]:
+    """What was found and NEXT; with `detail` what stands behind them."""
     lines: list[tuple[str, str]] = []
     if isinstance(judgement, Assessment):
         lines.append((judgement.headline, "bold" if judgement.tone is VerdictTone.RED else ""))
-        lines += [(said, "") for said in _numbers(judgement)] if detail else []
+        if detail:
+            lines += [(said, "") for said in _numbers(judgement)]
+            posterior = judgement.posterior
+            lines += [] if posterior is None else [(posterior.text, "")]
     lines.append((next_words(judgement), "bold"))
     if isinstance(judgement, Assessment):
         follows = what_follows(judgement)
         lines += [(follows, "")] if follows is not None else []
         question = judgement.plan.open_question
         lines += [(f"OPEN: {question}", "bold")] if question is not None else []
-        if judgement.posterior is not None:
-            lines.append((judgement.posterior.text, ""))
-    for said, style in lines:
-        body.append_text(text(("\n" if body else "") + screen.said(said), style))
-    return body
+    return [text(screen.said(said), style) for said, style in lines]
 
 
 def _numbers(a: Assessment) -> Iterator[str]:
@@ -105,7 +103,9 @@ def _numbers(a: Assessment) -> Iterator[str]:
         )
 
 
-def _show_joints(a: Assessment, screen: DataConsole, *, detail: bool) -> None:
+def _show_joints(
+    a: Assessment, screen: DataConsole, *, detail: bool, most: int | None = None
+) -> None:
     """Show the joints in the order to read them: the first few, or all that is known of each."""
     row = a.inspection
     first = a.next_action
@@ -136,7 +136,7 @@ def _show_joints(a: Assessment, screen: DataConsole, *, detail: bool) -> None:
         columns["rank\nrange>"] = lambda f: "-".join(map(str, dict.fromkeys(f.rank_range)))
     rows = [
         [text(cell(f), "bold" if f.over_limit else "") for cell in columns.values()]
-        for f in listed[: None if detail else _JOINTS]
+        for f in listed[:most]
     ]
     spare = ("rank\nrange", "S\nfirst", "S\ntotal")
     print_table(screen, [*columns], rows, spare, folded=joint)
@@ -181,7 +181,7 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
         if a.as_loaded
         else "The worst case is a bound."
     )
-    screen.print(f"Model: {gear.name}, geometry {gear.provenance}. {what}", style="dim")
+    screen.print(f"Model: {gear.name}. {what}", style="dim")
 
 
 def _show_repairs(a: Assessment, screen: DataConsole) -> None:

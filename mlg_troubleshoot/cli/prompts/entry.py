@@ -1,0 +1,285 @@
+"""What is typed at one sitting: texts by column, and the words that name a column."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date, datetime, timedelta
+
+import msgspec
+
+from mlg_troubleshoot.cli.output import at_prompt
+from mlg_troubleshoot.decision.columns import (
+    BY_NAME,
+    CLEARANCE,
+    CONVENTION,
+    DATE,
+    GAUGE_ID,
+    LANDINGS,
+    MARGIN,
+    OUTCOME,
+    PLUNGER_DISPLACEMENT,
+    PRESSURE,
+    RECORD_ID,
+    REMARKS,
+    RESTORED_JOINTS,
+    RIGGING_CHECKED,
+    SIDE,
+    TAIL_NO,
+    TECHNICIAN_ID,
+    TEMPERATURE,
+    UNIT,
+    WORK_ORDER,
+    Column,
+    Holds,
+)
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records import ReadOptions, admit, judge_length
+from mlg_troubleshoot.records.gate import judge_row
+from mlg_troubleshoot.units import (
+    ClearanceConvention,
+    LengthUnit,
+    Sentence,
+    parse_length,
+    with_unit,
+)
+
+PLUNGER = PLUNGER_DISPLACEMENT.name
+REPAIR_DATE = "repair_date"
+HEADING = (TAIL_NO.name, SIDE.name, UNIT.name, CONVENTION.name)
+# What is asked of every new entry before and after its joints.
+FIRST = (*HEADING, OUTCOME.name, PLUNGER)
+LAST = (TECHNICIAN_ID.name, GAUGE_ID.name)
+OUTCOMES = {"f": "FAILED", "failed": "FAILED", "r": "RETRACTED", "retracted": "RETRACTED"}
+OUTCOMES |= {"n": "", "not tried": ""}
+# What is typed at any prompt: the word, its column, an example, and what it says.
+WORDS = (
+    ("plunger", PLUNGER, "{plunger}", "a plunger reading, + over-travel; also p"),
+    ("date", DATE.name, "20 Nov", "the day of what is typed here; else today"),
+    ("landings", LANDINGS.name, "4000", "landings since overhaul"),
+    ("order", WORK_ORDER.name, "WO-17", "the work order"),
+    ("restored", RESTORED_JOINTS.name, "3 5 on 25 Nov", "joints that were restored"),
+    ("rigging", RIGGING_CHECKED.name, "yes", "rigging and roller checked; or corrected"),
+    ("cannot reach", "cannot_reach", "3 5", "joints out of reach today; none: in reach"),
+    ("no spare", "no_spare", "3", "joints without a spare today; none: at hand"),
+    ("margin", MARGIN.name, "{margin}", "this gear's own margin, as found at rigging"),
+    ("temperature", TEMPERATURE.name, "21", "degrees Celsius"),
+    ("pressure", PRESSURE.name, "3000", "hydraulic pressure, psi"),
+    ("name", TECHNICIAN_ID.name, "J. Smith", "who measured"),
+    ("gauge", GAUGE_ID.name, "G-03", "the gauge set"),
+    ("remarks", REMARKS.name, "oil seen", "goes to the report"),
+    ("tail", TAIL_NO.name, "N123AB", "another tail number"),
+    ("side", SIDE.name, "RH", "the other side"),
+)
+_COLUMNS = {word: column for word, column, _, _ in WORDS} | {"p": PLUNGER}
+_NAMES = "|".join(sorted((*_COLUMNS, *OUTCOMES), key=len, reverse=True))
+_WORD = re.compile(rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w)[\s=:]*", re.IGNORECASE)
+_NEXT_WORD = re.compile(rf"(?<![\w#])(?:{_NAMES})(?!\w)", re.IGNORECASE)
+_NEXT_JOINT = re.compile(rf"{_NEXT_WORD.pattern}|#", re.IGNORECASE)
+# The day of a part of an entry that has its own.
+DAY_OF = {RESTORED_JOINTS.name: REPAIR_DATE, PLUNGER: "plunger_date", OUTCOME.name: "outcome_date"}
+
+_FOR_DAYS = ReadOptions(unit=LengthUnit.INCH, convention=ClearanceConvention.RADIAL)
+
+
+class Entry(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """The answers of one sitting as they were typed, in the order in which they came.
+
+    A column that was asked for and not answered has an empty text. `todo`: the columns that NEXT
+    asks for, None for a new inspection; `given`: the columns that were not typed here;
+    `continues`: the hash of the kept inspection that this adds to.
+    """
+
+    id: str
+    gear: str
+    started: datetime
+    cells: dict[str, str] = {}
+    given: list[str] = []
+    todo: list[str] | None = None
+    confirmed: list[str] = []
+    continues: str = ""
+
+    @classmethod
+    def new(cls, gear: Gear, cells: dict[str, str], **more: list[str] | str) -> Entry:
+        started = datetime.now()
+        name = f"{started:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
+        return msgspec.convert(
+            {"id": name, "gear": gear.id, "started": started, "cells": cells}
+            | {"given": [*cells], **more},
+            cls,
+        )
+
+    @property
+    def unit(self) -> LengthUnit:
+        return LengthUnit(self.cells.get(UNIT.name, LengthUnit.INCH))
+
+    @property
+    def convention(self) -> ClearanceConvention:
+        return ClearanceConvention(self.cells.get(CONVENTION.name, ClearanceConvention.RADIAL))
+
+    @property
+    def identity(self) -> str:
+        return " ".join(self.cells[name] for name in HEADING[:2] if name in self.cells)
+
+    @property
+    def gear_key(self) -> tuple[str, Side]:
+        return self.cells[TAIL_NO.name], Side(self.cells[SIDE.name])
+
+    @property
+    def typed(self) -> list[str]:
+        """The columns that were answered here, in the order of the answers."""
+        return [name for name in self.cells if name not in self.given]
+
+    @property
+    def has_findings(self) -> bool:
+        """Whether a reading, an outcome or work was typed."""
+        facts = (OUTCOME.name, PLUNGER, RESTORED_JOINTS.name, RIGGING_CHECKED.name)
+        return any(text for name, text in self.cells.items() if name in facts or joint_of(name))
+
+    @property
+    def day(self) -> date:
+        """The day of the sitting."""
+        typed = self.cells.get(DATE.name)
+        return date.fromisoformat(typed) if typed else self.started.date()
+
+    def require_columns(self) -> None:
+        """Raise `KeyError` or `ValueError` if a column is not known, or a text cannot be."""
+        for name, text in self.cells.items():
+            column_of(name)
+            if not text.isprintable():
+                raise ValueError(f"{name} is not a text")
+        Side(self.cells.get(SIDE.name, Side.LH))
+        _ = self.unit, self.convention, self.day
+
+    def give(self, name: str, text: str) -> None:
+        self.cells.pop(name, None)
+        self.cells[name] = text
+        self.given = [each for each in self.given if each != name]
+
+    def judge(self, gear: Gear, name: str, text: str) -> tuple[Inspection, str]:
+        """Let the gate of tables judge an answer: what it reads, and what it wants confirmed."""
+        is_joint = joint_of(name) is not None
+        options = ReadOptions.of(gear, unit=self.unit, convention=self.convention, asks=is_joint)
+        rows = []
+        for each in text.split(";") if name == PLUNGER else [text]:
+            read, problems = judge_length(name, each.strip(), options)
+            if problems or not isinstance(read, Inspection):
+                raise UsageError(
+                    f"{each.strip()!r} is not accepted: expected {problems[0].expected}",
+                    " ".join(at_prompt(problem.remedy) for problem in problems),
+                )
+            rows.append(read)
+        readings_in = tuple(x for row in rows for x in row.readings_in)
+        said = str(Sentence.joined(rows[0].warnings)) if is_joint else ""
+        return replace(rows[0], readings_in=readings_in), said
+
+    def row(self) -> dict[str, object]:
+        """The answers as the cells of one row; each length stands under its own unit."""
+        cells: dict[str, object] = {RECORD_ID.name: self.id, DATE.name: self.day.isoformat()}
+        # Where nothing was read it says nothing.
+        cells[CONVENTION.name] = self.convention.value
+        for name, text in self.cells.items():
+            if name == PLUNGER and text:
+                for number, each in enumerate(text.split(";"), 1):
+                    cells[PLUNGER_DISPLACEMENT.header(number)] = each.strip()
+            elif joint_of(name) and text:
+                cells[f"{name}_{parse_length(text.removeprefix('<')).unit}"] = text
+            elif text and name != UNIT.name:
+                cells[name] = text
+        return cells
+
+    def unit_question(self, gear: Gear) -> str:
+        """What is to be confirmed about the unit of the readings; empty if nothing."""
+        read, _ = judge_row(self.row(), ReadOptions.of(gear, asks=True))
+        return read.unit_question if isinstance(read, Inspection) else ""
+
+    def inspection(self, gear: Gear) -> Inspection:
+        """What was typed, as one inspection."""
+        read = admit(self.row(), ReadOptions.of(gear, asks=True))
+        if not self.confirmed:
+            return read
+        names = ", ".join(f"#{joint_of(name)}" for name in self.confirmed)
+        return replace(read, warnings=(*read.warnings, f"asked again and confirmed: {names}"))
+
+    def take(self, gear: Gear, words: Sequence[tuple[str, str]]) -> list[str]:
+        """Take columns and their texts, all or none; the columns that were given are returned."""
+        taken: dict[str, str] = {}
+        for name, typed in words:
+            text, _, day = typed.partition(" on ") if name in DAY_OF else (typed, "", "")
+            taken[name] = self._accepted(gear, name, text, taken.get(name, ""))
+            if day:
+                taken[DAY_OF[name]] = day_of(day, self.started.date())
+        for name, text in taken.items():
+            self.give(name, text)
+        return [*taken]
+
+    def _accepted(self, gear: Gear, name: str, typed: str, earlier: str) -> str:
+        """A text of a column as it is kept; a plunger reading stands after an `earlier` one."""
+        column = column_of(name)
+        if not typed and name != OUTCOME.name:
+            raise UsageError(f"{column.plain} without a value", "Type ? for an example.")
+        if name in (DATE.name, REPAIR_DATE):
+            return day_of(typed, self.started.date())
+        if name == SIDE.name:
+            return Side.parse(typed).value
+        if typed.lower() == "none" and name in ("cannot_reach", "no_spare"):
+            return ""
+        if typed:
+            self.judge(gear, name, typed)
+        if not column.is_length:
+            return typed.upper() if name == TAIL_NO.name else typed
+        lengths = [with_unit(each.strip(), self.unit) for each in typed.split(";")]
+        if name == PLUNGER:
+            lengths = [earlier or self.cells.get(name, ""), *lengths]
+        return "; ".join(filter(None, lengths))
+
+
+def joint_of(name: str) -> int | None:
+    """The joint whose clearance a column holds; None for any other column."""
+    head, _, number = name.rpartition("_")
+    return int(number) if head == CLEARANCE.name and number.isdecimal() else None
+
+
+def column_of(name: str) -> Column:
+    return CLEARANCE if joint_of(name) else BY_NAME[name]
+
+
+def split_words(line: str) -> list[tuple[str, str]]:
+    """Split a line into columns and their texts; empty if it does not begin with a word."""
+    found: list[tuple[str, str]] = []
+    while line.strip(" ,;"):
+        line = line.strip(" ,;")
+        match = _WORD.match(line)
+        if match is None:
+            return []
+        word = re.sub(r"\s+", " ", match["word"].lower())
+        rest = line[match.end() :]
+        number = word.lstrip("# ")
+        name = CLEARANCE.header(int(number)) if number.isdecimal() else _COLUMNS.get(word, "")
+        free = name and column_of(name).holds is Holds.TEXT
+        ends = _NEXT_JOINT if name and joint_of(name) else _NEXT_WORD
+        following = None if free else ends.search(rest)
+        end = following.start() if following else len(rest)
+        text, line = rest[:end].strip(" ,;"), rest[end:]
+        if not name:
+            name, text = OUTCOME.name, f"{OUTCOMES[word]} {text}".strip()
+        found.append((name, text))
+    return found
+
+
+def day_of(text: str, today: date) -> str:
+    """A day as it is typed, in ISO 8601; without a year the last such day."""
+    word = text.strip().lower()
+    if word in ("today", "yesterday"):
+        return (today - timedelta(days=word == "yesterday")).isoformat()
+    for year in (f" {today.year}", f" {today.year - 1}", ""):
+        read, problems = judge_length(DATE.name, text + year, _FOR_DAYS)
+        day = None if problems or not isinstance(read, Inspection) else read.inspection_date
+        if day is not None and day <= today:
+            return day.isoformat()
+    remedy = "Type a day that has come, for example 20 Nov, 2026-11-20, today or yesterday."
+    raise UsageError(f"{text!r} is not such a date", remedy)

@@ -1,0 +1,217 @@
+"""One gear at the prompts, from the tail number to the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import date, timedelta
+
+import pytest
+
+from mlg_troubleshoot.life.folding import GearLife
+from tests.prompts.scripted import Sit, StoppedError
+
+HEAD = ("N1 LH", "thou", "play")
+TEN = ("8", "11", "6", "6", "4", "3", "3", "3", "3", "3")
+END = ("J. Smith", "G-03")
+Life = Callable[..., GearLife]
+
+
+def gear(*typed: str) -> tuple[str, ...]:
+    """A whole entry whose middle is given."""
+    return (*HEAD, *typed, *END)
+
+
+def failed(*joints: str) -> tuple[str, ...]:
+    return gear("f", "46", *joints)
+
+
+def test_the_questions_come_in_this_order(sit: Sit) -> None:
+    asked = sit(*failed("8", "done"), "").prompts
+    begins = ("Tail number", "Unit", "A clearance", "Did it retract?", "Plunger", "#3", "#5")
+    for prompt, begin in zip(asked, (*begins, "Measured by", "Gauge"), strict=False):
+        assert prompt.startswith(begin)
+
+
+def test_a_gear_takes_few_keys_and_questions_beyond_its_readings(sit: Sit) -> None:
+    terminal = sit(*failed(*TEN), "")
+    readings = ("46", *TEN)
+    assert terminal.keys - sum(len(each) + 1 for each in readings) <= 34
+    assert len(terminal.prompts) - 10 <= 9
+
+
+def test_the_second_gear_of_a_day_takes_enter_for_what_is_known(sit: Sit) -> None:
+    sit(*failed("done"), "")
+    terminal = sit("N125TL RH", "", "f", "", "done", "", "", "")
+    assert terminal.keys <= 24
+    assert "Readings are thou, total play (Enter: yes" in terminal.screen
+    assert "Measured by (Enter: J. Smith)" in terminal.screen
+
+
+def test_joints_are_asked_for_in_the_order_of_next_and_show_their_limit_as_read(sit: Sit) -> None:
+    terminal = sit(*failed("8", "11", "26", "done"), "")
+    joints = [prompt for prompt in terminal.prompts if prompt.startswith("#")]
+    assert joints[0].startswith("#3 short link inner bearing, limit 15.0 thou")
+    assert joints[1].startswith("#5")
+    assert "Over the limit of 15.0 thou (assumed): look up the manual's." in terminal.screen
+
+
+def test_what_is_not_read_is_kept_as_not_read(sit: Sit, life: Life) -> None:
+    sit(*gear("n", "", "8", "", "done"), "")
+    found = life().inspections[-1].inspection
+    assert (found.outcome, found.readings_in) == (None, ())
+    assert list(found.clearance_in.values()) == [0.004]
+
+
+def test_readings_keep_the_unit_that_they_were_typed_in(sit: Sit, life: Life) -> None:
+    sit(*gear("f", "1.1 mm", "0.013 in", "0.2 mm", "9", "done"), "")
+    found = life().inspections[-1].inspection
+    assert {str(each) for each in found.entered.values()} == {"0.013 in", "0.2 mm", "9 thou"}
+    assert found.readings_in == pytest.approx((0.0433,), abs=1e-4)
+
+
+def test_a_change_of_unit_or_convention_is_said(sit: Sit) -> None:
+    sit(*failed("done"), "")
+    screen = sit("N2 LH", "mm radial", "r", "", "done", "", "", "").screen
+    assert "Readings are in mm, radial (last time: thou, total play)." in screen
+
+
+@pytest.mark.parametrize("typed", ["p 41 p 22", "plunger 41; 22", "p 0.041 in p 22", "p 41"])
+def test_every_plunger_reading_counts_at_any_question(sit: Sit, life: Life, typed: str) -> None:
+    sit(*gear("f", "", typed, *["p 22"] * (typed == "p 41"), "done"), "")
+    assert life().inspections[-1].inspection.readings_in == (0.041, 0.022)
+
+
+WORDS = (
+    *("date 2026-11-20", "landings 4000", "margin 28", "temperature 21", "pressure 3000"),
+    *("cannot reach 3 5", "no spare 3", "rigging yes", "order WO-17", "remarks oil seen"),
+)
+
+
+@pytest.mark.parametrize("question", [3, 4, 5])
+def test_words_are_understood_at_every_question(sit: Sit, life: Life, question: int) -> None:
+    answers = [*HEAD, "f", "46", "8", "done", *END]
+    sit(*answers[:question], *WORDS, *answers[question:], "")
+    found = life().inspections[-1].inspection
+    assert (found.outcome, found.readings_in) == ("FAILED", (0.046,))
+    assert str(found.inspection_date) == "2026-11-20"
+    assert (found.gear_landings, found.margin_in) == (4000, pytest.approx(0.028))
+    assert (found.temperature_c, found.hydraulic_pressure_psi) == (21, 3000)
+    assert (found.cannot_reach, found.no_spare) == ((3, 5), (3,))
+    assert (found.rigging_checked, found.carried["work_order"]) == ("yes", "WO-17")
+    assert found.carried["remarks"] == "oil seen"
+
+
+def test_a_day_without_a_year_is_the_last_such_day(sit: Sit, life: Life) -> None:
+    day = date.today() - timedelta(days=200)
+    sit(*gear(f"date {day:%d %b}", "f", "46", "done"), "")
+    assert life().inspections[-1].inspection.inspection_date == day
+
+
+WRONG = {
+    1: ("x", "", "cm", "1 thou"),
+    2: ("x", "", "rad x"),
+    3: ("x", "", "5", "y"),
+    4: ("0,041", "3/64", "x", "900", "46 47", "f 3", "n 5 5"),
+    5: ("x", "6,5", "-5", "1/64", "9 mm", "200", "3 cm", "#99 5", "landings 3,412", "margin x"),
+    6: ("date 99 Nov", "date 03/04/2026", "temperature 99", "side x", "p", "8 8"),
+}
+
+
+@pytest.mark.parametrize("question", WRONG)
+def test_a_wrong_answer_is_refused_and_its_question_is_asked_again(
+    sit: Sit, life: Life, question: int
+) -> None:
+    right = [*HEAD, "f", "46", "8", "done", *END, ""]
+    wrong = WRONG[question]
+    asked = sit(*right[:question], *wrong, *right[question:]).prompts
+    assert len(set(asked[question : question + len(wrong) + 1])) == 1
+    found = life().inspections[-1].inspection
+    assert (found.clearance_in, found.readings_in) == ({3: 0.004}, (0.046,))
+
+
+def test_a_fraction_is_refused_with_its_value(sit: Sit) -> None:
+    assert "1/64 in = 15.6 thou" in sit(*gear("f", "1/64", "46", "1/64", "8", "done"), "").screen
+
+
+def test_a_reading_that_can_hardly_be_is_confirmed_or_typed_again(sit: Sit, life: Life) -> None:
+    screen = sit(*gear("f", "46", "85", "8.5", "<2", "y", "done"), "").screen
+    assert "Is the decimal point misplaced (factor 10)? It would be 8.5 thou" in screen
+    found = life().inspections[-1].inspection
+    assert sorted(map(str, found.entered.values())) == ["8.5 thou", "<2 thou"]
+
+
+@pytest.mark.parametrize("again", ["46", "n", "u"])
+def test_a_plunger_that_joints_cannot_cause_is_asked_for_again(
+    sit: Sit, life: Life, again: str
+) -> None:
+    terminal = sit(*gear("f", "460", again, "46", "done"), "")
+    assert "at most" in terminal.screen
+    assert life().inspections[-1].inspection.readings_in == (0.046,)
+
+
+def test_undo_says_what_it_takes_back_and_asks_for_it_again(sit: Sit, life: Life) -> None:
+    screen = sit(*gear("f", "46", "18", "u", "8", "done"), "").screen
+    assert "– undone: #3 18 thou" in screen
+    assert life().inspections[-1].inspection.clearance_in == {3: 0.004}
+
+
+def test_a_joint_is_named_to_jump_to_it_or_to_give_its_reading(sit: Sit, life: Life) -> None:
+    sit(*gear("f", "46", "#9", "5", "#10 7", "done"), "")
+    assert life().inspections[-1].inspection.clearance_in == {9: 0.0025, 10: 0.0035}
+
+
+def test_readings_of_another_unit_are_asked_about_before_they_are_judged(
+    sit: Sit, life: Life
+) -> None:
+    tight = ["0.4"] * 10
+    terminal = sit(*gear("f", "46", *[each for x in tight for each in (x, "y")]), "y", "")
+    assert "y = it is right; or type it again" in terminal.screen
+    assert life().inspections[-1].inspection.small_readings_true
+
+
+def test_help_is_of_the_question_and_lists_the_words(sit: Sit) -> None:
+    screen = sit(*gear("f", "?", "46", "?", "done"), "").screen
+    assert "with the Down Lock released" in screen
+    assert "Make the gear safe as the maintenance manual says" in screen
+    assert screen.count("restored 3 5 on 25 Nov") == 2
+
+
+@pytest.mark.parametrize("end", [EOFError, KeyboardInterrupt])
+def test_an_entry_that_is_stopped_goes_on_where_it_stopped(
+    sit: Sit, life: Life, end: type[BaseException]
+) -> None:
+    with pytest.raises(StoppedError):
+        sit(*HEAD, "f", "46", "8", end=end)
+    terminal = sit("", "11", "done", *END, "")
+    assert "Enter continues N1 LH" in terminal.screen
+    assert len(terminal.prompts) == 6
+    assert life().inspections[-1].inspection.clearance_in == {3: 0.004, 5: 0.0055}
+
+
+def test_an_unfinished_entry_is_continued_by_its_tail_and_begun_anew_by_a_word(
+    sit: Sit, life: Life
+) -> None:
+    with pytest.raises(StoppedError):
+        sit(*HEAD, "f", "46", "8")
+    screen = sit("N1 LH", "new", "thou", "play", "n", "", "9", "done", *END, "").screen
+    assert "Continued: N1 LH" in screen
+    assert life().inspections[-1].inspection.outcome is None
+
+
+def test_a_start_at_which_nothing_was_typed_leaves_nothing(sit: Sit) -> None:
+    for _ in range(2):
+        with pytest.raises(StoppedError, match="Nothing was typed"):
+            sit()
+
+
+def test_answers_that_cannot_be_saved_are_said_once(
+    sit: Sit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from mlg_troubleshoot.errors import OutputError
+    from mlg_troubleshoot.store import Drafts
+
+    def full(*_: object) -> bool:
+        raise OutputError("no space left", "Make room.")
+
+    monkeypatch.setattr(Drafts, "save", full)
+    assert sit(*failed("done"), "").screen.count("Answers cannot be saved") == 1
