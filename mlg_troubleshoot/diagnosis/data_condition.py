@@ -195,7 +195,7 @@ def _identical(table: DiagnosisTable) -> Mask:
     same &= (first > 0.0) & (count >= LEAST_ALIKE)
     others = values[~same]
     often = np.unique(others[np.isfinite(others)], return_counts=True)[1]
-    alike = np.sum((often / max(often.sum(), 1)) ** 2)
+    alike = np.sum(often**2) / max(int(often.sum()) ** 2, 1)
     return np.asarray(same & (len(values) * alike ** np.maximum(count - 1.0, 0.0) < BY_CHANCE))
 
 

@@ -55,7 +55,7 @@ def read_times(time: ArrayLike | None, chain: Wholes) -> Array:
     if given.dtype == object:
         given = np.array([_without_zone(moment) for moment in given])
     if given.dtype.kind == "M":
-        given = (given - given.min()) / np.timedelta64(1, "s")
+        given = np.divide(given - given.min(), np.timedelta64(1, "s"))
     when = read_numbers(given, "time")
     if when.shape != chain.shape or not np.isfinite(when).all():
         raise UsageError(
