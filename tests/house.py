@@ -60,8 +60,8 @@ WAYS = {
 # writes it down again.
 BUDGETS: dict[str, int] = {
     "(top)": 9621,
-    "cli": 28960,
-    "decision": 32724,
+    "cli": 28986,
+    "decision": 32718,
     "diagnosis": 36411,
     "gear": 11306,
     "geometry": 5881,

@@ -267,3 +267,13 @@ def test_every_room_of_the_package_is_named() -> None:
         if p.is_dir() and not p.name.startswith("_")
     }
     assert {room for room in rooms if f"`{room}/`" not in TEXT} == set()
+
+
+def test_the_readme_has_the_first_run_on_windows() -> None:
+    """Each command of the first run, as a Windows prompt takes it."""
+    text = README.read_text(encoding="utf-8")
+    (lines,) = re.findall(r"```bat\n(.*?)```", text, re.DOTALL)
+    venv, install, first = lines.splitlines()
+    assert venv == "py -m venv .venv"
+    assert install.startswith(".venv\\Scripts\\pip install")
+    assert first.startswith(".venv\\Scripts\\mlg check inspection_data\\failure_case.csv")

@@ -149,6 +149,8 @@ class Run:
         self.keep(result, judged=found.entries)
         if wanted.report is not None:
             self.write_reports(result, wanted.report, unit)
+        if not (wanted.keep or wanted.quiet) and sys.stderr.isatty():
+            output.say("Not kept: --keep adds these inspections to the records.")
         if result.problems and not wanted.as_json and not found.lines:
             output.say("No row could be judged.")
         return task.exit_code_of(found.lines, result.unread_files)

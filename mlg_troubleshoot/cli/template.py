@@ -26,7 +26,7 @@ def template(
     convention: options.Convention = None,
     columns: Annotated[
         str, typer.Option(metavar="usual|all", help="Columns of the workbook.")
-    ] = "all",
+    ] = "usual",
 ) -> None:
     """Write an empty inspection workbook, or a one-page form (.pdf, .html) to fill in by hand."""
     from mlg_troubleshoot.cli.claims import claim

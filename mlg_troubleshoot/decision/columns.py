@@ -205,8 +205,7 @@ def _convention_hints() -> dict[str, str]:
 RECORD_ID = Column(
     name="record_id",
     holds=Holds.TEXT,
-    need=Need.REQUIRED,
-    meaning="Your own unique name of this inspection.",
+    meaning="Your own unique name of this inspection; else made from file, row and content.",
     expected="a record id (unique text)",
     spellings=(
         "id|insp no|insp id|record|record no|record nr|record number|inspection id|inspection no"

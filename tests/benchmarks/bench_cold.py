@@ -1,9 +1,9 @@
 """Cold starts and large pieces of work of two trees, in turns: ``python -m
-tests.benchmarks.bench_cold --base FOLDER [--runs 7] [--before PATH] [--lacks=--workers]
+tests.benchmarks.bench_cold --base FOLDER [--runs 7] [--before PATH] [--lacks=FLAG]
 [--batches | -- check FILE]``.
 
 Not collected by pytest. FOLDER is a checkout of the version before; ``--before`` is put into its
-``PYTHONPATH``, for libraries of that time; ``--lacks=--workers`` leaves a flag out that it does
+``PYTHONPATH``, for libraries of that time; ``--lacks=FLAG`` leaves a flag out that it does
 not know. Each run is a process of its own, the trees take turns,
 and what is compared is the processor's time (user and system), so that other work on the machine
 changes both alike. The import of numpy is the measure of the machine. Memory is the largest sum
@@ -76,10 +76,9 @@ def batches(folder: Path) -> list[list[str]]:
     out = ["--csv", str(folder / VERDICTS)]
     kept = ["--keep", "--store", str(folder / STORE)]
     return [
-        [str(many), "--workers", "1", *out],
-        [str(many), "--workers", "2", *out],
-        [str(many), "--workers", "2", "--json"],
-        [str(many), "--workers", "1", *kept],
+        [str(many), *out],
+        [str(many), "--json"],
+        [str(many), *kept],
         [str(few), "--report", str(folder / REPORTS)],
     ]
 

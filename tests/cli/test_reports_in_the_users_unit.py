@@ -36,7 +36,7 @@ def test_a_report_of_a_check_stands_in_the_unit_to_show(tmp_path: Path) -> None:
 
 
 def test_a_form_to_fill_in_by_hand_has_the_paper_and_the_unit_asked_for(tmp_path: Path) -> None:
-    assert mlg("template", tmp_path / "form.pdf", "--page", "Letter", "--show", "mm").code == 0
+    assert mlg("template", tmp_path / "form.pdf", "--page", "Letter", "--unit", "mm").code == 0
     (page,) = pypdf.PdfReader(tmp_path / "form.pdf").pages
     assert round(page.mediabox.width) == 612
     assert "0.190" in page.extract_text()

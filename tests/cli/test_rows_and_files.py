@@ -12,6 +12,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
+from mlg_troubleshoot.gear.gear_file import load_gear
 from tests.cli.conftest import DATA, FAILURE, FLEET, HAND, Run, Table, mlg, row
 
 VERDICTS = {"WITHIN_MARGIN", "OUTSIDE_MARGIN", "INCONCLUSIVE", "INCOMPLETE", "INVALID"}
@@ -196,15 +197,15 @@ def fill_in(path: Path, cells: dict[str, object]) -> None:
 def test_a_template_that_was_filled_in_reads_back(tmp_path: Path) -> None:
     path = tmp_path / "inspections.xlsx"
     mlg("template", path)
+    gear = load_gear()
     clearances = {n: {3: 0.013, 5: 0.007}.get(n, 0.001) for n in range(1, 11)}
     fill_in(
         path,
         {
-            "record_id": "R1",
             "tail_no": "N1",
             "side": "RH",
             "clearance_convention": "RADIAL",
-            **{f"clearance_{n}_in": value for n, value in clearances.items()},
+            **{f"{gear.joint(n).label}, in": value for n, value in clearances.items()},
         },
     )
     found = mlg("check", path, "--json").one

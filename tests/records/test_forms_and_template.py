@@ -310,7 +310,7 @@ def headers_and_comments(path):
 
 @pytest.mark.parametrize("unit", list(LengthUnit))
 def test_a_template_is_in_the_unit_that_is_asked_for(tmp_path, unit):
-    assert mlg("template", tmp_path / "t.xlsx", "--unit", unit.value).code == 0
+    assert mlg("template", tmp_path / "t.xlsx", "--columns", "all", "--unit", unit.value).code == 0
     lengths = [
         name
         for name in headers_and_comments(tmp_path / "t.xlsx")
@@ -326,7 +326,7 @@ def test_a_template_says_the_numbers_of_its_gear(tmp_path):
         ("schema", "\nmargin = 0.03", "\nmargin = 0.05"),
         ("down_lock_range", "[0.01, 0.05]", "[0.02, 0.04]"),
     )
-    assert mlg("template", tmp_path / "t.xlsx", "--gear", gear).code == 0
+    assert mlg("template", tmp_path / "t.xlsx", "--columns", "all", "--gear", gear).code == 0
     explained = headers_and_comments(tmp_path / "t.xlsx")
     assert "Blank: 0.0500 in." in explained["margin_in"]
     assert "0.0200 in to 0.0400 in is allowed" in explained["plunger_down_lock_in"]
@@ -338,3 +338,19 @@ def test_a_template_in_millimetres_explains_in_millimetres(tmp_path):
     explained = headers_and_comments(tmp_path / "t.xlsx")
     assert "Blank: 0.762 mm." in explained["margin_mm"]
     assert "Blank: 0.013 mm radial is assumed." in explained["gauge_u_mm"]
+
+
+@pytest.mark.parametrize("unit", list(LengthUnit))
+def test_the_workbook_has_the_columns_that_people_fill_in_and_reads_back(tmp_path, unit):
+    path = tmp_path / "t.xlsx"
+    assert mlg("template", path, "--unit", unit.value).code == 0
+    book = openpyxl.load_workbook(path)
+    headers = [cell.value for cell in book["Inspections"][1]]
+    assert len(headers) == 16
+    assert f"#3 short link inner bearing, {unit.value}" in headers
+    values = {"tail_no": "007", "side": "LH", "clearance_convention": "TOTAL_PLAY"}
+    values[f"#3 short link inner bearing, {unit.value}"] = unit.from_inches(0.026)
+    fill_table(book["Inspections"], 2, values)
+    book.save(path)
+    found = mlg("check", path, "--json").one
+    assert found["joints"][2]["clearance_in"] == pytest.approx(0.013)
