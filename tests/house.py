@@ -70,7 +70,7 @@ BUDGETS: dict[str, int] = {
     "misfit": 17978,
     "notebook": 2355,
     "paper": 6762,
-    "records": 45109,
+    "records": 45727,
     "reporting": 27950,
     "schemas": 771,
     "store": 7926,

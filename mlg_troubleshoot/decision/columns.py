@@ -307,10 +307,10 @@ OUTCOME = Column(
     meaning="What the gear did: RETRACTED or FAILED.",
     choices=Outcome,
     spellings=(
-        "result|test result|retraction result|retraction|retracted|gear retracted|failed"
+        "retraction result|retraction|retracted|gear retracted|failed"
         "|gear failed|failed to retract|did it retract|did the gear retract|failure"
         "|retraction failed|not retracted|retraction ok|retraction outcome|retraction test"
-        "|gear result|ergebnis"
+        "|gear result"
     ),
     bears_verdict=True,
 )

@@ -117,6 +117,7 @@ _INVISIBLE = dict.fromkeys(
 _STEERING = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 _ELAPSED = re.compile(r"\[[hms]+\]", re.IGNORECASE)
 _BUILTIN_DATES = frozenset((*range(14, 23), *range(27, 37), *range(45, 48), *range(50, 59)))
+_BUILTIN_CODES = {9: "0%", 10: "0.00%", 11: "0.00E+00", 48: "##0.0E+0"}
 # What a number format is made of: words in quotes, a character behind a backslash, the sign of a
 # currency, blanks of a width, colours and conditions, the number, the end of a section, the rest.
 _PIECE = re.compile(
@@ -148,21 +149,26 @@ class NumberFormat:
     width: int = 0
     sections: tuple[str, ...] = ()
     has_conditions: bool = False
+    is_percent: bool = False
+    is_scientific: bool = False
 
     @classmethod
     def of(cls, code: str | None, format_id: int = 0) -> NumberFormat | None:
         """Read a format, or take the one that programs know by a number; None if it shows plain
         numbers.
         """
+        code = _BUILTIN_CODES.get(format_id) if code is None else code
         if code is None:
             return cls(is_date=True) if format_id in _BUILTIN_DATES else None
-        if _ELAPSED.search(code):
-            return cls(is_date=True)
         pieces = list(_PIECE.finditer(code))
         bare = "".join(piece["bare"] or "" for piece in pieces).lower()
         # y, m, d, h and s without quotes stand only in dates and times.
-        if any(letter in bare for letter in "ymdhs") and "general" not in code.lower():
+        is_date = any(letter in bare for letter in "ymdhs") and "general" not in code.lower()
+        if is_date or _ELAPSED.search(code):
             return cls(is_date=True)
+        numbers = "".join(piece["number"] or "" for piece in pieces).lower()
+        if "%" in numbers or "e+" in numbers:
+            return cls(is_percent="%" in numbers, is_scientific="e+" in numbers)
         if len(code) > 1 and set(code) == {"0"}:
             return cls(width=len(code))
         sections, is_worded = _sections(pieces)
@@ -176,6 +182,9 @@ class NumberFormat:
             return number
         if self.is_date:
             return date_cell(number, epoch_1904=epoch_1904)
+        if self.is_percent or self.is_scientific:
+            text = f"{show_number(100.0 * number)}%" if self.is_percent else f"{number:.2E}"
+            return OddCell(OddKind.WORDED, text, None, number)
         text = self._worded(number) if self.sections else show_number(number).zfill(self.width)
         return OddCell(OddKind.WORDED if self.sections else OddKind.PADDED, text, None, number)
 

@@ -16,6 +16,8 @@ from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet
 csv.field_size_limit(1_000_000)
 _DELIMITERS = (",", ";", "\t", "|")
 _SEP_LINE = re.compile(r'\s*"?sep=(.)"?\s*(?:\r\n|\r|\n)', re.IGNORECASE)
+# What keeps a spreadsheet program from taking a text for a number.
+_PROTECTED = re.compile(r"""\A\s*(?:="([^"]*)"|'(?=\w)([^']*))\s*\Z""")
 _CONTROL = re.compile(r"[\x01-\x08\x0b\x0e-\x1f]")
 _MAX_FIELD_LINES = 50
 _MAX_BYTES = 25_000_000
@@ -109,6 +111,8 @@ class _CsvSheet(Sheet):
                 what = "a zero character: the file is damaged there"
                 self.facts.faulty[number] = FileRefusedError("csv_nul", what, row=number)
             usual = len(fields) or usual
+            if "'" in line or '="' in line:
+                fields = [_PROTECTED.sub(r"\1\2", field) for field in fields]
             yield fields
 
     def _quoted(self, line: str, lines: deque[str], usual: int, number: int) -> list[str]:
@@ -139,7 +143,12 @@ class _CsvSheet(Sheet):
     def _parse(self, record: str) -> list[str] | None:
         try:
             parsed = list(
-                csv.reader(io.StringIO(record, newline=""), delimiter=self._delimiter, strict=True)
+                csv.reader(
+                    io.StringIO(record, newline=""),
+                    delimiter=self._delimiter,
+                    skipinitialspace=True,
+                    strict=True,
+                )
             )
         except csv.Error:
             return None
@@ -175,7 +184,9 @@ def _find_delimiter(head: str, header_score: Callable[[Cells], int]) -> str:
 
     def best_score(delimiter: str) -> int:
         rows = (
-            next(csv.reader([line], delimiter=delimiter), []) for line in lines if delimiter in line
+            next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+            for line in lines
+            if delimiter in line
         )
         return max(
             (header_score([f or None for f in fields[:MAX_COLUMNS]]) for fields in rows), default=0

@@ -44,7 +44,7 @@ _WORDED_DAY = re.compile(
     re.IGNORECASE | re.ASCII,
 )
 _CLOCK = r"(?:[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d+)?)?(?:Z|[+\-]\d{2}:?\d{2})?)?"
-_ISO_DAY = re.compile(rf"(\d{{4}}-\d{{2}}-\d{{2}}){_CLOCK}", re.ASCII)
+_ISO_DAY = re.compile(rf"(\d{{4}}-\d{{2}}-\d{{2}}){_CLOCK}|((?:19|20)\d{{6}})", re.ASCII)
 _NUMBERS = re.compile(rf"(\d{{1,4}})([./\-])(\d{{1,2}})\2(\d{{1,4}}){_CLOCK}", re.ASCII)
 
 
@@ -54,7 +54,7 @@ def written_day(text: str) -> date | None:
     """
     iso = _ISO_DAY.fullmatch(text)
     if iso is not None:
-        return date.fromisoformat(iso[1])
+        return date.fromisoformat(iso[1] or iso[2])
     worded = _WORDED_DAY.fullmatch(text)
     if worded is None:
         return None

@@ -46,6 +46,7 @@ from mlg_troubleshoot.records.cells import (
     Cell,
     Cells,
     Filled,
+    OddCell,
     column_letters,
     plain_text,
     quote,
@@ -233,6 +234,8 @@ class RowReader:
         # Which orders fit the dates that are written as numbers, and the dates of rows that wait
         # for the others.
         self._date_orders = set(DateOrder)
+        self._typed_days: Counter[bool] = Counter()
+        self._written_days = 0
         self._waiting: dict[RowSource, tuple[AmbiguousDateError, Cell, CellPlace]] = {}
 
     def _add(self, placed: Sequence[PlacedField]) -> None:
@@ -243,7 +246,9 @@ class RowReader:
         for p in placed:
             self._placed[p.index] = p
             self._width = max(self._width, p.index + 1)
-            if p.field is None or p.field.column.holds not in (Holds.LENGTH, Holds.NUMBER):
+            column = None if p.field is None else p.field.column
+            is_number = column is not None and column.holds in (Holds.LENGTH, Holds.NUMBER)
+            if not is_number and column not in (TAIL_NO, RECORD_ID):
                 self._plain.append(p.index)
             if (p.field is None or p.field.column.carried) and not (p.refused or p.is_settled):
                 self._unread_words.append(p)
@@ -710,8 +715,11 @@ class RowReader:
         return CellPlace.at(self._row, index, self._placed[index].header)
 
     def _read_date(self, cell: Filled) -> date:
+        if isinstance(cell, OddCell) and cell.day is not None:
+            self._typed_days[cell.day.day > 12] += 1
         if isinstance(cell, str):
             orders = set(readings(plain_text(cell)) or ())
+            self._written_days += bool(orders)
             # A year first says nothing of the order of day and month in other cells.
             self._date_orders &= orders if orders - {DateOrder.YMD} else self._date_orders
         return read_date(cell, self._options.dates, self._latest)
@@ -723,6 +731,12 @@ class RowReader:
         Where several orders, or none, fit all dates of the column, the cells are reported and stay
         unread.
         """
+        if self._written_days and self._typed_days[False] and not self._typed_days[True]:
+            # A program that expects the other order makes dates of those only that fit both.
+            return (
+                f"{self._typed_days[False]} dates with a day up to 12 stand among dates that are"
+                " text: day and month may have been swapped when the file was opened. Check them"
+            )
         if not self._waiting:
             return ""
         if len(self._date_orders) != 1:

@@ -254,6 +254,8 @@ class _Table:
         self._repeated = 0
         self._aside: list[tuple[int, str, Cells]] = []
         self._dates = ""
+        # Whether ids begin with the sign of a comment, as the first of them does.
+        self._is_marked: bool | None = None
         self._options = table.options
         self._second: FileRefusedError | None = None
         self._telling = [
@@ -360,6 +362,12 @@ class _Table:
         place = next((i for i, cell in enumerate(cells) if cell is not None), None)
         if place is None:
             return False
+        marked = show(cells[place]).startswith("#")
+        is_alone = not any(cell is not None for cell in cells[place + 1 :])
+        if marked and (is_alone or self._is_marked is False):
+            self._aside.append((number, show(cells[place]), cells))
+            return True
+        self._is_marked = marked if self._is_marked is None else self._is_marked
         if all(c is None or (isinstance(c, str) and _RULE.fullmatch(c)) for c in cells):
             self._aside.append((number, show(cells[place]), ()))
             return True
@@ -473,7 +481,8 @@ class _Table:
             )
             named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
             shown = ", ".join(named[:5]) + (f" and {len(named) - 5} more" if len(named) > 5 else "")
-            said = f"{count}, set aside: {shown} (a statistic, a signature or a rule by its name)"
+            why = "a statistic, a signature, a comment or a rule by its name"
+            said = f"{count}, set aside: {shown} ({why})"
             notes.append(said)
             self._out.unread.append(said)
         if self._dates:
@@ -500,13 +509,10 @@ def _hidden_notes(sheet: Sheet, columns: Columns, header_row: int) -> list[str]:
     for first, last in facts.hidden_columns:
         ends = dict.fromkeys(column_letters(index) for index in (first, min(last, width - 1)))
         notes += [f"hidden column {' to '.join(ends)} was also read"] * (first < width)
-    counts = [
-        f"{column_letters(index)} ({n})"
-        for index, n in sorted(facts.formulas.items())
-        if index < width
-    ]
-    if counts:
-        notes.append(
-            f"formulas were read by their last calculated values: column {', '.join(counts)}"
-        )
+    for what, found in (
+        ("formulas were read by their last calculated values", facts.formulas),
+        ("cells that are struck through were also read", facts.struck),
+    ):
+        counts = [f"{column_letters(i)} ({n})" for i, n in sorted(found.items()) if i < width]
+        notes += [f"{what}: column {', '.join(counts)}"] if counts else []
     return notes

@@ -70,6 +70,10 @@ _USUAL = {
     ),
     "not_a_number": "Enter a plain number, or leave it blank if it is not known.",
     "not_finite": "Enter a number, or leave it blank if it was not measured.",
+    "number_shown_otherwise": (
+        "The cell shows something else than the number it holds. Format it as text and enter it"
+        " again."
+    ),
     "number_lost_digits": (
         "A spreadsheet keeps 15 digits of a number. Format the cell as text and enter it again."
     ),
@@ -99,7 +103,11 @@ NOT_MEASURED = frozenset(_BLANK_WORDS.split("|"))
 # What they write for a tail that they do not know; NA and NONE may be tails.
 _NO_NAME = frozenset(("n/a", "n.a.", "unknown", "not known", "tbd", "tba"))
 
-_ODD_CELLS = {OddKind.NO_VALUE: "formula_without_value", OddKind.DATE: "cell_is_date"}
+_ODD_CELLS = {
+    OddKind.WORDED: "number_shown_otherwise",
+    OddKind.NO_VALUE: "formula_without_value",
+    OddKind.DATE: "cell_is_date",
+}
 
 
 def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
@@ -260,6 +268,9 @@ def read_number(
         raise CellFaultError("not_finite", expected)
     if not low <= value <= high:
         raise CellFaultError("out_of_range", expected)
+    if units == ("landings",) and (value % 1.0 or _UNCLEAR_GROUP.fullmatch(show(cell).strip())):
+        remedy = "Landings are whole: enter them without a separator for thousands."
+        raise CellFaultError("ambiguous_number", expected, remedy)
     return value
 
 

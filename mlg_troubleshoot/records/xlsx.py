@@ -66,6 +66,7 @@ _MERGE = re.compile(rb'<(?:\w+:)?mergeCell\s[^<>]*?ref="([A-Z]{1,3}\d{1,7}:[A-Z]
 _TEXT_TAG, _PHONETIC_TAG, _STRING_TAG = (
     f"{{{SHEET_MAIN_NS}}}{name}" for name in ("t", "rPh", "si")
 )
+_RAISED = "{*}rPr/{*}vertAlign[@val='superscript']"
 _SPANNING = tuple(f"{{{SHEET_MAIN_NS}}}{name}" for name in ("mergeCell", "hyperlink"))
 _EXCEL_ROWS = 1 << 20
 _EXCEL_COLUMNS = 1 << 14
@@ -137,13 +138,28 @@ class XlsxFile(Workbook):
         return found
 
     @cached_property
-    def formats(self) -> dict[str, NumberFormat]:
-        """Return the formats by style that do not show plain numbers."""
+    def _styles(self) -> Element:
         part = self._parts.get("styles", "")
         if part.lower() not in self.archive.names:
-            return {}
+            return Element("styleSheet")
         with damage(f"{part} is not well-formed"):
-            root = fromstring(self.archive.read(part))
+            return fromstring(self.archive.read(part))
+
+    @cached_property
+    def struck(self) -> frozenset[str]:
+        """The styles whose text is struck through."""
+        fonts = {
+            str(index)
+            for index, font in enumerate(self._styles.iterfind("{*}fonts/{*}font"))
+            if (mark := font.find("{*}strike")) is not None and mark.get("val", "1") in _TRUE
+        }
+        styles = enumerate(self._styles.iterfind("{*}cellXfs/{*}xf"))
+        return frozenset(str(index) for index, style in styles if style.get("fontId") in fonts)
+
+    @cached_property
+    def formats(self) -> dict[str, NumberFormat]:
+        """Return the formats by style that do not show plain numbers."""
+        root = self._styles
         codes = {
             number.get("numFmtId"): number.get("formatCode", "")
             for number in root.iterfind(".//{*}numFmt")
@@ -170,10 +186,11 @@ def _refuse_other_kinds(kinds: str) -> None:
 
 
 def _text(element: Element) -> str | None:
-    """Return the text of a cell, without its pronunciation; None if it is blank."""
-    pieces = (
-        t.text or "" for run in element if run.tag != _PHONETIC_TAG for t in run.iter(_TEXT_TAG)
-    )
+    """Return the text of a cell, without its pronunciation and the marks of footnotes; None if it
+    is blank.
+    """
+    runs = (run for run in element if run.tag != _PHONETIC_TAG and run.find(_RAISED) is None)
+    pieces = (t.text or "" for run in runs for t in run.iter(_TEXT_TAG))
     return _shown("".join(pieces))
 
 
@@ -245,6 +262,7 @@ class _Rows(WorkSheetParser):
         super().__init__(cast(Any, None), cast(Any, sheet.book.strings), data_only=True)
         self._sheet = sheet
         self._formats = sheet.book.formats
+        self._struck = sheet.book.struck
 
     def parse(self) -> Generator[NumberedRow]:
         """Read the rows only: what stands behind them, such as rules, can make openpyxl refuse the
@@ -285,6 +303,8 @@ class _Rows(WorkSheetParser):
             return index, None
         if index >= MAX_COLUMNS or self.row_counter > MAX_ROWS:
             raise outside_limits(self._sheet.name, index, self.row_counter)
+        if element.get("s") in self._struck:
+            self._sheet.facts.struck[index] += 1
         if formula and not (isinstance(cell, OddCell) and cell.kind is OddKind.NO_VALUE):
             self._sheet.facts.formulas[index] += 1
         return index, cell

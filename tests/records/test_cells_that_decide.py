@@ -37,7 +37,15 @@ def one(tmp_path, gear, **columns):
 
 @pytest.mark.parametrize(
     "header",
-    ["outcome", "Result", "RESULT", "Outcome", "Retracted?", "Failed?", "Gear retracted (Y/N)"],
+    [
+        "outcome",
+        "Retraction result",
+        "GEAR RESULT",
+        "Outcome",
+        "Retracted?",
+        "Failed?",
+        "Gear retracted (Y/N)",
+    ],
 )
 def test_usual_headers_of_an_outcome_are_understood(gear, header):
     found = recognise(header, Joints(gear.joint_numbers))
@@ -48,13 +56,13 @@ def test_usual_headers_of_an_outcome_are_understood(gear, header):
 @pytest.mark.parametrize(
     "word", ["fail", "FAIL", "Failed", "Failed to retract", "NG", "n.g.", "did not retract"]
 )
-@pytest.mark.parametrize("header", ["Result", "outcome", "Retracted?"])
+@pytest.mark.parametrize("header", ["Gear result", "outcome", "Retracted?"])
 def test_words_for_a_failure_are_read(tmp_path, gear, header, word):
     assert one(tmp_path, gear, **{header: word}).outcome is Outcome.FAILED
 
 
 @pytest.mark.parametrize("word", ["pass", "OK", "ok", "Passed", "RETRACTED", "retracts"])
-@pytest.mark.parametrize("header", ["Result", "outcome", "Retracted?"])
+@pytest.mark.parametrize("header", ["Gear result", "outcome", "Retracted?"])
 def test_words_for_a_gear_that_retracted_are_read(tmp_path, gear, header, word):
     assert one(tmp_path, gear, **{header: word}).outcome is Outcome.RETRACTED
 
@@ -74,7 +82,7 @@ def test_yes_and_no_answer_the_question_of_the_header(tmp_path, gear, header, wo
     assert one(tmp_path, gear, **{header: word}).outcome is outcome
 
 
-@pytest.mark.parametrize("header", ["Result", "outcome"])
+@pytest.mark.parametrize("header", ["Gear result", "outcome"])
 @pytest.mark.parametrize("word", ["no", "yes"])
 def test_yes_and_no_under_a_header_that_asks_nothing_stop_the_row(tmp_path, gear, header, word):
     assert isinstance(one(tmp_path, gear, **{header: word}), InvalidRow)
