@@ -622,11 +622,6 @@ def _unsaid(table: DiagnosisTable) -> tuple[str, ...]:
             " same, nor where this plunger rod should be rigged; the gain is measured on rows of"
             " the same gears."
         )
-    if not np.isfinite(table.clearance_in).any() and len(np.unique(table.gears)) > 1:
-        found.append(
-            "Without clearances the wear of each gear is only supposed: what is found in several"
-            " gears may be wear. Read clearances, at least of #2 to #5, before acting on it."
-        )
     if len(table) < LEAST_ROWS:
         found.append(
             f"With fewer than {LEAST_ROWS} rows small effects stay unseen, and scatter is a rough"
@@ -676,7 +671,7 @@ def _report(
     raw_misfit = table.measured_in - raw
     verdict = case.follows.verdict
     gain = _gain(case, raw) if verdict is Verdict.NAMED else None
-    if gain is not None and gain.rms_after_in > gain.rms_before_in:
+    if gain is not None and gain.worse:
         verdict = Verdict.AMBIGUOUS
         open_ = (*causes, *open_)
         causes = ()

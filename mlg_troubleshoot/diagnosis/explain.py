@@ -2,7 +2,8 @@
 
 An explanation is a set of effects, each a candidate of a listed cause, a shape of the bank or a
 slip of one row, in one context: none, or all-joint effects. How often each is expected and how
-large stands in `Beliefs` and with each cause; the rest is arithmetic.
+large stands in `Beliefs` and with each cause; the rest is arithmetic: Eqs. M1 to M9 of
+docs/reference/models.md.
 """
 
 from __future__ import annotations

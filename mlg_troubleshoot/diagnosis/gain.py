@@ -1,4 +1,6 @@
-"""What an extension gains on rows that it was not fitted to: in displacement and in decisions."""
+"""What an extension gains on rows that it was not fitted to (M10): in displacement and in
+decisions.
+"""
 
 from __future__ import annotations
 
@@ -38,6 +40,8 @@ class Gain:
     better : bool
         True if held-out rows are likelier with the extension than without, and their misfit is
         smaller.
+    worse : bool
+        True if they are less likely, and their misfit is larger.
     """
 
     rms_before_in: float
@@ -50,6 +54,7 @@ class Gain:
     verdicts_changed: tuple[str, ...]
     held_out_by: str
     better: bool
+    worse: bool
 
 
 def folds(noise: NoiseModel, columns: Array) -> tuple[Wholes, str]:
@@ -82,6 +87,8 @@ def measure_gain(
     before = measured - as_read
     after = before - correction
     drawn = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else np.arange(len(misfit))
+    smaller = bool(rms(after) < rms(before))
+    more_likely = likelier(noise, expected, expected - correction, fold)
     outside = np.abs(measured) > table.margin_in
     said_before = np.abs(as_read) <= table.margin_in
     said_after = np.abs(as_read + correction) <= table.margin_in
@@ -97,8 +104,8 @@ def measure_gain(
             table.record_id[int(i)] for i in np.flatnonzero(said_before != said_after)
         ),
         held_out_by="tail" if held_out_by == "group" else "row",
-        better=bool(np.mean(after**2) < np.mean(before**2))
-        and likelier(noise, expected, expected - correction, fold),
+        better=smaller and more_likely,
+        worse=not (smaller or more_likely),
     )
 
 

@@ -76,8 +76,6 @@ class Rows:
     unread_in : ndarray, shape (n, k)
         What joints that nobody read may add or take away in all rows together, each at one
         standard deviation. [in]
-    unknown_in : ndarray, shape (n, k)
-        What is not known of wear where none was read, each at one standard deviation. [in]
     drawn_in : ndarray, shape (n,)
         Prediction from the readings as they are, minus the prediction with all readings shrunk
         to their expectation. [in]
@@ -96,7 +94,6 @@ class Rows:
     u_filled_in: Array
     u_shared_in: Array
     unread_in: Array
-    unknown_in: Array
     drawn_in: Array
     trends: Array
     readers: tuple[Array, ...]
@@ -180,22 +177,17 @@ def less_expected(misfit: Array, predicted_in: Array) -> Array:
 def build_noise(
     misfit: Array, rows: Rows, explained: Array | None = None, far: float = FAR
 ) -> NoiseModel:
-    """Estimate the noise from the misfit; effects of unknown size, and of the curve, are not
-    scatter but its doubt. Rows further out than `far` standard deviations scatter more than others.
+    """Estimate V and σ of Eq. M2 from the misfit. Rows further out than `far` standard deviations
+    scatter more than others.
     """
     rest = misfit if explained is None else misfit - explained
-    wide = rows.unknown_in
     noise = _scatter(rest, rest, rows, far)
     gears = numbered(rows.gears)
-    unread = rows.unread_in if rows.unread_in.any() else np.empty((len(rest), 0))
-    for _ in range(_ROUNDS if wide.size + unread.size else 0):
-        known = noise.with_effects(wide)
-        left = rest - known.share_of(wide, rest)
-        alone = left - known.share_of(unread, rest)
-        if unread.size:
-            alone = alone - known.share_of_groups(rows.u_shared_in, gears, rest)
-        noise = _scatter(left, alone, rows, far)
-    return noise.with_effects(wide) if wide.size else noise
+    for _ in range(_ROUNDS if rows.unread_in.any() else 0):
+        alone = rest - noise.share_of(rows.unread_in, rest)
+        alone -= noise.share_of_groups(rows.u_shared_in, gears, rest)
+        noise = _scatter(rest, alone, rows, far)
+    return noise
 
 
 def _scatter(rest: Array, alone: Array, rows: Rows, far: float) -> NoiseModel:

@@ -8,24 +8,13 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
-from mlg_troubleshoot.diagnosis.noise import (
-    Rows,
-    build_noise,
-    small_trends,
-)
+from mlg_troubleshoot.diagnosis.noise import Rows, small_trends
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import (
-    UNREAD_IN,
-    LikelyClearances,
-    likely_clearances,
-    wear_of_gears,
-)
+from mlg_troubleshoot.diagnosis.wear import likely_clearances
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.fitting import fit
 
 
 def build_scene(
@@ -34,29 +23,9 @@ def build_scene(
     """Predict every row with the plain model; what is known of the rows before their misfit is
     looked at.
 
-    Readings of clearances are drawn to their expectation. Where no wear was read at all, moderate
-    wear is supposed, or heavy wear where that is clearly likelier.
+    Readings of clearances are drawn to their expectation.
     """
-    if np.nan_to_num(table.clearance_in).any():
-        return _scene(model, table, where, likely_clearances(table))
-    supposed = [
-        _scene(model, table, where, likely_clearances(table, unread_in)) for unread_in in UNREAD_IN
-    ]
-    moderate, heavy = (_likelihood(*found) for found in supposed)
-    return supposed[heavy > moderate + Beliefs().odds]
-
-
-def _likelihood(scene: Scene, rows: Rows) -> float:
-    """Log-likelihood of rows in which nothing is wrong; none if a linkage does not close."""
-    misfit = scene.table.measured_in - scene.over_in
-    if not np.isfinite(misfit).all():
-        return -np.inf
-    return fit(build_noise(misfit, rows), np.empty((len(misfit), 0)), misfit).log_likelihood
-
-
-def _scene(
-    model: LinkageModel, table: DiagnosisTable, where: Discrepancies, worn: LikelyClearances
-) -> tuple[Scene, Rows]:
+    worn = likely_clearances(table)
     clearance = worn.likely_in
     as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, clearance)
     read = worst_of_sense(model, as_read)[0]
@@ -71,10 +40,6 @@ def _scene(
         np.sqrt(np.sum((slopes * u) ** 2, axis=1)) for u in (worn.u_row_in, worn.u_gear_in)
     )
     fleet_in = slopes * worn.u_fleet_in
-    unknown = np.empty((len(table), 0))
-    if not np.nan_to_num(table.clearance_in).any():
-        unknown = wear_of_gears(table, slopes * worn.u_gear_in)
-        shared_in = np.zeros(len(table))
     rows = Rows(
         scene.over_in,
         table.tails,
@@ -82,7 +47,6 @@ def _scene(
         filled_in,
         shared_in,
         np.hstack([fleet_in, np.sum(fleet_in, axis=1, keepdims=True) * worn.together]),
-        unknown,
         np.nan_to_num(read - scene.over_in),
         *small_trends(table),
     )

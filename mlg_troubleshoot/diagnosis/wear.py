@@ -42,14 +42,6 @@ _HEAVY_TAILS = 1.5
 JOINTS_APART = 0.35
 GEARS_APART = 0.5
 ROWS_APART = 0.4
-# Mean radial wear of joints where none was read, moderate; heavy wear is twice that. [in]
-_MODERATE_IN = 0.003
-UNREAD_IN = (_MODERATE_IN, 2 * _MODERATE_IN)
-# How far all joints of such a fleet, and of one of its gears, may be worn more or less together,
-# over that. Of 100 sound simulated fleets (seeds 20,000 and on) two alarmed, seven where wear was
-# half as much again. [1]
-FLEET_TOGETHER = GEARS_APART
-GEARS_TOGETHER = FLEET_TOGETHER / 2
 # Where landings fall in a larger share of visits they do not follow the dates: half of them would
 # fall by chance. [1]
 _MOST_FALLS = 1 / 3
@@ -101,7 +93,7 @@ class LikelyClearances:
         Most likely radial clearances. [in]
     u_row_in, u_gear_in, u_fleet_in : ndarray, shape (n, n_joints)
         Standard uncertainty of what was not read: of each row, common to a gear's rows, common to
-        all rows. Where no wear was read, that of the gear is all that is supposed. [in]
+        all rows. [in]
     together : ndarray, shape (n, k)
         Further changes of `u_fleet_in`, of all joints that nobody read alike. [1]
     """
@@ -113,7 +105,7 @@ class LikelyClearances:
     together: Array
 
 
-def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) -> LikelyClearances:
+def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
     """Estimate the clearances behind the readings, and those that were not read.
 
     A gear's joint wears along its own history (`wear`). A reading is drawn towards what that makes
@@ -121,16 +113,9 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     (regression calibration). Otherwise the scatter of the readings alone looks like a cause,
     because a reading that is too large by chance predicts too much. A joint that nobody read is
     latent: it wears with landings as the read joints do on average, in part as those of its own
-    gear, and how far it lies off that is unknown for the fleet, each gear and each row. Where no
-    wear was read at all, joints are supposed to be worn by `unread_in` [in] on average.
+    gear, and how far it lies off that is unknown for the fleet, each gear and each row.
     """
     readings = table.clearance_in
-    if not np.nan_to_num(readings).any():
-        none = np.zeros_like(readings)
-        unread = np.where(np.isfinite(readings), 0.0, unread_in)
-        return LikelyClearances(
-            landed_share(table)[:, None] * unread, none, unread, none, none[:, :0]
-        )
     history, kilo, landed = fleet_history(table)
     known = np.isfinite(readings)
     noise = history.reading_in2
@@ -225,12 +210,6 @@ def landings_of(landings: Array, gears: Places) -> tuple[Array, Mask]:
     return np.where(known, landings, mean[gears]) / 1000.0, known
 
 
-def landed_share(table: DiagnosisTable) -> Array:
-    """Landings of each row over their mean, 1 where none are known. [1]"""
-    landings = landings_of(table.numbers("gear_landings"), gears_of(table))[0]
-    return landings / np.mean(landings) if landings.any() else np.ones(len(table))
-
-
 def inspection_of(table: DiagnosisTable) -> Places:
     """Number of the inspection of each row: of one gear at one number of landings and on one day,
     so far as known, shape (n,).
@@ -267,30 +246,6 @@ def step_of(values: Array) -> float:
     over = values[:, None] / _STEPS_IN
     on = np.mean(np.abs(over - np.rint(over)) > _ON_STEP, axis=0) <= EXCEPTIONS
     return float(np.max(_STEPS_IN, where=on, initial=0.0))
-
-
-def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
-    """What wear may add or lack where none was read, each column at one standard deviation: (n, k).
-    [in]
-
-    The joints of the fleet, of each gear, and at each inspection of it lie off what is supposed, on
-    their own and together. The rows of one inspection, at one number of landings or on one day,
-    share their wear.
-    """
-    gears = gears_of(table)
-    worn = landed_share(table)
-    own = gears[:, None] == gears
-    inspection = inspection_of(table)
-    visit = inspection[:, None] == inspection
-    each = unread_in @ unread_in.T
-    all_in = unread_in.sum(axis=1)
-    together = np.outer(all_in, all_in)
-    grown = np.outer(worn, worn)
-    covariance = (1.0 + grown) * (FLEET_TOGETHER**2 * together + JOINTS_APART**2 * each)
-    covariance += own * grown * (GEARS_TOGETHER**2 * together + GEARS_APART**2 * each)
-    values, vectors = np.linalg.eigh(covariance + visit * grown * ROWS_APART**2 * each)
-    kept = values > np.sqrt(np.finfo(float).eps) * values[-1]
-    return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
 
 
 def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:

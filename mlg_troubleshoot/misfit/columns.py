@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, hstack
 
 from mlg_troubleshoot.arrays import Array, Places
 
@@ -72,8 +72,16 @@ class EffectColumns:
     @staticmethod
     def joined(parts: Sequence[EffectColumns]) -> EffectColumns:
         """All columns of several, one after the other."""
-        each = (part.take([k])[:, 0] for part in parts for k in range(part.p))
-        return EffectColumns.made(len(parts[0].full), each)
+        f = sum(part.full.shape[1] for part in parts)
+        begin = [0, f]
+        at = []
+        for part in parts:
+            own = part.full.shape[1]
+            at.append(np.where(part.at < own, part.at + begin[0], part.at - own + begin[1]))
+            begin[0] += own
+            begin[1] += part.few.shape[1]
+        few = csc_array(hstack([part.few for part in parts]))
+        return EffectColumns(np.hstack([part.full for part in parts]), few, np.concatenate(at))
 
     @property
     def p(self) -> int:

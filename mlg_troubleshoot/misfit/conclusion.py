@@ -1,4 +1,4 @@
-"""What follows from a posterior: what is sure, what stays open, and the verdict."""
+"""What follows from a posterior (M8): what is sure, what stays open, and the verdict (M9)."""
 
 from __future__ import annotations
 

@@ -4,8 +4,9 @@
 
 in units of the common scatter: B what each row scatters by itself, a diagonal or, along a series, a
 process that forgets; F what rows have in common, over B: groups and loadings. S(r) is 1 but for the
-scatter between tails, whose ratio r is one of a few. With C Cᵀ = I + S Fᵀ F S and R = C⁻¹ S
-(Woodbury): V⁻¹ = B⁻ᵀ (I − F Rᵀ R Fᵀ) B⁻¹.
+tails T, whose ratio r is one of a few; G is F without them. With C Cᵀ = I + Gᵀ G, P = G C⁻ᵀ,
+Q = T − P Pᵀ T, D Dᵀ = I + r² Tᵀ Q and R = r D⁻¹ (Woodbury, twice):
+V⁻¹ = B⁻ᵀ (I − P Pᵀ − Q Rᵀ R Qᵀ) B⁻¹.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.misfit.columns import EffectColumns
@@ -175,49 +177,48 @@ class NoiseModel:
         """What each row scatters by itself, all that rows have in common taken out, and the share
         of the rows that is left to tell it. [in, 1]
         """
-        common, roots, _log = self._common
-        low = roots[-1] @ common.T
+        common, tails, roots, _log = self._common
+        low = np.vstack([common.T, roots[-1] @ tails.T])
         own = self.own(data[:, None])[:, 0]
         left = own - low.T @ (low @ own)
         return self.relative * left, float(1.0 - np.mean(np.sum(low**2, axis=0)))
 
     @cached_property
-    def _common(self) -> tuple[Array, Array, Array]:
-        """F, R of each ratio of the scatter between tails, (levels, k, k), and log |V|."""
+    def _common(self) -> tuple[Array, Array, Array, Array]:
+        """P, Q, R of each ratio of the scatter between tails, (levels, t, t), and log |V|."""
         one = np.ones(len(self.relative))
         kinds = [(self.gears, self.gear_ratio * one)]
         kinds += [] if self.of_gear is None else [(self.gears, self.of_gear)]
         kinds += [] if self.of_tail is None else [(self.tails, own) for own in self.of_tail.T]
-        kinds += [(self.tails, float(any(self.tail_ratios)) * one)]
-        parts = [
-            scatter[:, None] * (group[:, None] == np.arange(group.max() + 1))
-            for group, scatter in kinds
-            if scatter.any()
-        ]
-        common = self.own(np.hstack([self.loadings, *parts]))
-        size = np.ones((len(self.tail_ratios), common.shape[1]))
-        if any(self.tail_ratios):
-            size[:, -self.tails.max() - 1 :] = np.array(self.tail_ratios)[:, None]
-        inner = size[:, :, None] * (common.T @ common) * size[:, None, :]
-        lower = np.linalg.cholesky(np.eye(common.shape[1]) + inner)
-        log = 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
-        log += 2.0 * np.sum(np.log(self.relative)) + np.sum(np.log1p(-(self._steps[2] ** 2)))
-        return common, np.linalg.inv(lower) * size[:, None, :], log
+        parts = [_by_group(group, scatter) for group, scatter in kinds if scatter.any()]
+        shared = self.own(np.hstack([self.loadings, *parts]))
+        tails = self.own(_by_group(self.tails, one)[:, : None if any(self.tail_ratios) else 0])
+        ratios = np.array(self.tail_ratios)[:, None, None]
+        lower = np.linalg.cholesky(np.eye(shared.shape[1]) + shared.T @ shared)
+        common = solve_triangular(lower, shared.T, lower=True).T
+        apart = tails - common @ (common.T @ tails)
+        inner = np.linalg.cholesky(np.eye(tails.shape[1]) + ratios**2 * (tails.T @ apart))
+        log = 2.0 * np.log(np.diagonal(inner, axis1=1, axis2=2)).sum(axis=1)
+        log += 2.0 * np.sum(np.log(np.diagonal(lower))) + 2.0 * np.sum(np.log(self.relative))
+        log += np.sum(np.log1p(-(self._steps[2] ** 2)))
+        return common, apart, np.linalg.inv(inner) * ratios, log
 
     def each_precision_times(self, columns: Array) -> tuple[Array, Array]:
         """Columns times V⁻¹, shape (levels, n, k), and log |V|, (levels,), of each ratio."""
-        common, roots, log = self._common
+        common, tails, roots, log = self._common
         own = self.own(columns)
-        bent = roots @ (common.T @ own)
-        return self._back(own - common @ (roots.swapaxes(1, 2) @ bent)), log
+        left = own - common @ (common.T @ own)
+        bent = roots.swapaxes(1, 2) @ (roots @ (tails.T @ own))
+        return self._back(left - tails @ bent), log
 
     def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
         """Columns times V⁻¹, and log |V|, of one ratio of the scatter between tails."""
-        common, roots, log = self._common
         level = self.tail_ratios.index(tail_ratio)
+        common, tails, roots, log = self._common
         own = self.own(columns)
-        bent = roots[level] @ (common.T @ own)
-        return self._back(own - common @ (roots[level].T @ bent)), float(log[level])
+        left = own - common @ (common.T @ own)
+        bent = roots[level].T @ (roots[level] @ (tails.T @ own))
+        return self._back(left - tails @ bent), float(log[level])
 
     def square(self, data: Array, tail_ratio: float) -> Array:
         """Squared length of data sets under V⁻¹."""
@@ -228,12 +229,18 @@ class NoiseModel:
         """Squared length of many columns, for each ratio of the scatter between tails, (levels,
         p).
         """
-        common, roots, _log = self._common
+        common, tails, roots, _log = self._common
         if self.correlation:
             columns = EffectColumns.of(self.own(columns.take(np.arange(columns.p))))
-            own = columns.squares
-            low = columns.onto(common.T)
+            scale = np.ones(len(self.relative))
         else:
-            own = columns.squared_onto(self.relative**-2)
-            low = columns.onto((common / self.relative[:, None]).T)
+            scale = 1.0 / self.relative
+        own = columns.squared_onto(scale**2)
+        own -= np.sum(columns.onto((common * scale[:, None]).T) ** 2, axis=0)
+        low = columns.onto((tails * scale[:, None]).T)
         return np.array([own - np.sum((root @ low) ** 2, axis=0) for root in roots])
+
+
+def _by_group(group: Wholes, scatter: Array) -> Array:
+    """What the rows of each group have in common, one column each."""
+    return np.asarray(scatter[:, None] * (group[:, None] == np.arange(group.max() + 1)))

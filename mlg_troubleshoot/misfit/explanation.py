@@ -1,4 +1,4 @@
-"""What may explain a misfit: effects, each a column, and contexts that change many rows at once."""
+"""What may explain a misfit: effects, each a column (M3), and contexts of many rows (M4)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """How well a set of effects explains data, all its sizes and the noise's scale integrated out.
 
-Sizes are normal, so each likelihood is a number in closed form. It is summed over the sizes that
-causes of one table may share, and over the scatter between tails.
+Sizes are normal, so each likelihood is a number in closed form, Eq. M6 of docs/reference/models.md.
+It is summed over the sizes that causes of one table may share (M3), and over the scatter between
+tails (M2).
 """
 
 from __future__ import annotations

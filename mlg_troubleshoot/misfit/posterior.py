@@ -29,7 +29,7 @@ _TRACE = float(np.exp(-2 * REACH))
 
 @dataclass(frozen=True)
 class MisfitPosterior:
-    """How likely explanations of one set of data are.
+    """How likely explanations of one set of data are (M8).
 
     Attributes
     ----------
@@ -48,8 +48,6 @@ class MisfitPosterior:
         Probability that nothing of any name acts.
     unlisted : float
         Probability that something acts that is on no list.
-    expected_size : ndarray, shape (p,)
-        Expected size of each effect, whether it acts or not.
     expected_in : ndarray, shape (n,)
         Expected effect on each row of all that acts but slips. [in]
     log_evidence : float
@@ -66,7 +64,6 @@ class MisfitPosterior:
     over_nothing: Array
     nothing: float
     unlisted: float
-    expected_size: Array
     expected_in: Array
     log_evidence: float = 0.0
 
@@ -187,13 +184,15 @@ class _Search:
 
     def _cancelled(self, own: Explanation, values: Array) -> Mask:
         """Tell with which further effects, and whether with none (last), those of a set cancel each
-        other by more than the data: Σ |x_k β_k|² − |Σ x_k β_k|² > |y|². (M7)
+        other by more than the data: −Σ_{k<l} β_k x_kᵀ x_l β_l > yᵀ y. (M7) Not asked where data
+        hold nuisance parameters as well.
         """
-        held = self.products.columns.take(own.members) * own.values
+        columns = self.products.columns
+        held = columns.take(own.members) * own.values
         whole = held.sum(axis=1)
         each = float(np.sum(held**2) - whole @ whole)
-        cancelled = each - 2.0 * values * self.products.columns.onto(whole[None])[0]
-        return np.append(cancelled, each) > float(self.data @ self.data)
+        cancelled = 0.5 * np.append(each - 2.0 * values * columns.onto(whole[None])[0], each)
+        return np.asarray(cancelled > self.data @ self.data) & (self.noise.absorbed == 0)
 
     def _likeliest(self, kinds: Collection[bool] = (False, True)) -> list[_Extended]:
         """Sets in a context, in none, or in either, the likeliest first."""
@@ -319,7 +318,6 @@ class _Search:
             over_nothing,
             nothing,
             unlisted,
-            size,
             expected,
             whole,
         )

@@ -302,9 +302,7 @@ def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -
         for n in gear.model.joint_numbers
         if all(i.clearance_in.get(n) is None for i in inspections)
     ]
-    if len(unread) == len(gear.joint_numbers):
-        yield "no clearance was read in any row: wear is assumed, not measured"
-    elif unread:
+    if unread:
         listed = joint_list(unread)
         yield (
             f"not measured in any row: {listed}; counted as worn like the others of their gear, and"

@@ -148,4 +148,4 @@ def test_an_output_in_radians_works_as_well() -> None:
         readings_in=true[:, None] + rng.normal(0.0, 1e-4, (ROWS, 2)),
     )
     found = diagnose(four_bar.model, table)
-    assert [c.candidate.cause.name for c in found.causes] == ["calibration_rate"]
+    assert next(iter(found.probabilities)) == ("calibration_rate", None)
