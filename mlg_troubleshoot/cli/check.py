@@ -12,7 +12,7 @@ from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.options import ReportFormat
 
 EPILOG = (
-    "Examples: mlg check · mlg check N123AB LH · mlg check inspections.xlsx --report out · mlg"
+    "Examples: mlg check; mlg check N123AB LH; mlg check inspections.xlsx --report out; mlg"
     " check --tail N123 --side LH --convention RADIAL --set 3=0.013in --set outcome=FAILED"
 )
 # What --help shows; --help-all shows every option.
@@ -114,8 +114,8 @@ def check(
 ) -> None:
     """Check gears: clearances in, verdict and ranked joints out.
 
-    Without FILE it asks for one gear. Exit codes: 0 every gear within margin · 1 something needs
-    attention · 3 no row could be judged · 2 usage.
+    Without FILE it asks for one gear. Exit codes: 0 every gear within margin; 1 something needs
+    attention; 3 no row could be judged; 2 usage.
     """
     from mlg_troubleshoot.cli.check_run import Run
 
@@ -124,6 +124,6 @@ def check(
 
 app = options.alone(
     check,
-    f"{EPILOG} · All options: mlg check --help-all · Defaults from the environment: MLG_UNIT,"
+    f"{EPILOG}; All options: mlg check --help-all; Defaults from the environment: MLG_UNIT,"
     " MLG_CONVENTION, MLG_SHOW, MLG_PAGE, MLG_GEAR, MLG_STORE; MLG_PLAIN=1 for plain text",
 )

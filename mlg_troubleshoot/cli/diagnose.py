@@ -48,7 +48,7 @@ def diagnose(
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
 
-    Exit codes: 0 nothing found · 1 something found · 3 this table allows no conclusion · 2 usage.
+    Exit codes: 0 nothing found; 1 something found; 3 this table allows no conclusion; 2 usage.
     """
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.views.notes import show_notes, show_problems

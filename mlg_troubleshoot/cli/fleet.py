@@ -10,7 +10,7 @@ import typer
 
 from mlg_troubleshoot.cli import history, options, output
 
-EPILOG = "Example: mlg fleet · mlg fleet --only OUTSIDE_MARGIN --csv outside.csv"
+EPILOG = "Example: mlg fleet; mlg fleet --only OUTSIDE_MARGIN --csv outside.csv"
 
 
 def _verdict(text: str) -> StrEnum:

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.workflows.history import Lives
 
 EPILOG = (
-    "Example: mlg history N123 LH · mlg history repair N123 LH --joint 3 --date"
-    " 2026-05-04 · mlg history verify"
+    "Example: mlg history N123 LH; mlg history repair N123 LH --joint 3 --date"
+    " 2026-05-04; mlg history verify"
 )
 _SHOW = "show"
 

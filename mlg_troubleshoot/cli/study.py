@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.paper.study import StudyFindings
 
 EPILOG = (
-    "Example: mlg study · the paper's design: mlg study --design lhs · the table"
+    "Example: mlg study; the paper's design: mlg study --design lhs; the table"
     " that mlg check uses: mlg study --write-table"
 )
 # Bar of the largest first-order index. [characters]

@@ -51,5 +51,5 @@ def template(
 
 app = options.alone(
     template,
-    "Examples: mlg template fleet.xlsx · mlg template form.pdf --unit thou --convention TOTAL_PLAY",
+    "Examples: mlg template fleet.xlsx; mlg template form.pdf --unit thou --convention TOTAL_PLAY",
 )

@@ -41,7 +41,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records.values import is_no_name
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, with_unit
 
 _FOLLOW_HELP = (
     "y: you did NEXT; only its answers are asked for. report writes the report and shows where;"
@@ -150,7 +150,7 @@ class Asker:
         self._say("   ".join([*keys, "new", "gear", "?"]), "dim")
         while True:
             try:
-                typed = self._typed("Enter ends", _FOLLOW_HELP)
+                typed = self._typed("Enter ends", f"{visit.step.how} {_FOLLOW_HELP}".strip())
             except (EOFError, KeyboardInterrupt):
                 self._say("")
                 return ""
@@ -314,7 +314,9 @@ class Asker:
         if name == _UNUSUAL and PLUNGER in dict(split_words(typed)):
             # It is typed again, not once more.
             self.entry.cells.pop(PLUNGER, None)
-        if name in (TAIL_NO.name, *LAST) or not self._take(typed):
+        # One letter at the heading is a slip, not an outcome.
+        no_words = name in (TAIL_NO.name, *LAST) or (name in HEADING and len(typed) == 1)
+        if no_words or not self._take(typed):
             special = getattr(self, f"_answer_{name}", None)
             if special is not None:
                 special(typed)
@@ -395,7 +397,8 @@ class Asker:
             self.entry.give(name, "")
             self._say(f"– #{number} not read", "dim")
             return
-        read, said = self.entry.judge(self.gear, name, typed)
+        self.entry.judge(self.gear, name, typed)
+        read, said = self.entry.judge(self.gear, name, with_unit(typed, self.entry.unit))
         if said:
             self._jump = name
             self._say(f"#{number}: {said}", "magenta")
@@ -437,7 +440,7 @@ class Asker:
         if PLUNGER in taken and not self._is_sure_of_plunger():
             self.entry.cells = before
             return
-        said = (f"{column_of(name).plain} {self.entry.cells[name] or 'none'}" for name in taken)
+        said = (f"{column_of(name).said} {self.entry.cells[name] or 'none'}" for name in taken)
         self._say(f"✓ {', '.join(said)}", "green")
 
     def _is_sure_of_plunger(self) -> bool:

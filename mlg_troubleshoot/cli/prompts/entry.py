@@ -233,6 +233,7 @@ class Entry(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
         if not column.is_length:
             return typed.upper() if name == TAIL_NO.name else typed
         lengths = [with_unit(each.strip(), self.unit) for each in typed.split(";")]
+        self.judge(gear, name, "; ".join(lengths))
         if name == PLUNGER:
             lengths = [earlier or self.cells.get(name, ""), *lengths]
         return "; ".join(filter(None, lengths))
