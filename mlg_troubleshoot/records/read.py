@@ -42,13 +42,15 @@ STDIN_NAME = "-"
 _NAMED = 8
 _PEEKED_ROWS = 120
 _INSTRUCTIONS = "instructions"
-# What is packed as a workbook is and cannot be read, by its suffix.
-_OTHER_PACKED = {
-    ".ods": "an OpenDocument spreadsheet (.ods)",
-    ".numbers": "a document of Apple Numbers (.numbers)",
-    ".docx": "a text document (.docx)",
-    ".zip": "a packed folder (.zip)",
-}
+# What is packed as a workbook is and cannot be read: its suffix, the name of a part, what it is.
+_PACKED: tuple[tuple[str, bytes, str], ...] = (
+    (".ods", b"opendocument.spreadsheet", "an OpenDocument spreadsheet (.ods)"),
+    (".numbers", b"Index/Document.iwa", "a document of Apple Numbers (.numbers)"),
+    (".xlsb", b"xl/workbook.bin", "a binary workbook (.xlsb)"),
+    (".docx", b"word/document.xml", "a text document (.docx)"),
+    (".pptx", b"ppt/presentation.xml", "a presentation (.pptx)"),
+    (".zip", b"\0no part\0", "a packed folder (.zip)"),
+)
 _SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods", ".numbers"))
 
 _OLE_MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
@@ -274,10 +276,14 @@ def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
         from mlg_troubleshoot.records.xls import xls_book
 
         return xls_book(data)
-    suffix = ".ods" if b"opendocument.spreadsheet" in data[:200] else Path(label).suffix.lower()
-    if suffix in _OTHER_PACKED:
-        remedy = "Save it as .xlsx or .csv and read that."
-        raise FileRefusedError("file_kind", _OTHER_PACKED[suffix], remedy=remedy)
+    if b"workbook.xml" not in (names := data.lower()):
+        suffix = Path(label).suffix.lower()
+        packed = [what for end, mark, what in _PACKED if mark in data or end == suffix]
+        if b"[content_types]" not in names and b"PK\x05\x06" in data[22:]:
+            packed.append(_PACKED[-1][2])
+        if packed:
+            remedy = "Save it as .xlsx or .csv and read that."
+            raise FileRefusedError("file_kind", packed[0], remedy=remedy)
     from mlg_troubleshoot.records.xlsx import XlsxFile
 
     return XlsxFile(data)

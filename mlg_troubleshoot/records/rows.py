@@ -116,6 +116,12 @@ _END = re.compile(r"(?:(?P<below><=?|≤|no[ -]?go)|(?:>=?|≥|go))\s*(?=[\d.,])
 _NO_END = "Measure with a gauge that reaches further, or leave it blank if it was not measured."
 
 
+@lru_cache(4096)
+def _spoken(text: str) -> tuple[bool, ClearanceConvention | None, LengthUnit | None]:
+    """Whether a text says that the gear failed, and the convention or the unit that it is."""
+    return says_failed(text), convention_word(text), UNIT_SPELLINGS.get(plain_text(text).lower())
+
+
 @dataclass(slots=True)
 class PlacedField:
     """A column of a table in hand, or a line of a form: its header, and what that means.
@@ -486,10 +492,9 @@ class RowReader:
             if cell is None:
                 continue
             text = cell if isinstance(cell, str) else ""
-            said = convention_word(text)
-            unit = UNIT_SPELLINGS.get(plain_text(text).lower())
+            failed, said, unit = _spoken(text)
             if found.values.get(OUTCOME) is not Outcome.FAILED and (
-                says_failed(text) or answers_outcome(placed.header, cell)
+                failed or answers_outcome(placed.header, cell)
             ):
                 column = OUTCOME
             elif said is not None and (stated is None or said.per_radial != stated.per_radial):

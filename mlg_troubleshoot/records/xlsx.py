@@ -45,7 +45,6 @@ from mlg_troubleshoot.records.cells import (
 )
 from mlg_troubleshoot.records.source import (
     MACROS,
-    FileRefusedError,
     MergedRange,
     NumberedRow,
     Sheet,
@@ -110,7 +109,6 @@ class XlsxFile(Workbook):
             reader = ExcelReader(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
             reader.archive = cast(Any, self.archive)
             reader.read_manifest()
-            _refuse_other_kinds(" ".join(part.ContentType for part in reader.package.Override))
             reader.read_workbook()
             self.epoch_1904: bool = reader.wb.epoch == CALENDAR_MAC_1904
             self._parts = {
@@ -172,17 +170,6 @@ class XlsxFile(Workbook):
             if shown is not None:
                 found[str(index)] = shown
         return found
-
-
-def _refuse_other_kinds(kinds: str) -> None:
-    """Refuse what is packed like a workbook and cannot be read as one."""
-    for mark, what, remedy in (
-        ("wordprocessingml", "a text document or presentation", "Read the workbook."),
-        ("presentationml", "a text document or presentation", "Read the workbook."),
-        ("sheet.binary", "a binary workbook (.xlsb)", "Save it as .xlsx and read the copy."),
-    ):
-        if mark in kinds:
-            raise FileRefusedError("file_kind", what, remedy=remedy)
 
 
 def _text(element: Element) -> str | None:

@@ -892,34 +892,25 @@ def test_43_a_truncated_workbook_is_named_as_cut_off(read, xlsx, keep):
     assert "cut off" in problem.value
 
 
+@pytest.mark.parametrize("name", ["t.xlsx", "t.csv", "t"])
 @pytest.mark.parametrize(
-    ("part", "content_type", "words"),
+    ("part", "words"),
     [
-        (
-            "word/document.xml",
-            "application/vnd.openxmlformats-officedocument.wordprocessingml.document.main+xml",
-            "text",
-        ),
-        ("xl/workbook.bin", "application/vnd.ms-excel.sheet.binary.macroEnabled.main", "xlsb"),
+        ("word/document.xml", "text document"),
+        ("ppt/presentation.xml", "presentation"),
+        ("xl/workbook.bin", "xlsb"),
+        ("Index/Document.iwa", "Apple Numbers"),
+        ("table.csv", "packed folder"),
     ],
 )
-def test_43_a_package_of_another_program_is_named_in_plain_words(
-    read, package, part, content_type, words
-):
-    types = (
-        '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Override'
-        f' PartName="/{part}" '
-    )
-    data = package(
-        parts={
-            part: b"\x83",
-            "[Content_Types].xml": f'{types}ContentType="{content_type}"/></Types>',
-        }
-    )
-    assert (only(read(data, "t.xlsx")).code, words in only(read(data, "t.xlsx")).value) == (
-        "file_kind",
-        True,
-    )
+def test_43_a_package_of_another_program_is_named_in_plain_words(read, part, words, name):
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as package:
+        package.writestr(part, b"x")
+    problem = only(read(data.getvalue(), name))
+    assert problem.code == "file_kind"
+    assert words in problem.value
+    assert "Save it as .xlsx" in problem.remedy
 
 
 def test_43_a_pdf_named_csv_is_named_as_a_pdf(read):
