@@ -35,6 +35,10 @@ def diagnose(
         Path | None,
         typer.Option(metavar="EXT.toml", help="Write the extended model to this file."),
     ] = None,
+    approve: Annotated[
+        str, typer.Option(metavar="NAME", help="Who approves that it may relax verdicts.")
+    ] = "",
+    why: Annotated[str, typer.Option(metavar="TEXT", help="Why it is approved.")] = "",
     causes: Annotated[
         list[Path] | None,
         typer.Option(
@@ -43,7 +47,7 @@ def diagnose(
             " probabilities and sizes of effects in your fleet.",
         ),
     ] = None,
-    tables: options.Tables,
+    tables: options.MeasuredTables,
     shown: options.Shown,
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
@@ -57,6 +61,11 @@ def diagnose(
     from mlg_troubleshoot.reporting.json_form import diagnosis_as_json, written
     from mlg_troubleshoot.workflows import diagnose as task
 
+    if bool(approve.strip()) != bool(why.strip()) or (approve and write_extension is None):
+        raise UsageError(
+            "an approval lacks its name, its reason or its extension",
+            'Give --write-extension EXT.toml --approve "NAME" --why "TEXT" together.',
+        )
     inputs = [*files, *(causes or ()), *tables.map_files]
     priors = [file for file in causes or () if file.suffix == ".toml"]
     if len(priors) > 1:
@@ -91,7 +100,9 @@ def diagnose(
     if write_extension is not None and result.extension is None:
         output.say(_unwritten(result.diagnosis))
     elif write_extension is not None and result.extension is not None:
-        keep_extension(result.extension, write_extension)
+        keep_extension(
+            result.extension, write_extension, approved_by=approve.strip(), reason=why.strip()
+        )
         output.say(
             f"Extension: {write_extension}. Use it: mlg check FILE --extension {write_extension}"
         )

@@ -225,16 +225,14 @@ class Records:
 
 
 @dataclass(frozen=True, slots=True)
-class Tables:
-    """The gear, and what is declared about the tables that are read."""
+class MeasuredTables:
+    """The gear, and what is declared about the tables that a diagnosis reads."""
 
     gear: Gear = DEFAULT_GEAR
     unit: Unit = None
     convention: Convention = None
     sheet: Sheet = None
     column_map: ColumnMap = None
-    decimal_comma: DecimalComma = False
-    dates: Dates = None
 
     @property
     def map_files(self) -> list[str]:
@@ -253,9 +251,11 @@ class Tables:
         shared: dict[str, str] = {}
         for file in self.map_files:
             shared.update(read_header_file(Path(file)))
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        if own.get("dates") is not None:
+            own["dates"] = DateOrder.parse(own["dates"])
         return {
-            **{each.name: getattr(self, each.name) for each in fields(self)},
-            "dates": None if self.dates is None else DateOrder.parse(self.dates),
+            **own,
             "column_map": self._columns(),
             "shared_map": shared,
         }
@@ -274,6 +274,14 @@ class Tables:
                 )
             mapped[header.strip()] = column.strip()
         return mapped
+
+
+@dataclass(frozen=True)
+class Tables(MeasuredTables):
+    """The same of tables that are typed by hand: how numbers and dates are written."""
+
+    decimal_comma: DecimalComma = False
+    dates: Dates = None
 
 
 def flat(command: Callable[..., None]) -> Callable[..., None]:

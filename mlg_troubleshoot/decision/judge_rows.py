@@ -92,7 +92,8 @@ def _judge_part(
         found = _assess_valid(cases, table, advice) if valid else []
         if extension is not None and valid:
             extended = _assess_valid(replace(cases, extension=extension), table, advice)
-            found = [_never_relaxed(*both) for both in zip(found, extended, strict=True)]
+            approval = extension.approval
+            found = [_worse(*both, approval) for both in zip(found, extended, strict=True)]
         if advice:
             found = [_with_consequences(a, cases, table) for a in found]
     judged = dict(zip(alike, found, strict=True))
@@ -145,18 +146,21 @@ _PREDICTED = (
 )
 
 
-def _never_relaxed(plain: Assessment, extended: Assessment) -> Assessment:
-    """The worse of what the plain model and an extension say of one gear: an extension relaxes no
-    verdict.
+def _worse(plain: Assessment, extended: Assessment, approval: str) -> Assessment:
+    """The worse of what the plain model and an extension say of one gear: only an approved
+    extension relaxes a verdict.
     """
 
     def badness(found: Assessment) -> tuple[int, float]:
         return _ORDER.index(found.verdict), -(found.probability_within_margin or 0.0)
 
-    decides = badness(plain) >= badness(extended)
+    decides = not approval and badness(plain) >= badness(extended)
     bound = RigidBound(
         plain.predicted_displacement_in, plain.probability_within_margin, plain.verdict, decides
     )
+    if approval:
+        said = Sentence.joined([extended.headline, f"With the extension, {approval}."])
+        return replace(extended, headline=said, rigid=bound)
     if not decides:
         return replace(extended, rigid=bound)
     beside = sentences.beside(extended.predicted_displacement_in, extended.verdict)

@@ -31,6 +31,10 @@ class Extension(Protocol):
     def residual_u_in(self) -> float:
         """Standard uncertainty of the extended model: the scatter that it leaves. [in]"""
 
+    @property
+    def approval(self) -> str:
+        """Who approved that it may relax verdicts, when and why; empty if nobody did."""
+
     def adjust(self, inspections: Sequence[Inspection], clearance_in: Array) -> Adjustment:
         """Return what differs from the plain model for these inspections."""
 

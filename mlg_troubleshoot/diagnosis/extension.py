@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -82,6 +83,15 @@ class ExtensionFile(Table):
     unread_joints: tuple[Whole, ...] = ()
     program: str = ""
     sha256: str = ""
+    approved_by: str = ""
+    approved_on: str = ""
+    reason: str = ""
+    approval_sha256: str = ""
+
+    @property
+    def approval(self) -> str:
+        """Who approved it, when and why; empty if nobody did."""
+        return f"approved by {self.approved_by} on {self.approved_on}: {self.reason}"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -128,6 +138,9 @@ class ModelExtension(Result):
         Joints of which these rows had no clearance.
     foreign : tuple of str
         Files that hold it and are not as a diagnosis wrote them.
+    approval : str
+        Who approved every file of it, when and why; empty if one was not approved, or changed
+        after its approval. Only an approved extension may relax a verdict.
     """
 
     gear: Gear
@@ -137,6 +150,7 @@ class ModelExtension(Result):
     rows: int
     unread: tuple[int, ...] = ()
     foreign: tuple[str, ...] = ()
+    approval: str = ""
 
     def adjust(self, inspections: Sequence[Inspection], clearance_in: Array) -> Adjustment:
         """Return what all terms change for n inspections.
@@ -158,7 +172,8 @@ class ModelExtension(Result):
             else ""
         )
         foreign = f"; no diagnosis wrote {', '.join(self.foreign)}" if self.foreign else ""
-        return f"{terms}; fitted to {self.rows} measured rows{unread}{foreign}"
+        approval = f"; {self.approval}" if self.approval else ""
+        return f"{terms}; fitted to {self.rows} measured rows{unread}{foreign}{approval}"
 
     def lacks(self, inspection: Inspection) -> tuple[str, ...]:
         """Return the columns that the terms need and an inspection lacks: a term does nothing where
@@ -204,7 +219,9 @@ def adjustment_of(
     return Adjustment(clearance, changed, scaled, rate, shift, loaded)
 
 
-def write_extension(extension: ModelExtension, file: Path) -> None:
+def write_extension(
+    extension: ModelExtension, file: Path, *, approved_by: str = "", reason: str = ""
+) -> None:
     """Write an extension as TOML.
 
     Parameters
@@ -213,6 +230,8 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
         The extension.
     file : Path
         File to write.
+    approved_by, reason : str
+        Who approves today that it may relax verdicts, and why; empty if nobody does.
 
     Raises
     ------
@@ -243,13 +262,27 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
         "program": f"mlg_troubleshoot {version('mlg-troubleshoot')}",
     }
     whole["sha256"] = _digest({**whole, "terms": terms})
+    if approved_by:
+        approval = (approved_by, date.today().isoformat(), reason)
+        whole |= dict(zip(_APPROVAL, approval, strict=True))
+        whole["approval_sha256"] = _approval_digest({**whole, "terms": terms})
     write_text(file, _HEADING + tomli_w.dumps({**whole, "terms": terms}))
+
+
+_APPROVAL = ("approved_by", "approved_on", "reason")
 
 
 def _digest(values: Mapping[str, Any]) -> str:
     """SHA-256 of all that a diagnosis wrote into an extension."""
-    content = {key: value for key, value in values.items() if key != "sha256"}
+    own = ("sha256", "approval_sha256", *_APPROVAL)
+    content = {key: value for key, value in values.items() if key not in own}
     return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _approval_digest(values: Mapping[str, Any]) -> str:
+    """SHA-256 of what was approved, by whom, when and why."""
+    approval = [_digest(values), *(values.get(key, "") for key in _APPROVAL)]
+    return sha256(json.dumps(approval).encode()).hexdigest()
 
 
 def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ()) -> ModelExtension:
@@ -280,6 +313,7 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
     residual = float("nan")
     unread = set[int]()
     foreign: list[str] = []
+    approvals: list[str] = []
     known = {cause.name: cause for cause in with_own(own)}
     for file in files:
         read = read_toml(file, ExtensionFile, "Give a file that mlg diagnose wrote.")
@@ -293,11 +327,18 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
         rows = found.rows
         residual = found.residual_u_in
         unread |= set(found.unread_joints)
-        foreign += [str(file)] * (found.sha256 != _digest(read.values))
+        is_foreign = found.sha256 != _digest(read.values)
+        foreign += [str(file)] * is_foreign
+        is_approved = found.approval_sha256 == _approval_digest(read.values)
+        if found.approved_by and is_approved and not is_foreign:
+            approvals.append(found.approval)
         hashes += found.data_sha256
         terms += [_term(read, index, known, gear) for index in range(len(found.terms))]
     joints = tuple(sorted(unread))
-    return ModelExtension(gear, tuple(terms), residual, tuple(hashes), rows, joints, tuple(foreign))
+    approval = "; ".join(approvals) if len(approvals) == len(files) else ""
+    return ModelExtension(
+        gear, tuple(terms), residual, tuple(hashes), rows, joints, tuple(foreign), approval
+    )
 
 
 def _tried_out(term: Term, gear: Gear) -> float:

@@ -413,7 +413,8 @@ def _judge(
 
         fleet = expected_of(store, found.gear)
     if options.extension is not None:
-        said = f"Extension: {options.extension.describe()}. It relaxes no verdict."
+        binds = "" if options.extension.approval else " It relaxes no verdict."
+        said = f"Extension: {options.extension.describe()}.{binds}"
         found = replace(found, notes=(*found.notes, said))
     if fleet is not None:
         found = replace(found, notes=(*found.notes, fleet.text))

@@ -212,3 +212,41 @@ def test_an_extension_that_cannot_be_written_exits_5(measured: Path) -> None:
     found = mlg("diagnose", measured, "--quiet", "--write-extension", occupied / "e.toml")
     assert found.code == 5
     assert "What to do:" in found.err
+
+
+@pytest.fixture(scope="module")
+def approved(measured: Path, diagnosed: Run) -> Path:
+    """That extension, approved."""
+    file = measured.with_name("approved.toml")
+    approval = ("--approve", "J. Smith", "--why", "fleet trial 7")
+    mlg("diagnose", measured, "--write-extension", file, *approval)
+    return file
+
+
+def test_an_approval_is_printed_with_every_verdict(measured: Path, approved: Path) -> None:
+    found = mlg("check", measured, "--extension", approved, "--json")
+    said = r"approved by J. Smith on \d{4}-\d\d-\d\d: fleet trial 7"
+    assert all(re.search(said, i["headline"]) for i in found.json["inspections"])
+    assert any(re.search(said, note) for note in found.json["warnings"])
+
+
+@pytest.mark.parametrize("key", ["residual_u_in", "reason", "approved_by"])
+def test_an_approval_of_changed_content_does_not_count(
+    measured: Path, approved: Path, key: str
+) -> None:
+    text = approved.read_text(encoding="utf-8")
+    changed = re.sub(
+        rf"(?m)^{key} = (.*)$",
+        lambda m: f"{key} = " + ("0.0123" if m[1][0] != '"' else '"x"'),
+        text,
+    )
+    file = measured.with_name(f"changed-{key}.toml")
+    file.write_text(changed, encoding="utf-8")
+    found = mlg("check", measured, "--extension", file, "--json")
+    assert not any("approved by" in i["headline"] for i in found.json["inspections"])
+
+
+@pytest.mark.parametrize("flags", [("--approve", "A"), ("--why", "B")])
+def test_an_approval_needs_a_name_and_a_reason(measured: Path, flags: tuple[str, str]) -> None:
+    run = mlg("diagnose", measured, "--write-extension", measured.with_name("no.toml"), *flags)
+    assert run.code == 2

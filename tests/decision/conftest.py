@@ -49,6 +49,7 @@ class Shifted:
 
     shift_in: float = 0.004
     residual_u_in: float = 0.001
+    approval: str = ""
 
     def adjust(self, inspections: Sequence[Inspection], clearance_in: np.ndarray) -> Adjustment:
         return Adjustment(clearance_in, offset_in=np.full(len(inspections), self.shift_in))

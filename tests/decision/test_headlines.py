@@ -17,7 +17,7 @@ from mlg_troubleshoot.decision.ranking import Listed
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import LengthUnit, said_in
-from tests.decision.conftest import Judge, every_joint, inspected
+from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 RETRACTED, FAILED = {"outcome": Outcome.RETRACTED}, {"outcome": Outcome.FAILED}
 RED, AMBER, GREEN = VerdictTone
@@ -167,6 +167,15 @@ def test_each_action_that_is_work_says_how(judge: Judge, action: Action) -> None
     idle = (Action.CONTINUE, Action.DONE, Action.CORRECT)
     assert all(bool(step.how) is (action not in idle) for step in steps)
     assert steps or action in (Action.CORRECT,)
+
+
+@pytest.mark.parametrize("approval", ["", "approved by J. Smith on 2026-03-02: trial 7"])
+def test_only_an_approved_extension_relaxes_a_verdict(judge: Judge, approval: str) -> None:
+    extension = Shifted(shift_in=0.0, residual_u_in=1e-5, approval=approval)
+    found = judge(every_joint(0.0021), extension=extension, gauge_u_in=1e-4)
+    assert judge(every_joint(0.0021), gauge_u_in=1e-4).verdict is Verdict.INCONCLUSIVE
+    assert found.verdict is (Verdict.WITHIN_MARGIN if approval else Verdict.INCONCLUSIVE)
+    assert ("With the extension, approved by J. Smith" in found.headline) is bool(approval)
 
 
 def drawn_states(n: int, seed: int) -> list[Inspection]:
