@@ -60,9 +60,9 @@ WAYS = {
 # writes it down again.
 BUDGETS: dict[str, int] = {
     "(top)": 9621,
-    "cli": 28986,
-    "decision": 32718,
-    "diagnosis": 35708,
+    "cli": 29103,
+    "decision": 32772,
+    "diagnosis": 35962,
     "gear": 11306,
     "geometry": 5881,
     "indices": 5102,
@@ -76,7 +76,7 @@ BUDGETS: dict[str, int] = {
     "store": 7926,
     "surveying": 5285,
     "wear": 7893,
-    "workflows": 13662,
+    "workflows": 13673,
 }
 _NO_CODE = {
     tokenize.COMMENT,
