@@ -70,7 +70,7 @@ BUDGETS: dict[str, int] = {
     "misfit": 18210,
     "notebook": 2355,
     "paper": 6762,
-    "records": 45778,
+    "records": 45907,
     "reporting": 27950,
     "schemas": 771,
     "store": 7926,

@@ -21,6 +21,7 @@ from mlg_troubleshoot.decision.columns import (
     UNIT,
     Column,
 )
+from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, column_letters, show
 from mlg_troubleshoot.records.headers import UNKNOWN, Field, recognise
 from mlg_troubleshoot.records.layout import ColumnReader, mapped_to
@@ -52,7 +53,7 @@ class Form:
 
     lines: row, label and cells. value_column: of what is said once, above the row `measured_from`
     of readings as well. columns: of numbers next to joints, each with its heading and how it is
-    called in a message.
+    called in a message. side: as a line says it of the whole form.
     """
 
     lines: Sequence[tuple[int, str, Cells]]
@@ -61,6 +62,7 @@ class Form:
     columns: dict[int, tuple[Heading, str]]
     measured_from: int
     is_ours: bool
+    side: Side | None = None
 
     def value(self, row: int, cells: Cells, column: int, *, is_measured: bool) -> Cell:
         """What a line says in a column, or else for all of them."""
@@ -83,6 +85,9 @@ class Form:
         if self.is_ours and [*self.columns] != [self.value_column]:
             return {}
         visits = visits_of([heading for heading, _ in self.columns.values()])
+        sides = {visit.side for visit in visits if visit is not None and visit.side}
+        if self.side is not None and sides - {self.side}:
+            return {}
         return {i: v for i, v in zip(self.columns, visits, strict=False) if v is not None}
 
 
@@ -131,7 +136,15 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         for i in sorted(numbers)
     }
     measured_from = min([joints[0][0], *headings])
-    return Form(lines, column, value_column, columns, measured_from, is_ours)
+    sides = [
+        side
+        for _, label, cells in lines
+        if (each := _field(label, options)) and each.column is SIDE
+        for cell in cells[column + 1 :]
+        if isinstance(cell, str) and (side := Side.spelt(cell))
+    ]
+    side = sides[0] if len(sides) == 1 else None
+    return Form(lines, column, value_column, columns, measured_from, is_ours, side)
 
 
 def _with_joints(

@@ -159,6 +159,13 @@ def test_sides_in_the_headings_of_a_table_with_sides_are_refused() -> None:
     assert {problem.code for problem in found.problems} == {"header_doubtful"}
 
 
+def test_sides_in_the_headings_of_a_form_that_says_its_side_are_refused() -> None:
+    lines = [["Tail", "N1"], ["Side", "LH"], ["Convention", "RADIAL"], ["Item", "LH", "RH"]]
+    lines += [[f"J{n} (in)", 0.001, 0.029] for n in (3, 5)]
+    (problem,) = read_many([workbook(lines)], OPTIONS).problems
+    assert problem.code == "form_columns"
+
+
 def test_a_plunger_whose_visit_is_not_said_is_refused() -> None:
     head = ["tail", "convention", "J3 LH (in)", "J3 RH (in)", "plunger_displacement_in"]
     found = read_many([workbook([head, ["N1", "RADIAL", 0.001, 0.002, 0.06]])], OPTIONS)
