@@ -118,6 +118,8 @@ class CheckedInspection(TypedDict):
     tail_no: str | None
     side: Side | None
     outcome: Literal["RETRACTED", "FAILED"] | None
+    inspection_date: str | None
+    gear_landings: float | None
     verdict: Verdict
     headline: str
     predicted_displacement_in: float | None
@@ -478,8 +480,19 @@ class Landings(TypedDict):
     p95: float | None
 
 
+class JointReading(TypedDict):
+    """A reading of the joint that was asked for; radial clearance."""
+
+    date: str | None
+    gear_landings: float | None
+    clearance_in: float
+
+
 class FleetGear(TypedDict):
-    """One gear of a fleet: its last inspection, and the landings that it has left."""
+    """One gear of a fleet: its last inspection, what is urgent and why, and the landings that it
+    has left. failed: days; changed: since the day that was asked for; repair: whether the last one
+    helped.
+    """
 
     tail_no: str
     side: Side
@@ -499,10 +512,15 @@ class FleetGear(TypedDict):
     next_action: str | None
     minutes: float
     restore: list[JointNumber]
+    why: str
+    failed: list[str]
+    repair: str
+    changed: list[str]
+    readings: list[JointReading]
 
 
 class FleetOutput(TypedDict):
-    """Output of mlg fleet --json and, without forecasts, mlg history --json: worst gear first.
+    """Output of mlg fleet --json and, without forecasts, mlg history --json: the most urgent first.
 
     Of each gear: predicted_displacement_in: worst case, a bound, and margin_in: of its last
     inspection. next_action: in words that stand alone. minutes, restore: work and joints that the
@@ -512,6 +530,7 @@ class FleetOutput(TypedDict):
     schema_version: Version
     gears: list[FleetGear]
     work: str
+    parts_within: str | None
     warnings: list[str]
 
 

@@ -1,22 +1,34 @@
-"""``mlg fleet``: one line per gear, its latest inspection only, worst first."""
+"""``mlg fleet``: the gears that need attention, first things first: why, and by when."""
 
 from __future__ import annotations
 
-from enum import StrEnum
+import os
+from datetime import date
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from mlg_troubleshoot.cli import history, options, output
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.units import LengthUnit
 
-EPILOG = "Example: mlg fleet; mlg fleet --only OUTSIDE_MARGIN --csv outside.csv"
+EPILOG = "Example: mlg fleet; mlg fleet --since 2026-05-01; mlg fleet --joint 3 --within 300"
 
 
-def _verdict(text: str) -> StrEnum:
-    from mlg_troubleshoot.decision.assessment import Verdict
+def _day(text: str) -> str:
+    try:
+        return date.fromisoformat(text).isoformat()
+    except ValueError:
+        raise UsageError(f"--since {text!r} is not a date", "Give it as 2026-05-01.") from None
 
-    return options.one_of(Verdict, text.upper(), "--only")
+
+def _shown(**given: Any) -> options.OutputOptions:
+    """What is written; paper and unit of a fleet are those of the environment."""
+    page = options.one_of(options.PaperSize, os.environ.get("MLG_PAGE", "A4"), "MLG_PAGE")
+    unit = os.environ.get("MLG_SHOW")
+    show = None if unit is None else LengthUnit.parse(unit)
+    return options.OutputOptions(page=page, show=show, **given)
 
 
 @options.flat
@@ -24,20 +36,28 @@ def fleet(
     *,
     records: options.Records,
     no_forecast: options.NoForecast = False,
-    only: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="VERDICT",
-            parser=_verdict,
-            help="Only gears with this verdict, e.g. OUTSIDE_MARGIN; may repeat.",
-        ),
+    since: Annotated[
+        str | None,
+        typer.Option(metavar="DATE", parser=_day, help="What changed since a day."),
     ] = None,
+    failed: Annotated[
+        bool, typer.Option("--failed", help="The gears that failed; with --since, since that day.")
+    ] = False,
+    joint: Annotated[
+        int | None, typer.Option(metavar="N", help="The readings of one joint over the fleet.")
+    ] = None,
+    within: Annotated[
+        float, typer.Option(metavar="N", min=0.0, help="Parts for the next N landings.")
+    ] = 0.0,
     csv: Annotated[
         Path | None, typer.Option(metavar="OUT.csv", help="The gears as CSV, one line per gear.")
     ] = None,
-    shown: options.OutputOptions,
+    report: options.Report = None,
+    force: options.Force = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
-    """Show every gear in the store: verdict, landings left, next inspection due; worst first.
+    """Show the gears that need attention, the most urgent first: why, by when, what next.
 
     Exit code 0, whatever the verdicts.
     """
@@ -48,6 +68,9 @@ def fleet(
     from mlg_troubleshoot.workflows.history import show_fleet
 
     known = load_gear(records.gear)
+    shown = _shown(report=report, force=force, as_json=as_json, quiet=quiet)
+    if joint is not None:
+        known.require_joints([joint], "--joint")
     shown.claim(records.gear, (), [("--csv", csv)], store=records.store)
     with stages(quiet=shown.quiet) as bar:
         everything = show_fleet(
@@ -55,18 +78,21 @@ def fleet(
             known,
             ahead=not no_forecast,
             whole=shown.report is not None,
+            since=since or "",
+            joint=joint,
             progress=bar,
         )
-        found = everything.chosen(only or ())
+        found = everything.chosen(changed=since is not None and not failed, failed=failed)
     compared = () if shown.quiet else [line.key for line in found.lines]
     for line in suggestions(compared, found.forecasts):
         output.say(f"Note: {line}")
     if shown.as_json:
-        output.write_json(fleet_as_json(found.lines, found.forecasts))
+        output.write_json(fleet_as_json(found.lines, found.forecasts, within))
     elif found.lines:
-        history.show_gears(found, ahead=not no_forecast)
+        history.show_gears(found, shown.unit(), ahead=not no_forecast, within=within, joint=joint)
     elif everything.lines:
-        output.console().print("No gear in the store has such a verdict.")
+        what = "failed" if failed else "changed"
+        output.console().print(f"No gear {what}{'' if since is None else f' since {since}'}.")
     else:
         output.console().print(history.no_records(records.kept.place))
     if csv is not None:

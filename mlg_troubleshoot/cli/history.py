@@ -18,7 +18,7 @@ from mlg_troubleshoot.units import LengthUnit, said_in
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.life.folding import GearLife
-    from mlg_troubleshoot.life.forecast import Forecast, Quantiles
+    from mlg_troubleshoot.life.forecast import Forecast
     from mlg_troubleshoot.life.landings_left import FleetLine
     from mlg_troubleshoot.store import Record, Store
     from mlg_troubleshoot.workflows.history import Lives
@@ -84,7 +84,7 @@ def show(
         if shown.as_json:
             output.write_json(life_json.fleet_as_json(everything.lines, {}))
         elif everything.lines:
-            show_gears(everything, ahead=False)
+            show_gears(everything, shown.unit(), ahead=False)
         else:
             output.console().print(no_records(place.place))
         return
@@ -137,57 +137,70 @@ def no_records(place: str) -> str:
     return f"No records in {place}. Keep inspections with: mlg check FILE --keep"
 
 
-def show_gears(found: Lives, *, ahead: bool) -> None:
-    """Show one line per gear, worst first; `ahead`: with the landings that are left."""
+def show_gears(
+    found: Lives, unit: LengthUnit, *, ahead: bool, within: float = 0.0, joint: int | None = None
+) -> None:
+    """Show one line per gear, the most urgent first and why; `within`: with the parts of so many
+    landings, `joint`: with the readings of that joint.
+    """
     from mlg_troubleshoot.cli.views.tables import STYLES, Cell
-    from mlg_troubleshoot.life.landings_left import fleet_lines, landings_shown, work_sentence
+    from mlg_troubleshoot.life.landings_left import fleet_lines, parts_within, work_sentence
 
-    console = output.console()
-    gear = found.gear
+    console = output.console(unit=unit)
     lines = fleet_lines(found.lines, found.forecasts)
+    worst_in = f"worst {console.unit}"
+    why = "changed" if any(line.changed for line in lines) else "why"
     headings = (
-        *("tail", "side", "last seen", "landings>", "verdict", "inspect"),
-        *("to limit", "to margin", "next due", "next action"),
+        *("tail", "side", why, f"{worst_in}>", "by when", "last seen", "landings>"),
+        *("verdict", "failed", "next action"),
     )
     styles = {each.value: style for each, style in STYLES.items()}
-
-    def left(ends: Quantiles | None) -> str:
-        if ends is None or not ahead:
-            return "-"
-        return f"{landings_shown(ends['p50'], gear)} ({landings_shown(ends['p05'], gear)})"
-
     rows: list[list[Cell]] = []
     for line in lines:
-        first = "" if line.limit_joint is None else f" #{line.limit_joint}"
-        due = line.landings_to_limit if ahead else None
         verdict = line.verdict or "-"
+        worst = line.predicted_displacement_in
         rows.append(
             [
                 output.word(line.tail_no),
                 line.side,
+                "; ".join(line.changed) or said_in(line.why, console.unit),
+                "-" if worst is None else console.length(worst),
+                line.by_when(found.gear),
                 line.inspection_date or "no date",
                 _count(line.gear_landings),
                 output.text(verdict.removesuffix("_MARGIN"), styles.get(verdict, "")),
-                output.joint(line.worst_joint),
-                left(due) + first * (due is not None),
-                left(line.landings_to_margin),
-                "-" if due is None else landings_shown(line.next_inspection_landings, gear),
+                ", ".join(line.failed) or "-",
                 line.next_action or "-",
             ]
         )
     gears = "1 gear" if len(lines) == 1 else f"{len(lines)} gears"
-    said = f"{gears}; 'inspect' is the joint to inspect first today"
-    if ahead:
-        said += (
-            "; landings left are those from the last inspection, median (5 %): to the limit of any"
-            " joint, with the one that most likely reaches its limit first; to the margin by the"
-            " worst-case bound"
-        )
-    console.print(f"{said}.")
+    console.print(f"{gears}, the most urgent first.")
     show_warnings(console, found.lines)
-    spare = ("landings", "inspect", "last seen", "to limit", "to margin")
-    output.print_table(console, headings, rows, spare, "--json lists all of them")
+    spare = ("landings", "last seen", "failed", worst_in, "verdict", "next action")
+    output.print_table(console, headings, rows, spare, "--json lists all of them", folded=why)
+    if joint is not None:
+        _show_trend(console, lines, joint)
     console.print(work_sentence(lines))
+    if within and ahead:
+        console.print(parts_within(lines, found.forecasts, within))
+
+
+def _show_trend(console: output.DataConsole, lines: Sequence[FleetLine], joint: int) -> None:
+    """Show the readings of one joint over the fleet, the widest last reading first."""
+    read = [line for line in lines if line.readings]
+    rows = [
+        (
+            line.tail_no,
+            line.side,
+            ", ".join(
+                f"{each.date or 'no date'}: {console.length(each.clearance_in)}"
+                for each in line.readings[-4:]
+            ),
+        )
+        for line in sorted(read, key=lambda line: -line.readings[-1].clearance_in)
+    ]
+    console.print(f"Readings of #{joint}, {console.unit} radial:")
+    output.print_table(console, ("tail", "side", "date: reading"), rows, (), "--json lists all")
 
 
 def _count(landings: float | None) -> str:
@@ -203,13 +216,15 @@ def show_warnings(console: output.DataConsole, found: Iterable[GearLife | FleetL
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
     from mlg_troubleshoot.life.landings_left import outlook_sentence
     from mlg_troubleshoot.life.logbook import log_of, shortened
+    from mlg_troubleshoot.life.urgency import repair_sentence
     from mlg_troubleshoot.reporting.life_json import life_as_json
 
     console = output.console(unit=unit)
     console.print(output.text(life.name, "bold"))
     events = []
     before: tuple[str, ...] = ()
-    for line in shortened(log_of(life, gear)):
+    lines = log_of(life, gear)
+    for line in shortened(lines):
         # What was found together bears its day once.
         visit = line.date or "no date", _count(line.gear_landings), line.hash[:10]
         what = f"{said_in(line.full, unit)}{'' if line.counts else ' (void)'}"
@@ -222,6 +237,8 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
         console.print(note)
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
+    if helped := repair_sentence(lines):
+        console.print(said_in(helped, unit))
     _show_joints(console, life, life_as_json(life, ahead, gear)["joints"], ahead, gear)
 
 

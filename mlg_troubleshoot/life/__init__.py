@@ -13,5 +13,6 @@ __all__ = [
     "looking_back",
     "state",
     "unrecorded_work",
+    "urgency",
     "wear_paths",
 ]

@@ -8,13 +8,32 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
+from typing import NamedTuple
 
 from mlg_troubleshoot.decision.plan import Action
-from mlg_troubleshoot.decision.ranking import WORST_FIRST
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import Forecast, Quantiles
+from mlg_troubleshoot.life.logbook import log_of
 from mlg_troubleshoot.life.state import GearKey
+from mlg_troubleshoot.life.urgency import OVER_LIMIT, changes_since, repair_sentence, urgency_of
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What is asked of a fleet: since when (ISO 8601), and the readings of which joint."""
+
+    gear: Gear
+    since: str = ""
+    joint: int | None = None
+
+
+class Reading(NamedTuple):
+    """A reading of one joint. [in]"""
+
+    date: str | None
+    gear_landings: float | None
+    clearance_in: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +64,37 @@ class FleetLine:
     landings_to_margin: Quantiles | None = None
     next_inspection_landings: float | None = None
     due_date: str | None = None
+    rank: int = 0
+    size: float = 0.0
+    why: str = ""
+    failed: tuple[str, ...] = ()
+    repair: str = ""
+    changed: tuple[str, ...] = ()
+    readings: tuple[Reading, ...] = ()
 
     @classmethod
-    def of(cls, life: GearLife) -> FleetLine:
+    def of(cls, life: GearLife, asked: Asked) -> FleetLine:
         counts = len(life.inspections), len(life.repairs)
         line = cls(*life.key, *counts, life.warnings)
         if life.latest is None:
             return line
+        lines = log_of(life, asked.gear)
+        urgent = urgency_of(life, lines, asked.gear)
+        failed = [e.date or "no date" for e in lines if e.counts and e.kind == "FAILED"]
+        line = replace(
+            line,
+            rank=urgent.rank,
+            size=urgent.size,
+            why=urgent.why,
+            failed=tuple(day for day in failed if day >= asked.since),
+            repair=repair_sentence(lines),
+            changed=changes_since(life, lines, asked.since) if asked.since else (),
+            readings=tuple(
+                Reading(e.date, e.gear_landings, e.value_in or 0.0)
+                for e in lines
+                if e.counts and e.kind == "reading" and e.joints == (asked.joint,)
+            ),
+        )
         kept, found = life.latest, life.now
         line = replace(
             line,
@@ -74,6 +117,14 @@ class FleetLine:
             ),
         )
 
+    def by_when(self, gear: Gear) -> str:
+        """When the gear is to be looked at: now, on a day, or after so many landings."""
+        if self.rank <= OVER_LIMIT:
+            return "now"
+        after = self.next_inspection_landings
+        left = "-" if after is None else f"{landings_shown(after, gear)} landings"
+        return self.due_date or left
+
     def forecast(self, ahead: Forecast) -> FleetLine:
         """The same gear with its landings left."""
         return replace(
@@ -90,19 +141,17 @@ class FleetLine:
         return self.tail_no, self.side
 
     @property
-    def urgency(self) -> tuple[int, float, GearKey]:
-        """By verdict, then by landings to the next inspection."""
-        order = [verdict.value for verdict in WORST_FIRST]
-        rank = order.index(self.verdict) if self.verdict in order else len(order)
+    def urgency(self) -> tuple[int, float, float, GearKey]:
+        """By what is most urgent, how far it is, and landings to the next inspection."""
         due = self.next_inspection_landings
-        return rank, float("inf") if due is None else due, self.key
+        return self.rank, -self.size, float("inf") if due is None else due, self.key
 
 
 def fleet_lines(
     lines: Iterable[FleetLine],
     forecasts: Mapping[GearKey, Forecast],
 ) -> list[FleetLine]:
-    """The gears that were inspected, with their forecasts; worst first."""
+    """The gears that were inspected, with their forecasts; the most urgent first."""
     seen = [
         line.forecast(forecasts.get(line.key, Forecast())) for line in lines if line.inspections
     ]
@@ -118,6 +167,23 @@ def work_sentence(lines: Sequence[FleetLine]) -> str:
         f"Work that the plans expect: {minutes:.0f} min on"
         f" {sum(line.minutes > 0.0 for line in lines)} of {len(lines)} gears; joints to restore"
         f" (number of gears): {restored or 'none'}."
+    )
+
+
+def parts_within(
+    lines: Iterable[FleetLine], forecasts: Mapping[GearKey, Forecast], landings: float
+) -> str:
+    """The joints that more likely than not reach their limit within so many landings."""
+    parts = Counter(
+        joint
+        for line in lines
+        for joint, left in forecasts.get(line.key, Forecast()).joints.items()
+        if joint not in line.restore and left["p50"] is not None and left["p50"] <= landings
+    )
+    listed = ", ".join(f"#{joint} ({count})" for joint, count in sorted(parts.items()))
+    return (
+        f"Within {landings:g} landings these probably reach their limit as well (number of gears):"
+        f" {listed or 'none'}."
     )
 
 

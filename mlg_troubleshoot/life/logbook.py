@@ -104,6 +104,11 @@ def _value(line: LogLine) -> str:
     return line.text.partition(" ")[2]
 
 
+def value_of(lines: Iterable[LogLine], what: str) -> str | None:
+    """What was last said of the ``outcome`` or the ``plunger``."""
+    return _newest(lines).get(what)
+
+
 def _newest(lines: Iterable[LogLine]) -> dict[str | int, str]:
     """What was last said of the outcome, the plunger and each joint."""
     found: dict[str | int, str] = {}

@@ -4,7 +4,7 @@ side.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife
@@ -17,6 +17,7 @@ from mlg_troubleshoot.life.landings_left import (
 )
 from mlg_troubleshoot.life.logbook import as_found_as_left, log_of, shortened
 from mlg_troubleshoot.life.state import GearKey
+from mlg_troubleshoot.life.urgency import repair_sentence
 from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture, wear_figure
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import Document
@@ -28,6 +29,7 @@ from mlg_troubleshoot.units import LengthUnit
 
 def fleet_document(
     lives: Iterable[GearLife],
+    every: Sequence[FleetLine],
     forecasts: Mapping[GearKey, Forecast],
     gear: Gear,
     provenance: ReportProvenance,
@@ -38,7 +40,6 @@ def fleet_document(
     """
     lengths = Lengths(unit)
     by_key = {life.key: life for life in lives}
-    every = [*map(FleetLine.of, by_key.values())]
     gears = fleet_lines(every, forecasts)
     places = []
     lines = []
@@ -71,14 +72,13 @@ def life_document(
     provenance: ReportProvenance,
     unit: LengthUnit,
 ) -> Document:
-    """Make one gear's life: its last inspections side by side, what was restored between, landings
-    left.
-    """
+    """Make one gear's life: its log book, what was found and left, landings left."""
     log = log_of(life, gear)
     shown = {
         "life": life_as_json(life, ahead, gear),
         "log": list(shortened(log)),
         "found_left": as_found_as_left(log),
+        "helped": repair_sentence(log),
         "outlook": outlook_sentence(life, ahead, gear),
         "figure": wear_figure(life, ahead, gear, Lengths(unit)),
     }

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import date
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, cast
 
@@ -170,12 +171,18 @@ def _assessment(a: Assessment) -> dict[str, Any]:
     return filled(CheckedInspection, a, **_course(a.inspection, a), **own)
 
 
+def _day(moment: date | None) -> str | None:
+    return None if moment is None else moment.isoformat()[:10]
+
+
 def _course(row: Any, judgement: Judgement) -> dict[str, Any]:
     """Whose row it is, its verdict and what to do next."""
     steps = judgement.plan.steps
     return {
         **{name: getattr(row, name) for name in ("record_id", "tail_no", "side")},
         "outcome": getattr(row, "outcome", None),
+        "inspection_date": _day(getattr(row, "inspection_date", None)),
+        "gear_landings": getattr(row, "gear_landings", None),
         "verdict": judgement.verdict,
         "headline": judgement.headline,
         "next_action": steps[0],

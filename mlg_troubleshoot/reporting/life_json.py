@@ -11,7 +11,12 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.json_outputs import FleetGear, FleetOutput, LifeEvent, LifeOutput
 from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import Forecast
-from mlg_troubleshoot.life.landings_left import FleetLine, fleet_lines, work_sentence
+from mlg_troubleshoot.life.landings_left import (
+    FleetLine,
+    fleet_lines,
+    parts_within,
+    work_sentence,
+)
 from mlg_troubleshoot.life.logbook import log_of
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.life.wear_paths import stretches
@@ -21,13 +26,18 @@ from mlg_troubleshoot.reporting.json_form import filled, written
 def fleet_as_json(
     gears: Sequence[FleetLine],
     forecasts: Mapping[GearKey, Forecast],
+    within: float = 0.0,
 ) -> dict[str, Any]:
-    """One line per gear, worst first."""
+    """One line per gear, the most urgent first; `within`: parts for so many landings."""
     lines = fleet_lines(gears, forecasts)
     return written(
         FleetOutput,
-        gears=[filled(FleetGear, line) for line in lines],
+        gears=[
+            filled(FleetGear, line, readings=[each._asdict() for each in line.readings])
+            for line in lines
+        ],
         work=work_sentence(lines),
+        parts_within=parts_within(lines, forecasts, within) if within else None,
         warnings=[warning for gear in gears for warning in gear.warnings],
     )
 
@@ -38,6 +48,10 @@ def fleet_table(gears: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[lis
     def flat(name: str, value: Any) -> dict[str, Any]:
         if name.startswith("landings_to_"):
             return {f"{name}_{end}": (value or {}).get(end) for end in ("p05", "p50", "p95")}
+        if name == "readings":
+            return {}
+        if name in ("failed", "changed"):
+            return {name: "; ".join(value or ())}
         return {name: joint_list(value) if isinstance(value, list) else value}
 
     rows = [

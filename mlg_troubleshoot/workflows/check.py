@@ -689,7 +689,7 @@ _NUMBERS = (
     "rigid_displacement_in",
 )
 _VERDICT_HEADER = (
-    *("record_id", "tail_no", "side"),
+    *("record_id", "tail_no", "side", "inspection_date", "gear_landings"),
     *(
         "verdict",
         "basis",
@@ -734,7 +734,11 @@ def verdict_lines(judgements: Sequence[Judgement]) -> str:
     rows = []
     for judgement in judgements:
         row = judgement.row
-        identity = (row.record_id, row.tail_no, None if row.side is None else str(row.side))
+        side = None if row.side is None else str(row.side)
+        a = row if isinstance(row, Inspection) else None
+        day = None if a is None or a.inspection_date is None else a.inspection_date.isoformat()
+        seen = day, None if a is None else a.gear_landings
+        identity = (row.record_id, row.tail_no, side, *seen)
         place = (row.source.file, row.source.sheet, row.source.row)
         rows.append((*identity, *_verdict_columns(judgement).values(), *place))
     return csv_lines(rows)

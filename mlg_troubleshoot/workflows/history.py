@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime
 from functools import partial
@@ -23,7 +23,7 @@ from mlg_troubleshoot.life.folding import (
     life_of,
     lives_of,
 )
-from mlg_troubleshoot.life.landings_left import FleetLine
+from mlg_troubleshoot.life.landings_left import Asked, FleetLine
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.parallel import Progress, StageProgress
@@ -76,9 +76,13 @@ class Lives(Result):
     model: WearModel | None
     problems: tuple[Problem, ...] = ()
 
-    def chosen(self, verdicts: Collection[str]) -> Lives:
-        """The gears of which the last verdict is one of these; all of them where none is asked."""
-        lines = tuple(line for line in self.lines if not verdicts or line.verdict in verdicts)
+    def chosen(self, *, changed: bool, failed: bool) -> Lives:
+        """The gears of which something changed, or that failed, as far as that is asked."""
+        lines = tuple(
+            line
+            for line in self.lines
+            if (line.changed or not changed) and (line.failed or not failed)
+        )
         keys = {line.key for line in lines}
         lives = tuple(life for life in self.lives if life.key in keys)
         return replace(self, lives=lives, lines=lines)
@@ -97,16 +101,20 @@ def show_fleet(
     *,
     ahead: bool,
     whole: bool = True,
+    since: str = "",
+    joint: int | None = None,
     progress: StageProgress = lambda _name, _done, _total: None,
     problems: tuple[Problem, ...] = (),
 ) -> Lives:
     """Every gear, judged by the model of today, with its forecast if asked for; `whole`, with all
-    of its records, each judged as it was found.
+    of its records, each judged as it was found; with what changed since a day, and the readings
+    of one joint.
     """
     from mlg_troubleshoot.life.forecast import forecast
     from mlg_troubleshoot.life.judged import judge_lives
 
     progress("Reading the store", 0, None)
+    asked = Asked(gear, since, joint)
     keys = store.gears()
     table = load_index_table(gear)
     model = _taught(store, gear, keys, progress) if ahead else None
@@ -118,9 +126,9 @@ def show_fleet(
     for first in range(0, len(keys), _AT_ONCE):
         progress(doing, first, len(keys))
         part = lives_of(store, keys[first : first + _AT_ONCE]).values()
-        judged = judge_lives(part, gear, table, every=whole)
+        judged = judge_lives(part, gear, table, every=whole or bool(since))
         forecasts |= forecast(judged, model, gear)
-        lines += map(FleetLine.of, judged)
+        lines += [FleetLine.of(life, asked) for life in judged]
         found += judged if whole else ()
     progress(doing, len(keys), len(keys))
     return Lives(gear, tuple(found), tuple(lines), forecasts, model, problems)
@@ -170,7 +178,7 @@ def show_lives(
         progress("Looking ahead", 0, None)
     known = lives_of(store, wanted).values()
     found = tuple(judge_lives(known, gear, load_index_table(gear), every=True))
-    lines = tuple(map(FleetLine.of, found))
+    lines = tuple(FleetLine.of(life, Asked(gear)) for life in found)
     return Lives(gear, found, lines, forecast(found, model, gear), model)
 
 
@@ -201,7 +209,9 @@ def write_pages(
     )
     if not fleet:
         return [*map(write, documents)]
-    sheet = fleet_report.fleet_document(shown.lives, shown.forecasts, shown.gear, made, unit)
+    sheet = fleet_report.fleet_document(
+        shown.lives, shown.lines, shown.forecasts, shown.gear, made, unit
+    )
     written = [write(sheet)]
     # The pages behind the lines of a fleet are for the screen.
     return written + [write(each, formats=("html",)) for each in documents]

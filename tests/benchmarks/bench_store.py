@@ -27,7 +27,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life import folding
 from mlg_troubleshoot.life.forecast import fit_fleet, forecast
-from mlg_troubleshoot.life.landings_left import FleetLine
+from mlg_troubleshoot.life.landings_left import Asked, FleetLine
 from mlg_troubleshoot.life.unrecorded_work import suggestions
 from mlg_troubleshoot.reporting.life_json import fleet_as_json
 from mlg_troubleshoot.store import Record, Store, inspection_record
@@ -150,7 +150,8 @@ def main() -> None:
 
         def page() -> list[folding.GearLife]:
             found = list(folding.lives(store).values())
-            fleet_as_json([*map(FleetLine.of, found)], {})
+            asked = Asked(load_gear())
+            fleet_as_json([FleetLine.of(life, asked) for life in found], {})
             return found
 
         found = timed("the fleet without forecasts", 10.0, page)

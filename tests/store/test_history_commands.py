@@ -249,10 +249,11 @@ def test_a_quiet_history_writes_its_page_and_says_nothing(tmp_path: Path, place:
 
 
 def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(
-    tmp_path: Path, place: Path
+    tmp_path: Path, place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seeded((1, 0.001))
-    mlg("fleet", "--no-forecast", "--report", tmp_path, "--page", "Letter")
+    monkeypatch.setenv("MLG_PAGE", "Letter")
+    mlg("fleet", "--no-forecast", "--report", tmp_path)
     page = pypdf.PdfReader(tmp_path / "fleet.pdf").pages[0]
     assert sorted(map(float, page.mediabox[2:])) == [612.0, 792.0]
 
@@ -341,7 +342,7 @@ def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(
 
 def test_a_fleet_of_one_gear_is_one_gear(tmp_path: Path, place: Path) -> None:
     keep(tmp_path, visit(1, 0.001))
-    assert "1 gear; " in mlg("fleet", "--no-forecast").out
+    assert mlg("fleet", "--no-forecast").out.startswith("1 gear, ")
 
 
 def test_a_fleet_without_landings_has_no_forecast_and_says_null(

@@ -20,8 +20,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import life_of, lives
 from mlg_troubleshoot.life.forecast import Forecast, fit_fleet, forecast
 from mlg_troubleshoot.life.judged import judge_lives
-from mlg_troubleshoot.life.landings_left import FleetLine
-from mlg_troubleshoot.life.looking_back import side_by_side
+from mlg_troubleshoot.life.landings_left import Asked, FleetLine
 from mlg_troubleshoot.life.unrecorded_work import suggestions
 from mlg_troubleshoot.life.wear_paths import wear_paths
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
@@ -269,31 +268,6 @@ def test_an_undated_inspection_is_placed_by_its_landings() -> None:
     assert [each.inspection.gear_landings for each in found.inspections] == [100, 400, 900, 1500]
 
 
-def test_an_undated_inspection_between_others_does_not_repeat_what_was_restored_before() -> None:
-    seen = [("2024-01-01", 100), ("2025-01-01", 900), ("", 1000), ("2025-06-01", 1200)]
-    Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
-    mlg(
-        "history",
-        "repair",
-        "N507",
-        "LH",
-        "--joint",
-        "3",
-        "--date",
-        "2024-06-01",
-        "--landings",
-        "500",
-    )
-    steps = side_by_side(life_of(Store(), "N507", "LH"))
-    assert [step.restored for step in steps] == [(), (3,), (), ()]
-
-
-def test_the_last_four_inspections_stand_side_by_side() -> None:
-    add([[inspection(n, f"2024-0{n}-01", 100.0 * n) for n in range(1, 7)]])
-    steps = side_by_side(life_of(Store(), "N507", "LH"))
-    assert [step.record_id for step in steps] == ["R3", "R4", "R5", "R6"]
-
-
 def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
     seen = [("2024-01-01", 802), ("2024-01-01", 800)]
     Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
@@ -388,7 +362,7 @@ def test_the_date_due_follows_from_the_landings_between_the_inspections(views: V
     assert line["due_date"] == due.isoformat()
 
 
-@pytest.mark.parametrize("view", ["fleet", "history", "page of fleet", "page of history"])
+@pytest.mark.parametrize("view", ["history", "page of fleet", "page of history"])
 def test_the_view_says_what_its_quantiles_are_of(views: Views, view: str) -> None:
     assert "worst-case bound" in views.texts[view]
     assert f"#{views.lives['N4']['limit_joint']}" in views.texts[view]
@@ -477,7 +451,7 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
     gear = load_gear()
     found = judge_lives(lives(Store()).values(), gear, load_index_table(gear))
     model = fit_fleet(found[:5], gear)
-    lines = [*map(FleetLine.of, found)]
+    lines = [FleetLine.of(life, Asked(gear)) for life in found]
     fleet = fleet_as_json(lines, forecast(found, model, gear))["gears"]
     pages = [life_as_json(life, forecast([life], model, gear)[life.key], gear) for life in found]
     assert len(fleet) == len(pages) == 200
