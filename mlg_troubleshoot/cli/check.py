@@ -95,6 +95,12 @@ class Wanted(CheckOutputs):
         bool,
         typer.Option("--keep", help="Add the inspections to the store; the prompts always do."),
     ] = False
+    amend: Annotated[
+        bool, typer.Option("--amend", help="With --keep: take changed cells from the table.")
+    ] = False
+    keep_old: Annotated[
+        bool, typer.Option("--keep-old", help="With --keep: leave what is kept as it is.")
+    ] = False
     store: options.Place = None
 
 

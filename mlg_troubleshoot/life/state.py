@@ -160,6 +160,7 @@ def state_now(visits: Sequence[GearVisit], gear: Gear) -> GearState | None:
     Visits stand in the order of time as far as it is known.
     """
     found = [v for v in visits if not _is_repair_alone(v.inspection)]
+    found = [v for v in found if not v.inspection.says_nothing] or found
     if not found:
         return None
     known = _Known(gear)
@@ -342,7 +343,7 @@ class _AsOf:
         """Whether something may count in favour of the gear: it is surely older than the visit,
         and no repair of another visit may have replaced it.
         """
-        if self._is_own(event):
+        if self._is_own(event) and not self._now:
             return True
         is_before = self._now or _is_later(self._at, event.occasion)
         repairs = (r for r in self._of(joint) if r.visit is not event.visit)

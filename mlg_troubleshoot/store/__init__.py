@@ -15,6 +15,7 @@ from mlg_troubleshoot.store.database import (
 )
 from mlg_troubleshoot.store.drafts import Draft, Drafts
 from mlg_troubleshoot.store.inspections import (
+    NOT_CONTENT,
     RETIRED,
     content_of,
     inspection_from,
@@ -23,6 +24,7 @@ from mlg_troubleshoot.store.inspections import (
 )
 
 __all__ = [
+    "NOT_CONTENT",
     "RETIRED",
     "Added",
     "Broken",

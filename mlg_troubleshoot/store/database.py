@@ -301,8 +301,7 @@ def kept_otherwise(records: Sequence[Record]) -> StoreError:
     more = f" and {len(records) - 5} more" if len(records) > 5 else ""
     return StoreError(
         f"kept already with other content: {named}{more}; nothing of this was kept",
-        "If the new one is right: mlg history correct RECORD FILE, where FILE may be this table. If"
-        " it is another inspection, give it its own record_id or date.",
+        "Run it again: another run has kept some of this meanwhile.",
     )
 
 

@@ -15,7 +15,7 @@ from mlg_troubleshoot.store.database import Record, RecordKind, packed
 from mlg_troubleshoot.units import LengthUnit
 
 # What says where and how an inspection was entered, not what was found.
-_NOT_CONTENT = ("record_id", "source", "warnings", "entered", "unit_question")
+NOT_CONTENT = ("record_id", "source", "warnings", "entered", "unit_question")
 _BY_JOINT = tuple(column.joint_fills for column in COLUMNS if column.joint_fills)
 
 _FIELDS = tuple(
@@ -102,7 +102,7 @@ def content_of(record: Record, *, with_day: bool = True) -> bytes:
     """Hash of what was found at which gear and, unless it is left out, on which day; wherever it
     was entered and whatever it is called.
     """
-    left_out = {*_NOT_CONTENT, *(() if with_day else ("inspection_date",))}
+    left_out = {*NOT_CONTENT, *(() if with_day else ("inspection_date",))}
     found = record.body.get("inspection", record.body)
     return sha256(packed({n: v for n, v in found.items() if n not in left_out})).digest()
 

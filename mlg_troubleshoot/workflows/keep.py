@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
+from enum import StrEnum
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
@@ -22,6 +23,7 @@ from mlg_troubleshoot.life.state import GearKey, key_of
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.rows import is_made_for_row
 from mlg_troubleshoot.store import (
+    NOT_CONTENT,
     Record,
     RecordKind,
     Store,
@@ -29,13 +31,14 @@ from mlg_troubleshoot.store import (
     content_of,
     inspection_from,
     inspection_record,
-    kept_otherwise,
     packed,
     same_inspection,
 )
 from mlg_troubleshoot.workflows.check import CheckResult
 
 _ENTERED = (RecordKind.INSPECTION, RecordKind.CORRECTION)
+# Inspections that one sentence names at most.
+_MOST_NAMED = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +71,18 @@ class _KnownContents:
         self._without_day: dict[bytes, list[Record]] = {}
         # What each id of a gear stands for on each day, and those that stand without a day.
         self._by_id: dict[tuple[str, ...], Record] = {}
+        # What a table without ids said of a gear on a day, and the last version of each record.
+        self._unnamed: dict[tuple[str, ...], list[Record]] = {}
+        self._latest: dict[str, Record] = {}
         self._undated: dict[tuple[str, ...], Record] = {}
+        self._void: set[str] = set()
         for record in store.of_aircraft(tails):
-            if record.kind in _ENTERED and is_readable(record):
+            if not is_readable(record):
+                continue
+            if record.kind in _ENTERED:
                 self.add(record)
+            elif record.kind is RecordKind.VOID:
+                self._void.add(record.body["voids"])
 
     def add(self, record: Record) -> None:
         self._contents.setdefault(content_of(record), []).append(record)
@@ -82,13 +93,28 @@ class _KnownContents:
             self._undated[whose] = record
         if record.kind is RecordKind.INSPECTION:
             self._by_id[*whose, record.day] = record
+            if is_made_for_row(record.record_id):
+                self._unnamed.setdefault((*whose[1:], record.day), []).append(record)
+        else:
+            self._latest[record.body["supersedes"]] = record
 
     def __contains__(self, record: Record) -> bool:
-        return any(_may_be_one(each, record) for each in self._contents.get(content_of(record), ()))
+        return self.same(record) is not None
 
-    def otherwise(self, record: Record) -> Record | None:
+    def same(self, record: Record) -> Record | None:
+        alike = self._contents.get(content_of(record), ())
+        return next((each for each in alike if _may_be_one(each, record)), None)
+
+    def latest(self, record: Record) -> Record:
+        """The last version of a kept inspection."""
+        while (later := self._latest.get(record.key)) is not None:
+            record = later
+        return record
+
+    def otherwise(self, record: Record, stand: Collection[str]) -> Record | None:
         """The record that stands for the same inspection with other content: under its id on its
-        day or without one, or the same findings under its id on another day or without one.
+        day or without one, or the same findings under its id on another day or without one; where
+        no table has ids, what is mostly the same on that day and in no row of this table (`stand`).
         """
         whose = record.record_id, record.tail_no, record.side
         same = self._by_id.get((*whose, record.day)) or self._undated.get(whose)
@@ -98,7 +124,33 @@ class _KnownContents:
             for each in alike
             if each.record_id == record.record_id or (not each.day and _may_be_one(each, record))
         )
-        return same or next(moved, None)
+        found = same or next(moved, None)
+        if found is None and is_made_for_row(record.record_id):
+            unnamed = self._unnamed.get((*whose[1:], record.day), ())
+            left = (each for each in unnamed if each.key and each.key not in stand)
+            found = next((each for each in left if _is_mostly(each, record)), None)
+        return found
+
+    def told(self, records: Iterable[Record]) -> Iterator[Record]:
+        """What is kept of some records."""
+        for record in records:
+            yield from self._contents.get(content_of(record), ())
+
+    def vanished(self, files: Collection[str], stand: set[str]) -> list[str]:
+        """Inspections that a file said when it was kept, and that its rows no longer say."""
+        return [
+            f"{record.record_id} ({record.tail_no} {record.side} {record.day or 'no date'})"
+            for record in self._by_id.values()
+            if record.key and stand.isdisjoint((record.key, self.latest(record).key))
+            if record.key not in self._void
+            if (inspection_from(record).source.file or "") in files
+        ]
+
+
+def _is_mostly(one: Record, other: Record) -> bool:
+    """Whether most of what two records say of one gear and day is the same."""
+    said = [set(record.body["inspection"]["clearance_in"].items()) for record in (one, other)]
+    return 2 * len(said[0] & said[1]) >= max(map(len, said)) > 0
 
 
 def _may_be_one(one: Record, other: Record) -> bool:
@@ -107,40 +159,104 @@ def _may_be_one(one: Record, other: Record) -> bool:
     return ids[0] == ids[1] or any(map(is_made_for_row, ids))
 
 
+class Settle(StrEnum):
+    """What becomes of inspections that are kept with other content than the table says."""
+
+    AMEND = "amend"
+    KEEP_OLD = "keep-old"
+
+
 def keep(
     result: CheckResult,
     store: Store,
     same_tail: Callable[[str, str], bool] | None = None,
     progress: Progress = lambda _done, _total: None,
     judged: Sequence[Inspection] | None = None,
+    settle: Settle | None = None,
 ) -> Kept:
     """Add the judged inspections of a check that found something, all or none.
 
     ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they
     are refused. ``judged``: the inspections of a result that does not hold its judgements.
+    ``settle``: take what the table says of inspections that are kept otherwise, or leave them.
     """
     if judged is None:
         judged = inspections_of(result.judgements)
     tails = _settled_tails((row.tail_no for row in judged), store, same_tail)
     rows = [replace(r, tail_no=tails.get(r.tail_no, r.tail_no)) for r in judged]
     known = _KnownContents(store, {row.tail_no for row in rows})
+    made = [inspection_record(row) for row in rows]
+    stand = {same.key for record in made if (same := known.same(record)) is not None}
     records: list[Record] = []
-    others: list[Record] = []
+    changed: list[tuple[Record, Record]] = []
     new = 0
-    for done, row in enumerate(rows, 1):
-        record = inspection_record(row)
-        if record not in known:
-            other = known.otherwise(record)
-            others += [other] if other else []
-            known.add(record)
-            records.append(record)
-            new += 1
+    for done, (row, record) in enumerate(zip(rows, made, strict=True), 1):
         progress(done, len(rows))
-    if others:
-        raise kept_otherwise(others)
+        if record in known:
+            continue
+        other = known.otherwise(record, stand)
+        if other is None:
+            records.append(record)
+        else:
+            other = known.latest(other)
+            changed.append((other, record))
+            stand |= {other.key, other.body.get("supersedes", "")}
+            if settle is Settle.AMEND:
+                amended = replace(row, record_id=other.record_id)
+                kind = RecordKind.CORRECTION
+                records.append(inspection_record(amended, kind, supersedes=other.key))
+        known.add(record)
+        new += other is None or settle is Settle.AMEND
+    if changed and settle is None:
+        raise _kept_otherwise(changed)
     store.add(records, lambda _kept, record: record.kind is not RecordKind.INSPECTION)
+    files = {row.source.file for row in rows if row.source.file is not None}
+    gone: list[str] = []
+    if stand and files:
+        # The table, or a part of it, was kept before.
+        every = _KnownContents(store, {tail for tail, _side in store.gears()})
+        gone = every.vanished(files, stand | {record.key for record in every.told(made)})
     gears = {key_of(row) for row in rows}
-    return Kept(new, len(rows) - new, tuple(warnings_of(store, gears)))
+    return Kept(new, len(rows) - new, (*_vanished(gone), *warnings_of(store, gears)))
+
+
+def _vanished(gone: Sequence[str]) -> list[str]:
+    if not gone:
+        return []
+    listed = ", ".join(gone[:_MOST_NAMED]) + (" …" if len(gone) > _MOST_NAMED else "")
+    return [
+        f"kept from this table before, and no longer in it: {listed}. They go on counting; if they"
+        " are wrong: mlg history void RECORD --why TEXT"
+    ]
+
+
+def _kept_otherwise(changed: Sequence[tuple[Record, Record]]) -> StoreError:
+    """Refuse a table that says otherwise of what is kept already, and name the cells."""
+    named = "; ".join(_difference(*both) for both in changed[:_MOST_NAMED])
+    more = f"; and {len(changed) - _MOST_NAMED} more" if len(changed) > _MOST_NAMED else ""
+    return StoreError(
+        f"kept already with other content: {named}{more}; nothing of this was kept",
+        "Settle the table as a whole: --amend takes what it says, --keep-old leaves what is kept."
+        " An inspection of its own needs its own record_id or date.",
+    )
+
+
+def _difference(kept: Record, new: Record) -> str:
+    """Name an inspection, and what of it was kept and what a table says."""
+    was, says = (record.body["inspection"] for record in (kept, new))
+    cells = []
+    for name in [*dict.fromkeys((*was, *says))]:
+        before, now = was.get(name), says.get(name)
+        if name in NOT_CONTENT or before == now:
+            continue
+        if name == "clearance_in":
+            joints = sorted({*(before or {}), *(now or {})}, key=int)
+            pairs = [(f"#{n}", (before or {}).get(n), (now or {}).get(n)) for n in joints]
+        else:
+            pairs = [(name.replace("_", " "), before, now)]
+        cells += [f"{what} was {a}, the table says {b}" for what, a, b in pairs if a != b]
+    of = f"{kept.record_id} ({kept.tail_no} {kept.side} {kept.day or 'no date'})"
+    return f"{of}: {', '.join(cells).replace('None', 'blank')}" if cells else of
 
 
 def under_a_free_id(made: Inspection, store: Store) -> Inspection:

@@ -10,7 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.store import Store
 from tests.cli.conftest import Run, mlg, row
+
+from .places import table
 
 Keep = Callable[..., Run]
 OF_ROWS = ("A", "B", "C")
@@ -31,7 +35,9 @@ def keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Keep:
             for n, name in enumerate(OF_ROWS, 1)
         ]
         with (tmp_path / "table.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+            writer = csv.DictWriter(
+                file, fieldnames=list(dict.fromkeys(c for r in rows for c in r))
+            )
             writer.writeheader()
             writer.writerows(rows)
         return mlg("check", tmp_path / "table.csv", "--keep")
@@ -55,11 +61,11 @@ def test_the_row_of_a_table_with_its_id_corrects_a_record(keep: Keep, tmp_path: 
     assert "0 inspections kept" in keep(B={CLEARANCE: "0.002"}).err
 
 
-def test_the_refusal_of_a_changed_row_says_that_the_table_itself_will_do(keep: Keep) -> None:
+def test_the_refusal_of_a_changed_row_says_how_the_table_is_settled(keep: Keep) -> None:
     keep()
     refused = keep(B={CLEARANCE: "0.002"}).err
     assert "kept already with other content: B (N1 LH 2026-02-01)" in refused
-    assert "FILE may be this table" in refused
+    assert "Settle the table as a whole" in " ".join(refused.split())
 
 
 def test_what_is_wrong_with_other_rows_of_the_table_is_not_said(keep: Keep, tmp_path: Path) -> None:
@@ -103,3 +109,98 @@ def test_once_the_record_is_corrected_the_table_is_known(
 def test_an_id_that_is_used_on_another_day_is_another_inspection(keep: Keep) -> None:
     keep()
     assert "1 inspection kept" in keep(B={DAY: "2026-02-09", CLEARANCE: "0.002"}).err
+
+
+# A table that comes back is settled as a whole.
+
+
+def settle(folder: Path, *flags: str) -> Run:
+    return mlg("check", folder / "table.csv", "--keep", *flags)
+
+
+def third_joint(folder: Path) -> dict[str, float]:
+    (life,) = lives(Store(folder / "store.sqlite")).values()
+    return {
+        kept.record.record_id: kept.inspection.clearance_in[3]
+        for kept in sorted(life.inspections, key=lambda kept: kept.record.record_id)
+    }
+
+
+def test_the_cells_that_were_changed_are_named(keep: Keep) -> None:
+    keep(A={"outcome": ""})
+    refused = keep(A={"outcome": ""}, B={CLEARANCE: "0.0031"}, C={"outcome": "FAILED"}).err
+    assert "B (N1 LH 2026-02-01): #3 was 0.001, the table says 0.0031" in refused
+    assert "C (N1 LH 2026-03-01): outcome was blank, the table says FAILED" in refused
+    assert "--amend takes what it says, --keep-old leaves what is kept" in " ".join(refused.split())
+
+
+def test_amend_takes_what_the_table_says(keep: Keep, tmp_path: Path) -> None:
+    keep()
+    keep(B={CLEARANCE: "0.002"}, C={CLEARANCE: "0.003"})
+    assert "2 inspections kept" in settle(tmp_path, "--amend").err
+    assert third_joint(tmp_path) == {"A": 0.001, "B": 0.002, "C": 0.003}
+    assert "0 inspections kept" in settle(tmp_path).err
+
+
+def test_keep_old_leaves_what_is_kept(keep: Keep, tmp_path: Path) -> None:
+    keep()
+    keep(B={CLEARANCE: "0.002"})
+    assert "0 inspections kept" in settle(tmp_path, "--keep-old").err
+    assert third_joint(tmp_path) == {"A": 0.001, "B": 0.001, "C": 0.001}
+
+
+def test_amended_back_and_forth_is_what_it_was(keep: Keep, tmp_path: Path) -> None:
+    keep()
+    before = mlg("fleet", "--json", "--no-forecast").json
+    for worn in ("0.0121", "0.001"):
+        keep(B={CLEARANCE: worn})
+        settle(tmp_path, "--amend")
+    assert mlg("fleet", "--json", "--no-forecast").json == before
+
+
+def test_both_ways_of_settling_are_one_too_many(keep: Keep, tmp_path: Path) -> None:
+    keep()
+    assert settle(tmp_path, "--amend", "--keep-old").code == 2
+
+
+def unnamed(folder: Path, *clearances: str, name: str = "table.csv") -> Path:
+    rows = [
+        row(record_id=None, tail_no=f"N{n}", **{DAY: "2026-01-01", CLEARANCE: worn})
+        for n, worn in enumerate(clearances)
+        if worn
+    ]
+    return table(folder, *rows, name=name)
+
+
+@pytest.fixture
+def without_ids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("MLG_STORE", str(tmp_path / "store.sqlite"))
+    mlg("check", unnamed(tmp_path, "0.0011", "0.0012", "0.0013"), "--keep")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["table.csv", "renamed.csv"])
+def test_a_table_without_ids_that_was_sorted_or_renamed_is_known(
+    without_ids: Path, name: str
+) -> None:
+    rows = (unnamed(without_ids, "0.0011", "0.0012", "0.0013", name=name)).read_text().splitlines()
+    (without_ids / name).write_text("\n".join([rows[0], *rows[:0:-1]]) + "\n")
+    said = mlg("check", without_ids / name, "--keep").err
+    assert "0 inspections kept" in said
+    assert "3 known already" in said
+
+
+def test_a_changed_cell_of_a_table_without_ids_is_named_and_amended(without_ids: Path) -> None:
+    changed = unnamed(without_ids, "0.0011", "0.0099", "0.0013")
+    assert "#3 was 0.0012, the table says 0.0099" in mlg("check", changed, "--keep").err
+    mlg("check", changed, "--keep", "--amend")
+    assert len(mlg("fleet", "--json", "--no-forecast").json["gears"]) == 3
+    assert "0 inspections kept" in mlg("check", changed, "--keep").err
+
+
+def test_a_row_that_vanished_is_named(without_ids: Path) -> None:
+    shorter = unnamed(without_ids, "0.0011", "", "0.0013")
+    said = " ".join(mlg("check", shorter, "--keep").err.split())
+    assert "no longer in it" in said
+    assert "(N1 LH 2026-01-01)" in said
+    assert "(N0 LH" not in said

@@ -118,7 +118,7 @@ def test_the_same_identity_with_other_content_is_refused_with_what_to_do(
     run = keep(tmp_path, visit(2, 0.002), visit(1, 0.005))
     assert run.code == 5
     assert "N123-LH-1" in run.err
-    assert "mlg history correct" in run.err
+    assert "--amend" in run.err
     assert len(Store(place).all()) == 1
 
 
