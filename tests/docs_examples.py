@@ -24,6 +24,8 @@ PAGES = (README, *sorted((ROOT / "docs").rglob("*.md")), ROOT / "inspection_data
 PICTURES = ROOT / ".github" / "pictures"
 _BLOCK = re.compile(r"^```console\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PROMPT = "$ "
+# A hash of a record, whole or its beginning.
+_HASH = re.compile(r"\b[0-9a-f]{10}(?:[0-9a-f]{54})?\b")
 # What stands between this and the next blank line is made from the table of columns.
 COLUMNS_MARK = "<!-- made by tests/docs_examples.py from mlg_troubleshoot/decision/columns.py -->\n"
 _FONTS = "DejaVu Sans, Verdana, Segoe UI, sans-serif"
@@ -108,6 +110,15 @@ def columns_table() -> str:
     return "\n".join(lines) + "\n"
 
 
+def _with_hashes_of(before: str, printed: str) -> str:
+    """What was printed, each hash of a record as it stood: it holds the clock."""
+    old, new = before.splitlines(keepends=True), printed.splitlines(keepends=True)
+    if len(old) != len(new):
+        return printed
+    masked = [[_HASH.sub("", line) for line in lines] for lines in (old, new)]
+    return "".join(o if a == b else n for o, n, a, b in zip(old, new, *masked, strict=True))
+
+
 def refreshed(text: str, folder: Path) -> str:
     """The README with what its commands print today."""
     before, mark, rest = text.partition(COLUMNS_MARK)
@@ -115,7 +126,8 @@ def refreshed(text: str, folder: Path) -> str:
         text = before + mark + columns_table() + "\n" + rest.partition("\n\n")[2]
     pieces, end = [], 0
     for match, session in sessions(text):
-        pieces += [text[end : match.start(1)], run(session.commands, folder).written()]
+        printed = run(session.commands, folder).written()
+        pieces += [text[end : match.start(1)], _with_hashes_of(match[1], printed)]
         end = match.end(1)
     return "".join((*pieces, text[end:]))
 
