@@ -73,7 +73,7 @@ BUDGETS: dict[str, int] = {
     "records": 45907,
     "reporting": 28089,
     "schemas": 771,
-    "store": 7926,
+    "store": 7925,
     "surveying": 5285,
     "wear": 7893,
     "workflows": 13794,

@@ -96,11 +96,12 @@ class Wanted(CheckOutputs):
         typer.Option("--keep", help="Add the inspections to the store; the prompts always do."),
     ] = False
     amend: Annotated[
-        bool, typer.Option("--amend", help="With --keep: take changed cells from the table.")
-    ] = False
-    keep_old: Annotated[
-        bool, typer.Option("--keep-old", help="With --keep: leave what is kept as it is.")
-    ] = False
+        bool | None,
+        typer.Option(
+            "--amend/--keep-old",
+            help="With --keep: take the cells of a table that changed, or leave what is kept.",
+        ),
+    ] = None
     store: options.Place = None
 
 

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.json_form import CheckText
     from mlg_troubleshoot.store import Record
-    from mlg_troubleshoot.workflows.keep import Settle
 
 # One gear, and one before and after a repair, are shown in full.
 _FEW = 2
@@ -63,10 +62,6 @@ class Run:
             flags, files = replace(flags, tail=files[0], side=files[1]), []
         if wanted.annotate is not None and (len(files) != 1 or files[0] == "-"):
             raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
-        if wanted.amend and wanted.keep_old:
-            raise UsageError(
-                "--amend and --keep-old were both given", "Give one of them, with --keep."
-            )
         if wanted.formats and wanted.report is None:
             output.say("Note: --format is for reports: without --report DIR none is written.")
         extensions = wanted.extension or ()
@@ -301,7 +296,7 @@ class Run:
         if self._place is None or not (self._wanted.keep or self._asks):
             return
         from mlg_troubleshoot.life.folding import warnings_of
-        from mlg_troubleshoot.workflows.keep import Kept, Settle, is_same, keep, supersede
+        from mlg_troubleshoot.workflows.keep import Kept, is_same, keep, supersede
 
         if before is not None:
             if not is_same(before, result):
@@ -317,7 +312,7 @@ class Run:
                     _is_same_aircraft,
                     progress,
                     judged,
-                    self._settle(Settle),
+                    amend=self._wanted.amend,
                 )
         if not self._wanted.quiet:
             noun = "inspection" if added.new == 1 else "inspections"
@@ -325,12 +320,6 @@ class Run:
             output.say(f"{added.new} {noun} kept in {self._place.place}{known}.")
         for warning in added.warnings:
             output.say(f"Warning: {warning}")
-
-    def _settle(self, ways: type[Settle]) -> Settle | None:
-        """What becomes of inspections that are kept with other content."""
-        if self._wanted.amend:
-            return ways.AMEND
-        return ways.KEEP_OLD if self._wanted.keep_old else None
 
 
 def _is_same_aircraft(new: str, kept: str) -> bool:

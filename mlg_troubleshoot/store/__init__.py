@@ -9,7 +9,6 @@ from mlg_troubleshoot.store.database import (
     Store,
     StoreError,
     files_of,
-    kept_otherwise,
     login,
     packed,
 )
@@ -39,7 +38,6 @@ __all__ = [
     "files_of",
     "inspection_from",
     "inspection_record",
-    "kept_otherwise",
     "login",
     "packed",
     "same_inspection",

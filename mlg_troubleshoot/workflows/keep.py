@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
-from enum import StrEnum
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
@@ -159,26 +158,21 @@ def _may_be_one(one: Record, other: Record) -> bool:
     return ids[0] == ids[1] or any(map(is_made_for_row, ids))
 
 
-class Settle(StrEnum):
-    """What becomes of inspections that are kept with other content than the table says."""
-
-    AMEND = "amend"
-    KEEP_OLD = "keep-old"
-
-
 def keep(
     result: CheckResult,
     store: Store,
     same_tail: Callable[[str, str], bool] | None = None,
     progress: Progress = lambda _done, _total: None,
     judged: Sequence[Inspection] | None = None,
-    settle: Settle | None = None,
+    *,
+    amend: bool | None = None,
 ) -> Kept:
     """Add the judged inspections of a check that found something, all or none.
 
     ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they
     are refused. ``judged``: the inspections of a result that does not hold its judgements.
-    ``settle``: take what the table says of inspections that are kept otherwise, or leave them.
+    ``amend``: take what the table says of inspections that are kept otherwise, or leave them; None
+    refuses the table.
     """
     if judged is None:
         judged = inspections_of(result.judgements)
@@ -201,13 +195,13 @@ def keep(
             other = known.latest(other)
             changed.append((other, record))
             stand |= {other.key, other.body.get("supersedes", "")}
-            if settle is Settle.AMEND:
+            if amend:
                 amended = replace(row, record_id=other.record_id)
                 kind = RecordKind.CORRECTION
                 records.append(inspection_record(amended, kind, supersedes=other.key))
         known.add(record)
-        new += other is None or settle is Settle.AMEND
-    if changed and settle is None:
+        new += other is None or bool(amend)
+    if changed and amend is None:
         raise _kept_otherwise(changed)
     store.add(records, lambda _kept, record: record.kind is not RecordKind.INSPECTION)
     files = {row.source.file for row in rows if row.source.file is not None}

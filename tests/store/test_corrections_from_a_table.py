@@ -158,11 +158,6 @@ def test_amended_back_and_forth_is_what_it_was(keep: Keep, tmp_path: Path) -> No
     assert mlg("fleet", "--json", "--no-forecast").json == before
 
 
-def test_both_ways_of_settling_are_one_too_many(keep: Keep, tmp_path: Path) -> None:
-    keep()
-    assert settle(tmp_path, "--amend", "--keep-old").code == 2
-
-
 def unnamed(folder: Path, *clearances: str, name: str = "table.csv") -> Path:
     rows = [
         row(record_id=None, tail_no=f"N{n}", **{DAY: "2026-01-01", CLEARANCE: worn})
