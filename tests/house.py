@@ -60,13 +60,13 @@ WAYS = {
 # writes it down again.
 BUDGETS: dict[str, int] = {
     "(top)": 9679,
-    "cli": 29622,
+    "cli": 29653,
     "decision": 32772,
     "diagnosis": 35962,
     "gear": 11306,
     "geometry": 5881,
     "indices": 5102,
-    "life": 17455,
+    "life": 17478,
     "misfit": 18210,
     "notebook": 2355,
     "paper": 6762,
@@ -76,7 +76,7 @@ BUDGETS: dict[str, int] = {
     "store": 7925,
     "surveying": 5285,
     "wear": 7893,
-    "workflows": 13794,
+    "workflows": 14810,
 }
 _NO_CODE = {
     tokenize.COMMENT,
