@@ -5,8 +5,9 @@ the chain.
 from __future__ import annotations
 
 import os
+import re
 import stat
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime
 from functools import partial
@@ -168,8 +169,8 @@ def show_lives(
     from mlg_troubleshoot.life.forecast import forecast
     from mlg_troubleshoot.life.judged import judge_lives
 
-    tail, meant = key_of(tail, "LH" if side is None else side)
     keys = store.gears()
+    tail, meant = _as_kept(keys, key_of(tail, "LH" if side is None else side))
     wanted = [key for key in keys if key == (tail, meant if side else key[1])]
     if not wanted:
         life_of(store, tail, meant)
@@ -223,6 +224,19 @@ def key_of(tail: str, side: str) -> GearKey:
     return row.tail_no, row.side.value
 
 
+def _as_kept(keys: Collection[GearKey], asked: GearKey) -> GearKey:
+    """A gear as it stands in the store, whatever capitals, blanks and dashes its tail was typed
+    with.
+    """
+    tails = {tail for tail, _side in keys}
+    alike = [tail for tail in tails if _spelling(tail) == _spelling(asked[0])]
+    return (alike[0], asked[1]) if asked[0] not in tails and len(alike) == 1 else asked
+
+
+def _spelling(tail: str) -> str:
+    return re.sub(r"[\s-]", "", tail).upper()
+
+
 def work(
     store: Store,
     kind: RecordKind,
@@ -235,7 +249,7 @@ def work(
     """Record that joints were restored, or the reversing valve re-rigged: the joints wear on, the
     plunger moved.
     """
-    key = key_of(*gear)
+    key = _as_kept(store.gears(), key_of(*gear))
     given = {"inspection_date": day, "gear_landings": landings, "work_order": work_order}
     flags = {
         "inspection_date": "--date",

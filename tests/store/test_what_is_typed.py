@@ -212,3 +212,11 @@ def test_an_id_that_was_typed_stays_as_it_is(place: Path) -> None:
     refused = mlg(*typed, "--set", "4=0.002in")
     assert refused.code == 5
     assert "kept already with other content" in refused.err
+
+
+@pytest.mark.parametrize("tail", ["n1", "N-1", "n 1"])
+def test_a_tail_is_found_in_any_capitals_blanks_and_dashes(place: Path, tail: str) -> None:
+    shown = mlg("history", tail, "LH", "--no-forecast", "--json")
+    assert shown.json["tail_no"] == "N1"
+    assert mlg("history", "repair", tail, "LH", "--joint", "3", "--date", "2026-02-01").code == 0
+    assert last(place).tail_no == "N1"
