@@ -25,6 +25,7 @@ from mlg_troubleshoot.records.row_consistency import (
     copies,
     order_warnings,
     settle_duplicates,
+    slips,
 )
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.tables import Collected, read_table
@@ -432,7 +433,7 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     problems += settle_duplicates(rows, out.layouts, out.invalid_content)
     repeated = copies(rows)
     backwards = order_warnings(rows, out.layouts)
-    for place, said in (*repeated.items(), *backwards.items()):
+    for place, said in (*repeated.items(), *slips(rows).items(), *backwards.items()):
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, said))
     tails: dict[str, RowSource] = {}
     for row in rows:
