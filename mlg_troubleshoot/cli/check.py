@@ -51,7 +51,7 @@ class Flags:
 
 
 @dataclass(frozen=True, slots=True)
-class CheckOutputs(options.OutputOptions):
+class CheckOutputs(options.Shown):
     """What ``mlg check`` shows and writes."""
 
     formats: Annotated[

@@ -277,7 +277,7 @@ class Run:
                 self.asked,
                 directory,
                 formats,
-                self._wanted.page.value,
+                options.paper_size(),
                 on_written=progress,
                 unit=unit,
                 store=self._place,

@@ -23,12 +23,11 @@ def _day(text: str) -> str:
         raise UsageError(f"--since {text!r} is not a date", "Give it as 2026-05-01.") from None
 
 
-def _shown(**given: Any) -> options.OutputOptions:
-    """What is written; paper and unit of a fleet are those of the environment."""
-    page = options.one_of(options.PaperSize, os.environ.get("MLG_PAGE", "A4"), "MLG_PAGE")
+def _shown(**given: Any) -> options.Shown:
+    """What is written; the unit of a fleet is that of the environment."""
     unit = os.environ.get("MLG_SHOW")
     show = None if unit is None else LengthUnit.parse(unit)
-    return options.OutputOptions(page=page, show=show, **given)
+    return options.Shown(show=show, **given)
 
 
 @options.flat

@@ -62,7 +62,7 @@ def show(
     ] = None,
     records: options.Records,
     no_forecast: options.NoForecast = False,
-    shown: options.OutputOptions,
+    shown: options.Shown,
 ) -> None:
     """Show all gears with their latest state, or the life of one gear with its forecast."""
     from mlg_troubleshoot.cli.progress import stages
@@ -114,7 +114,7 @@ def show(
 
 
 def write_pages(
-    found: Lives, store: Store, shown: options.OutputOptions, unit: LengthUnit, *, fleet: bool
+    found: Lives, store: Store, shown: options.Shown, unit: LengthUnit, *, fleet: bool
 ) -> None:
     """Write the pages of gears if they are asked for, and name them on stderr."""
     from mlg_troubleshoot.workflows import history
@@ -126,7 +126,7 @@ def write_pages(
         store,
         shown.report,
         fleet=fleet,
-        page=shown.page.value,
+        page=options.paper_size(),
         unit=unit,
         replace_files=shown.force,
     )

@@ -54,7 +54,7 @@ class PaperSize(StrEnum):
 
 
 def paper_size() -> str:
-    """The paper of a command without a flag for it."""
+    """The paper that the environment asks for."""
     return one_of(PaperSize, os.environ.get("MLG_PAGE", PaperSize.A4), "MLG_PAGE").value
 
 
@@ -132,9 +132,6 @@ Report = Annotated[
     Path | None,
     typer.Option("--report", metavar="DIR", help="Write printable reports to this folder."),
 ]
-Paper = Annotated[
-    PaperSize, typer.Option("--page", envvar="MLG_PAGE", help="Paper size of the report.")
-]
 Show = Annotated[
     LengthUnit | None,
     typer.Option(
@@ -198,13 +195,6 @@ class Shown:
     def unit(self, entered_in: LengthUnit = LengthUnit.INCH) -> LengthUnit:
         """The unit that lengths are shown in; where none is asked for, that of the entry."""
         return self.show or entered_in
-
-
-@dataclass(frozen=True, slots=True)
-class OutputOptions(Shown):
-    """What a command shows and writes, with the size of the paper."""
-
-    page: Paper = PaperSize.A4
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,7 +291,7 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
             continue
         own = get_type_hints(groups[name], include_extras=True)
         # What all commands share stands last.
-        for each in sorted(fields(groups[name]), key=lambda each: each in fields(OutputOptions)):
+        for each in sorted(fields(groups[name]), key=lambda each: each in fields(Shown)):
             show(each.name, each.default, own[each.name])
 
     @wraps(command)

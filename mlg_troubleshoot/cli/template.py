@@ -21,7 +21,6 @@ def template(
     ],
     gear: options.Gear = DEFAULT_GEAR,
     force: options.Force = False,
-    page: options.Paper = options.PaperSize.A4,
     unit: options.Unit = None,
     convention: options.Convention = None,
     columns: Annotated[
@@ -41,7 +40,12 @@ def template(
         raise UsageError(f"--columns {columns!r} is not known", "Give usual or all.")
     claim(gear, (), [("the template", file)], force=force)
     task.write_template(
-        file, gear, page=page.value, unit=unit, convention=convention, every_column=columns == "all"
+        file,
+        gear,
+        page=options.paper_size(),
+        unit=unit,
+        convention=convention,
+        every_column=columns == "all",
     )
     if file.suffix.lower() == ".xlsx":
         output.write(f"Written: {file}. Fill it in, then: mlg check {file} --report DIR")

@@ -297,9 +297,7 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     kept: dict[str, KeptInspection] = {}
     others: dict[str, Record] = {}
     records = _as_recorded(_readable_or_not_void(records))
-    # What was recorded in two chains before they were merged is one, by its first hash.
-    first_of: dict[tuple[object, ...], str] = {}
-    one = {r.key: first_of.setdefault((r.kind, *r.content), r.key) for r in records}
+    one = first_keys(records)
     for record in records:
         key_of_record = one[record.key]
         if record.kind is RecordKind.INSPECTION:
@@ -338,6 +336,14 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
         _disagreements(key, events, moments),
         overhauls([moments[place] for place in order]),
     )
+
+
+def first_keys(records: Iterable[Record]) -> dict[str, str]:
+    """For each record, by its first hash, that of the record which says the same: what was recorded
+    in two chains before they were merged is one.
+    """
+    first_of: dict[tuple[object, ...], str] = {}
+    return {r.key: first_of.setdefault((r.kind, *r.content), r.key) for r in records}
 
 
 def _as_recorded(records: Sequence[Record]) -> list[Record]:

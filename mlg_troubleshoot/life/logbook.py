@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from itertools import groupby
@@ -11,7 +11,7 @@ from typing import Any
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.life.folding import GearLife
+from mlg_troubleshoot.life.folding import GearLife, first_keys
 from mlg_troubleshoot.store import Record, RecordKind, inspection_from
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
@@ -129,20 +129,24 @@ def log_of(life: GearLife, gear: Gear) -> list[LogLine]:
     day stands where it was entered.
     """
     versions: dict[str, Inspection] = {}
-    void = _void(life.records)
+    one = first_keys(life.records)
+    void = _void(life.records, one)
     lines: list[LogLine] = []
     for record in life.records:
+        if one[record.key] != record.key:
+            continue
         body = record.body
         about: dict[str, Any] = {
             "gear_landings": body.get("landings"),
             "record_id": record.record_id or None,
             "hash": record.digest,
-            "counts": record.digest not in void,
+            "counts": record.key not in void,
         }
         if record.kind in _VISITS:
-            row = versions[record.digest] = inspection_from(record)
+            row = versions[record.key] = inspection_from(record)
             about["gear_landings"] = row.gear_landings
-            found = visit_lines(row, gear, versions.get(body.get("supersedes", "")))
+            old = one.get(body.get("supersedes", ""), "")
+            found = visit_lines(row, gear, versions.get(old))
             found += _verdict(life, record)
         else:
             found = _other_lines(record)
@@ -163,14 +167,14 @@ def _without_corrected(lines: Sequence[LogLine]) -> list[LogLine]:
     return kept[::-1]
 
 
-def _void(records: Sequence[Record]) -> set[str]:
-    """Hashes of what was voided, with the earlier versions of it."""
+def _void(records: Sequence[Record], one: Mapping[str, str]) -> set[str]:
+    """First hashes of what was voided, with the earlier versions of it."""
     gone: set[str] = set()
     for record in reversed(records):
         if record.kind is RecordKind.VOID:
-            gone.add(record.body["voids"])
-        elif record.kind is RecordKind.CORRECTION and record.digest in gone:
-            gone.add(record.body["supersedes"])
+            gone.add(one.get(record.body["voids"], ""))
+        elif record.kind is RecordKind.CORRECTION and one[record.key] in gone:
+            gone.add(one.get(record.body["supersedes"], ""))
     return gone
 
 

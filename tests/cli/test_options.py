@@ -9,8 +9,8 @@ import pytest
 
 from tests.cli.conftest import command
 
-ALL = 110
-BUDGET = {"check": 25, "diagnose": 14, "fleet": 12, "study": 10}
+ALL = 108
+BUDGET = {"check": 24, "diagnose": 14, "fleet": 12, "study": 10}
 
 
 def options_of(found: Any) -> Iterator[str]:

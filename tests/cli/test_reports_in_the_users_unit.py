@@ -7,6 +7,7 @@ from html import unescape
 from pathlib import Path
 
 import pypdf
+import pytest
 
 from .conftest import mlg
 
@@ -35,8 +36,11 @@ def test_a_report_of_a_check_stands_in_the_unit_to_show(tmp_path: Path) -> None:
     assert "0.0472 in" not in written(tmp_path)
 
 
-def test_a_form_to_fill_in_by_hand_has_the_paper_and_the_unit_asked_for(tmp_path: Path) -> None:
-    assert mlg("template", tmp_path / "form.pdf", "--page", "Letter", "--unit", "mm").code == 0
+def test_a_form_to_fill_in_by_hand_has_the_paper_and_the_unit_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MLG_PAGE", "Letter")
+    assert mlg("template", tmp_path / "form.pdf", "--unit", "mm").code == 0
     (page,) = pypdf.PdfReader(tmp_path / "form.pdf").pages
     assert round(page.mediabox.width) == 612
     assert "0.190" in page.extract_text()

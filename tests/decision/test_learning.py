@@ -72,9 +72,10 @@ def test_a_small_fleet_excludes_no_level_of_wear(gear: Gear) -> None:
     assert min(new_parts.levels) > 0.05
 
 
-def test_a_failure_near_the_bound_is_repaired_again_less_often_in_a_fleet_that_is_known(
+def test_a_failure_near_the_bound_is_repaired_again_more_often_where_loads_hold_the_pins(
     gear: Gear,
 ) -> None:
+    """Plain draws of the model: .025 with free pins, .10 with held ones."""
     reading = float(0.8 * gear.model.plunger_amplification() @ np.full(10, 0.0035))
     row = inspected(every_joint(0.0035), readings_in=(reading,))
     least, most = (
@@ -82,7 +83,7 @@ def test_a_failure_near_the_bound_is_repaired_again_less_often_in_a_fleet_that_i
     )
     shut = np.zeros((1, 10), bool)
     shut[0, :2] = True
-    assert most.second_repair(shut)[0] < least.second_repair(shut)[0]
+    assert most.second_repair(shut)[0] > least.second_repair(shut)[0]
 
 
 @pytest.fixture(scope="module")

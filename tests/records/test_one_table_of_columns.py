@@ -170,9 +170,9 @@ _SHARED = {"record_id", "tail_no", "side", "unit", "joint", "clearance", "margin
 @pytest.mark.parametrize(
     "column", [c for c in COLUMNS if c.name not in _SHARED], ids=lambda column: column.name
 )
-def test_the_name_of_a_column_stands_in_at_most_four_files(column: Column) -> None:
+def test_the_name_of_a_column_stands_in_at_most_six_files(column: Column) -> None:
     """The diagnosis aside: its causes name the variables that they act through."""
     names = {column.name, f"{column.name}_in"}
     rooms = (p for p in PACKAGE.rglob("*.py") if p.relative_to(PACKAGE).parts[0] != "diagnosis")
     files = [p for p in rooms if names & _texts(p)]
-    assert len(files) <= 4, [str(p.relative_to(PACKAGE)) for p in files]
+    assert len(files) <= 6, [str(p.relative_to(PACKAGE)) for p in files]

@@ -13,7 +13,6 @@ from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError, grouped
 from mlg_troubleshoot.records import ReadOptions, ReadResult, read_many
 from mlg_troubleshoot.units import ClearanceConvention
-from tests.cli.conftest import mlg
 from tests.records.reading import Named
 
 HEADER = ["tail_no", "clearance_3_in", "clearance_5_in"]
@@ -118,8 +117,3 @@ def test_a_header_that_is_not_in_the_table_brings_the_nearest() -> None:
     result = read(csv("t.csv", [*HEADER, "Spiel 4"], *ROWS), column_map={"Spiel": "clearance_4_in"})
     (problem,) = (p for p in result.problems if p.code == "map_header_unknown")
     assert "Spiel 4" in problem.remedy.partition("nearest are:")[2]
-
-
-@pytest.mark.parametrize("panel", ["One gear by hand", "Input", "Output", "This run"])
-def test_the_help_of_a_check_stands_in_panels(panel: str) -> None:
-    assert f"─ {panel} ─" in mlg("check", "--help").out

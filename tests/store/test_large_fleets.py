@@ -111,7 +111,7 @@ def test_a_store_kept_in_many_blocks_is_the_one_kept_at_once(
     kept = keep(result, at_once)
     monkeypatch.setattr("mlg_troubleshoot.store.database._AT_ONCE", 5)
     assert keep(result, in_blocks) == kept
-    assert [*in_blocks.export()] == [*at_once.export()]
+    assert [r.content for r in in_blocks.all()] == [r.content for r in at_once.all()]
 
 
 def test_rows_that_stand_twice_in_a_call_are_kept_once(tmp_path: Path) -> None:
