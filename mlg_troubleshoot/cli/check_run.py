@@ -69,6 +69,7 @@ class Run:
         self._files = files
         self._flags = flags
         self._wanted = wanted
+        self._page = options.paper_size()
         self._asks = not (files or flags.values)
         outputs = [("--csv", wanted.csv), ("--annotate", wanted.annotate)]
         wanted.claim(
@@ -277,7 +278,7 @@ class Run:
                 self.asked,
                 directory,
                 formats,
-                options.paper_size(),
+                self._page,
                 on_written=progress,
                 unit=unit,
                 store=self._place,
