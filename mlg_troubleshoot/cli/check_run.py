@@ -310,7 +310,6 @@ class Run:
                 added = keep(
                     result,
                     self._place,
-                    _is_same_aircraft,
                     progress,
                     judged,
                     amend=self._wanted.amend,
@@ -321,9 +320,3 @@ class Run:
             output.say(f"{added.new} {noun} kept in {self._place.place}{known}.")
         for warning in added.warnings:
             output.say(f"Warning: {warning}")
-
-
-def _is_same_aircraft(new: str, kept: str) -> bool:
-    """Spellings that differ in case, blanks, dashes or O for 0 are one aircraft."""
-    output.say(f"Note: {new} is kept as {kept}: one aircraft.")
-    return True

@@ -233,6 +233,20 @@ def _lives(records: Iterable[Record]) -> dict[GearKey, GearLife]:
     return {key: _life(key, own) for key, own in sorted(by_gear.items())}
 
 
+def as_spelt(tails: Iterable[str], store: Store) -> dict[str, str]:
+    """Each tail number as the store spells it: case, blanks, dashes and O for 0 make no other
+    aircraft.
+    """
+    known = dict.fromkeys(tail for tail, _side in store.gears())
+    first: dict[str, str] = {}
+    for tail in known:
+        first.setdefault(plain_tail(tail), tail)
+    return {
+        tail: tail if tail in known else first.setdefault(plain_tail(tail), tail)
+        for tail in dict.fromkeys(tails)
+    }
+
+
 def life_of(store: Store, tail: str, side: str) -> GearLife:
     """One gear's life; a gear without records is a usage error that names near spellings."""
     side = Side.parse(side).value

@@ -12,7 +12,6 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, cast
 
-from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.cells import show, writable
 from mlg_troubleshoot.records.csvfile import csv_book
@@ -21,8 +20,8 @@ from mlg_troubleshoot.records.frames import FRAME, FrameSheet, as_frame, in_fram
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
 from mlg_troubleshoot.records.model import FileRead, ReadOptions, ReadResult
 from mlg_troubleshoot.records.row_consistency import (
-    alike_tails,
     copies,
+    one_aircraft,
     order_warnings,
     settle_duplicates,
     slips,
@@ -430,15 +429,12 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         out.join(found, "")
     rows = out.rows
     problems = out.problems
+    alike = one_aircraft(rows)
     problems += settle_duplicates(rows, out.layouts, out.invalid_content)
     repeated = copies(rows)
     backwards = order_warnings(rows, out.layouts)
     for place, said in (*repeated.items(), *slips(rows).items(), *backwards.items()):
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, said))
-    tails: dict[str, RowSource] = {}
-    for row in rows:
-        if row.tail_no is not None:
-            tails.setdefault(row.tail_no, row.source)
     files = {file.name: i for i, (file, _) in reversed([*enumerate(results)])}
     sheets = dict.fromkeys((layout.file, layout.sheet) for layout in out.layouts)
     places = {sheet: i for i, sheet in enumerate(sheets)}
@@ -452,7 +448,7 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     frames = {file.name: file.labels for file, _ in results if file.labels}
     named = [f"{rows[place].record_id}: {said}" for place, said in repeated.items()]
     many = {
-        "Tails look alike": alike_tails(tails) if len(tails) > 1 else [],
+        "Tails look alike": alike,
         "Landings fall": [*dict.fromkeys(backwards.values())],
         "Clearances are repeated": named,
     }

@@ -174,17 +174,27 @@ def slips(rows: Sequence[Inspection | InvalidRow]) -> dict[int, str]:
     return found
 
 
-def alike_tails(tails: Mapping[str, RowSource]) -> list[str]:
-    """Say which tail numbers may be one that is written in several ways, each with a row of it."""
-    alike: dict[str, list[str]] = {}
-    for tail, source in tails.items():
-        alike.setdefault(plain_tail(tail), []).append(f"{quote(tail, 40)!r} ({where(source)})")
-    return [
-        f"tails {' and '.join(same)} differ only in case, blanks, dashes or O for 0, and"
-        " are taken as different aircraft: correct the one that is wrong"
-        for same in alike.values()
-        if len(same) > 1
-    ]
+def one_aircraft(rows: list[Inspection | InvalidRow]) -> list[str]:
+    """Give rows whose tail numbers differ only in how they are spelt the first spelling; say which
+    they are, each with a row of it.
+    """
+    tails: dict[str, RowSource] = {}
+    for row in rows:
+        if row.tail_no is not None:
+            tails.setdefault(row.tail_no, row.source)
+    spelt: dict[str, list[str]] = {}
+    for tail in tails:
+        spelt.setdefault(plain_tail(tail), []).append(tail)
+    several = [same for same in spelt.values() if len(same) > 1]
+    first = {tail: same[0] for same in several for tail in same[1:]}
+    for place, row in enumerate(rows):
+        if row.tail_no in first:
+            rows[place] = replace(row, tail_no=first[row.tail_no])
+    notes = []
+    for same in several:
+        named = " and ".join(f"{quote(tail, 40)!r} ({where(tails[tail])})" for tail in same)
+        notes.append(f"tails {named} are taken as one aircraft: if they are two, correct them")
+    return notes
 
 
 def order_warnings(

@@ -488,10 +488,13 @@ def _kept_visits(
     """What a store keeps of the gears of some rows."""
     if store is None:
         return {}
-    from mlg_troubleshoot.life.folding import lives_of
+    from mlg_troubleshoot.life.folding import as_spelt, lives_of
 
-    lives = lives_of(store, {key_of(row) for row in rows if isinstance(row, Inspection)})
-    return {key: life.visits for key, life in lives.items()}
+    keys = {key_of(row) for row in rows if isinstance(row, Inspection)}
+    tails = as_spelt((tail for tail, _side in keys), store)
+    kept_as = {key: (tails[key[0]], key[1]) for key in keys}
+    lives = lives_of(store, set(kept_as.values()))
+    return {key: lives[kept].visits for key, kept in kept_as.items() if kept in lives}
 
 
 def _states(

@@ -37,11 +37,6 @@ def forecast(
     -------
     Lives
         One life per gear with its forecast; ``problems`` of the table. [landings]
-
-    Raises
-    ------
-    StoreError
-        If two spellings of a tail number differ only in case, blanks, dashes or O for 0.
     """
     known = load_gear(gear)
     if isinstance(inspections, Store):

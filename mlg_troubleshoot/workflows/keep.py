@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from typing import Any
@@ -13,11 +13,10 @@ from mlg_troubleshoot.decision.inspection import (
     RiggingCheck,
     RowSource,
     Side,
-    plain_tail,
     surely_later,
 )
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.life.folding import find, is_readable, warnings_of
+from mlg_troubleshoot.life.folding import as_spelt, find, is_readable, warnings_of
 from mlg_troubleshoot.life.state import GearKey, key_of
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.rows import is_made_for_row
@@ -161,7 +160,6 @@ def _may_be_one(one: Record, other: Record) -> bool:
 def keep(
     result: CheckResult,
     store: Store,
-    same_tail: Callable[[str, str], bool] | None = None,
     progress: Progress = lambda _done, _total: None,
     judged: Sequence[Inspection] | None = None,
     *,
@@ -169,15 +167,14 @@ def keep(
 ) -> Kept:
     """Add the judged inspections of a check that found something, all or none.
 
-    ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they
-    are refused. ``judged``: the inspections of a result that does not hold its judgements.
+    ``judged``: the inspections of a result that does not hold its judgements.
     ``amend``: take what the table says of inspections that are kept otherwise, or leave them; None
     refuses the table.
     """
     if judged is None:
         judged = inspections_of(result.judgements)
-    tails = _settled_tails((row.tail_no for row in judged), store, same_tail)
-    rows = [replace(r, tail_no=tails.get(r.tail_no, r.tail_no)) for r in judged]
+    tails = as_spelt((row.tail_no for row in judged), store)
+    rows = [replace(row, tail_no=tails[row.tail_no]) for row in judged]
     known = _KnownContents(store, {row.tail_no for row in rows})
     made = [inspection_record(row) for row in rows]
     stand = {same.key for record in made if (same := known.same(record)) is not None}
@@ -211,7 +208,9 @@ def keep(
         every = _KnownContents(store, {tail for tail, _side in store.gears()})
         gone = every.vanished(files, stand | {record.key for record in every.told(made)})
     gears = {key_of(row) for row in rows}
-    return Kept(new, len(rows) - new, (*_vanished(gone), *warnings_of(store, gears)))
+    said = [f"{one} is kept as {kept}: one aircraft" for one, kept in tails.items() if one != kept]
+    warnings = (*said, *_vanished(gone), *warnings_of(store, gears))
+    return Kept(new, len(rows) - new, warnings)
 
 
 def _vanished(gone: Sequence[str]) -> list[str]:
@@ -388,29 +387,3 @@ def _former_repair(wrong: Record, right: Inspection) -> list[Record]:
 
 def _text(at: date | None) -> str:
     return "" if at is None else at.isoformat()
-
-
-def _settled_tails(
-    tails: Iterable[str], store: Store, same_tail: Callable[[str, str], bool] | None
-) -> dict[str, str]:
-    """Spellings that differ only in case, blanks, dashes or O for 0: never one aircraft without
-    being asked.
-    """
-    known = dict.fromkeys(tail for tail, _side in store.gears())
-    by_spelling: dict[str, str] = {}
-    for tail in known:
-        by_spelling.setdefault(plain_tail(tail), tail)
-    settled: dict[str, str] = {}
-    for tail in dict.fromkeys(tails):
-        other = by_spelling.setdefault(plain_tail(tail), tail)
-        if tail in known or other == tail:
-            continue
-        if same_tail is None:
-            raise StoreError(
-                f"tail {tail!r} differs from {other!r} only in case, blanks, dashes or O for 0;"
-                " nothing was kept",
-                "Correct it, or pass --tails same (one aircraft) or --tails apart (two).",
-            )
-        if same_tail(tail, other):
-            settled[tail] = other
-    return settled

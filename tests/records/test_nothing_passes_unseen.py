@@ -85,8 +85,10 @@ def tails(one: str, two: str) -> ReadResult:
         *("N801.HK", "N8O1HK", "N\u2011801HK"),
     ],
 )
-def test_a_tail_that_looks_like_another_is_asked_about(other: str) -> None:
-    assert any("are taken as different aircraft" in note for note in tails("N801HK", other).notes)
+def test_a_tail_that_looks_like_another_is_taken_as_that_and_said(other: str) -> None:
+    found = tails("N801HK", other)
+    assert any("are taken as one aircraft" in note for note in found.notes)
+    assert {row.tail_no for row in found.rows} == {"N801HK"}
 
 
 @pytest.mark.parametrize("unseen", "\u00ad\ufe0f\u034f\u3164\u200b\u200e\u2060\u115f\U000e0020")

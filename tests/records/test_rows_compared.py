@@ -77,6 +77,6 @@ def test_landings_that_fall_in_many_gears_are_counted_beyond_the_eighth_and_note
 def test_tails_that_may_be_one_aircraft_are_named_with_their_rows(read, table, tail, notes):
     header = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in")
     rows = [("R1", "N103", "LH", "RADIAL", 0.003), ("R2", tail, "LH", "RADIAL", 0.003)]
-    said = f"'N103' (row 2 of t.csv) and {tail!r} (row 3 of t.csv) differ only in"
+    said = f"'N103' (row 2 of t.csv) and {tail!r} (row 3 of t.csv) are taken as one"
     result = read(table(header, rows), "t.csv")
     assert sum(said in note for note in result.notes) == notes
