@@ -36,7 +36,7 @@ _ANSWERS = {
     "Readings are": "",
     "A clearance": "play",
     "Did it retract": "f",
-    "Plunger": "4{gear}",
+    "Plunger": "4{digit}",
     **{f"#{n} ": f"{n + 2}" for n in range(1, 11)},
     "Measured by": "A. Smith",
     "Gauge": "G-7",
@@ -103,7 +103,7 @@ class Trial:
             if question in self.acknowledged:
                 self.asked_again.append(f"N{self.gear}: {question}")
             pending = question
-            child.sendline(_ANSWERS[question].format(gear=self.gear % 10))
+            child.sendline(_ANSWERS[question].format(gear=self.gear, digit=self.gear % 10))
         time.sleep(self.chance.choice((0.0, 0.002, 0.01, 0.05, 0.2)))
         child.kill(self.chance.choice(_ENDS))
         # Ctrl-C between a prompt and the wait for a key is seen with the next key only.
