@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ON_A_TERMINAL = (
     "tests/cli/test_on_a_terminal.py::test_an_interrupt_says_how_to_go_on_and_exits_130",
-    "tests/prompts/test_interruptions.py::test_a_second_visit_loses_no_answer_at_any_question[0-2]",
+    "tests/prompts/test_one_gear.py::test_answers_that_cannot_be_saved_are_said_once",
 )
 WHAT_A_USER_SETS = (
     "tests/cli/test_views.py::test_the_screen_follows_columns_and_is_80_wide_without",
