@@ -6,6 +6,8 @@ pages that are named only those); ``test_docs.py`` fails while that would change
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import math
 import os
 import re
@@ -14,6 +16,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.warm_mlg import folder_of_mlg
@@ -26,8 +29,10 @@ _BLOCK = re.compile(r"^```console\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PROMPT = "$ "
 # A hash of a record, whole or its beginning.
 _HASH = re.compile(r"\b[0-9a-f]{10}(?:[0-9a-f]{54})?\b")
-# What stands between this and the next blank line is made from the table of columns.
-COLUMNS_MARK = "<!-- made by tests/docs_examples.py from mlg_troubleshoot/decision/columns.py -->\n"
+# What stands between this and the next blank line is made from that file or module.
+_MADE = re.compile(
+    r"(?<=<!-- made by tests/docs_examples\.py from )(\S+)( -->\n).*?\n(?=\n|\Z)", re.DOTALL
+)
 _FONTS = "DejaVu Sans, Verdana, Segoe UI, sans-serif"
 
 
@@ -110,6 +115,79 @@ def columns_table() -> str:
     return "\n".join(lines) + "\n"
 
 
+def names_table(module: str) -> str:
+    """The public names of a module with the first sentence of each docstring."""
+    door = importlib.import_module(module)
+    lines = ["| name | is |", "|---|---|"]
+    for name in sorted(door.__all__, key=str.lower):
+        thing = getattr(door, name)
+        if inspect.ismodule(thing):
+            continue
+        text = " ".join((inspect.getdoc(thing) or "").split("\n\n")[0].split())
+        text = re.sub(r":\w+:`~?([^`]+)`", r"`\1`", text.replace("``", "`")).replace("|", "\\|")
+        call = name
+        if inspect.isfunction(thing):
+            call = f"{name}({', '.join(inspect.signature(thing).parameters)})"
+        lines.append(f"| `{call}` | {text} |")
+    return "\n".join(lines) + "\n"
+
+
+def _commands(command: Any, path: str) -> Iterator[tuple[str, Any]]:
+    yield path, command
+    for name in command.list_commands(None) if hasattr(command, "commands") else ():
+        yield from _commands(command.get_command(None, name), f"{path} {name}")
+
+
+def all_commands() -> list[tuple[str, Any]]:
+    """Every command of the program as it is typed, without ``mlg``."""
+    from typer.main import get_command
+
+    from mlg_troubleshoot.cli.app import app
+
+    return [(path.removeprefix("mlg "), each) for path, each in _commands(get_command(app), "mlg")][
+        1:
+    ]
+
+
+def commands_table() -> str:
+    """Each command with its arguments and what it does."""
+    lines = ["| command | does |", "|---|---|"]
+    for path, command in all_commands():
+        takes = [p.metavar for p in command.params if p.param_type_name == "argument"]
+        words = " ".join(("mlg", path, *takes)).replace("|", "\\|")
+        lines.append(f"| `{words}` | {' '.join(command.help.split(chr(10) * 2)[0].split())} |")
+    return "\n".join(lines) + "\n"
+
+
+def options_table() -> str:
+    """Each option with the commands that have it."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for path, command in all_commands():
+        for option in command.params:
+            if option.param_type_name == "option" and "--help" not in option.opts:
+                names = [max(o, key=len) for o in (option.opts, option.secondary_opts) if o]
+                words = f"{'/'.join(names)} {option.metavar or ''}".strip().replace("|", "\\|")
+                variable = f" Else `{option.envvar}`." if option.envvar else ""
+                found.setdefault((words, f"{option.help}{variable}"), []).append(path)
+    lines = ["| option | does | of |", "|---|---|---|"]
+    lines += [
+        f"| `{words}` | {does} | {', '.join(of)} |" for (words, does), of in sorted(found.items())
+    ]
+    return "\n".join(lines) + "\n"
+
+
+# What makes the table below a mark; a module stands for its names.
+_TABLES = {
+    "mlg_troubleshoot/decision/columns.py": columns_table,
+    "mlg_troubleshoot/cli/app.py": commands_table,
+    "mlg_troubleshoot/cli/options.py": options_table,
+}
+
+
+def _table(source: str) -> str:
+    return _TABLES[source]() if source in _TABLES else names_table(source)
+
+
 def _with_hashes_of(before: str, printed: str) -> str:
     """What was printed, each hash of a record as it stood: it holds the clock."""
     old, new = before.splitlines(keepends=True), printed.splitlines(keepends=True)
@@ -121,9 +199,7 @@ def _with_hashes_of(before: str, printed: str) -> str:
 
 def refreshed(text: str, folder: Path) -> str:
     """The README with what its commands print today."""
-    before, mark, rest = text.partition(COLUMNS_MARK)
-    if mark:
-        text = before + mark + columns_table() + "\n" + rest.partition("\n\n")[2]
+    text = _MADE.sub(lambda m: f"{m[1]}{m[2]}{_table(m[1])}", text)
     pieces, end = [], 0
     for match, session in sessions(text):
         printed = run(session.commands, folder).written()

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import ast
 import doctest
-import importlib
 import inspect
-import re
 import subprocess
 import sys
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +16,6 @@ import mlg_troubleshoot as mlg
 
 ROOT = Path(__file__).parents[1]
 FAILURE = {3: 0.013, 5: 0.007}
-# Rooms whose names are public, in addition to those of the package itself.
-ROOMS = ("diagnosis", "wear")
-# Names of a room that the page describes with the package.
-ALSO_ABOVE = {
-    "mlg_troubleshoot": {"Cause", "SimulationDiagnosis", "Suspect", "diagnose_simulation"},
-    "mlg_troubleshoot.diagnosis": {"write_extension"},
-    "mlg_troubleshoot.wear": set(),
-}
 
 
 def inspection(clearance_in: dict[int, float]) -> mlg.Inspection:
@@ -200,51 +189,3 @@ def test_tables_can_be_checked_and_reported(tmp_path: Path) -> None:
 
 def test_the_package_says_that_it_is_typed() -> None:
     assert (Path(mlg.__file__).parent / "py.typed").exists()
-
-
-PAGE = (ROOT / "docs/reference/api.md").read_text(encoding="utf-8")
-# Of each public module the text below each name.
-ENTRIES = {
-    module: dict(re.findall(r"^### `(\w+)`.*\n((?:(?!#).*\n|####.*\n)*)", text, re.MULTILINE))
-    for module, text in re.findall(r"^# `([\w.]+)`\n((?:(?!# `).*\n)*)", PAGE, re.MULTILINE)
-}
-
-
-@pytest.mark.parametrize("module", ["mlg_troubleshoot", *map("mlg_troubleshoot.{}".format, ROOMS)])
-def test_the_page_of_the_api_has_exactly_the_public_names(module: str) -> None:
-    room = importlib.import_module(module)
-    # Modules behind the door of a room are for the other rooms.
-    public = {name for name in room.__all__ if not inspect.ismodule(getattr(room, name, inspect))}
-    assert set(ENTRIES[module]) | ALSO_ABOVE[module] == public
-
-
-def test_the_page_of_the_api_has_no_other_module() -> None:
-    assert set(ENTRIES) == {"mlg_troubleshoot", *map("mlg_troubleshoot.{}".format, ROOMS)}
-
-
-@pytest.mark.parametrize(
-    ("module", "name"), [(module, name) for module in ENTRIES for name in ENTRIES[module]]
-)
-def test_the_page_of_the_api_has_the_parameters_of_a_function(module: str, name: str) -> None:
-    thing = getattr(importlib.import_module(module), name)
-    takes = ENTRIES[module][name].partition("| takes | |")[2].split("\n\n")[0]
-    parameters = inspect.signature(thing).parameters if inspect.isfunction(thing) else {}
-    if takes or parameters:
-        listed = re.findall(r"^\| `(\w+)` \|", takes, re.MULTILINE)
-        assert listed == list(inspect.signature(thing).parameters)
-
-
-def fields_of(module: str, name: str) -> list[str]:
-    """Names that the table of a class gives."""
-    table = ENTRIES[module][name].partition("| field | |")[2].split("\n\n")[0]
-    firsts = re.findall(r"^\| (`[^|]+) \|", table, re.MULTILINE)
-    return [field for first in firsts for field in re.findall(r"`(\w+)`", first)]
-
-
-@pytest.mark.parametrize(
-    ("module", "name", "field"),
-    [(m, name, field) for m in ENTRIES for name in ENTRIES[m] for field in fields_of(m, name)],
-)
-def test_every_field_on_the_page_of_the_api_exists(module: str, name: str, field: str) -> None:
-    thing = getattr(importlib.import_module(module), name)
-    assert field in {*dir(thing), *(each.name for each in fields(thing))}
