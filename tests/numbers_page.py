@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -16,10 +17,10 @@ PAGE = ROOT / "docs" / "reference" / "numbers.md"
 ROOMS = ("diagnosis", "misfit")
 _HEAD = """# Numbers of the diagnosis
 
-Every number at the level of a module in `diagnosis/` and `misfit/` that somebody chose, with its
-meaning and where it is from. What is believed beforehand is in
-[the priors](../explanation/diagnosis.md#priors), what is plausible of a cause with the cause. This
-page is made from the comments in the code by `python tests/numbers_page.py`.
+For whoever maintains `diagnosis/` and `misfit/`: every number that somebody chose at the level of
+a module, with its meaning and source. Look up a line. Made from the comments in the code by
+`python tests/numbers_page.py`. What is believed beforehand stands in
+[the priors](../explanation/diagnosis.md#priors), what is plausible of a cause with the cause.
 
 """
 
@@ -64,8 +65,12 @@ def _of_file(path: Path) -> Iterator[Chosen]:
 
 def page() -> str:
     """The page as it should be."""
-    found = list(chosen())
-    rows = [f"| `{c.file}` | `{c.name}` | `{c.value}` | {c.meaning} |" for c in found]
+    rows = []
+    for (file, meaning), same in groupby(chosen(), key=lambda c: (c.file, c.meaning)):
+        together = list(same)
+        names = ", ".join(f"`{c.name}`" for c in together)
+        values = ", ".join(f"`{c.value}`" for c in together)
+        rows.append(f"| `{file}` | {names} | {values} | {meaning} |")
     head = "| file | name | value | meaning |\n|---|---|---|---|\n"
     return _HEAD + head + "\n".join(rows) + "\n"
 
