@@ -23,7 +23,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import bench_batch
+from .made import write_csv
 
 ROOT = Path(__file__).parents[2]
 # A process of its own starts what is measured: the memory of who starts it counts as its own.
@@ -71,8 +71,8 @@ def run(tree: Path, command: Sequence[str], environment: dict[str, str]) -> tupl
 def batches(folder: Path) -> list[list[str]]:
     """Checks of made tables, a joint in twenty not read: on one core and on two, kept, reported."""
     few, many = folder / "60.csv", folder / "10000.csv"
-    bench_batch.write_csv(few, 60, 0.05)
-    bench_batch.write_csv(many, 10_000, 0.05)
+    write_csv(few, 60, 0.05)
+    write_csv(many, 10_000, 0.05)
     out = ["--csv", str(folder / VERDICTS)]
     kept = ["--keep", "--store", str(folder / STORE)]
     return [

@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 
 from mlg_troubleshoot.reporting.figures import Axis, Canvas, Plot, Series
-from mlg_troubleshoot.store import Store
+from mlg_troubleshoot.store import Store, inspection_record
 from tests.docs_examples import PICTURES, standing_alone
 
-from . import bench_batch, bench_store
 from .bench_cold import run
+from .made import lives, write_csv
 
 ROOT = Path(__file__).parents[2]
 ROWS = (100, 1_000, 10_000, 100_000)
@@ -42,7 +42,7 @@ def tables_of(rows: int, folder: Path) -> list[str]:
     for first in range(0, rows, ROWS_OF_A_FILE):
         file = folder / f"rows-{rows}-{first}.csv"
         if not file.exists():
-            bench_batch.write_csv(file, min(rows - first, ROWS_OF_A_FILE), 0.05)
+            write_csv(file, min(rows - first, ROWS_OF_A_FILE), 0.05)
         files.append(str(file))
     return files
 
@@ -51,8 +51,8 @@ def store_of(inspections: int, folder: Path) -> Path:
     """A store of gears with as many inspections each."""
     file = folder / f"kept-{inspections}.sqlite"
     if not file.exists():
-        drawn = bench_store.lives(inspections // VISITS, VISITS, np.random.default_rng(1))
-        Store(file).add(bench_store.records(drawn))
+        drawn = lives(inspections // VISITS, VISITS, np.random.default_rng(1))
+        Store(file).add([inspection_record(one) for life in drawn for one in life])
     return file
 
 

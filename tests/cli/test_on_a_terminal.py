@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.benchmarks.bench_check import write_inspections
+from tests.benchmarks.made import write_csv
 from tests.cli.conftest import FLEET, ROOT
 from tests.keys import interrupt
 
@@ -123,7 +123,7 @@ def test_a_plain_terminal_has_the_same_words_without_colour_and_boxes(
 
 
 def test_a_large_batch_shows_its_progress(start: Start, tmp_path: Path) -> None:
-    write_inspections(tmp_path / "batch.csv", 1000)
+    write_csv(tmp_path / "batch.csv", 1000, blank=0.05)
     child = start("check", tmp_path / "batch.csv")
     child.expect(r"Judging .*/1000")
     child.expect_exact("1000 inspections:")

@@ -124,7 +124,7 @@ def result_of(records: list[dict[str, Any]], first_seed: int) -> dict[str, Any]:
     """
     of_study = [r for r in records if "strengths" in r]
     of_departures = [r for r in records if "strengths" not in r]
-    rates = study.summarise(of_study)["targets"] | departures.summarise(of_departures)["lines"]
+    rates = study.summarise(of_study) | departures.summarise(of_departures)
     return {
         "fleets": len(records),
         "first_seed": first_seed,

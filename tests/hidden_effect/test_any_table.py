@@ -24,7 +24,7 @@ ODD = ("", "x", "-5", "1000000", "0")
 
 def drawn(seed: int, rng: np.random.Generator) -> Table:
     """The table of a departure's fleet."""
-    group = str(rng.choice(list(departures.PLAN)))
+    group = str(rng.choice(departures.GROUPS))
     spec = departures._spec(group, int(rng.integers(100)), seed)
     return dict(simulate_fleet(spec, seed).table)
 

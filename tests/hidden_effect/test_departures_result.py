@@ -22,7 +22,7 @@ def record(
 
 
 def rate(line: str, *records: dict[str, Any]) -> float:
-    return float(summarise(list(records))["lines"][line]["rate"])
+    return float(summarise(list(records))[line]["rate"])
 
 
 @pytest.mark.parametrize(
@@ -51,34 +51,12 @@ def test_a_hidden_cause_counts_as_named_beside_the_linkage_but_not_with_another_
     )
 
 
-def test_what_is_named_on_another_linkage_is_told_by_cause() -> None:
-    gauge, rate_error = ([["gauge_bias", "gauge G-1"]], [["calibration_rate", None]])
-    found = summarise(
-        [
-            record("linkage, one cause", [*gauge], [*gauge]),
-            record("linkage, one cause", [], [*rate_error]),
-            record("loads:40", [], [["load_directions", None]]),
-        ]
-    )["by_cause"]
-    assert {cause: (one["n"], one["rate"]) for cause, one in found.items()} == {
-        "calibration_rate": (1, 0.0),
-        "gauge_bias": (1, 1.0),
-        "all": (2, 0.5),
-    }
-
-
 def test_directions_are_asked_for_only_where_a_regression_beats_one_scale() -> None:
     loads: list[list[str | None]] = [["load_directions", None]]
     line = "load directions, spread 40°: named or in the set, where a regression beats one scale"
     told, dull = (record("loads:40", named, loads, beats=bool(named)) for named in (loads, []))
     listed = record("loads:40", [], loads, also=loads, beats=True)
     assert rate(line, told, listed, dull) == 1.0
-
-
-def test_a_convention_that_is_named_where_nothing_is_hidden_is_counted() -> None:
-    slip = record("nothing hidden", [["convention_slip", "gauge G-1"]], [])
-    other = record("nothing hidden", [["gauge_bias", "gauge G-1"]], [])
-    assert rate("nothing hidden: the other convention named", slip, other) == 0.5
 
 
 def test_a_table_that_is_refused_counts_as_not_named() -> None:

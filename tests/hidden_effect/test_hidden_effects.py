@@ -169,12 +169,6 @@ def test_causes_that_touch_the_same_rows_are_all_listed() -> None:
     assert {_plain(*cause) for cause in found.fleet.label.aliases} <= listed
 
 
-def test_causes_that_cannot_be_distinguished_come_with_the_reading_that_splits_them() -> None:
-    assert all(
-        len(c.candidate.cause.separates) > 20 for c in case("aliased").diagnosis.also_possible
-    )
-
-
 def test_causes_that_cannot_be_distinguished_do_not_extend_the_model() -> None:
     assert case("aliased").extension is None
 

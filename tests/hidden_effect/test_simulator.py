@@ -4,11 +4,12 @@ it tests.
 
 from __future__ import annotations
 
-import ast
 import csv
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,6 @@ from .simulator import (
     EffectSpec,
     FleetSpec,
     draw_fleet,
-    draw_spec,
     follow_up,
     linkage,
     physics,
@@ -35,6 +35,7 @@ from .simulator.generate import _ALIAS_CAUSES
 from .simulator.records import CLEARANCES, DISPLACEMENTS
 
 FOLDER = Path(simulator.__file__).parent
+Rows = Callable[[dict[str, Any], dict[str, Any]], np.ndarray]
 QUIET = FleetSpec(rows=120, blank_share=0.0)
 
 
@@ -177,16 +178,6 @@ def _gears() -> physics.Gears:
 
 
 @pytest.mark.parametrize(
-    "part", ["actuator", "short_link", "rod", "stroke", "twist", "rate_error", "offset"]
-)
-def test_every_part_of_the_state_reaches_the_reading(part: str) -> None:
-    gears = _gears()
-    state = gears.sound()
-    getattr(state, part)[:] += 0.002
-    assert np.abs(gears.read(state) - gears.read(gears.sound())).min() > 1e-5
-
-
-@pytest.mark.parametrize(
     "tilted", range(4), ids=["short link", "link 6-7", "link 9-10", "locking lever"]
 )
 def test_a_tilt_acts_like_a_projected_length_shrunk_by_its_cosine(tilted: int) -> None:
@@ -201,43 +192,6 @@ def test_a_tilt_acts_like_a_projected_length_shrunk_by_its_cosine(tilted: int) -
     assert np.allclose(effect, expected, rtol=0.12 if tilted == 3 else 0.01)
 
 
-# Independence
-
-
-@pytest.mark.parametrize("path", sorted(FOLDER.glob("**/*.py")), ids=lambda path: path.name)
-def test_the_simulator_imports_nothing_of_the_program_under_test(path: Path) -> None:
-    allowed = {
-        "__future__",
-        "collections",
-        "csv",
-        "dataclasses",
-        "datetime",
-        "functools",
-        "itertools",
-        "json",
-        "numpy",
-    }
-    allowed |= {"pathlib", "typing"}
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level <= 1, f"{path.name} reaches out of its folder"
-            names = [node.module or ""] if node.level == 0 else []
-        else:
-            names = []
-        assert {name.split(".")[0] for name in names} <= allowed
-        if isinstance(node, ast.Name | ast.Attribute):
-            word = node.id if isinstance(node, ast.Name) else node.attr
-            assert word not in {"__import__", "import_module", "exec", "eval"}
-
-
-def test_no_file_of_the_simulator_names_the_program_under_test() -> None:
-    assert not [
-        path for path in FOLDER.glob("**/*.py") if "mlg" in path.read_text(encoding="utf-8")
-    ]
-
-
 # Fleets
 
 
@@ -250,13 +204,10 @@ def test_a_seed_reproduces_the_fleet(kind: str) -> None:
 
 
 @pytest.mark.parametrize("cause", [*CATALOGUE, *OFF_CATALOGUE])
-@pytest.mark.parametrize(
-    "strength", [10.0, *(pytest.param(s, marks=pytest.mark.slow) for s in (5.0, 25.0))]
-)
-def test_the_requested_strength_is_reached(cause: str, strength: float) -> None:
+def test_the_requested_strength_is_reached(cause: str) -> None:
     kind = "single" if cause in CATALOGUE else "off_catalogue"
-    label = draw_fleet(100 + int(strength), kind, cause=cause, strength=strength).label
-    assert label.strength == pytest.approx(strength, rel=0.1)
+    label = draw_fleet(110, kind, cause=cause, strength=10.0).label
+    assert label.strength == pytest.approx(10.0, rel=0.1)
     assert label.effects[0].strength == pytest.approx(label.strength)
 
 
@@ -310,25 +261,22 @@ def test_a_cause_of_one_identity_changes_its_rows_only(cause: str, column: str) 
     assert np.array_equal(changed, own)
 
 
-def test_a_date_step_changes_the_later_rows_only() -> None:
-    fleet = simulate_fleet(_hide(EffectSpec("date_step", strength=15.0)), 9)
-    later = (
-        np.array(fleet.table["inspection_date"]) >= fleet.label.effects[0].parameters["from_date"]
-    )
-    assert np.array_equal(_changed(simulate_fleet(QUIET, 9), fleet), later)
-
-
 @pytest.mark.parametrize(
-    ("cause", "column", "value"),
-    [("side_difference", "side", "RH"), ("approach_hysteresis", "approach", "RETRACTING")],
+    ("cause", "own"),
+    [
+        ("side_difference", lambda table, _: np.array(table["side"]) == "RH"),
+        ("approach_hysteresis", lambda table, _: np.array(table["approach"]) == "RETRACTING"),
+        (
+            "date_step",
+            lambda table, step: np.array(table["inspection_date"]) >= step["from_date"],
+        ),
+    ],
 )
-def test_a_cause_of_one_half_of_the_fleet_changes_that_half(
-    cause: str, column: str, value: str
-) -> None:
+def test_a_cause_of_some_rows_changes_these_and_no_other(cause: str, own: Rows) -> None:
     parameters = {"calibrated_at": 0.0} if cause == "approach_hysteresis" else {}
     fleet = simulate_fleet(_hide(EffectSpec(cause, strength=15.0, parameters=parameters)), 9)
-    half = np.array([cell == value for cell in fleet.table[column]])
-    assert np.array_equal(_changed(simulate_fleet(QUIET, 9), fleet), half)
+    rows = own(fleet.table, fleet.label.effects[0].parameters)
+    assert np.array_equal(_changed(simulate_fleet(QUIET, 9), fleet), rows)
 
 
 @pytest.mark.parametrize("cause", ["direction_not_worst_case", "oval_wear"])
@@ -360,17 +308,6 @@ def test_heat_and_pressure_act_relative_to_rigging_and_calibration() -> None:
     slope, at_full = np.polyfit(below, press.label.truth_term, 1)
     assert np.corrcoef(press.label.truth_term, below)[0, 1] ** 2 > 0.95
     assert abs(at_full) < 0.05 * abs(slope) * 3000.0
-
-
-def test_a_tilted_link_acts_through_the_square_of_its_end_floats() -> None:
-    halved = [
-        simulate_fleet(
-            _hide(EffectSpec("out_of_plane_tilt", parameters={"bearing_span_in": span})), 2
-        )
-        for span in (1.5, 3.0)
-    ]
-    ratio = halved[0].label.effect_rms_in / halved[1].label.effect_rms_in
-    assert ratio == pytest.approx(4.0, rel=0.05)
 
 
 def test_two_causes_are_each_as_strong_as_requested() -> None:
@@ -430,23 +367,6 @@ def test_every_fault_of_the_label_stands_in_the_table_and_no_other() -> None:
     assert {fault.kind for fault in fleet.label.faults} >= set(kinds) - {"swapped_joints"}
 
 
-def test_two_swapped_joints_exchange_their_clearances() -> None:
-    faults = simulate_fleet(FleetSpec(faults=("swapped_joints",)), 21).label.faults
-    assert len(faults) == 2
-    assert faults[0].row == faults[1].row
-    assert (faults[0].right, faults[0].written) == (faults[1].written, faults[1].right)
-
-
-def test_about_one_cell_in_a_hundred_is_blank() -> None:
-    table = simulate_fleet(FleetSpec(rows=500), 2).table
-    cells = [
-        value
-        for name in (*CLEARANCES, "temperature_c", "gauge_id", "axial_float_4_in")
-        for value in table[name]
-    ]
-    assert 0.005 < sum(value is None for value in cells) / len(cells) < 0.016
-
-
 def test_the_table_has_the_columns_of_the_interface_and_nothing_of_the_label(
     tmp_path: Path,
 ) -> None:
@@ -461,34 +381,3 @@ def test_the_table_has_the_columns_of_the_interface_and_nothing_of_the_label(
         assert rows[0] == list(fleet.table)
         assert len(rows) == fleet.spec.rows + 1
         assert rows[1][0] == "R0001"
-
-
-def test_no_gear_is_inspected_twice_on_one_day() -> None:
-    for seed in range(8):
-        table = simulate_fleet(FleetSpec(blank_share=0.0), seed).table
-        identity = list(zip(table["tail_no"], table["side"], table["inspection_date"], strict=True))
-        assert len(set(identity)) == len(identity)
-
-
-def test_gauges_and_technicians_hang_on_bases_without_being_exclusive() -> None:
-    table = simulate_fleet(FleetSpec(blank_share=0.0), 5).table
-    tails = sorted(set(table["tail_no"]))
-    counts = np.array(
-        [
-            [
-                sum(
-                    t == tail and g == gauge
-                    for t, g in zip(table["tail_no"], table["gauge_id"], strict=True)
-                )
-            ]
-            for tail in tails
-            for gauge in sorted(set(table["gauge_id"]))
-        ]
-    ).reshape(len(tails), -1)
-    assert (counts.max(axis=1) / counts.sum(axis=1)).mean() > 1.3 / counts.shape[1]
-    assert ((counts > 0).sum(axis=1) > 1).mean() > 0.8
-
-
-def test_draw_spec_refuses_an_unknown_kind() -> None:
-    with pytest.raises(ValueError, match="Unknown kind"):
-        draw_spec(1, "nothing")
