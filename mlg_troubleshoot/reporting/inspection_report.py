@@ -105,8 +105,10 @@ def _inspection(
     a: Assessment, gear: Gear, provenance: ReportProvenance, lengths: Lengths
 ) -> dict[str, Any]:
     inspection = a.inspection
-    stated = {k: v for k, v in inspection.carried.items() if v and k not in _MANUAL}
-    carried = [(name.replace("_", " "), value) for name, value in stated.items()]
+    given = {**inspection.carried, **inspection.other_columns}
+    carried = [
+        (k.replace("_", " "), str(v)) for k, v in given.items() if v != "" and k not in _MANUAL
+    ]
     first = carried[:_MOST_IN_FRONT]
     in_front = [(short(label, 60), short(value, 120)) for label, value in first]
     known = _identified(a, gear, provenance, lengths)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -40,6 +41,7 @@ from mlg_troubleshoot.records import ReadOptions, read_many
 from mlg_troubleshoot.records.gate import judge_again
 from mlg_troubleshoot.records.template import write_template
 from mlg_troubleshoot.reporting.diagnosis_lines import column_words
+from mlg_troubleshoot.workflows.check import CheckOptions, check_files, write_reports
 from mlg_troubleshoot.store.inspections import inspection_from, inspection_record
 from mlg_troubleshoot.workflows.kept import KeptGate
 from tests.docs_examples import columns_table
@@ -62,7 +64,12 @@ header = next(cell for cell in sheet[1] if cell.value == NAME)
 record = inspection_record(row)
 damaged = json.loads(json.dumps(record.body))
 damaged["inspection"][NAME] = 400
+lines = f"tail_no,side,clearance_convention,clearance_3_in,{NAME}\\nN1,LH,RADIAL,0.005,41\\n"
+table = io.BytesIO(lines.encode())
+checked = check_files([table], CheckOptions())
+(report,) = write_reports(checked, CheckOptions(), "reports", formats=("html",))
 found = {
+    "report": report.html.read_text(encoding="utf-8"),
     "read": row.value(NAME),
     "spelled": read("Humidity (percent)", "41").inspections[0].value(NAME),
     "refused": [problem.expected for problem in read(NAME, "140").problems],
@@ -141,6 +148,10 @@ def test_a_new_column_is_judged_from_python(journey):
 
 def test_a_new_column_is_offered_to_the_diagnosis(journey):
     assert journey["diagnosis"] == [41.0]
+
+
+def test_a_new_column_is_on_the_report(journey):
+    assert re.search(r"air humidity percent</dt>\s*<dd>\s*(<bdi>)?41", journey["report"])
 
 
 def test_a_new_column_is_named_in_sentences(journey):
