@@ -50,13 +50,14 @@ def test_a_folder_that_is_missing_is_made(tmp_path: Path) -> None:
     assert (tmp_path / "a" / "b.csv").read_bytes() == b"x"
 
 
-def test_a_new_file_has_what_the_umask_leaves(tmp_path: Path) -> None:
-    before = os.umask(0o077)
+@pytest.mark.parametrize(("mask", "mode"), [(0o077, 0o600), (0o022, 0o644)])
+def test_a_new_file_has_what_the_umask_leaves(mask: int, mode: int, tmp_path: Path) -> None:
+    before = os.umask(mask)
     try:
         write_bytes(tmp_path / "new", b"x")
     finally:
         os.umask(before)
-    assert (tmp_path / "new").stat().st_mode & 0o777 == 0o600
+    assert (tmp_path / "new").stat().st_mode & 0o777 == mode
 
 
 def test_a_replaced_file_keeps_its_mode(tmp_path: Path) -> None:

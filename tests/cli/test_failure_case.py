@@ -12,42 +12,24 @@ from tests.cli.conftest import DATA, FAILURE, HAND, Run, Table, mlg, ranked, row
 BLANK = {f"clearance_{n}_in": "" for n in range(1, 11)}
 
 
-def test_it_is_predicted_at_0_0472_in(failure_json: Run) -> None:
-    assert failure_json.one["predicted_displacement_in"] == pytest.approx(0.0472, abs=2e-4)
+def test_it_is_outside_as_the_paper_says(failure: Run, failure_json: Run) -> None:
+    found = failure_json.one
+    assert found["predicted_displacement_in"] == pytest.approx(0.0472, abs=2e-4)
+    assert (found["verdict"], failure.code) == ("OUTSIDE_MARGIN", 1)
 
 
-def test_it_is_outside_the_margin(failure_json: Run) -> None:
-    assert failure_json.one["verdict"] == "OUTSIDE_MARGIN"
-
-
-def test_it_exits_1(failure: Run) -> None:
-    assert failure.code == 1
-
-
-def test_joints_3_and_5_are_on_top_by_contribution(failure_json: Run) -> None:
-    contributions = {j["joint"]: j["contribution_in"] or 0.0 for j in failure_json.one["joints"]}
+def test_joints_3_and_5_are_on_top_and_the_eight_others_unmeasured(failure_json: Run) -> None:
+    found = failure_json.one
+    contributions = {j["joint"]: j["contribution_in"] or 0.0 for j in found["joints"]}
     assert sorted(contributions, key=contributions.__getitem__, reverse=True)[:2] == [3, 5]
-
-
-def test_joints_3_and_5_are_on_top_of_the_ranking(failure_json: Run) -> None:
-    assert list(ranked(failure_json.one)[:2]) == [3, 5]
-
-
-def test_the_eight_joints_that_the_paper_does_not_give_are_unmeasured(failure_json: Run) -> None:
-    unmeasured = [j["joint"] for j in failure_json.one["joints"] if j["clearance_in"] is None]
+    assert list(ranked(found)[:2]) == [3, 5]
+    unmeasured = [j["joint"] for j in found["joints"] if j["clearance_in"] is None]
     assert unmeasured == [1, 2, 4, 6, 7, 8, 9, 10]
 
 
 def test_the_bound_and_the_chance_with_random_directions_stand_together(failure: Run) -> None:
     shown = " ".join(failure.out.replace("│", "").split())
     assert "worst case 0.0472 of 0.0300 in, chance 2" in shown
-
-
-def test_the_workbook_says_what_the_csv_says(failure_json: Run) -> None:
-    assert (
-        mlg("check", DATA / "failure_case.xlsx", "--json").json["inspections"]
-        == failure_json.json["inspections"]
-    )
 
 
 @pytest.mark.parametrize(
@@ -105,39 +87,38 @@ def test_in_a_table_every_unit_and_convention_gives_the_same(
     assert found["predicted_displacement_in"] == pytest.approx(expected, abs=1e-12)
 
 
-def test_without_a_unit_it_is_refused() -> None:
-    found = mlg(*HAND, "--convention", "RADIAL", "--set", "3=0.013", "--set", "5=0.007")
-    assert (found.code, found.out) == (2, "")
-    assert "The unit is missing" in found.err
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--convention", "RADIAL", "--set", "3=0.013"), "The unit is missing"),
+        (("--set", "3=0.013in"), "--convention"),
+    ],
+)
+def test_by_hand_it_is_refused_without_unit_or_convention(
+    arguments: tuple[str, ...], said: str
+) -> None:
+    found = mlg(*HAND, *arguments)
+    assert (found.code, found.out, said in found.err) == (2, "", True)
 
 
-def test_without_a_convention_it_is_refused() -> None:
-    found = mlg(*HAND, "--set", "3=0.013in", "--set", "5=0.007in")
-    assert (found.code, found.out) == (2, "")
-    assert "--convention" in found.err
-
-
-def test_a_table_without_a_unit_is_refused(table: Table) -> None:
-    cells = {column.removesuffix("_in"): value for column, value in row().items()}
-    found = mlg("check", table(cells), "--json")
-    assert found.code == 3
-    assert [i["verdict"] for i in found.json["inspections"]] == ["INVALID"]
-
-
-def test_a_table_without_a_convention_is_refused(table: Table) -> None:
-    found = mlg("check", table(row(clearance_convention=None)), "--json")
-    assert found.code == 3
-    assert [i["verdict"] for i in found.json["inspections"]] == ["INVALID"]
-
-
-def test_the_unit_of_a_table_can_be_declared(table: Table) -> None:
-    cells = {column.removesuffix("_in"): value for column, value in row().items()}
-    assert mlg("check", table(cells), "--unit", "in", "--json").one["verdict"] == "WITHIN_MARGIN"
-
-
-def test_the_convention_of_a_table_can_be_declared(table: Table) -> None:
-    path = table(row(clearance_convention=None))
-    assert mlg("check", path, "--convention", "RADIAL", "--json").one["verdict"] == "WITHIN_MARGIN"
+@pytest.mark.parametrize(
+    ("cells", "declared"),
+    [
+        (
+            {column.removesuffix("_in"): value for column, value in row().items()},
+            ("--unit", "in"),
+        ),
+        (row(clearance_convention=None), ("--convention", "RADIAL")),
+    ],
+    ids=["unit", "convention"],
+)
+def test_a_table_without_unit_or_convention_is_refused_until_it_is_declared(
+    cells: dict[str, str], declared: tuple[str, ...], table: Table
+) -> None:
+    path = table(cells)
+    found = mlg("check", path, "--json")
+    assert (found.code, found.one["verdict"]) == (3, "INVALID")
+    assert mlg("check", path, *declared, "--json").one["verdict"] == "WITHIN_MARGIN"
 
 
 def test_the_factor_2_of_the_convention_changes_the_verdict(table: Table) -> None:
@@ -151,14 +132,11 @@ def test_the_factor_2_of_the_convention_changes_the_verdict(table: Table) -> Non
     assert verdicts == ["OUTSIDE_MARGIN", "WITHIN_MARGIN"]
 
 
-def test_standard_input_reads_the_csv(failure_json: Run) -> None:
-    found = mlg("check", "-", "--json", stdin=FAILURE.read_bytes())
-    assert found.json["inspections"] == failure_json.json["inspections"]
-
-
-def test_standard_input_reads_the_workbook(failure_json: Run) -> None:
-    found = mlg("check", "-", "--json", stdin=(DATA / "failure_case.xlsx").read_bytes())
-    assert found.json["inspections"] == failure_json.json["inspections"]
+@pytest.mark.parametrize("file", [FAILURE, FAILURE.with_suffix(".xlsx")], ids=["csv", "xlsx"])
+def test_file_and_standard_input_say_the_same(file: Path, failure_json: Run) -> None:
+    expected = failure_json.json["inspections"]
+    assert mlg("check", "-", "--json", stdin=file.read_bytes()).json["inspections"] == expected
+    assert mlg("check", file, "--json").json["inspections"] == expected
 
 
 def test_the_shipped_files_carry_the_two_published_clearances_and_no_other() -> None:

@@ -24,29 +24,13 @@ def test_every_file_that_is_named_in_the_note_exists() -> None:
     assert [pattern for pattern in named if not list(DATA.glob(pattern))] == []
 
 
-def fleet_rows() -> list[dict[str, str]]:
+def test_the_batch_is_a_small_fleet_of_all_conventions_and_verdicts(fleet_json: Run) -> None:
     with FLEET.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
-def test_the_batch_has_at_least_40_inspections_of_a_small_fleet() -> None:
-    rows = fleet_rows()
+        rows = list(csv.DictReader(file))
     assert len(rows) >= 40
     assert len({row["tail_no"] for row in rows}) == 6
-
-
-def test_the_batch_mixes_the_conventions() -> None:
-    assert {row["clearance_convention"] for row in fleet_rows()} == {
-        "RADIAL",
-        "DIAMETRAL",
-        "TOTAL_PLAY",
-    }
-
-
-def test_the_batch_mixes_the_verdicts(fleet_json: Run) -> None:
+    conventions = {row["clearance_convention"] for row in rows}
+    assert conventions == {"RADIAL", "DIAMETRAL", "TOTAL_PLAY"}
     verdicts = {i["verdict"] for i in fleet_json.json["inspections"]}
     assert verdicts == {"OUTSIDE_MARGIN", "INCOMPLETE", "WITHIN_MARGIN", "INCONCLUSIVE"}
-
-
-def test_the_batch_has_no_problem(fleet_json: Run) -> None:
     assert fleet_json.json["problems"] == []

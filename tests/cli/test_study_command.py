@@ -26,14 +26,6 @@ def test_the_figure_is_an_svg_with_every_joint(tmp_path: Path) -> None:
     assert {f"#{joint}" for joint in range(1, 11)} <= set(texts)
 
 
-def test_a_figure_that_exists_is_replaced_by_force_only(tmp_path: Path) -> None:
-    file = tmp_path / "study.svg"
-    file.write_text("mine", encoding="utf-8")
-    assert mlg("study", "--figure", file).code == 2
-    assert file.read_text(encoding="utf-8") == "mine"
-    assert mlg("study", "--figure", file, "--force").code == 0
-
-
 def test_screen_json_and_csv_give_the_same_indices(tmp_path: Path) -> None:
     file = tmp_path / "study.csv"
     small = ("study", "--design", "lhs", "--size", "10,50,2", "--workers", "1")
