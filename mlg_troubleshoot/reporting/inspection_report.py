@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 _SIDES = {Side.LH: "left-hand main landing gear", Side.RH: "right-hand main landing gear"}
 _WARNINGS_ON_FRONT = 3
 _MANUAL = ("manual_ref", "manual_rev")
-_MOST_IN_FRONT = 8
+_MOST_IN_FRONT = 3
 
 
 def inspection_document(
@@ -110,7 +110,7 @@ def _inspection(
         (k.replace("_", " "), str(v)) for k, v in given.items() if v != "" and k not in _MANUAL
     ]
     first = carried[:_MOST_IN_FRONT]
-    in_front = [(short(label, 60), short(value, 120)) for label, value in first]
+    in_front = [(short(label, 30), short(value, 60)) for label, value in first]
     known = _identified(a, gear, provenance, lengths)
     warnings = known["warnings"]
     front = warnings if len(warnings) <= _WARNINGS_ON_FRONT else warnings[: _WARNINGS_ON_FRONT - 1]

@@ -209,7 +209,7 @@ def test_what_stays_open_stands_on_the_first_page_and_in_the_handover(
     open_question = ended.plan.open_question or ""
     text = make(ended, formats=("html",)).text.replace("\u00a0", " ")
     assert open_question == "#4 cannot be reached and is not read."
-    assert -1 < text.find(f"Open: {open_question}") < text.find("Joints, by contribution")
+    assert -1 < text.find(f"Open: {open_question}") < text.find("in the order to inspect them")
     assert f"Handover, open for the next shift: {open_question}" in text
 
 
@@ -350,19 +350,13 @@ def test_what_follows_is_the_plan_to_its_end(judge: Judge, failure: Made) -> Non
         at = text.index(step.text, at) + 1
     for step in steps[1:]:
         if step.minutes:
-            assert re.search(rf"{re.escape(step.text)}.{{1,60}}? {step.minutes:.0f} min", text)
+            assert re.search(rf"{re.escape(step.text)}.{{0,60}}? {step.minutes:.0f} min", text)
 
 
 def test_each_step_has_a_box_to_tick_and_room_for_a_signature(judge: Judge, failure: Made) -> None:
     steps = judge(FAILURE).plan.steps
-    assert failure.html.count('class="tick"') == len(steps)
-    assert failure.html.count('class="sign-here"') == len(steps)
-
-
-def test_the_sign_off_stands_last_and_with_the_provenance(failure: Made) -> None:
-    kept = failure.html[failure.html.rindex('<div class="keep">') :]
-    assert "Assumptions and provenance" in kept
-    assert kept.index("Sign-off and handover") > kept.index("Assumptions and provenance")
+    assert failure.html.count('class="tick"') == len(steps) - 1
+    assert failure.html.count('class="sign-here"') == len(steps) - 1
 
 
 def test_repair_sets_stand_with_their_minutes(judge: Judge, worn: Made) -> None:
@@ -385,15 +379,10 @@ def test_the_first_page_says_date_and_manual_reference(judge: Judge, make: Make)
     text = make(
         judge(FAILURE, carried={"manual_ref": "32-10-05", "manual_rev": "12"}), formats=("html",)
     ).text
-    front = text[: text.index("Joints, by contribution")]
+    front = text[: text.index("in the order to inspect them")]
     assert "Inspected on 2024-05-17" in front
     assert "Manual 32-10-05 rev. 12" in front
     assert "report made 2024-05-17" in front
-
-
-def test_the_verdict_stands_beside_the_signatures(failure: Made) -> None:
-    signed = failure.text[failure.text.index("Sign-off and handover") :]
-    assert -1 < signed.find("COULD BE OUTSIDE · N123AB LH") < signed.find("Measured by")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,119 @@
+"""The front of the report is a card: one sheet, signed on it, readable at the gear."""
+
+from __future__ import annotations
+
+import random
+import unicodedata
+from collections.abc import Iterator
+from contextlib import closing
+from typing import Any
+
+import pypdf
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting.html import render
+from mlg_troubleshoot.reporting.inspection_report import inspection_document
+from mlg_troubleshoot.reporting.pdf import PdfEngine
+from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.units import ClearanceConvention
+
+from .conftest import FAILURE, SOUND, WORN, Judge
+from .test_pdf import opened
+
+PAPERS = ("A4", "Letter")
+ROLES = ("Measured by", "Independently measured by", "Rectified by", "Inspected by", "Handover")
+_TEN_LINES = [(f"#{n}", "0.0130 in, over its limit", "0.0010 in, restored") for n in range(1, 11)]
+
+
+@pytest.fixture(scope="module")
+def engine() -> Iterator[PdfEngine]:
+    with closing(PdfEngine()) as made:
+        yield made
+
+
+def drawn_state(seed: int) -> tuple[dict[int, float], dict[str, Any], list[tuple[str, str, str]]]:
+    """Clearances, what else stands in the row, and what an earlier repair found and left."""
+    draw = random.Random(seed)
+    read = draw.sample(range(1, 11), draw.randint(1, 10))
+    clearance = {n: round(draw.uniform(0.0, 0.012), 4) for n in sorted(read)}
+    readings = (round(draw.uniform(-0.06, 0.06), 3),) if draw.random() < 0.5 else ()
+    carried = {f"shop column {n}": "as the shop writes it" for n in range(draw.randint(0, 8))}
+    changes: dict[str, Any] = {
+        "outcome": draw.choice([Outcome.FAILED, Outcome.RETRACTED, None]),
+        "readings_in": readings,
+        "carried": carried,
+        "convention": draw.choice(list(ClearanceConvention)),
+        "warnings": tuple(f"Remark {n} about this row." for n in range(draw.randint(0, 5))),
+    }
+    if draw.random() < 0.2:
+        changes["cannot_reach"] = (draw.randint(1, 10),)
+    return clearance, changes, _TEN_LINES[: draw.randint(1, 6)] if draw.random() < 0.2 else []
+
+
+def card(
+    engine: PdfEngine,
+    judge: Judge,
+    gear: Gear,
+    provenance: ReportProvenance,
+    paper: str,
+    state: tuple[dict[int, float], dict[str, Any], list[tuple[str, str, str]]],
+) -> tuple[pypdf.PageObject, str]:
+    """The first page of the report of a gear, and its text."""
+    clearance, changes, found_left = state
+    judged = judge(clearance, entered={}, **changes)
+    document = inspection_document(judged, gear, provenance, found_left=found_left)
+    made, _ = engine.convert(render(document, paper, for_pdf=True), paper, document.created)
+    page = opened(made).pages[0]
+    return page, " ".join(unicodedata.normalize("NFKC", page.extract_text()).split())
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+@pytest.mark.parametrize("clearance", [FAILURE, SOUND, WORN], ids=["failure", "sound", "worn"])
+def test_what_is_signed_stands_on_the_first_page(
+    clearance: dict[int, float],
+    paper: str,
+    engine: PdfEngine,
+    judge: Judge,
+    gear: Gear,
+    provenance: ReportProvenance,
+) -> None:
+    _page, text = card(engine, judge, gear, provenance, paper, (clearance, {}, []))
+    assert [role for role in ROLES if role not in text] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("paper", PAPERS)
+def test_two_hundred_drawn_gears_have_their_sign_off_on_the_first_page(
+    paper: str, engine: PdfEngine, judge: Judge, gear: Gear, provenance: ReportProvenance
+) -> None:
+    beyond = []
+    for seed in range(200):
+        _page, text = card(engine, judge, gear, provenance, paper, drawn_state(seed))
+        beyond += [seed] if any(role not in text for role in ROLES) else []
+    assert beyond == []
+
+
+def test_what_is_read_at_the_gear_is_nine_points_high(
+    engine: PdfEngine, judge: Judge, gear: Gear, provenance: ReportProvenance
+) -> None:
+    page, _text = card(engine, judge, gear, provenance, "A4", (FAILURE, {}, []))
+    sizes: dict[str, float] = {}
+
+    def seen(text: str, matrix: Any, place: Any, _font: Any, size: float) -> None:
+        sizes.update({text.strip(): size * abs(place[3]) * abs(matrix[3])})
+
+    page.extract_text(visitor_text=seen)
+    for words in ("Read the plunger", "short link inner bearing", "OVER LIMIT", "IF the plunger"):
+        heights = [size for text, size in sizes.items() if words in text]
+        assert heights and min(heights) >= 8.99, (words, heights)
+
+
+def test_each_joint_and_the_plunger_have_a_box_with_their_limit(
+    judge: Judge, gear: Gear, provenance: ReportProvenance
+) -> None:
+    judged = judge(FAILURE, convention=ClearanceConvention.TOTAL_PLAY, entered={})
+    html = render(inspection_document(judged, gear, provenance), "A4").replace("\u00a0", " ")
+    boxes = [part.split("<")[0] for part in html.split('class="box">')[1:]]
+    assert boxes == ["0.0150 in"] * 10 + ["±0.0300 in"]
