@@ -151,7 +151,7 @@ class Made:
 
 
 def readable(html: str) -> str:
-    """Text of a document without markup, titles of figures included."""
+    """Text of a document without markup, titles of figures included, with plain spaces."""
     body = re.sub(r"<(style|script)>.*?</\1>", " ", html, flags=re.DOTALL)
     return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]*>", " ", body)))
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mlg_troubleshoot.errors import OutputError, UsageError
-from mlg_troubleshoot.outputs import write_bytes
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.reporting.publish import safe_stem
 
 from .conftest import FAILURE, Judge, Made
@@ -34,30 +33,16 @@ def test_different_texts_get_different_names(texts: list[str]) -> None:
     assert safe_stem(texts[0]) != safe_stem(texts[1])
 
 
-def test_texts_are_not_confused_across_fields() -> None:
+def test_a_name_can_be_read_and_follows_from_the_fields() -> None:
+    name = safe_stem("N123AB", "LH", "R-1")
+    assert name.startswith("mlg-N123AB-LH-R-1-")
+    assert safe_stem("N123AB", "LH", "R-1") == name
     assert safe_stem("a-", "b") != safe_stem("a", "-b")
 
 
-def test_the_same_identity_gets_the_same_name() -> None:
-    assert safe_stem("N123AB", "LH", "R-1") == safe_stem("N123AB", "LH", "R-1")
-
-
-def test_the_name_can_be_read() -> None:
-    assert safe_stem("N123AB", "LH", "R-1").startswith("mlg-N123AB-LH-R-1-")
-
-
-def test_a_file_is_written_completely_or_not_at_all(tmp_path: Path) -> None:
-    (tmp_path / "report.html").mkdir()
-    with pytest.raises(OutputError):
-        write_bytes(tmp_path / "report.html", b"text")
-    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
-
-
-def test_an_unknown_format_is_refused(judge: Judge, make: Callable[..., Made]) -> None:
-    with pytest.raises(UsageError, match="docx"):
-        make(judge(FAILURE), formats=("docx",))
-
-
-def test_an_unknown_paper_is_refused(judge: Judge, make: Callable[..., Made]) -> None:
-    with pytest.raises(UsageError, match="B7"):
-        make(judge(FAILURE), page="B7")
+@pytest.mark.parametrize("wrong", [{"formats": ("docx",)}, {"page": "B7"}])
+def test_an_unknown_format_or_paper_is_refused(
+    wrong: dict[str, Any], judge: Judge, make: Callable[..., Made]
+) -> None:
+    with pytest.raises(UsageError, match=r"docx|B7"):
+        make(judge(FAILURE), **wrong)
