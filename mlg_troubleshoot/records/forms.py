@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, takewhile
+from typing import NamedTuple
 
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
@@ -23,18 +25,11 @@ from mlg_troubleshoot.decision.columns import (
 )
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, column_letters, show
-from mlg_troubleshoot.records.headers import UNKNOWN, Field, recognise
-from mlg_troubleshoot.records.layout import ColumnReader, mapped_to
-from mlg_troubleshoot.records.model import (
-    CellPlace,
-    ColumnReading,
-    ReadOptions,
-    SheetLayout,
-    TableInHand,
-)
-from mlg_troubleshoot.records.rows import RowReader
+from mlg_troubleshoot.records.headers import UNKNOWN, recognise
+from mlg_troubleshoot.records.layout import Columns, Header, mapped_to
+from mlg_troubleshoot.records.model import CellPlace, ReadOptions
+from mlg_troubleshoot.records.rows import Row
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow
-from mlg_troubleshoot.records.tables import Collected
 from mlg_troubleshoot.records.values import may_be_outcome, says_failed, written_number
 from mlg_troubleshoot.records.visits import ONE_VISIT, Heading, Occasion, take_apart, visits_of
 
@@ -47,148 +42,156 @@ _MEASURED = (*_READ, OUTCOME)
 _NUMBER = re.compile(r"[^\w]*\d")
 
 
-@dataclass(frozen=True, slots=True)
-class Form:
-    """A form as found.
+class _Line(NamedTuple):
+    """A row with a label, and the column of a table that this names; None if it names none."""
 
-    lines: row, label and cells. value_column: of what is said once, above the row `measured_from`
-    of readings as well. columns: of numbers next to joints, each with its heading and how it is
-    called in a message. side: as a line says it of the whole form.
+    row: int
+    label: str
+    column: Column | None
+    cells: Cells
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Form(Header):
+    """A form as found: a table on its side, whose headers are the labels of its lines.
+
+    value_column: of what is said once, above the row `measured_from` of readings as well. columns:
+    of numbers next to joints, each with its heading and how it is called in a message.
     """
 
-    lines: Sequence[tuple[int, str, Cells]]
+    lines: Sequence[_Line]
     label_column: int
     value_column: int
-    columns: dict[int, tuple[Heading, str]]
+    columns: Mapping[int, tuple[Heading, str]]
     measured_from: int
     is_ours: bool
-    side: Side | None = None
 
-    def value(self, row: int, cells: Cells, column: int, *, is_measured: bool) -> Cell:
-        """What a line says in a column, or else for all of them."""
-        own, shared = (cells[i] if i < len(cells) else None for i in (column, self.value_column))
-        is_own = is_measured and row >= self.measured_from
-        return own if own is not None or is_own else shared
+    @property
+    def places(self) -> Sequence[CellPlace]:
+        return [CellPlace.at(line.row, self.label_column, line.label) for line in self.lines]
 
-    def is_untouched(self, options: ReadOptions) -> bool:
+    @property
+    def is_untouched(self) -> bool:
         at = self.value_column
-        filled = [label for _, label, cells in self.lines if any(cells[at : at + 1])]
-        fields = (_field(label, options) for label in filled)
-        return not self.columns and all(
-            field is not None and field.column in _DECLARATIONS for field in fields
-        )
+        filled = [line.column for line in self.lines if any(line.cells[at : at + 1])]
+        return not self.columns and all(column in _DECLARATIONS for column in filled)
 
-    def visits(self) -> dict[int, Occasion]:
-        """The columns that are read, each with its visit; none where that cannot be decided."""
+    def visits(self, sheet: str | None) -> dict[int, Occasion]:
+        """The columns that are read, each with its visit; what cannot be decided is refused."""
         if not self.columns:
             return {self.value_column: ONE_VISIT}
-        if self.is_ours and [*self.columns] != [self.value_column]:
-            return {}
         visits = visits_of([heading for heading, _ in self.columns.values()])
         sides = {visit.side for visit in visits if visit is not None and visit.side}
-        if self.side is not None and sides - {self.side}:
-            return {}
-        return {i: v for i, v in zip(self.columns, visits, strict=False) if v is not None}
+        stated = [
+            side
+            for line in self.lines
+            if line.column is SIDE
+            for cell in line.cells[self.label_column + 1 :]
+            if isinstance(cell, str) and (side := Side.spelt(cell))
+        ]
+        is_elsewhere = self.is_ours and [*self.columns] != [self.value_column]
+        contradicts = len(stated) == 1 and sides - {*stated}
+        if visits and not is_elsewhere and not contradicts:
+            return {i: v for i, v in zip(self.columns, visits, strict=True) if v is not None}
+        named = ", ".join(name for _, name in self.columns.values())
+        remedy = "Delete the columns that are not readings, or write found above those that are."
+        if self.is_ours:
+            remedy = f"Move the readings to column {column_letters(self.value_column)}."
+        raise FileRefusedError(
+            "form_columns",
+            f"it holds numbers next to its joints in columns {named}",
+            "one column of readings, or headings that tell found from limit, LH from RH, or the"
+            " days",
+            remedy,
+            sheet=sheet,
+        )
+
+    def upright(self, columns: Columns, visits: Mapping[int, Occasion]) -> Iterator[Row]:
+        """The form as rows of a table, one for each visit."""
+        ids = columns.at(RECORD_ID)
+        row = self.lines[ids[0]].row if ids else self.row
+        for column, visit in visits.items():
+            cells = []
+            for line, p in zip(self.lines, columns.placed, strict=True):
+                own, shared = (
+                    line.cells[i] if i < len(line.cells) else None
+                    for i in (column, self.value_column)
+                )
+                is_measured = p.field is None or p.field.column in _MEASURED
+                # Above the readings a line may say it once for all columns.
+                is_own = is_measured and line.row >= self.measured_from
+                cells.append(own if own is not None or is_own else shared)
+            places = [CellPlace.at(line.row, column, line.label) for line in self.lines]
+            yield Row(row, cells, places, visit)
+
+    def note(self, visits: Mapping[int, Occasion]) -> str:
+        """Say which columns of numbers are the readings, if there are several."""
+        if len(self.columns) < 2:
+            return ""
+        shown = [name for column, (_, name) in self.columns.items() if column in visits]
+        left = [name for column, (_, name) in self.columns.items() if column not in visits]
+        not_read = f"; not read: {', '.join(left)}" if left else ""
+        return f"the readings are those of column {', '.join(shown)}{not_read}"
 
 
 def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
-    kinds: dict[int, list[Column]] = {}
+    named: Counter[int] = Counter()
     for _, cells in rows:
-        fields = ((i, _field(cell, options)) for i, cell in enumerate(cells[:4]))
-        for index, field in islice(((i, f) for i, f in fields if f is not None), 1):
-            kinds.setdefault(index, []).append(field.column)
-    column = max(kinds, key=lambda index: len(kinds[index]), default=0)
-    labelled = [
-        (number, label, cells)
-        for number, cells in _with_joints(rows, column, options)
-        if column < len(cells) and isinstance(label := cells[column], str)
-    ]
-    known = [each.column for _, label, _ in labelled if (each := _field(label, options))]
-    if len(known) < 3 or not {*IDENTITY} & {*known} or CLEARANCE not in known:
+        known = (i for i, cell in enumerate(cells[:4]) if _column(cell, options))
+        named.update(islice(known, 1))
+    at = max(named, key=lambda index: named[index], default=0)
+    lines = _lines(rows, at, options)
+    columns = [line.column for line in lines if line.column]
+    joints = [line for line in lines if line.column in _READ]
+    if len(columns) < 3 or not {*IDENTITY} & {*columns} or CLEARANCE not in columns:
         return None
-    value_column = column + 1
     is_ours = any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1])
-    if not is_ours:
-        filled = {
-            i for *_, cells in labelled for i, c in enumerate(cells) if i > column and c is not None
-        }
-        # Merged labels push the values further to the right.
-        value_column = min(filled, default=value_column)
-    joints = [
-        (number, cells)
-        for number, label, cells in labelled
-        if (each := _field(label, options)) and each.column in _READ
-    ]
+    filled = {i for line in lines for i, c in enumerate(line.cells) if i > at and c is not None}
+    # Merged labels push the values further to the right.
+    value_column = at + 1 if is_ours else min(filled, default=at + 1)
     numbers = {
         i
-        for _, cells in joints
-        for i, cell in enumerate(cells)
-        if (_is_number(cell) if i > column else _is_fraction(cell))
+        for line in joints
+        for i, cell in enumerate(line.cells)
+        if (_is_number(cell) if i > at else _is_fraction(cell))
     }
-    headings = _rows_of_headings(rows, joints[0][0], column, options)
-    lines = [
-        (number, label, cells)
-        for number, label, cells in labelled
-        if number not in headings and _is_line(label, cells[column + 1 :], options)
+    # Up to three rows above the first joint hold headings, none of them a line.
+    kinds = {line.row: line.column for line in lines if line.column is not JOINT}
+    above = [(row, cells) for row, cells in reversed(rows) if row < joints[0].row]
+    headings = dict(takewhile(lambda each: not kinds.get(each[0]), above[:3]))
+    lines = [line for line in lines if line.row not in headings and _is_line(line, at, options)]
+    # Lines of a side or a day that several columns fill also head them.
+    told_apart = [
+        line.cells
+        for line in lines
+        if line.column in (SIDE, DATE)
+        and sum(cell is not None for cell in line.cells[at + 1 :]) > 1
     ]
-    columns = {
-        i: _heading(i, [*headings.values(), *_told_apart(lines, column, options)])
-        for i in sorted(numbers)
-    }
-    measured_from = min([joints[0][0], *headings])
-    sides = [
-        side
-        for _, label, cells in lines
-        if (each := _field(label, options)) and each.column is SIDE
-        for cell in cells[column + 1 :]
-        if isinstance(cell, str) and (side := Side.spelt(cell))
-    ]
-    side = sides[0] if len(sides) == 1 else None
-    return Form(lines, column, value_column, columns, measured_from, is_ours, side)
+    heads = [*reversed(headings.values()), *told_apart]
+    return Form(
+        row=lines[0].row,
+        texts=tuple(line.label for line in lines),
+        rows_used=(lines[0].row,),
+        lines=lines,
+        label_column=at,
+        value_column=value_column,
+        columns={i: _heading(i, heads) for i in sorted(numbers)},
+        measured_from=min([joints[0].row, *headings]),
+        is_ours=is_ours,
+    )
 
 
-def _with_joints(
-    rows: Sequence[NumberedRow], column: int, options: ReadOptions
-) -> Sequence[NumberedRow]:
-    """Rows with the numbers below a label that says joint as the names of joints."""
-    named: list[NumberedRow] = []
-    is_list = False
-    for number, cells in rows:
-        label = cells[column] if column < len(cells) else None
-        field = _field(label, options)
-        is_list = is_list or (field is not None and field.column is JOINT)
-        joint = show(label).strip()
-        if is_list and joint.isdecimal():
-            named.append((number, [*cells[:column], f"joint {joint}", *cells[column + 1 :]]))
-        else:
-            named.append((number, cells))
-    return named
-
-
-def _rows_of_headings(
-    rows: Sequence[NumberedRow], first: int, column: int, options: ReadOptions
-) -> dict[int, Cells]:
-    """The rows above the first joint that hold headings: up to three, none of them a line."""
-    found: dict[int, Cells] = {}
-    for number, cells in reversed([row for row in rows if row[0] < first]):
-        field = _field(cells[column] if column < len(cells) else None, options)
-        if len(found) == 3 or (field is not None and field.column is not JOINT):
-            break
-        found = {number: cells, **found}
-    return found
-
-
-def _told_apart(
-    lines: Sequence[tuple[int, str, Cells]], column: int, options: ReadOptions
-) -> list[Cells]:
-    """Lines of a side or a day that several columns fill."""
-    return [
-        cells
-        for _, label, cells in lines
-        if (field := _field(label, options))
-        and field.column in (SIDE, DATE)
-        and sum(cell is not None for cell in cells[column + 1 :]) > 1
-    ]
+def _lines(rows: Sequence[NumberedRow], at: int, options: ReadOptions) -> list[_Line]:
+    """The rows with a label; numbers below a label that says joint are the names of joints."""
+    lines: list[_Line] = []
+    for row, cells in rows:
+        label = cells[at] if at < len(cells) else None
+        number = show(label).strip()
+        if number.isdecimal() and any(line.column is JOINT for line in lines):
+            label = f"joint {number}"
+        if isinstance(label, str):
+            lines.append(_Line(row, label, _column(label, options), cells))
+    return lines
 
 
 def _heading(index: int, rows: Sequence[Cells]) -> tuple[Heading, str]:
@@ -199,8 +202,9 @@ def _heading(index: int, rows: Sequence[Cells]) -> tuple[Heading, str]:
     return take_apart(text), f"{letters} ({text[:40]!r})" if text else letters
 
 
-def _field(cell: Cell, options: ReadOptions) -> Field | None:
-    return recognise(cell, options.joints).field if isinstance(cell, str) else None
+def _column(cell: Cell, options: ReadOptions) -> Column | None:
+    field = recognise(cell, options.joints).field if isinstance(cell, str) else None
+    return None if field is None else field.column
 
 
 def _is_number(cell: Cell) -> bool:
@@ -214,67 +218,16 @@ def _is_fraction(cell: Cell) -> bool:
     return number % 1.0 > 0.0
 
 
-def _is_line(label: str, right: Cells, options: ReadOptions) -> bool:
+def _is_line(line: _Line, at: int, options: ReadOptions) -> bool:
     """Leave out titles, hints and signature lines, but not a label that may be a reading."""
-    is_known = recognise(label, options.joints) is not UNKNOWN
-    is_named = mapped_to(options, label, -1) is not None or label.rstrip().endswith(":")
-    return is_known or is_named or any(map(_is_answer, right))
-
-
-def _is_answer(cell: Cell) -> bool:
-    return cell is not None and (
-        _is_fraction(cell) or may_be_outcome(cell) or says_failed(show(cell))
-    )
-
-
-def read_form(
-    form: Form, options: ReadOptions, *, file: str | None, sheet: str | None
-) -> Collected:
-    out = Collected()
-    visits = form.visits()
-    if not visits:
-        named = ", ".join(name for _, name in form.columns.values())
-        remedy = "Delete the columns that are not readings, or write found above those that are."
-        if form.is_ours:
-            remedy = f"Move the readings to column {column_letters(form.value_column)}."
-        raise FileRefusedError(
-            "form_columns",
-            f"it holds numbers next to its joints in columns {named}",
-            "one column of readings, or headings that tell found from limit, LH from RH, or the"
-            " days",
-            remedy,
-            sheet=sheet,
+    is_known = recognise(line.label, options.joints) is not UNKNOWN
+    is_named = mapped_to(options, line.label, -1) is not None or line.label.rstrip().endswith(":")
+    return (
+        is_known
+        or is_named
+        or any(
+            _is_fraction(cell) or may_be_outcome(cell) or says_failed(show(cell))
+            for cell in line.cells[at + 1 :]
+            if cell is not None
         )
-    labels = [CellPlace.at(row, form.label_column, label) for row, label, _ in form.lines]
-    side = next(iter(visits.values())).side
-    table = TableInHand(options, file, sheet, out.tell, options.decimal_comma, side)
-    first = form.lines[0][0]
-    columns = ColumnReader(table).place([label for _, label, _ in form.lines], first, places=labels)
-    lines = [(row, p) for (row, *_), p in zip(form.lines, columns.placed, strict=True)]
-    ids = [row for row, p in lines if p.field is not None and p.field.column is RECORD_ID]
-    several = len(visits) > 1
-    out.notes += filter(None, columns.notes())
-    for column, visit in visits.items():
-        places = [CellPlace.at(row, column, label) for row, label, _ in form.lines]
-        cells = [
-            form.value(
-                row, line, column, is_measured=p.field is None or p.field.column in _MEASURED
-            )
-            for (row, _, line), p in zip(form.lines, columns.placed, strict=True)
-        ]
-        reader = RowReader(columns.placed, table.of_visit(visit, is_one_of_several=several))
-        read = [reader.read(ids[0] if ids else first, cells, places)]
-        said = reader.settle_dates(read)
-        out.notes += [said] * bool(said)
-        out.rows += read
-        out.invalid_content[read[0].source] = hash(tuple(cells))
-    if len(form.columns) > 1:
-        shown = [form.columns[column][1] for column in visits]
-        left = [name for column, (_, name) in form.columns.items() if column not in visits]
-        not_read = f"; not read: {', '.join(left)}" if left else ""
-        out.notes.append(f"the readings are those of column {', '.join(shown)}{not_read}")
-    column = next(iter(visits))
-    readings = tuple(ColumnReading(column, p.header, p.read_as, row) for row, p in lines)
-    kind = "visits" if several else "form"
-    out.layouts.append(SheetLayout(file, sheet, kind, first, max(visits) + 1, readings))
-    return out
+    )

@@ -30,9 +30,9 @@ from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.records.cells import typed
 from mlg_troubleshoot.records.headers import Joints
-from mlg_troubleshoot.records.layout import ColumnReader
+from mlg_troubleshoot.records.layout import Columns, Header
 from mlg_troubleshoot.records.model import ReadOptions, TableInHand
-from mlg_troubleshoot.records.rows import RowReader
+from mlg_troubleshoot.records.rows import Row, RowReader
 from mlg_troubleshoot.records.values import CellFaultError, read_text
 from mlg_troubleshoot.units import LengthUnit
 
@@ -54,7 +54,7 @@ def judge_row(
         lambda p: problems.append(replace(p, row=None, cell=None)),
         options.decimal_comma,
     )
-    columns = ColumnReader(table, by_hand=True).place(list(values), 1)
+    columns = Columns(Header(1, tuple(values), (1,)), table, by_hand=True)
     problems += [
         Problem(
             "column_unknown",
@@ -71,7 +71,7 @@ def judge_row(
         if p.field is None and not p.refused
     ]
     reader = RowReader(columns.placed, table)
-    rows = [reader.read(1, [typed(value) for value in values.values()])]
+    rows = [reader.read(Row(1, [typed(value) for value in values.values()]))]
     reader.settle_dates(rows)
     return replace(rows[0], source=RowSource()), problems
 

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 from mlg_troubleshoot.decision.columns import CLEARANCE, PLUNGER_DISPLACEMENT, Column
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records.cells import Cell, column_letters, quote
 from mlg_troubleshoot.records.dates import DateOrder
 from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.records.values import CellFaultError
-from mlg_troubleshoot.records.visits import ONE_VISIT, Occasion
 from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
@@ -172,8 +171,7 @@ class TableInHand:
     """The table or form that is being read: how, where it stands, and who receives its
     problems.
 
-    side: of every row of a table that has no column of sides. width: of the table. visit: whose
-    readings are read, and whether each row holds those of several.
+    side: of every row of a table that has no column of sides.
     """
 
     options: ReadOptions
@@ -182,16 +180,6 @@ class TableInHand:
     report: Callable[[Problem], None]
     decimal_comma: bool
     side: Side | None = None
-    width: int = 0
-    visit: Occasion = ONE_VISIT
-    is_one_of_several: bool = False
-
-    def of_visit(self, visit: Occasion, *, is_one_of_several: bool) -> TableInHand:
-        side = visit.side or self.side
-        return replace(self, side=side, visit=visit, is_one_of_several=is_one_of_several)
-
-    def source(self, row: int) -> RowSource:
-        return RowSource(self.file, self.sheet, row)
 
     def tell(
         self, code: str, value: str | None, expected: str, remedy: str, place: CellPlace

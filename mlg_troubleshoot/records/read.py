@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, BinaryIO, cast
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.cells import show, writable
 from mlg_troubleshoot.records.csvfile import csv_book
-from mlg_troubleshoot.records.forms import Form, find_form, read_form
+from mlg_troubleshoot.records.forms import Form, find_form
 from mlg_troubleshoot.records.frames import FRAME, FrameSheet, as_frame, in_frame, is_frame
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
 from mlg_troubleshoot.records.model import FileRead, ReadOptions, ReadResult
@@ -27,7 +27,7 @@ from mlg_troubleshoot.records.row_consistency import (
     slips,
 )
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
-from mlg_troubleshoot.records.tables import Collected, read_table
+from mlg_troubleshoot.records.tables import Collected, read_form, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -198,7 +198,16 @@ def load_bytes(source: File) -> bytes:
     """The bytes of a file, at most so many; one that cannot be read is refused."""
     try:
         if isinstance(source, str | Path) and str(source) != STDIN_NAME:
-            data = _regular_file(source)
+            # Opened without waiting: a pipe without a writer would hang before it can be reported.
+            flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+            with os.fdopen(os.open(source, flags), "rb") as file:
+                mode = os.fstat(file.fileno()).st_mode
+                if not stat.S_ISREG(mode):
+                    remedy = "Save the table as a file, or pass it by - (stdin)."
+                    raise FileRefusedError(
+                        "file_kind", "a pipe or a device", "a regular file", remedy
+                    )
+                data = file.read(MAX_FILE_BYTES + 1)
         else:
             data = (sys.stdin.buffer if isinstance(source, str | Path) else source).read(
                 MAX_FILE_BYTES + 1
@@ -220,21 +229,6 @@ def load_bytes(source: File) -> bytes:
             "file_too_large", f"the file is larger than {MAX_FILE_BYTES // 1_000_000} MB"
         )
     return data
-
-
-def _regular_file(source: str | Path) -> bytes:
-    """Read a file, never a pipe or a device that may not end."""
-    # Opened without waiting: a pipe without a writer would hang before it can be reported.
-    handle = os.open(
-        source, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-    )
-    with os.fdopen(handle, "rb") as file:
-        if stat.S_ISDIR(os.fstat(handle).st_mode):
-            raise IsADirectoryError
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            remedy = "Save the table as a file, or pass it by - (stdin)."
-            raise FileRefusedError("file_kind", "a pipe or a device", "a regular file", remedy)
-        return file.read(MAX_FILE_BYTES + 1)
 
 
 def _sniffed(data: bytes, name: str) -> str:
@@ -298,7 +292,7 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     is_filled = (
         any(number > header.row for number, _ in peeked)
         if header is not None
-        else not form.is_untouched(options)
+        else not form.is_untouched
         if form is not None
         else any(header_score(cells, options) for _, cells in peeked)
     )
@@ -317,7 +311,7 @@ def _read_book(
         sheet = candidate.sheet
         if candidate.form is not None:
             part = read_form(candidate.form, options, file=label, sheet=sheet.name)
-            ticker(1)
+            ticker(len(part.rows))
         elif candidate.header is not None:
             part = read_table(
                 sheet,

@@ -55,7 +55,7 @@ from mlg_troubleshoot.records.cells import (
     writable,
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings
-from mlg_troubleshoot.records.headers import Field, may_ask_outcome, suspect
+from mlg_troubleshoot.records.headers import UNKNOWN, Field, Recognition, may_ask_outcome, suspect
 from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand
 from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.unit_fit import (
@@ -81,7 +81,7 @@ from mlg_troubleshoot.records.values import (
     says_failed,
     written_number,
 )
-from mlg_troubleshoot.records.visits import Occasion
+from mlg_troubleshoot.records.visits import ONE_VISIT, Occasion
 from mlg_troubleshoot.units import (
     UNIT_SPELLINGS,
     ClearanceConvention,
@@ -126,9 +126,9 @@ def _spoken(text: str) -> tuple[bool, ClearanceConvention | None, LengthUnit | N
 class PlacedField:
     """A column of a table in hand, or a line of a form: its header, and what that means.
 
-    nearest: the canonical column that an unknown header may mean. is_settled: what it means was
-    declared, or follows from the columns next to it. visit: whose readings it holds, where a table
-    holds those of several visits.
+    is_settled: what it means was declared, or follows from the columns next to it. visit: whose
+    readings it holds, where a table holds those of several visits. found: what its header was
+    understood as by itself.
     """
 
     index: int
@@ -137,8 +137,8 @@ class PlacedField:
     refused: bool = False
     place: CellPlace = NOWHERE
     is_settled: bool = False
-    nearest: str | None = None
     visit: Occasion | None = None
+    found: Recognition = UNKNOWN
 
     @property
     def read_as(self) -> str | None:
@@ -149,6 +149,23 @@ class PlacedField:
 # How a length is read, whichever joint it is of; equal cells of one kind are one length: the
 # column, its unit, and whether it must be above zero.
 _LengthKind = tuple[Column, LengthUnit | None, bool]
+
+
+@dataclass(slots=True)
+class Row:
+    """The cells of one inspection, wherever they stand on the sheet.
+
+    places: of the cells, where they are not those of the row. visit: whose readings they are. bad,
+    warnings, questions: what was noticed while the cells were gathered; `bad` names headers.
+    """
+
+    number: int
+    cells: list[Cell]
+    places: list[CellPlace] = field(default_factory=list)
+    visit: Occasion = ONE_VISIT
+    bad: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    questions: list[str] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -174,30 +191,23 @@ class _Found:
 class RowReader:
     """Reads the rows of one table, each bad cell reported once.
 
-    makes_ids: without a column of record ids a row is named after its place and content.
+    is_several: True if the readings of several visits stand next to each other. invalid_content: a
+    hash of the cells of each row that cannot be judged, to recognize a repeated row.
     """
 
     def __init__(
-        self, placed: Sequence[PlacedField], table: TableInHand, *, makes_ids: bool = True
+        self, placed: Sequence[PlacedField], table: TableInHand, *, is_several: bool = False
     ) -> None:
         self._table = table
-        self._suffix = f" {table.visit}".rstrip() if table.is_one_of_several else ""
+        self._is_several = is_several
         self._options = table.options
         self._placed = {p.index: p for p in placed}
-        self._width = table.width
+        self._width = 0
         good = [(p.index, p.field) for p in placed if p.field is not None and not p.refused]
         self._refused = [p.index for p in placed if p.refused]
         self._at = {known.column: index for index, known in reversed(good)}
-        self._makes_ids = makes_ids and all(
-            p.field is None or p.field.column is not RECORD_ID for p in placed
-        )
-        self._lacking = [
-            column.name
-            for column, is_known in zip(
-                IDENTITY, (self._makes_ids, False, table.side is not None), strict=True
-            )
-            if column not in self._at and not is_known
-        ]
+        # Without a column of record ids a row is named after its place and content.
+        self._makes_ids = all(p.field is None or p.field.column is not RECORD_ID for p in placed)
         # Clearances stand first, in the order of the joints, whatever the order of their columns.
         ordered = sorted(
             good, key=lambda each: each[1].number or 0 if each[1].column is CLEARANCE else math.inf
@@ -224,19 +234,15 @@ class RowReader:
         self._blankable = [index for index, known in good if known.column.blank_by_word]
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
-        self._row = 0
-        self._places: Sequence[CellPlace] = ()
+        self.invalid_content: dict[RowSource, int] = {}
+        self._row = Row(0, [])
+        self._suffix = ""
         self._cells: Cells = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
         # Somewhere it is tomorrow already.
         self._latest = min(date.today(), date.max - _A_DAY) + _A_DAY
-        self._day_of_visit: date | None = None
-        if day := table.visit.day:
-            try:
-                self._day_of_visit = read_date(day, table.options.dates, self._latest)
-            except CellFaultError as fault:
-                table.tell_fault(fault, day, CellPlace(None, DATE.name))
+        self._days_of_visits: dict[str, date | None] = {"": None}
         # Which orders fit the dates that are written as numbers, and the dates of rows that wait
         # for the others.
         self._date_orders = set(DateOrder)
@@ -270,18 +276,17 @@ class RowReader:
                 # A column without a header may only number the rows if it is the first one.
                 self._suspects.append((p, nearest, is_sure or (not p.header and p.index > 0)))
 
-    def read(
-        self, row: int, cells: Cells, places: Sequence[CellPlace] = ()
-    ) -> Inspection | InvalidRow:
+    def read(self, row: Row) -> Inspection | InvalidRow:
         """Read one row; every bad cell is reported once."""
-        self._begin(row, cells, places)
+        self._begin(row)
         found = _Found(self._read_convention())
         self._read_cells(found, self._read_row_unit())
         asked = self._unit_questions(found)
         if self._suspects:
             asked += self.ask_about(self._cells, outcome=found.values.get(OUTCOME))
+        asked += row.questions
         question = Sentence.joined(asked) if asked else ""
-        source = self._table.source(row)
+        source = RowSource(self._table.file, self._table.sheet, row.number)
         for index, fault in sorted(self._faults, key=itemgetter(0)):
             if isinstance(fault, AmbiguousDateError):
                 self._waiting[source] = fault, self._cells[index], self._place(index)
@@ -289,29 +294,41 @@ class RowReader:
                 self._tell(index, fault)
         record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
         if SIDE not in self._at:
-            side = self._table.side
+            side = row.visit.side or self._table.side
         if record_id is not None and not self._makes_ids:
             record_id += self._suffix
-        if self._table.visit.day:
-            found.values[DATE] = self._day_of_visit
+        if row.visit.day:
+            found.values[DATE] = self._day_of(row.visit.day)
         identity = {"record_id": record_id, "tail_no": tail_no, "side": side}
         given = {**identity, "convention": found.convention, "source": source}
-        if self._bad or None in given.values():
+        if self._bad or row.bad or None in given.values():
             bad = sorted(index for index in self._bad if index >= 0)
-            named = [self._placed[index].header for index in bad]
-            named += [name for name in self._lacking if name not in named]
+            named = [*row.bad, *(self._placed[index].header for index in bad)]
+            named += [c.name for c in IDENTITY if c not in self._at and identity[c.name] is None]
             named += [CONVENTION.name] if -1 in self._bad else []
+            self.invalid_content[source] = hash(tuple(self._cells))
             return InvalidRow(
                 **identity,
-                correct=tuple(named),
-                warnings=tuple(found.warnings),
+                correct=tuple(dict.fromkeys(named)),
+                warnings=(*found.warnings, *row.warnings),
                 source=source,
                 understood=self._inspection(found, **given),
                 cells=tuple(cell for index in bad if (cell := self._place(index).cell)),
             )
         self._warn(found)
-        said = tuple(found.warnings)
+        said = (*found.warnings, *row.warnings)
         return self._inspection(found, **given, unit_question=question, warnings=said)
+
+    def _day_of(self, text: str) -> date | None:
+        """The day of a visit, as the heading of its readings says it."""
+        if text not in self._days_of_visits:
+            self._days_of_visits[text] = None
+            try:
+                day = read_date(text, self._options.dates, self._latest)
+                self._days_of_visits[text] = day
+            except CellFaultError as fault:
+                self._table.tell_fault(fault, text, CellPlace(None, DATE.name))
+        return self._days_of_visits[text]
 
     @staticmethod
     def _inspection(found: _Found, **given: Any) -> Inspection:
@@ -458,16 +475,18 @@ class RowReader:
         self._table.tell(
             problem.code, f"{why}: {shown}", problem.expected, problem.remedy, CellPlace(row)
         )
-        return InvalidRow(record_id, None, None, ("row",), (), self._table.source(row))
+        source = RowSource(self._table.file, self._table.sheet, row)
+        return InvalidRow(record_id, None, None, ("row",), (), source)
 
-    def _begin(self, row: int, cells: Cells, places: Sequence[CellPlace]) -> None:
+    def _begin(self, row: Row) -> None:
         """Take up a row: fill it to the width of the header, and leave out what was not
         measured.
         """
+        cells = row.cells
         if len(cells) > self._width:
             # Something stands to the right of the last header.
             self._add([PlacedField(i, "", None) for i in range(self._width, len(cells))])
-        cells = [*cells, *[None] * (self._width - len(cells))]
+        cells += [None] * (self._width - len(cells))
         for index in self._plain:
             cells[index] = stored(cells[index])
         for index in self._blankable:
@@ -476,7 +495,8 @@ class RowReader:
                 self.not_measured[cell.strip()] += 1
                 cells[index] = None
         self._row = row
-        self._places = places
+        # What tells the record ids of several visits apart.
+        self._suffix = f" {row.visit}".rstrip() if self._is_several else ""
         self._cells = cells
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
@@ -553,11 +573,12 @@ class RowReader:
     def _made_id(self) -> str:
         cells = [show(cell) for cell in self._cells]
         # Sheets of both sides may hold the same row.
-        cells += [] if self._table.side is None else [self._table.side.value]
+        side = self._row.visit.side or self._table.side
+        cells += [] if side is None else [side.value]
         cells += [self._suffix] * bool(self._suffix)
         content = zlib.crc32("\x1f".join(cells).encode("utf-8", "replace"))
         name = PurePath(self._table.file or "-").stem
-        return f"{'stdin' if name == '-' else name}-{self._row}-{content:08x}"
+        return f"{'stdin' if name == '-' else name}-{self._row.number}-{content:08x}"
 
     def _read_convention(self) -> ClearanceConvention | None:
         index = self._at.get(CONVENTION)
@@ -573,7 +594,7 @@ class RowReader:
                 "convention_missing",
                 None,
                 *_MISSING_CONVENTION,
-                CellPlace(self._row, CONVENTION.name),
+                CellPlace(self._row.number, CONVENTION.name),
             )
         return declared
 
@@ -715,9 +736,9 @@ class RowReader:
             self._table.tell(fault.code, placed.header, expected, fault.remedy, placed.place)
 
     def _place(self, index: int) -> CellPlace:
-        if self._places:
-            return self._places[index]
-        return CellPlace.at(self._row, index, self._placed[index].header)
+        if self._row.places:
+            return self._row.places[index]
+        return CellPlace.at(self._row.number, index, self._placed[index].header)
 
     def _read_date(self, cell: Filled) -> date:
         if isinstance(cell, OddCell) and cell.day is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain, islice
@@ -25,13 +24,13 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import ROUNDING_IN
 from mlg_troubleshoot.records.cells import Cells, Filled, column_letters, quote, show
+from mlg_troubleshoot.records.forms import Form
 from mlg_troubleshoot.records.headers import UNKNOWN, recognise, tidy
-from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header, header_score
-from mlg_troubleshoot.records.longform import LongReader
+from mlg_troubleshoot.records.layout import Columns, Header, header_score
+from mlg_troubleshoot.records.longform import Folder
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
-from mlg_troubleshoot.records.rows import RowReader
+from mlg_troubleshoot.records.rows import Row, RowReader
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet
-from mlg_troubleshoot.records.visits import ONE_VISIT
 from mlg_troubleshoot.units import ClearanceConvention
 
 # So many in one table are one mistake: they would take memory and help nobody.
@@ -95,18 +94,17 @@ def read_table(
     out = Collected()
     comma = options.decimal_comma or delimiter == ";"
     first = list(islice(rows, _LOOKED_AT))
-    rows = chain(first, rows)
     options, side, said = _sides(sheet.name, header, first, options, file)
     in_hand = TableInHand(options, file, sheet.name, out.tell, comma, side)
-    wide = max((len(cells) for number, cells in first if number > header.row), default=0)
     if delimiter is None:
+        wide = max((len(cells) for number, cells in first if number > header.row), default=0)
         blank = ("",) * (wide - len(header.texts))
         header = replace(header, texts=(*header.texts, *blank))
-    columns = ColumnReader(in_hand).place(header.texts, header.row, units=header.units)
+    columns = Columns(header, in_hand)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
     taken = 0
     titles: list[str] = []
-    for number, cells in rows:
+    for number, cells in chain(first, rows):
         if number < header.rows_used[0]:
             titles += [cell for cell in cells if isinstance(cell, str)]
         elif number > header.row:
@@ -116,11 +114,10 @@ def read_table(
                 tick(_PROGRESS_ROWS)
     tick(taken % _PROGRESS_ROWS)
     table.finish()
-    placed = (
-        f"the header is in row {' and '.join(map(str, header.rows_used))}" if header.row > 1 else ""
-    )
+    used = " and ".join(map(str, header.rows_used))
+    placed = f"the header is in row {used}" if header.row > 1 else ""
     read, carried = columns.notes()
-    about = "; ".join([*table.notes(), *_hidden_notes(sheet, columns, header.row)])
+    about = "; ".join([*table.notes(), *_hidden_notes(sheet, len(columns.placed), header.row)])
     against = _against_title(titles, options.convention)
     out.notes += filter(
         None, (against, "; ".join(filter(None, (placed, read, said))), carried, about)
@@ -129,6 +126,28 @@ def read_table(
     kind = "visits" if len(columns.visits) > 1 else kind
     readings = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
     out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, len(header.texts), readings))
+    return out
+
+
+def read_form(
+    form: Form, options: ReadOptions, *, file: str | None, sheet: str | None
+) -> Collected:
+    out = Collected()
+    visits = form.visits(sheet)
+    column, visit = next(iter(visits.items()))
+    table = TableInHand(options, file, sheet, out.tell, options.decimal_comma, visit.side)
+    columns = Columns(form, table)
+    is_several = len(visits) > 1
+    reader = RowReader(columns.placed, table, is_several=is_several)
+    out.rows += map(reader.read, form.upright(columns, visits))
+    out.invalid_content = reader.invalid_content
+    dates = reader.settle_dates(out.rows)
+    out.notes += filter(None, (*columns.notes(), dates, form.note(visits)))
+    kind = "visits" if is_several else "form"
+    readings = tuple(
+        ColumnReading(column, p.header, p.read_as, p.place.row) for p in columns.placed
+    )
+    out.layouts.append(SheetLayout(file, sheet, kind, form.row, max(visits) + 1, readings))
     return out
 
 
@@ -158,32 +177,26 @@ def _sides(
     else, as declared, or in the name of the sheet or the file. What was done is said in words.
     """
     known = [recognise(text, options.joints).field for text in header.texts]
-    columns = {field.column for field in known if field is not None}
     mapped = {*options.column_map.values(), *options.shared_map.values()}
-    if SIDE in columns or SIDE.name in mapped:
+    if SIDE.name in mapped or any(field and field.column is SIDE for field in known):
         return options, None, ""
     for index, text in enumerate(header.texts):
         cells = [row[index] for number, row in rows if number > header.row and index < len(row)]
         words = [cell for cell in cells if cell is not None]
-        if (
-            tidy(text) in _GEARS
-            and text not in options.column_map
-            and words
-            and all(isinstance(word, str) and Side.spelt(word) for word in words)
-        ):
+        sides = [word for word in words if isinstance(word, str) and Side.spelt(word)]
+        if sides and sides == words and tidy(text) in _GEARS and text not in options.column_map:
             mapping = {**options.column_map, text: SIDE.name}
             return replace(options, column_map=mapping), None, ""
-    for name, place in ((sheet, "sheet"), (PurePath(file or "").stem, "file")):
-        whole = name or ""
-        found = (
-            {Side.spelt(whole)}
-            if Side.spelt(whole)
-            else {Side.spelt(word) for word in re.findall(r"(?<![^\W_])[LR]H(?![^\W_])", whole)}
-        )
-        if options.side is None and len(found) == 1:
-            (side,) = found
+    if options.side is not None:
+        return options, options.side, f"every row is {options.side}"
+    for name, place in ((sheet or "", "sheet"), (PurePath(file or "").stem, "file")):
+        words_of_side = re.findall(r"(?<![^\W_])[LR]H(?![^\W_])", name)
+        whole = Side.spelt(name)
+        named = {whole} if whole else set(map(Side.spelt, words_of_side))
+        if len(named) == 1:
+            (side,) = named
             return options, side, f"every row is {side}, as the name of the {place} says"
-    return options, options.side, "" if options.side is None else f"every row is {options.side}"
+    return options, None, ""
 
 
 _STATISTICS = (
@@ -217,29 +230,24 @@ class _Table:
         delimiter: str | None,
         out: Collected,
     ) -> None:
-        self._columns = columns.placed
+        self._sheet = sheet
+        self._columns = columns
         self._table = table
-        self._several = len(columns.visits) > 1
-        self._readers: list[RowReader | LongReader] = []
-        self._own: list[list[int]] = []
-        for visit in columns.visits:
-            placed = [p for p in columns.placed if p.visit in (None, visit)]
-            in_hand = replace(table, width=len(columns.placed))
-            if visit != ONE_VISIT or self._several:
-                in_hand = in_hand.of_visit(visit, is_one_of_several=self._several)
-            reader = LongReader if columns.is_long else RowReader
-            self._readers.append(reader(placed, in_hand))
-            self._own.append([p.index for p in placed if p.visit is not None])
-        self._reader = RowReader(columns.placed, table)
-        self._is_long = columns.is_long
-        self.not_measured: Counter[str] = Counter()
-        self._faulty = sheet.facts.faulty
+        self._out = out
+        is_several = len(columns.visits) > 1
+        self._own = {
+            visit: [p.index for p in columns.placed if p.visit == visit] for visit in columns.visits
+        }
+        self._folder = Folder(columns, table) if columns.is_long else None
+        self._reader = (
+            RowReader(columns.placed, table, is_several=is_several)
+            if self._folder is None
+            else self._folder.reader
+        )
         self._texts = tuple(text or None for text in header.texts)
-        is_fixed = delimiter is not None or columns.is_long or self._several
+        is_fixed = delimiter is not None or columns.is_long or is_several
         self._width = len(header.texts) if is_fixed else None
         self._may_be_short = delimiter is None
-        self._out = out
-        self._sheet = sheet
         # A workbook's cell that is merged over several rows says the same of each; of a reading it
         # is not known which gear's it is, nor of which row a record's name.
         self._of_several = [
@@ -256,64 +264,55 @@ class _Table:
         self._dates = ""
         # Whether ids begin with the sign of a comment, as the first of them does.
         self._is_marked: bool | None = None
-        self._options = table.options
         self._second: FileRefusedError | None = None
-        self._telling = [
-            [p.index for p in columns.placed if p.field is not None and p.field.column is column]
-            for column in (TAIL_NO, SIDE, CLEARANCE, JOINT)
-        ]
-        self._named = {
-            p.index: p.field.column
-            for p in columns.placed
-            if p.field is not None and p.field.column in (RECORD_ID, TAIL_NO, JOINT)
-        }
-        self._evidence = [
-            p.index
-            for p in columns.placed
-            if p.field is not None and p.field.column in (CLEARANCE, PLUNGER_DISPLACEMENT, OUTCOME)
-        ]
+        self._telling = [columns.at(column) for column in (TAIL_NO, SIDE, CLEARANCE, JOINT)]
+        self._evidence = columns.at(CLEARANCE, PLUNGER_DISPLACEMENT, OUTCOME)
 
     def take(self, number: int, cells: Cells) -> None:
         # The header is printed again on a later page.
         if cells[0] == self._texts[0] and tuple(cells) == self._texts[: len(cells)] and any(cells):
             self._repeated += 1
             return
-        if self._stands_aside(number, cells):
+        name = self._stands_aside(cells)
+        if name:
+            self._aside.append((number, name, () if _RULE.fullmatch(name) else cells))
             return
         if self._of_several:
             cells = self._with_merged(number, cells)
         self._second = self._second or self._begins_again(number, cells)
         width = self._width
-        collect = self._out.rows.append
-        if self._second is not None:
-            collect(self._reader.faulty(number, cells, self._second))
+        why = self._second or self._sheet.facts.faulty.get(number)
+        if why is not None:
+            self._out.rows.append(self._reader.faulty(number, cells, why))
         elif (
             width is not None
             and len(cells) != width
             and (any(cells[width:]) or (len(cells) < width and not self._may_be_short))
         ):
-            collect(self._reader.ragged(number, cells, width))
-        elif number in self._faulty:
-            collect(self._reader.faulty(number, cells, self._faulty[number]))
+            self._out.rows.append(self._reader.ragged(number, cells, width))
         else:
-            for reader in self._readers_of(cells) if self._several else self._readers:
-                if isinstance(reader, LongReader):
-                    reader.add(number, cells)
-                    continue
-                read = reader.read(number, cells)
-                collect(read)
-                if read.__class__ is InvalidRow:
-                    self._out.invalid_content[read.source] = hash(tuple(cells))
+            for row in self._by_visits(number, cells):
+                if self._folder is None:
+                    self._out.rows.append(self._reader.read(row))
+                else:
+                    self._folder.add(row)
 
-    def _readers_of(self, cells: Cells) -> Sequence[RowReader | LongReader]:
-        """The readers of the visits that a row holds readings of."""
+    def _by_visits(self, number: int, cells: Cells) -> list[Row]:
+        """A row of the table for each visit that it holds readings of, without those of others."""
+        if len(self._own) == 1:
+            return [Row(number, [*cells], visit=visit) for visit in self._own]
         width = len(cells)
         filled = [
-            reader
-            for reader, own in zip(self._readers, self._own, strict=True)
+            visit
+            for visit, own in self._own.items()
             if any(i < width and cells[i] is not None for i in own)
         ]
-        return filled or self._readers[:1]
+        rows = []
+        for visit in filled or [*self._own][:1]:
+            others = {i for other, own in self._own.items() if other != visit for i in own}
+            kept = [None if i in others else cell for i, cell in enumerate(cells)]
+            rows.append(Row(number, kept, visit=visit))
+        return rows
 
     def _with_merged(self, number: int, cells: Cells) -> Cells:
         """Cells of a row, with those that are merged with a filled one above."""
@@ -323,30 +322,24 @@ class _Table:
                 self._above[index] = number, cell
             elif index in self._above:
                 top, above = self._above[index]
-                if number <= self._last_row(top, index):
+                if self._last_rows is None:
+                    self._last_rows = {each[:2]: each[2] for each in self._sheet.merged()}
+                if number <= self._last_rows.get((top, index), 0):
                     cells = [*cells, *[None] * (index + 1 - len(cells))]
                     cells[index] = above
                     self._filled_in += 1
         return cells
 
-    def _last_row(self, top: int, index: int) -> int:
-        """The last row of the merged cells that begin in a row and a column; 0 if none do."""
-        if self._last_rows is None:
-            self._last_rows = {
-                (first, left): last for first, left, last, _right in self._sheet.merged()
-            }
-        return self._last_rows.get((top, index), 0)
-
     def _begins_again(self, number: int, cells: Cells) -> FileRefusedError | None:
         """Refuse what stands below the header of another table: its columns may be others."""
-        joints = self._options.joints
+        options = self._table.options
         telling = [cells[i] for kind in self._telling for i in kind if i < len(cells)]
         words = [cell for cell in telling if isinstance(cell, str) and not cell.isdecimal()]
-        if all(recognise(word, joints) is UNKNOWN for word in words):
+        if all(recognise(word, options.joints) is UNKNOWN for word in words):
             return None
-        fields = [recognise(cell, joints).field for cell in cells if isinstance(cell, str)]
+        fields = [recognise(cell, options.joints).field for cell in cells if isinstance(cell, str)]
         names = any(field is not None and field.column in IDENTITY for field in fields)
-        if not names or not header_score(cells, self._options):
+        if not names or not header_score(cells, options):
             return None
         return FileRefusedError(
             "table_second",
@@ -355,48 +348,43 @@ class _Table:
             "Put each table on a sheet or into a file of its own.",
         )
 
-    def _stands_aside(self, number: int, cells: Cells) -> bool:
-        """Tell a row of totals, signatures and the like: a name of it says so, and it lacks what
+    def _stands_aside(self, cells: Cells) -> str:
+        """The name of a row of totals, signatures and the like: its name says so, and it lacks what
         makes an inspection. Without a reading its first cell may also say so.
         """
-        place = next((i for i, cell in enumerate(cells) if cell is not None), None)
-        if place is None:
-            return False
-        marked = show(cells[place]).startswith("#")
-        is_alone = not any(cell is not None for cell in cells[place + 1 :])
-        if marked and (is_alone or self._is_marked is False):
-            self._aside.append((number, show(cells[place]), cells))
-            return True
+        filled = {i for i, cell in enumerate(cells) if cell is not None}
+        if not filled:
+            return ""
+        first = show(cells[min(filled)])
+        marked = first.startswith("#")
+        if marked and (len(filled) == 1 or self._is_marked is False):
+            return first
         self._is_marked = marked if self._is_marked is None else self._is_marked
-        if all(c is None or (isinstance(c, str) and _RULE.fullmatch(c)) for c in cells):
-            self._aside.append((number, show(cells[place]), ()))
-            return True
-        is_read = any(i < len(cells) and cells[i] is not None for i in self._evidence)
-        named = self._named if is_read else {place: RECORD_ID}
-        for index, column in named.items():
-            cell = cells[index] if index < len(cells) else None
-            if not isinstance(cell, str):
-                continue
+        texts = {i: cell for i in filled if isinstance(cell := cells[i], str)}
+        if len(texts) == len(filled) and all(map(_RULE.fullmatch, texts.values())):
+            return first
+        named = {min(filled): RECORD_ID}
+        if not filled.isdisjoint(self._evidence):
+            columns = (RECORD_ID, TAIL_NO, JOINT)
+            named = {i: column for column in columns for i in self._columns.at(column)}
+        for index in filled.intersection(named, texts):
             # A gear whose side stands elsewhere may have any tail.
-            is_whole = column is TAIL_NO and self._table.side is not None
+            is_whole = named[index] is TAIL_NO and self._table.side is not None
             says = _STATISTIC.fullmatch if is_whole else _NO_INSPECTION.match
-            others = [
-                any(i != index and i < len(cells) and cells[i] is not None for i in kind)
-                for kind in self._telling
-            ]
-            if says(cell.strip()) is not None and sum(others) < 2:
-                self._aside.append((number, cell, cells))
-                return True
-        return False
+            others = sum(not (filled - {index}).isdisjoint(kind) for kind in self._telling)
+            if says(texts[index].strip()) is not None and others < 2:
+                return texts[index]
+        return ""
 
     def _judge_aside(self) -> None:
         """Refuse a row that was set aside and holds a reading over its limit, a plunger beyond the
         margin or a failure that no other row has.
         """
-        reader = RowReader(self._columns, replace(self._table, report=lambda _problem: None))
+        silent = replace(self._table, report=lambda _problem: None)
+        reader = RowReader(self._columns.placed, silent)
         others = self._alarms(self._out.rows)
         for number, name, cells in self._aside:
-            found = self._alarms([reader.read(number, cells)])
+            found = self._alarms([reader.read(Row(number, [*cells]))])
             alarms = [what for what, value in found.items() if value > others.get(what, 0.0)]
             texts = [*filter(None, map(show, cells))]
             if _JOINT_SAID.search(" ".join(texts)) and any(map(_FRACTION.search, texts)):
@@ -415,7 +403,7 @@ class _Table:
         """What rows hold beyond a limit or what no reading can be, each with its largest value.
         [in]
         """
-        options = self._options
+        options = self._table.options
         lowest = min(options.limit_in.values(), default=math.inf)
         of_readings = {self._texts[index] for index in self._evidence}
         worst: dict[str, float] = {}
@@ -445,67 +433,57 @@ class _Table:
     def finish(self) -> None:
         """Read what could be read only with all rows at hand."""
         found = self._out.rows
-        for reader in self._readers:
-            if isinstance(reader, LongReader):
-                found += reader.finish()
-            of_rows = reader.reader if isinstance(reader, LongReader) else reader
-            self._dates = of_rows.settle_dates(found) or self._dates
-            self.not_measured += of_rows.not_measured
-        if self._is_long:
+        if self._folder is not None:
+            found += map(self._reader.read, self._folder.rows.values())
             found.sort(key=lambda row: row.source.row or 0)
+        self._dates = self._reader.settle_dates(found)
+        self._out.invalid_content = self._reader.invalid_content
         if self._aside:
             self._judge_aside()
 
     def notes(self) -> list[str]:
+        """Say what stood between the inspections, and how some cells were read."""
         notes = []
-        if self._is_long:
+        if self._folder is not None:
             notes.append(
                 "long layout: one row is one joint's reading; rows with one record id are one"
                 " inspection"
             )
-        if self._repeated:
-            again = (
-                f"{self._repeated} repeated header rows were"
-                if self._repeated > 1
-                else "a repeated header row was"
-            )
-            notes.append(f"{again} skipped")
-        if self._filled_in:
-            those = "cells that are" if self._filled_in > 1 else "cell that is"
-            notes.append(f"{self._filled_in} blank {those} merged with one above read as it is")
-        if self._aside:
-            count = (
-                f"{len(self._aside)} rows are not inspections"
-                if len(self._aside) > 1
-                else "1 row is not an inspection"
-            )
-            named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
+        again = "a repeated header row was skipped", "{} repeated header rows were skipped"
+        merged = (
+            "1 blank cell that is merged with one above read as it is",
+            "{} blank cells that are merged with one above read as it is",
+        )
+        notes += [*_counted(self._repeated, *again), *_counted(self._filled_in, *merged)]
+        named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
+        for count in _counted(
+            len(named), "1 row is not an inspection", "{} rows are not inspections"
+        ):
             shown = ", ".join(named[:5]) + (f" and {len(named) - 5} more" if len(named) > 5 else "")
             why = "a statistic, a signature, a comment or a rule by its name"
-            said = f"{count}, set aside: {shown} ({why})"
-            notes.append(said)
-            self._out.unread.append(said)
-        if self._dates:
-            notes.append(self._dates)
-        words = self.not_measured
-        if words:
-            shown = ", ".join(repr(word) for word in list(words)[:4])
-            cells = sum(words.values())
-            notes.append(
-                f"{cells} {'cells' if cells > 1 else 'cell'} with {shown} read as not measured"
-            )
+            notes.append(f"{count}, set aside: {shown} ({why})")
+            self._out.unread.append(notes[-1])
+        notes += [self._dates] * bool(self._dates)
+        words = self._reader.not_measured
+        shown = ", ".join(map(repr, [*words][:4]))
+        for cells in _counted(words.total(), "1 cell", "{} cells"):
+            notes.append(f"{cells} with {shown} read as not measured")
         return notes
 
 
-def _hidden_notes(sheet: Sheet, columns: Columns, header_row: int) -> list[str]:
-    notes: list[str] = []
+def _counted(count: int, one: str, several: str) -> list[str]:
+    """Say how many there are, if there are any."""
+    return [one if count == 1 else several.format(count)] * bool(count)
+
+
+def _hidden_notes(sheet: Sheet, width: int, header_row: int) -> list[str]:
     facts = sheet.facts
-    width = len(columns.placed)
-    hidden = sum(1 for row in facts.hidden_rows if row > header_row)
-    if hidden:
-        notes.append(
-            f"{hidden} hidden or filtered {'rows were' if hidden > 1 else 'row was'} also read"
-        )
+    hidden = sum(row > header_row for row in facts.hidden_rows)
+    notes = _counted(
+        hidden,
+        "1 hidden or filtered row was also read",
+        "{} hidden or filtered rows were also read",
+    )
     for first, last in facts.hidden_columns:
         ends = dict.fromkeys(column_letters(index) for index in (first, min(last, width - 1)))
         notes += [f"hidden column {' to '.join(ends)} was also read"] * (first < width)
