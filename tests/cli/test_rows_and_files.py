@@ -42,11 +42,6 @@ def test_two_files_give_their_rows_in_order(table: Table) -> None:
     ]
 
 
-def test_blank_is_not_measured_and_zero_is_measured(table: Table) -> None:
-    joints = mlg("check", table(row(clearance_6_in="", clearance_7_in="0")), "--json").one["joints"]
-    assert [joints[5]["clearance_in"], joints[6]["clearance_in"]] == [None, 0.0]
-
-
 def test_an_unknown_column_is_named_and_not_dropped_in_silence(table: Table) -> None:
     assert "hangar" in mlg("check", table(row(hangar="7"))).err
 

@@ -15,17 +15,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions, ReadResult
 from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-from tests.records.reading import read_inspections
-
-HEADER = (
-    "record_id",
-    "tail_no",
-    "side",
-    "clearance_convention",
-    "clearance_3_in",
-    "clearance_5_in",
-)
-GOOD = ("R1", "N100AB", "LH", "RADIAL", 0.013, 0.007)
+from tests.records.reading import GOOD, HEADER, read_inspections
 
 _MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 _REL = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
