@@ -242,14 +242,10 @@ def picture() -> str:
 
 
 def table() -> str:
-    """Each room with what it is, and its doors."""
+    """Each room with what it is."""
     order = sorted(rooms(), key=lambda room: (-len(reach(uses())[room]), room))
-    lines = [
-        f"| `{room}/` | {first_line(trees()[f'{room}/__init__.py'])} |"
-        f" {', '.join(f'`{door}`' for door in doors(room))} |"
-        for room in order
-    ]
-    return "\n".join(["| room | what it is | what others may use |", "|---|---|---|", *lines])
+    lines = [f"| `{room}/` | {first_line(trees()[f'{room}/__init__.py'])} |" for room in order]
+    return "\n".join(["| room | what it is |", "|---|---|", *lines])
 
 
 def ways() -> str:

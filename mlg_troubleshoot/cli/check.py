@@ -72,7 +72,7 @@ class CheckOutputs(options.Shown):
     ] = None
     csv: Annotated[
         Path | None,
-        typer.Option(metavar="OUT.csv", help="Verdicts as a CSV, one line per gear."),
+        typer.Option(metavar="OUT.csv", help="Verdicts as a CSV, one line per row."),
     ] = None
     detail: Annotated[
         bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")
