@@ -34,14 +34,6 @@ def test_every_data_row_stands_exactly_once_even_if_it_is_bad(table: Table) -> N
     assert [i["record_id"] for i in found] == ["A", "B", None, "R1"]
 
 
-def test_two_files_give_their_rows_in_order(table: Table) -> None:
-    first, second = table(row(record_id="A"), name="1.csv"), table(row(record_id="B"), name="2.csv")
-    assert [i["record_id"] for i in mlg("check", first, second, "--json").json["inspections"]] == [
-        "A",
-        "B",
-    ]
-
-
 def test_an_unknown_column_is_named_and_not_dropped_in_silence(table: Table) -> None:
     assert "hangar" in mlg("check", table(row(hangar="7"))).err
 
