@@ -27,10 +27,6 @@ def test_the_contribution_is_amplification_times_clearance(judge: Judge) -> None
         )
 
 
-def test_the_amplification_of_joint_three_is_two_and_a_quarter(judge: Judge) -> None:
-    assert judge({3: 0.001}).joints[2].plunger_amplification == pytest.approx(2.25, abs=0.005)
-
-
 def test_the_contribution_of_an_unmeasured_joint_is_absent_and_not_zero(judge: Judge) -> None:
     finding = judge({3: 0.001}).joints[3]
     assert (finding.clearance_in, finding.contribution_in) == (None, None)
@@ -66,20 +62,14 @@ def test_ties_go_to_the_larger_total_order_index(
     assert [total[j] for j in ranked] == sorted(total.values(), reverse=True)
 
 
-def test_every_joint_has_its_own_rank(judge: Judge) -> None:
-    assert sorted(finding.rank for finding in judge(every_joint(0.001)).joints) == list(
-        range(1, 11)
-    )
-
-
-def test_the_table_stands_in_the_order_of_the_joints(judge: Judge) -> None:
-    assert [finding.joint for finding in judge({9: 0.001}).joints] == list(range(1, 11))
-
-
-def test_indices_come_from_the_precomputed_table(judge: Judge, table: IndexTable) -> None:
+def test_the_table_stands_in_the_order_of_the_joints_with_ranks_and_precomputed_indices(
+    judge: Judge, table: IndexTable
+) -> None:
     findings = judge(every_joint(0.001)).joints
+    assert [f.joint for f in findings] == sorted(f.rank for f in findings) == [*range(1, 11)]
     assert [f.first_order for f in findings] == table.first_order.tolist()
     assert [f.total_order for f in findings] == table.total_order.tolist()
+    assert findings[2].plunger_amplification == pytest.approx(2.25, abs=0.005)
 
 
 def test_the_rank_range_covers_the_rank_on_every_linkage(gear: Gear, judge: Judge) -> None:

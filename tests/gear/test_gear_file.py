@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
@@ -114,13 +113,6 @@ def test_the_hash_does_not_change_with_a_comment_or_a_name(gear: Gear, edited: E
     )
 
 
-def test_a_copy_of_the_gear_file_predicts_the_same(gear: Gear, edited: Edit) -> None:
-    copy = load_gear(edited("# Hawker", "# Copied from Hawker"))
-    assert copy.model.plunger_amplification() == pytest.approx(
-        gear.model.plunger_amplification(), abs=1e-15
-    )
-
-
 def test_a_gear_file_that_was_edited_is_read_anew(edited: Edit) -> None:
     path = edited("# Hawker", "# Copied from Hawker")
     before = load_gear(path).geometry_sha256
@@ -151,17 +143,6 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
             r"provenence: .*did you mean 'provenance'",
         ),
         (
-            "down_lock = 0.03\n",
-            "down_lock = 0.03\ntravell = 1\n",
-            r"calibration\.travell: .*did you mean 'travel'",
-        ),
-        ("margin = 0.03\n", "margin = 0.03\nmargn = 1\n", r"margn: .*did you mean 'margin'"),
-        (
-            "hard_limit = 0.050",
-            "hard_limt = 0.050",
-            r"hard_limt: .*did you mean 'hard_limit'",
-        ),
-        (
             "drawn_at = 0.687",
             "drawn_at = 0.687\ndrawn = 1",
             r"input\.drawn: .*did you mean 'drawn_at'",
@@ -173,7 +154,6 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         ),
         # a source that is missing or unknown
         ('margin = "margin"', 'margin = "hearsay"', r"source_of\.margin: .*'hearsay'"),
-        ('margin = "margin"', 'F0 = "margin"', r"source_of: expected the keys of numbers"),
         (
             '{ limit = "limit"',
             '{ limt = "limit"',
@@ -193,17 +173,10 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         # bad numbers
         ("F = [-1.8, -11.85]", "F = [nan, -11.85]", r"ground\.F: expected two numbers"),
         ("F = [-1.8, -11.85]", "F = [-1.8]", r"ground\.F: expected two numbers"),
-        ("F = [-1.8, -11.85]", 'F = ["-1.8", -11.85]', r"ground\.F: expected two numbers"),
         ("travel = [0.0, 0.687]", "travel = [0.0, inf]", r"input\.travel: expected two numbers"),
-        ("margin = 0.03\n", "margin = nan\n", r"margin: expected a number"),
         ("margin = 0.03\n", "margin = -0.03\n", r"margin: expected a number above 0"),
         ("margin = 0.03\n", "margin = true\n", r"margin: expected a number"),
         ("limit = 0.0075\n", "limit = 0\n", r"joints\.1\.limit: expected a number above 0"),
-        (
-            "access_min = 10\n",
-            "access_min = 0\n",
-            r"joints\.1\.access_min: expected a number above 0",
-        ),
         (
             "new_part = 0.0005\n",
             "new_part = -1\n",
@@ -211,9 +184,7 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         ),
         # wrong types
         ("schema = 2\n", "schema = 3\n", r"schema: expected 2, found 3"),
-        ("schema = 2\n", 'schema = "2"\n', r"schema: expected 2, found '2'"),
         ("critical = true", 'critical = "yes"', r"joints\.1\.critical: expected true or false"),
-        ('["F", "1"]', '"F-1"', r"links\.actuator: expected a list of names"),
         ('["F", "1"]', '["F", 1]', r"links\.actuator: expected a list of names"),
         ("10 = 58.73", '10 = "up"', r"guides_deg\.10: expected"),
         ('position_of = "10"', 'speed_of = "10"', r"output\.speed_of: expected .*known key"),
@@ -332,34 +303,17 @@ def test_joints_one_to_five_are_critical_and_the_others_are_not(gear: Gear) -> N
     assert [joint.number for joint in gear.joints if joint.critical] == [1, 2, 3, 4, 5]
 
 
-def test_a_joint_that_the_gear_does_not_have_is_refused(gear: Gear) -> None:
-    with pytest.raises(KeyError, match="no joint 11"):
-        gear.joint(11)
-
-
 @pytest.mark.parametrize("clearance", [0.0075, 0.1905 / 25.4, 0.381 / 25.4 / 2, 7.5 / 1000])
 def test_a_clearance_at_its_limit_is_not_over_it_in_whatever_unit_it_was_read(
     gear: Gear, clearance: float
 ) -> None:
     assert not gear.joint(1).is_over_limit(clearance)
-
-
-def test_a_clearance_a_tenth_of_a_thou_above_its_limit_is_over_it(gear: Gear) -> None:
-    assert gear.joint(1).is_over_limit(0.0076)
+    assert gear.joint(1).is_over_limit(clearance + 0.0001)
 
 
 def test_both_ends_of_a_link_act_alike_and_no_other_joints_do(gear: Gear) -> None:
     pairs = {frozenset((number, *others)) for number, others in gear.alike.items() if others}
     assert pairs == {frozenset({3, 5}), frozenset({6, 7}), frozenset({9, 10})}
-
-
-def test_the_files_carry_no_machine_path(gear: Gear) -> None:
-    texts = [path.read_text(encoding="utf-8") for path in gear.path.parent.glob("*.toml")]
-    assert not any(re.search(r"(?:^|[\s\"'(])/(?:home|work|root|tmp)/", text) for text in texts)
-
-
-def test_limits_are_an_array_in_the_order_of_the_joints(gear: Gear) -> None:
-    assert gear.limits_in == pytest.approx(np.full(10, 0.0075))
 
 
 def test_what_a_gear_file_need_not_state_is_assumed_and_says_so(edited: Edit) -> None:
@@ -375,11 +329,6 @@ def test_a_cause_that_would_change_no_number_of_the_linkage_is_refused(
 ) -> None:
     with pytest.raises(GearFileError, match=r"a number of the linkage instead of 'length\.1-F'"):
         load_gear(edited(f'"{name}"', '"length.1-F"'))
-
-
-def test_a_gear_that_is_given_in_place_of_a_name_is_returned_as_it_is() -> None:
-    gear = load_gear()
-    assert load_gear(gear) is gear
 
 
 def test_a_joint_that_a_gear_does_not_have_is_named_with_the_option_that_gave_it() -> None:

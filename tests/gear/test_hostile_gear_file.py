@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 import pytest
 import tomli_w
 
@@ -23,7 +22,6 @@ from mlg_troubleshoot.errors import GearFileError, MechanismError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.gear_tables import GearFile
-from mlg_troubleshoot.geometry.kernel import numba_is_installed
 from mlg_troubleshoot.geometry.mechanism import Crank, Mechanism, Output, Plane, Point
 from mlg_troubleshoot.geometry.program import write_program
 from mlg_troubleshoot.indices.index_table import IndexTable, TableGear
@@ -90,16 +88,6 @@ def test_a_linkage_with_hostile_names_moves_as_the_same_linkage_with_plain_names
         for m in (hostile, gear)
     ]
     assert x[0] == x[1]
-
-
-@pytest.mark.skipif(not numba_is_installed(), reason="without numba nothing is compiled")
-@pytest.mark.slow
-def test_hostile_names_do_not_reach_the_compiled_loop(hostile: Gear, gear: Gear) -> None:
-    clearance = np.full((10, 3), 0.001)
-    moved = [
-        g.model.kernel.batch(0.6, clearance, np.zeros(10), compiled=True) for g in (hostile, gear)
-    ]
-    assert moved[0].tolist() == moved[1].tolist()
 
 
 def of_gear(table: IndexTable, gear: Gear) -> IndexTable:
@@ -204,11 +192,6 @@ def edited(gear: Gear, tmp_path: Path) -> Edit:
             r"ensemble: expected the name of a file in the same folder",
         ),
         (
-            'ensemble = "hawker-800xp-ensemble.toml"',
-            'ensemble = ""',
-            r"ensemble: expected the name of a file in the same folder",
-        ),
-        (
             'indices = "hawker',
             'indices = "/etc/hawker',
             r"indices: expected the name of a \.json file in the same folder",
@@ -224,7 +207,6 @@ def edited(gear: Gear, tmp_path: Path) -> Edit:
             r"indices: expected the name of a \.json file in the same folder",
         ),
         ('indices = "hawker', f'indices = "{"h" * 300}', r"indices: expected the name of a \.json"),
-        ("F = [-1.8, -11.85]", "F = [1e308, -11.85]", r"ground\.F: expected two numbers"),
         (
             "F = [-1.8, -11.85]",
             "F = [1e5, -11.85]",
@@ -240,11 +222,6 @@ def edited(gear: Gear, tmp_path: Path) -> Edit:
             "dihedral_deg = 48.92",
             "dihedral_deg = 1e9",
             r"dihedral_deg: expected a number from -720 to 720",
-        ),
-        (
-            "access_min = 15",
-            "access_min = 1e9",
-            r"access_min: expected a number from 0 to 100000",
         ),
         (
             "[0.01, 0.05]",
@@ -297,18 +274,11 @@ def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(
             "dihedral_deg = nan",
             r"dihedral_deg: expected a number .*, found nan",
         ),
-        ("ensemble", "F = [-1.243", "F = [inf", r"member B: ground\.F: expected two numbers"),
         (
             "ensemble",
             "[members.B]\ninput",
             '[members."B\\u202e"]\ninput',
             r"expected a name of 1 to 40 printable",
-        ),
-        (
-            "ensemble",
-            "dihedral_deg = 48.656",
-            "dihedral_deg = 1e6",
-            r"expected a number from -720 to 720",
         ),
         (
             "targets",

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Dyad, Mechanism, Output, Plane, Point
 
-from .vectors import angle_from_sides, locate_joint, rotation, skew
+from .vectors import locate_joint
 
 coordinate = st.floats(-10, 10)
 vector = st.tuples(coordinate, coordinate, coordinate).map(np.array)
@@ -24,31 +24,6 @@ angle = st.floats(-math.pi, math.pi)
 def unit(v: np.ndarray) -> np.ndarray:
     assume(np.linalg.norm(v) > 0.1)
     return v / np.linalg.norm(v)
-
-
-def test_the_angle_between_the_sides_three_and_four_of_a_right_triangle_is_right() -> None:
-    assert angle_from_sides(3, 4, 5) == pytest.approx(math.pi / 2)
-
-
-def test_sides_that_make_no_triangle_have_no_angle() -> None:
-    assert math.isnan(angle_from_sides(1, 1, 3))
-
-
-@given(a=vector, b=vector)
-def test_the_skew_matrix_is_the_cross_product(a: np.ndarray, b: np.ndarray) -> None:
-    assert skew(a) @ b == pytest.approx(np.cross(a, b))
-
-
-@given(axis=vector, turn=angle)
-def test_a_rotation_keeps_lengths_and_handedness(axis: np.ndarray, turn: float) -> None:
-    matrix = rotation(unit(axis), turn)
-    assert matrix @ matrix.T == pytest.approx(np.eye(3), abs=1e-14)
-    assert np.linalg.det(matrix) == pytest.approx(1.0)
-
-
-@given(axis=vector, turn=angle)
-def test_a_rotation_keeps_its_axis(axis: np.ndarray, turn: float) -> None:
-    assert rotation(unit(axis), turn) @ unit(axis) == pytest.approx(unit(axis))
 
 
 @given(a=vector, b=vector, normal=vector, ca=st.floats(0.5, 20), bc=st.floats(0.5, 20))
