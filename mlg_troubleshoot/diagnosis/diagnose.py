@@ -107,8 +107,7 @@ class NamedCause(Term):
     @property
     def acting_rms_in(self) -> float:
         """Root mean square of its effect over the rows in which it acts. [in]"""
-        share = max(self.rows_acting, 1) / len(self.effect_in)
-        return self.effect_rms_in / float(np.sqrt(share))
+        return float(np.linalg.norm(self.effect_in) / np.sqrt(max(self.rows_acting, 1)))
 
     @property
     def predicts(self) -> bool:
@@ -354,8 +353,9 @@ def diagnose(
         catalogue = with_own(own_causes)
         # What never varies cannot be distinguished from a linkage of other dimensions.
         columns = plain[0].table.varying
-        lacking = ((cause.name, cause.lacks(columns)) for cause in catalogue)
-        not_testable = tuple((name, column) for name, column in lacking if column)
+        not_testable = tuple(
+            (cause.name, column) for cause in catalogue if (column := cause.lacks(columns))
+        )
         believed = beliefs or Beliefs()
 
         def explained(plain: tuple[Scene, Rows]) -> _Case:
@@ -402,7 +402,7 @@ class _Case(Finding):
     def columns(self) -> Array:
         """Effects of what is reported to act, the all-joint ones last. [in / unit]"""
         held = self.problem.columns.take(self.chosen)
-        return held if self.block is None else np.hstack([held, self.block.columns])
+        return held if self.block is None else np.hstack([held, self.block.shared_in])
 
     @property
     def explained(self) -> Array:
@@ -423,9 +423,10 @@ class _Case(Finding):
         fitted = self.columns.shape[1] * np.log(len(self.problem.misfit))
         return [whole, (self.problem.misfit - self.explained, float(prior - 0.5 * fitted))]
 
-    def effect(self, place: int) -> Array:
-        """What one of the chosen does to each row. [in]"""
-        return np.asarray(self.columns[:, place] * self.values[place])
+    @property
+    def effects_in(self) -> Array:
+        """What each that is reported does to each row, shape (n, k). [in]"""
+        return self.columns * self.values
 
 
 def _scene_of(
@@ -438,16 +439,16 @@ def _scene_of(
     """
     table, faults, usable = screened
     _single_slips(faults, len(table))
-    table = table.take(usable & np.isfinite(table.measured_in))
-    _enough(table)
-    plain = build_scene(model, table, where)
-    # With all its clearances, and without any one of them: what each adds must be known.
-    closes = np.isfinite(np.column_stack([plain[0].over_in, plain[0].contribution_in])).all(axis=1)
-    if not closes.all():
-        table = table.take(closes)
+    kept = usable & np.isfinite(table.measured_in)
+    while True:
+        table = table.take(kept)
         _enough(table)
         plain = build_scene(model, table, where)
-    return plain
+        # With all its clearances, and without any one of them: what each adds must be known.
+        moved = np.column_stack([plain[0].over_in, plain[0].contribution_in])
+        kept = np.asarray(np.isfinite(moved).all(axis=1))
+        if kept.all():
+            return plain
 
 
 def _explained(
@@ -497,23 +498,15 @@ def _explained(
     chosen = tuple(k for k in best.members if k < len(moving))
     others = [k for k in best.members if k >= len(moving)]
     context = finding.posterior.contexts[best.context]
-    block = blocks[best.context - 1] if best.context and context.listed else None
+    block = context if isinstance(context, Block) else None
     known = np.hstack([context.shared_in, every.kept.take(others)])
     spread = block_diag(context.covariance, np.diag(every.size[others] ** 2))
     values, covariance = shrunk(
         context.behind(finding.noise), effects.take(chosen), known, spread, problem.expected
     )
-    count = len(chosen) + (0 if block is None else block.columns.shape[1])
-    return _Case(
-        finding.problem,
-        finding.follows,
-        finding.noise,
-        scene,
-        chosen,
-        block,
-        values[:count],
-        covariance[:count, :count],
-    )
+    count = len(chosen) + (0 if block is None else block.shared_in.shape[1])
+    fitted = values[:count], covariance[:count, :count]
+    return _Case(problem, finding.follows, finding.noise, scene, chosen, block, *fitted)
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
@@ -742,14 +735,14 @@ def _gain(case: _Case, as_read: Array) -> Gain:
     said = case.follows.said
     keys = [case.problem.candidates[k].key for k in case.chosen]
     firm = [place for place, key in enumerate(keys) if key in said]
-    others = [case.effect(place)[:, None] for place in range(len(keys)) if place not in firm]
+    others = [place for place in range(len(keys)) if place not in firm]
     context = case.posterior.contexts[case.best.context]
     noise = case.noise
     if context.name not in said:
         noise = context.within(noise)
         block = None
     if others:
-        noise = noise.with_effects(np.hstack(others))
+        noise = noise.with_effects(case.effects_in[:, others])
     return measure_gain(
         noise,
         case.columns[:, firm],
@@ -788,12 +781,12 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
         candidate = case.problem.candidates[k]
         value = float(case.values[place])
         interval = _interval(value, float(errors[place]))
-        fitted[candidate.key] = candidate, value, interval, case.effect(place)
+        fitted[candidate.key] = candidate, value, interval, case.effects_in[:, place]
     if case.block is not None:
         k = len(case.chosen)
         change = case.values[k:]
         candidate = case.block.candidate(change, case.covariance[k:, k:])
-        fitted[candidate.key] = candidate, 1.0, (1.0, 1.0), case.block.columns @ change
+        fitted[candidate.key] = candidate, 1.0, (1.0, 1.0), case.block.shared_in @ change
     none = np.zeros(len(case.problem.misfit))
     for cause in {block.cause for block in case.problem.blocks}:
         fitted.setdefault((cause.name, None), (Candidate(cause), 0.0, (0.0, 0.0), none))

@@ -149,13 +149,7 @@ class MisfitProblem:
         return [
             Context.none(len(self.misfit)),
             *(
-                Context(
-                    (b.cause.name, None),
-                    float(np.log(shares[b.cause.name] * b.share)),
-                    b.columns,
-                    b.root,
-                    b.mean,
-                )
+                replace(b, log_prior=b.log_prior + float(np.log(shares[b.cause.name])))
                 for b in self.blocks
             ),
             *self._wandering(scale_in),
@@ -320,8 +314,7 @@ class Finding:
             probability = found.names.get(name, 0.0)
             weighed = WeighedCause(*name, float(np.exp(prior)), odds - prior, probability)
             each.append((odds, weighed))
-        each.sort(key=lambda own: -own[0])
-        return tuple(weighed for _odds, weighed in each)
+        return tuple(weighed for _odds, weighed in sorted(each, key=lambda own: -own[0]))
 
 
 def explain(problem: MisfitProblem) -> Finding:
@@ -375,10 +368,8 @@ def _with_noise_settled(
     for _ in range(_ROUNDS - 1):
         before = found.likeliest[0]
         noise = _noise_beside(problem, found.expected_in)
-        effects = problem.effects(noise)
-        found = posterior(
-            noise, problem.expected, effects, found.contexts, problem.beliefs, [before]
-        )
+        given = noise, problem.expected, problem.effects(noise), found.contexts, problem.beliefs
+        found = posterior(*given, [before])
         after = found.likeliest[0]
         if (before.context, before.members) == (after.context, after.members):
             break
@@ -408,7 +399,7 @@ def _concluded(problem: MisfitProblem, found: MisfitPosterior) -> Conclusion:
     """What follows, what can only be a rival left aside."""
     rivals_only = {c.key for c in problem.candidates if c.stands_in}
     if problem.doubtful:
-        rivals_only |= {(b.cause.name, None) for b in problem.blocks}
+        rivals_only |= {b.name for b in problem.blocks if b.name}
     variables, _size = _unlisted(found)
     # What moves with a cause's own variable speaks against the cause's form.
     moved = {*variables, *(name.rstrip("_0123456789") for name in variables)}

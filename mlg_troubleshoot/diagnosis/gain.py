@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes, rms
-from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.noise import less_expected
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.explanation import Context
 from mlg_troubleshoot.misfit.fitting import folds_of, held_out_part, likelier
 
 # With fewer tails none can be held out.
@@ -73,7 +73,7 @@ def measure_gain(
     predicted: Array,
     as_read: Array,
     table: DiagnosisTable,
-    block: Block | None = None,
+    block: Context | None = None,
 ) -> Gain:
     """Cross-validate an extension; rows of one tail are never on both sides, unless the others
     cannot teach it. It is fitted to the misfit of the likeliest clearances, and its gain is that of
@@ -81,7 +81,7 @@ def measure_gain(
     """
     fold, held_out_by = folds(noise, columns)
     expected = less_expected(misfit, predicted)
-    known = None if block is None else (block.columns, block.covariance)
+    known = None if block is None else (block.shared_in, block.covariance)
     correction = held_out_part(noise, columns, expected, fold, known)
     measured = predicted + misfit
     before = measured - as_read

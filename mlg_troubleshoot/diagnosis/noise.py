@@ -225,7 +225,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows, far: float) -> NoiseModel:
         TAIL_RATIOS,
         scale,
         tail_chances=_TAIL_CHANCES,
-        of_gear=rows.u_shared_in / scale if rows.u_shared_in.any() else None,
+        of_gear=rows.u_shared_in / scale,
         far_out=far_out,
     )
     standard = rest / scale

@@ -10,7 +10,7 @@ import numpy as np
 
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.explanation import UNLISTED, Explanation, Key
-from mlg_troubleshoot.misfit.posterior import MisfitPosterior, by_probability
+from mlg_troubleshoot.misfit.posterior import MisfitPosterior
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 
@@ -37,9 +37,7 @@ class Conclusion:
     @cached_property
     def listed(self) -> dict[Key, float]:
         """Probability of each listed name, the likeliest first."""
-        names = self.posterior.names
-        listed = ((n, p) for n, p in names.items() if n[0] != UNLISTED)
-        return dict(sorted(listed, key=by_probability))
+        return {n: p for n, p in self.posterior.names.items() if n[0] != UNLISTED}
 
     @cached_property
     def verdict(self) -> Verdict:

@@ -203,22 +203,22 @@ class NoiseModel:
         log += np.sum(np.log1p(-(self._steps[2] ** 2)))
         return common, apart, np.linalg.inv(inner) * ratios, log
 
-    def each_precision_times(self, columns: Array) -> tuple[Array, Array]:
-        """Columns times V⁻¹, shape (levels, n, k), and log |V|, (levels,), of each ratio."""
+    def each_precision_times(
+        self, columns: Array, levels: slice = slice(None)
+    ) -> tuple[Array, Array]:
+        """Columns times V⁻¹, (levels, n, k), and log |V|, (levels,), of each ratio or of some."""
         common, tails, roots, log = self._common
+        roots = roots[levels]
         own = self.own(columns)
         left = own - common @ (common.T @ own)
         bent = roots.swapaxes(1, 2) @ (roots @ (tails.T @ own))
-        return self._back(left - tails @ bent), log
+        return self._back(left - tails @ bent), log[levels]
 
     def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
         """Columns times V⁻¹, and log |V|, of one ratio of the scatter between tails."""
         level = self.tail_ratios.index(tail_ratio)
-        common, tails, roots, log = self._common
-        own = self.own(columns)
-        left = own - common @ (common.T @ own)
-        bent = roots[level].T @ (roots[level] @ (tails.T @ own))
-        return self._back(left - tails @ bent), float(log[level])
+        (product,), (log,) = self.each_precision_times(columns, slice(level, level + 1))
+        return product, float(log)
 
     def square(self, data: Array, tail_ratio: float) -> Array:
         """Squared length of data sets under V⁻¹."""

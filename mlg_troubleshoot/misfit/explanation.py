@@ -124,8 +124,9 @@ class Context:
     root : ndarray, shape (j, k), optional
         Root of the covariance of the sizes; None if they are independent, with one standard
         deviation each.
-    mean : float
-        Expected size of each.
+    changes : ndarray, shape (m,), optional
+        Equally likely values of each size, where they are not normal about zero; `root` is of
+        their variance.
     listed : bool
         True if it stands on the list of causes.
     of_tails_in : ndarray, shape (n, w), optional
@@ -136,9 +137,14 @@ class Context:
     log_prior: float
     shared_in: Array
     root: Array | None = None
-    mean: float = 0.0
+    changes: Array | None = None
     listed: bool = True
     of_tails_in: Array | None = None
+
+    @property
+    def mean(self) -> float:
+        """Expected size of each."""
+        return 0.0 if self.changes is None else float(np.mean(self.changes))
 
     @property
     def root_of(self) -> Array:

@@ -162,6 +162,7 @@ class Marginal:
             along = along[:, :0]
         if not places:
             none = np.empty((m * len(log), 0))
+            log = log - 2.0 * self._skew(members)
             square, along, rest, log = (np.concatenate([x] * m) for x in (square, along, rest, log))
             return _Given(square, along, rest, log, none)
         # Rows of the products that are needed, and where the members stand among them.
@@ -186,6 +187,7 @@ class Marginal:
         error = spread * np.linalg.norm(root, axis=2)
         error *= np.sqrt((np.maximum(rest, 0.0) + self.floor)[..., None] / self.products.n)
         log = log - 2.0 * np.sum(_of_sign(effects.sign[places], values, error), axis=-1)
+        log = log - 2.0 * self._skew(members)
         square = square - np.einsum("mrkp,mrkp->mrp", left, left)
         along = onto[:, others] - (told[:, :, None] @ left)[:, :, 0]
         levels = m * len(self.log)
@@ -196,6 +198,33 @@ class Marginal:
             log.ravel(),
             values.reshape(levels, len(places)),
         )
+
+    def _skew(self, members: Members) -> float:
+        """Log-likelihood by which the context's skewed prior beats the normal one, for σ as
+        estimated and the widest scatter between tails (M6′).
+        """
+        changes = self.context.changes
+        if changes is None:
+            return 0.0
+        noise = self.products.noise
+        shared = self.context.shared_in
+        columns = np.hstack([shared, self.products.columns.take(members)])
+        product, _log = noise.precision_times(columns / noise.scale_in, noise.tail_ratios[-1])
+        left = self.products.data - self.context.mean * shared.sum(axis=1)
+        # All sizes normal: mean and variance of each of the context's.
+        variance = np.full(shared.shape[1], np.var(changes))
+        prior = np.append(variance, self.effects.size[list(members)] ** 2)
+        spread = np.linalg.inv(columns.T @ product / noise.scale_in + np.diag(1.0 / prior))
+        error = np.diag(spread)[: len(variance)]
+        mean = (spread @ product.T @ left)[: len(variance)] / noise.scale_in
+        # Without its own prior, a_j and q_j.
+        pull = (mean / error)[:, None]
+        precise = np.maximum(1.0 / error - 1.0 / variance, 0.0)[:, None]
+        about = changes - np.mean(changes)
+        skewed = log_sum((pull * about - 0.5 * precise * about**2).T) - np.log(len(about))
+        wide = 1.0 + precise[:, 0] * variance
+        normal = 0.5 * (pull[:, 0] ** 2 * variance / wide - np.log(wide))
+        return float(np.sum(skewed - normal))
 
     def _prior(self, members: Members) -> float:
         return self.context.log_prior + float(np.sum(self.effects.log_prior[list(members)]))

@@ -65,17 +65,15 @@ class MisfitPosterior:
     nothing: float
     unlisted: float
     expected_in: Array
-    log_evidence: float = 0.0
+    log_evidence: float
 
     def names_of(self, found: Explanation) -> frozenset[Key]:
         """Names of what an explanation has, slips left out."""
         own = [self.effects.names[k] for k in found.members]
-        return frozenset(
-            name for name in (*own, self.contexts[found.context].name) if name is not None
-        )
+        return frozenset(name for name in (*own, self.contexts[found.context].name) if name)
 
 
-def by_probability(item: tuple[Key, float]) -> tuple[float, str]:
+def _by_probability(item: tuple[Key, float]) -> tuple[float, str]:
     """What orders names: the likeliest first, what rounding alone decides by the name."""
     name, probability = item
     return -round(probability, _DIGITS), str(name)
@@ -312,7 +310,7 @@ class _Search:
             self.effects,
             self.contexts,
             tuple(replace(e, log_posterior=e.log_posterior - whole) for e in order),
-            dict(sorted(names.items(), key=by_probability)),
+            dict(sorted(names.items(), key=_by_probability)),
             together,
             of_effect,
             over_nothing,

@@ -432,11 +432,11 @@ def test_a_linkage_that_does_not_close_with_what_was_read_is_not_the_gear_s(gear
     closing = [
         bool(np.isfinite(worst_of_sense(other, scene.clearance_in)[0]).all()) for other in others
     ]
-    blocks = OtherGeometry().blocks(scene, others)
+    blocks = [*OtherGeometry().blocks(scene, others)]
     assert 0 < sum(closing) < len(others)
-    counts = Counter(b.columns.shape[1] for b in blocks)
+    counts = Counter(b.shared_in.shape[1] for b in blocks)
     assert counts == {10 + sum(closing): len(blocks) - sum(closing), 11: sum(closing)}
-    assert all(np.isfinite(b.columns @ np.linalg.cholesky(b.covariance)).all() for b in blocks)
+    assert all(np.isfinite(b.independent_in).all() for b in blocks)
 
 
 def test_a_member_of_the_ensemble_is_a_linkage_of_its_own(gear: Gear) -> None:
@@ -444,7 +444,7 @@ def test_a_member_of_the_ensemble_is_a_linkage_of_its_own(gear: Gear) -> None:
     (other,) = gear.ensemble_models[1:2]
     *_between, member = OtherGeometry().blocks(scene, [other])
     moved = worst_case(other, scene.clearance_in).over_in - scene.over_in
-    effects = member.columns @ np.linalg.cholesky(member.covariance)
+    effects = member.independent_in
     share = np.linalg.lstsq(effects, moved, rcond=None)[0]
     assert effects @ share == pytest.approx(moved, abs=1e-9)
     assert np.linalg.norm(share) == pytest.approx(1.0, rel=1e-2)
@@ -456,7 +456,7 @@ def test_what_the_joints_add_is_together_the_displacement(gear: Gear) -> None:
         *LoadDirections().blocks(scene, ()),
         *OtherGeometry().blocks(scene, gear.ensemble_models[1:]),
     ):
-        assert block.columns[:, :10].sum(axis=1) == pytest.approx(scene.over_in)
+        assert block.shared_in[:, :10].sum(axis=1) == pytest.approx(scene.over_in)
 
 
 def test_a_technician_who_writes_the_other_convention_is_named() -> None:

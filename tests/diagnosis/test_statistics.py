@@ -100,25 +100,9 @@ def test_the_share_removed_has_an_interval_of_95_percent_over_tails() -> None:
     assert (low, high) == pytest.approx(norm.interval(0.95, 1.0 - share, error), abs=0.3 * error)
 
 
-@pytest.mark.parametrize(("spread_deg", "k"), [(25.0, 0), (45.0, 1), (90.0, 2), (None, 3)])
-def test_resting_places_of_pins_have_the_moments_of_their_angles(
-    gear: Gear, spread_deg: float | None, k: int
-) -> None:
-    rng = np.random.default_rng(1)
-    n = 400_000
-    angles = (
-        rng.uniform(0.0, 2.0 * np.pi, n)
-        if spread_deg is None
-        else np.radians(spread_deg) * rng.standard_normal(n)
-    )
-    change = np.cos(angles) - 1.0
-    found = LoadDirections().covariances(gear.model, ())[k]
-    assert found[0, 0] == pytest.approx(np.mean(change**2), abs=0.007)
-    assert found[0, 1] == pytest.approx(np.mean(change) ** 2, abs=0.007)
-
-
 @pytest.mark.parametrize(
-    ("k", "mean", "variance"), [(0, 0.9092, 0.0151), (1, 0.7346, 0.1063), (3, 0.0, 0.5)]
+    ("k", "mean", "variance"),
+    [(0, 0.9092, 0.0151), (1, 0.7346, 0.1063), (2, 0.2912, 0.4187), (3, 0.0, 0.5)],
 )
 def test_directions_have_the_mean_and_variance_of_the_cosine_of_their_angles(
     gear: Gear, k: int, mean: float, variance: float
@@ -126,13 +110,13 @@ def test_directions_have_the_mean_and_variance_of_the_cosine_of_their_angles(
     # exp(-s^2/2) and (1 - exp(-s^2))^2 / 2 for normal angles of s = 25 and 45 degrees; 0 and 1/2
     # all around.
     scene, _rows = build_scene(gear.model, fleet(gear.model), gear.discrepancies)
-    covariance = LoadDirections().blocks(scene, ())[k].covariance
+    covariance = [*LoadDirections().blocks(scene, ())][k].covariance
     assert covariance[0, 0] == pytest.approx((1.0 - mean) ** 2 + variance, abs=1e-3)
     assert covariance[0, 1] == pytest.approx((1.0 - mean) ** 2, abs=1e-3)
 
 
 def test_factors_of_all_joints_have_intervals_of_95_percent() -> None:
-    block = Block(OtherGeometry(), (3, 5), np.ones((4, 2)), np.eye(2), 0.0)
+    block = Block(None, 0.0, np.ones((4, 2)), cause=OtherGeometry(), joints=(3, 5))
     setting = block.candidate(np.array([0.1, -0.2]), np.diag([0.04, 0.01])).setting
     for joint, middle, error in (("3", 1.1, 0.2), ("5", 0.8, 0.1)):
         found = setting["low"][joint], setting["high"][joint]

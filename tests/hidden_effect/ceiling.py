@@ -129,7 +129,7 @@ def oracle(task: Task) -> dict[str, float | str]:
     own = whitened(
         fleet,
         usable,
-        np.hstack([effects, *(b.columns @ np.linalg.cholesky(b.covariance) for b in blocks)]),
+        np.hstack([effects, *(b.independent_in for b in blocks)]),
     )
     truth, columns, wide = own[:, :1], own[:, 1 : 1 + len(rivals)], own[:, 1 + len(rivals) :]
     noise = np.random.default_rng(task["seed"]).standard_normal((len(truth), 200))
@@ -144,12 +144,12 @@ def oracle(task: Task) -> dict[str, float | str]:
     true = alone + _evidence(truth, usual[:1], np.zeros(1), data)[0]
     odds = [*(share[:, None] + _evidence(columns, size, sign, data))]
     for block in blocks:
-        width = block.columns.shape[1]
+        width = block.independent_in.shape[1]
         part, wide = wide[:, :width], wide[:, width:]
         inner = np.eye(width) + part.T @ part
         along = part.T @ data
         fitted = np.sum(along * np.linalg.solve(inner, along), axis=0)
-        odds.append(np.log(block.share) + 0.5 * (fitted - np.linalg.slogdet(inner)[1]))
+        odds.append(block.log_prior + 0.5 * (fitted - np.linalg.slogdet(inner)[1]))
     lead = true - logsumexp(np.array(odds), axis=0)
     return {
         "group": str(task["group"]),

@@ -91,6 +91,12 @@ def test_readings_smaller_than_a_rate_is_ever_off_are_directions_before_one_scal
 
 
 @pytest.mark.slow
+def test_a_direction_is_not_named_where_only_a_faint_cause_is_left_beside_directions() -> None:
+    one = run(("loads:40", 21, 8_940_021))
+    assert (one["named"], ("load_directions", None) in one["also"]) == ([], True)
+
+
+@pytest.mark.slow
 def test_rows_that_scatter_more_decide_no_more_between_two_joints_and_directions_of_all() -> None:
     one = run(("loads:40", 91, 8_940_091))
     assert [name for name, _target in one["named"]] == ["load_directions"]

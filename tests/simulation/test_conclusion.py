@@ -50,14 +50,14 @@ def concluded(
         effects,
         (Context.none(N),),
         likeliest,
-        {n: p for n, p in names.items() if p > 0.0},
+        {n: names[n] for n in sorted(names, key=lambda n: -names[n]) if names[n] > 0.0},
         together,
         of_effect,
         of_effect,
         together.get(frozenset(), 0.0),
         names[SHAPE],
-        of_effect,
         np.zeros(N),
+        0.0,
     )
     return Conclusion(found, Beliefs(), never, firm)
 

@@ -3,14 +3,15 @@ than the drawn one.
 
 Ten factors cannot be estimated separately from 200 rows. A prior with a covariance shrinks them as
 far as the data leave them open. The marginal likelihood then says whether all ten are worth it
-compared with one cause, or one scale for all.
+compared with one cause, or one scale for all. The prior of directions is skewed, as directions are:
+of joints near their worst direction, which lose little, and far from it.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -22,6 +23,7 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.misfit.explanation import Context
 
 # Standard deviations of the angle between a pin's resting place and the worst direction that are
 # tried; the last one stands for evenly all around. Without the smallest three of 28 fleets of 20 to
@@ -41,9 +43,10 @@ NEAR = ALONE / 3
 _LIKELY = 250
 
 
-@dataclass(frozen=True)
-class Block:
-    """All-joint effects with what is known of them beforehand.
+@dataclass(frozen=True, kw_only=True)
+class Block(Context):
+    """All-joint effects with what is known of them beforehand: `shared_in` for each joint, the
+    effect of changing its factor by one [in]; then further effects.
 
     Attributes
     ----------
@@ -51,27 +54,10 @@ class Block:
         `LoadDirections` or `OtherGeometry`.
     joints : tuple of int
         Joints that were read.
-    columns : ndarray, shape (n, k)
-        For each joint, the effect of changing its factor by one; then further effects. [in]
-    covariance : ndarray, shape (k, k)
-        Second moments of the changes of the factors. [1]
-    share : float
-        Probability of this block among the blocks of its cause. [1]
-    mean : float
-        Mean of the changes. [1]
     """
 
     cause: JointFactors
     joints: tuple[int, ...]
-    columns: Array
-    covariance: Array
-    share: float
-    mean: float = 0.0
-
-    @property
-    def root(self) -> Array:
-        """Root of the covariance about the mean, shape (k, k). [1]"""
-        return np.asarray(np.linalg.cholesky(self.covariance - self.mean**2), float)
 
     def candidate(self, change: Array, covariance: Array) -> Candidate:
         """The cause with fitted factors, their 95 % intervals, and the joints that only count
@@ -118,27 +104,25 @@ class JointFactors(Cause):
         yield from ()
 
     @abstractmethod
-    def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
-        """Covariances of the changes of the joints' factors that are tried, each (n_joints,
-        n_joints). [1]
+    def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> Iterator[Block]:
+        """The cause for the joints of a table that were read and are worn, each way it may be, with
+        the logarithm of its probability among these.
         """
 
-    def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
-        """The cause for the joints of a table that were read and are worn."""
+    def joints(self, scene: Scene) -> tuple[tuple[int, ...], Array]:
+        """Joints that were read and are worn, and the effect of changing the factor of each by one.
+        [in]
+        """
         used = [
             j
             for j, n in enumerate(scene.joints)
             if scene.is_read(n) and np.any(scene.contribution_in[:, j])
         ]
-        joints = tuple(scene.joints[j] for j in used)
-        found = self.covariances(scene.model, ensemble)
         # What each adds is taken so that together they are the displacement: with all at nothing
         # nothing moves.
         total = np.sum(scene.contribution_in, axis=1)
         whole = np.divide(scene.over_in, total, out=np.ones_like(total), where=total > 0.0)
-        columns = scene.contribution_in[:, used] * whole[:, None]
-        share = 1.0 / max(len(found), 1)
-        return [Block(self, joints, columns, k[np.ix_(used, used)], share) for k in found]
+        return tuple(scene.joints[j] for j in used), scene.contribution_in[:, used] * whole[:, None]
 
     @property
     def plausible_values(self) -> tuple[float, float]:
@@ -173,17 +157,22 @@ class LoadDirections(JointFactors):
         "one gear's plunger over the whole stroke, or read again with one pin pushed by hand"
     )
 
-    def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
-        """Second moments of what normal angles change, about none."""
-        alike = np.ones((len(model.joint_numbers),) * 2)
-        own = np.eye(len(model.joint_numbers))
-        return [np.mean(change) ** 2 * alike + np.var(change) * own for change in _changes()]
-
-    def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
-        """All spreads of angles, each with the mean of what it takes off."""
-        found = super().blocks(scene, ensemble)
-        means = (float(np.mean(change)) for change in _changes())
-        return [replace(block, mean=mean) for block, mean in zip(found, means, strict=True)]
+    def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> Iterator[Block]:
+        """All spreads of angles: cos φ − 1 for normal angles φ of each, and for ones all around."""
+        joints, columns = self.joints(scene)
+        half = (np.arange(_LIKELY) + 0.5) / _LIKELY
+        for s in np.radians(SPREADS_DEG):
+            angles = np.pi * half if s >= np.pi else s * ndtri(0.5 + 0.5 * half)
+            changes = np.cos(angles) - 1.0
+            yield Block(
+                (self.name, None),
+                -float(np.log(len(SPREADS_DEG))),
+                columns,
+                np.std(changes) * np.eye(len(joints)),
+                changes,
+                cause=self,
+                joints=joints,
+            )
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Let each clearance act by its factor along its worst direction."""
@@ -203,75 +192,48 @@ class OtherGeometry(JointFactors):
     inspect = "Distances between the pivots of one gear (a survey of the gear)"
     separates = "a survey of one gear"
 
-    def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
-        """Second moments of what the linkages of the ensemble make of each joint, about the drawn
-        one.
-        """
-        if not ensemble:
-            return []
-        apart = _apart(model, ensemble)
-        spread = apart.T @ apart / len(apart) + ALONE**2 * np.eye(apart.shape[1])
-        return [share**2 * spread + alike**2 for share, alike in LINKAGES]
-
-    def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
+    def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> Iterator[Block]:
         """Any mixture of the ensemble's linkages, with how each bends the displacement; and the way
         to each of them.
         """
-        found = super().blocks(scene, ensemble)
-        if not found:
-            return []
-        apart = _apart(scene.model, ensemble)[
-            :, [scene.joints.index(joint) for joint in found[0].joints]
-        ]
+        if not ensemble:
+            return
+        joints, columns = self.joints(scene)
+        drawn = scene.model.plunger_amplification()
+        # Change of each joint's amplification by each linkage. [1]
+        changes = np.array([other.plunger_amplification() / drawn - 1.0 for other in ensemble])
+        spread = changes.T @ changes / len(changes) + ALONE**2 * np.eye(len(drawn))
+        used = [scene.joints.index(joint) for joint in joints]
+        apart = changes[:, used]
         moved = [worst_of_sense(other, scene.clearance_in)[0] - scene.over_in for other in ensemble]
-        bent = np.array(moved) - apart @ found[0].columns.T
+        bent = np.array(moved) - apart @ columns.T
         # A linkage that does not close with clearances that were read is not the one that they were
         # read in.
         closes = np.isfinite(bent).all(axis=1)
         bent = bent[closes]
-        apart = apart[closes]
-        columns = np.column_stack([found[0].columns, *bent])
         even = np.eye(len(bent)) / max(len(bent), 1)
-        between = [
-            replace(
-                block,
-                columns=columns,
-                covariance=block_diag(block.covariance, share**2 * even),
-                share=0.5 / len(found),
+        ways = [
+            (
+                bent,
+                block_diag(share**2 * spread[np.ix_(used, used)] + alike**2, share**2 * even),
+                0.5 / len(LINKAGES),
             )
-            for block, (share, _alike) in zip(found, LINKAGES, strict=True)
+            for share, alike in LINKAGES
         ]
-        members = [
-            replace(
-                found[0],
-                columns=np.column_stack([found[0].columns, bend]),
-                covariance=np.outer([*own, 1.0], [*own, 1.0])
-                + np.diag([NEAR**2] * len(own) + [1e-9]),
-                share=0.5 / len(bent),
+        for bend, own in zip(bent, apart[closes], strict=True):
+            way = np.append(own, 1.0)
+            near = np.diag([NEAR**2] * len(own) + [1e-9])
+            ways.append((bend[None], np.outer(way, way) + near, 0.5 / len(bent)))
+        for further, covariance, share in ways:
+            yield Block(
+                (self.name, None),
+                float(np.log(share)),
+                np.column_stack([columns, *further]),
+                np.linalg.cholesky(covariance),
+                cause=self,
+                joints=joints,
             )
-            for bend, own in zip(bent, apart, strict=True)
-        ]
-        return [*between, *members]
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Let each clearance count by its factor."""
         return Adjustment(scene.clearance_in * self.factors(scene.joints, candidate, value))
-
-
-def _changes() -> list[Array]:
-    """Equally likely changes cos φ − 1 of a joint for normal angles φ of each spread, and for ones
-    all around. [1]
-    """
-    half = (np.arange(_LIKELY) + 0.5) / _LIKELY
-    spreads = np.radians(SPREADS_DEG)
-    return [
-        np.cos(np.pi * half if s >= np.pi else s * ndtri(0.5 + 0.5 * half)) - 1.0 for s in spreads
-    ]
-
-
-def _apart(model: LinkageModel, ensemble: Sequence[LinkageModel]) -> Array:
-    """Change of each joint's amplification by each linkage of an ensemble, shape (n_linkages,
-    n_joints). [1]
-    """
-    drawn = model.plunger_amplification()
-    return np.array([other.plunger_amplification() / drawn - 1.0 for other in ensemble])
