@@ -50,19 +50,19 @@ def fitted_tails(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     yield seen
 
 
-def test_the_cause_is_named(found: Diagnosis) -> None:
-    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [
-        ("gauge_bias", "gauge G-2")
-    ]
+def test_the_cause_is_named_with_its_number_in_its_interval(found: Diagnosis) -> None:
+    (cause,) = found.causes
+    assert (cause.candidate.cause.name, cause.candidate.target) == ("gauge_bias", "gauge G-2")
+    assert cause.value == pytest.approx(0.006, abs=0.001)
+    assert cause.interval[0] < 0.006 < cause.interval[1]
 
 
-def test_the_fitted_number_is_near_the_true_one(found: Diagnosis) -> None:
-    assert found.causes[0].value == pytest.approx(0.006, abs=0.001)
-
-
-def test_the_interval_holds_the_true_number(found: Diagnosis) -> None:
-    low, high = found.causes[0].interval
-    assert low < 0.006 < high
+def test_the_misfit_of_held_out_tails_falls_by_a_share_above_zero(found: Diagnosis) -> None:
+    assert found.gain is not None
+    assert found.gain.held_out_by == "tail"
+    assert found.gain.rms_after_in < 0.6 * found.gain.rms_before_in
+    low, high = found.gain.share_interval
+    assert 0.0 < low < high < 1.0
 
 
 def test_rows_of_one_tail_are_held_out_together(
@@ -80,22 +80,6 @@ def test_a_cause_of_one_aircraft_is_held_out_row_by_row(gear: Gear) -> None:
     assert [c.candidate.cause.name for c in rigged.causes] == ["rigging_offset"]
     assert rigged.gain is not None
     assert rigged.gain.held_out_by == "row"
-
-
-def test_what_is_held_out_is_said(found: Diagnosis) -> None:
-    assert found.gain is not None
-    assert found.gain.held_out_by == "tail"
-
-
-def test_the_held_out_misfit_falls(found: Diagnosis) -> None:
-    assert found.gain is not None
-    assert found.gain.rms_after_in < 0.6 * found.gain.rms_before_in
-
-
-def test_the_share_removed_has_an_interval_above_zero(found: Diagnosis) -> None:
-    assert found.gain is not None
-    low, high = found.gain.share_interval
-    assert 0.0 < low < high < 1.0
 
 
 def test_decisions_are_counted_against_what_was_measured(found: Diagnosis) -> None:
@@ -122,19 +106,16 @@ def test_wrong_verdicts_of_a_model_that_stays_are_counted_by_their_sense(
     assert told["false_outside_before"] == told["false_outside_after"] == 0
 
 
-@pytest.fixture(scope="module")
-def twice(gear: Gear, table: DiagnosisTable) -> list[Diagnosis]:
-    return [diagnose(gear.model, table, gear.discrepancies) for _ in range(2)]
-
-
 def test_no_gain_is_claimed_where_nothing_is_named(nothing: Diagnosis) -> None:
     assert (nothing.verdict, nothing.gain, nothing.terms) == ("NONE", None, ())
 
 
-@pytest.mark.parametrize("part", ["verdict", "causes", "gain", "probabilities"])
-def test_the_same_table_gives_the_same_diagnosis(part: str, twice: list[Diagnosis]) -> None:
-    one, two = twice
-    assert repr(getattr(one, part)) == repr(getattr(two, part))
+def test_the_same_table_gives_the_same_diagnosis(
+    gear: Gear, table: DiagnosisTable, found: Diagnosis
+) -> None:
+    again = diagnose(gear.model, table, gear.discrepancies)
+    for part in ("verdict", "causes", "gain", "probabilities"):
+        assert repr(getattr(again, part)) == repr(getattr(found, part))
 
 
 def test_the_order_of_the_rows_does_not_matter_to_the_name(
@@ -174,18 +155,16 @@ def test_repeat_readings_tell_the_repeatability(found: Diagnosis) -> None:
     assert found.repeatability_in == pytest.approx(0.00075, rel=0.2)
 
 
-def test_without_repeat_readings_the_declared_one_is_marked(gear: Gear) -> None:
-    table = fleet(gear.model, plunger_gauge_u_in=np.full(120, 0.002))
-    single = diagnose(gear.model, _one_reading(table), gear.discrepancies)
-    assert (single.repeatability_in, single.repeatability_source) == (0.002, "declared")
-
-
-def test_without_either_it_is_unknown(gear: Gear) -> None:
-    single = diagnose(gear.model, _one_reading(fleet(gear.model)), gear.discrepancies)
-    assert (single.repeatability_in, single.repeatability_source) == (None, "unknown")
+@pytest.mark.parametrize(
+    ("declared_in", "said"), [(0.002, (0.002, "declared")), (None, (None, "unknown"))]
+)
+def test_without_repeat_readings_the_declared_repeatability_is_marked(
+    declared_in: float | None, said: tuple[float | None, str], gear: Gear
+) -> None:
+    stated = {} if declared_in is None else {"plunger_gauge_u_in": np.full(120, declared_in)}
+    single = diagnose(gear.model, _one_reading(fleet(gear.model, **stated)), gear.discrepancies)
+    assert (single.repeatability_in, single.repeatability_source) == said
 
 
 def _one_reading(table: DiagnosisTable) -> DiagnosisTable:
-    from dataclasses import replace
-
     return replace(table, readings_in=table.readings_in[:, :1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import date
 
 import numpy as np
+import pytest
 
 from mlg_troubleshoot.decision.inspection import Approach, Inspection, Side
 from mlg_troubleshoot.diagnosis import DiagnosisTable, table_from_inspections
@@ -26,39 +27,27 @@ def test_a_joint_that_was_not_measured_is_not_a_number(gear: Gear) -> None:
     assert np.isnan(found).sum() == 19
 
 
-def test_a_column_that_no_inspection_has_is_absent(gear: Gear) -> None:
+def test_a_column_that_only_one_inspection_has_is_there_with_gaps(gear: Gear) -> None:
     assert set(table(gear).columns) == {"tail_no", "side"}
+    found = table(gear, temperature_c=-5.0, gauge_id="G-1")
+    assert found.quantities["temperature_c"].tolist() == pytest.approx([np.nan, -5.0], nan_ok=True)
+    assert found.factors["gauge_id"].tolist() == ["", "G-1"]
 
 
-def test_a_column_that_one_inspection_has_is_there_with_gaps(gear: Gear) -> None:
-    found = table(gear, temperature_c=-5.0).quantities["temperature_c"]
-    assert np.isnan(found[0])
-    assert found[1] == -5.0
+def test_the_measured_value_is_the_mean_of_the_readings_if_there_are_any(gear: Gear) -> None:
+    found = table(gear, readings_in=(0.010, 0.014)).measured_in
+    assert found.tolist() == pytest.approx([np.nan, 0.012], nan_ok=True)
 
 
-def test_a_missing_name_is_an_empty_text(gear: Gear) -> None:
-    assert table(gear, gauge_id="G-1").factors["gauge_id"].tolist() == ["", "G-1"]
+def test_a_gear_is_a_side_of_a_tail_which_stays_text(gear: Gear) -> None:
+    found = table(gear, side=Side.RH)
+    assert found.tails.tolist() == ["007", "007"]
+    assert found.gears.tolist() == ["007 LH", "007 RH"]
 
 
 def test_days_are_counted_from_the_first_date(gear: Gear) -> None:
     found = table(gear, inspection_date=date(2024, 2, 29))
     assert (found.first_day, found.quantities["day"][1]) == ("2024-02-29", 0.0)
-
-
-def test_the_measured_value_is_the_mean_of_the_readings(gear: Gear) -> None:
-    assert table(gear, readings_in=(0.010, 0.014)).measured_in[1] == 0.012
-
-
-def test_a_row_without_readings_has_no_measured_value(gear: Gear) -> None:
-    assert np.isnan(table(gear, readings_in=(0.010,)).measured_in[0])
-
-
-def test_tails_stay_text(gear: Gear) -> None:
-    assert table(gear).tails.tolist() == ["007", "007"]
-
-
-def test_a_gear_is_a_tail_and_a_side(gear: Gear) -> None:
-    assert table(gear, side=Side.RH).gears.tolist() == ["007 LH", "007 RH"]
 
 
 def test_the_margin_of_the_gear_file_stands_in_where_none_was_found(gear: Gear) -> None:
