@@ -73,7 +73,12 @@ def judged(source: Any) -> tuple[list[Any], list[Any]]:
     return verdicts, [(p.code, p.column, p.value, p.expected, p.remedy) for p in found.problems]
 
 
-@pytest.mark.parametrize("seed", range(200))
+EVERY_DAY = 40
+
+
+@pytest.mark.parametrize(
+    "seed", [pytest.param(n, marks=() if n < EVERY_DAY else pytest.mark.slow) for n in range(200)]
+)
 def test_a_frame_has_the_verdicts_and_the_problems_of_its_file(seed: int) -> None:
     frame = sheet(seed)
     assert judged(frame) == judged(as_csv(frame))

@@ -291,11 +291,6 @@ def test_what_is_not_an_exported_record_is_refused_with_its_line(tmp_path: Path,
     assert "chain.jsonl, line 1 is not an exported record" in run.err
 
 
-def test_an_export_does_not_replace_the_store(tmp_path: Path, place: Path) -> None:
-    seeded((1, 0.001))
-    assert mlg("history", "export", place).code == 2
-
-
 @pytest.mark.parametrize(
     "command",
     [
