@@ -5,7 +5,6 @@ from __future__ import annotations
 import webbrowser
 from collections.abc import Mapping
 from dataclasses import replace
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +21,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.ranking import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.life.state import GearState, key_of
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.cli.check import Flags
     from mlg_troubleshoot.cli.check_run import Run
     from mlg_troubleshoot.cli.prompts import Entry, Visit
-    from mlg_troubleshoot.store import Record, Store
+    from mlg_troubleshoot.store import Store
 
 # Where the prompts write reports that were not asked for by a flag.
 _REPORTS = Path("report")
@@ -69,7 +69,7 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
     read = admit({RECORD_ID.name: "-", **values}, options, labels)
     if RECORD_ID.name in values:
         return read
-    read = replace(read, record_id=made_record_id(read.tail_no, read.side, datetime.now()))
+    read = replace(read, record_id=made_record_id(read))
     if place is None:
         return read
     from mlg_troubleshoot.workflows.keep import under_a_free_id
@@ -101,6 +101,7 @@ class Sitting:
         self._run = run
         self._place = place
         self._gear = load_gear(run.asked.gear)
+        self._first: tuple[str, ...] = (f"Kept in {place.place}.",)
         self._saved = prompts.SavedEntries(place.place)
         self._asker = prompts.Asker(
             self._gear,
@@ -115,76 +116,94 @@ class Sitting:
         from mlg_troubleshoot.cli.prompts import Entry, Visit
 
         found: Entry | Visit | str = self._asker.begin(given)
-        result = None
         visit: Visit | None = None
         while True:
             if isinstance(found, Entry):
-                result, visit = self._compute(found)
-                if self._run.stops_after_one or visit is None:
-                    return result
+                visit = self._keep(found, visit)
+                if self._run.stops_after_one:
+                    return visit.result
             elif isinstance(found, Visit):
-                visit, result = found, found.result
-                self._run.publish(result, visit.row.unit_entered)
+                visit = found
+                self._run.publish(visit.result, visit.row.unit_entered)
                 self._show_other_side(visit)
-            elif result is None or visit is None or not found:
+            elif visit is None or not found:
                 break
-            elif found == "u" and visit.before is not None:
-                result, visit = self._supersede(visit, visit.before)
-                if visit is None:
-                    return result
-            else:
-                self._show(found, result, visit.row.unit_entered)
-            found = self._asker.follow(visit)
-        if result is None:
-            raise TypeError("a sitting ends with a result")
-        return result
+            elif found == "u":
+                from mlg_troubleshoot.workflows.keep import voids
 
-    def _visit(self, tail: str, side: Side) -> Visit | None:
+                self._place.add([voids(visit.record, "taken back at the prompts")])
+                visit = self._published(*key_of(visit.row))
+            else:
+                self._show(found, visit.result, visit.row.unit_entered)
+            found = self._asker.follow(visit)
+        if visit is None:
+            raise TypeError("a sitting ends with a result")
+        return visit.result
+
+    def _visit(self, tail: str, side: Side | str) -> Visit | None:
         """What is kept of a gear; records that cannot be read do not prevent a new entry."""
         from mlg_troubleshoot.cli.prompts import find_visit
 
         try:
-            return find_visit(self._place, tail, side, self._judged)
+            return find_visit(self._place, self._gear, tail, Side(side), self._judged)
         except OutputError as error:
             output.say(f"The records of {tail} {side} cannot be read: {error}. {error.remedy}")
             return None
 
-    def _judged(self, row: Inspection) -> task.CheckResult:
-        return task.check_inspection(row, self._run.asked, self._place)
+    def _judged(self, state: GearState) -> task.CheckResult:
+        return task.check_gear(state, self._run.asked, self._place)
 
-    def _compute(self, entry: Entry) -> tuple[task.CheckResult, Visit | None]:
-        """Judge an entry, keep it, and show the verdict last; the entry stays open until then."""
-        from mlg_troubleshoot.cli.prompts import with_sitting
-        from mlg_troubleshoot.records import made_record_id
-        from mlg_troubleshoot.workflows.keep import moved_where_corrected, under_a_free_id
+    def _keep(self, entry: Entry, known: Visit | None) -> Visit:
+        """Keep an entry, and show the verdict; the entry stays open until then."""
+        from mlg_troubleshoot.cli.prompts import continued
+        from mlg_troubleshoot.workflows.keep import add_typed
 
-        typed = entry.inspection(self._gear)
-        if entry.continues:
-            moved_where_corrected(self._place, entry.continues, typed)
-        visit = self._visit(typed.tail_no, typed.side) if entry.continues else None
-        if visit is not None:
-            found = self._supersede(visit, with_sitting(visit, typed, entry))
+        key = entry.gear_key
+        if not entry.has_findings and known is not None:
+            self._correct(entry, known)
         else:
-            made = made_record_id(typed.tail_no, typed.side, entry.started)
-            row = under_a_free_id(replace(typed, record_id=made), self._place)
-            result = self._judged(row)
-            found = self._kept(result, None, entry.unit), self._visit(row.tail_no, row.side)
+            known = self._visit(*key)
+            rows = entry.visits(self._gear)
+            if known is not None:
+                rows = [continued(known, row, entry) for row in rows]
+            try:
+                warnings = add_typed(self._place, rows, entry.started)
+            except TroubleshootError:
+                # What was found is said, whatever becomes of the records.
+                result = task.check_inspection(rows[-1], self._run.asked, self._place)
+                self._run.publish(result, entry.unit)
+                raise
+            for said in (*self._first, *(f"Warning: {each}" for each in warnings)):
+                output.say(said)
+            self._first = ()
+        visit = self._published(*key)
         self._saved.finish(entry)
-        return found
+        return visit
 
-    def _supersede(self, visit: Visit, row: Inspection) -> tuple[task.CheckResult, Visit | None]:
-        result = self._kept(self._judged(row), visit.record, row.unit_entered)
-        return result, self._visit(row.tail_no, row.side)
+    def _correct(self, entry: Entry, known: Visit) -> None:
+        """Correct what does not belong to one finding in the visit that was recorded last."""
+        from mlg_troubleshoot.workflows.keep import amend, move
 
-    def _kept(
-        self, result: task.CheckResult, before: Record | None, unit: LengthUnit
-    ) -> task.CheckResult:
-        """Keep a result and show it, whatever becomes of the records."""
+        record = known.record
+        tail, side = entry.gear_key
+        if (tail, side.value) != (record.tail_no, record.side):
+            why = "tail or side corrected at the prompts"
+            record = move(self._place, record, (tail, side.value), why)
+        gear = (TAIL_NO.name, SIDE.name)
+        changes = {name: entry.cells[name] for name in entry.typed if name not in gear}
         try:
-            self._run.keep(result, before)
-        finally:
-            self._run.publish(result, unit)
-        return result
+            if changes:
+                amend(self._place, self._gear, record, changes)
+        except UsageError as error:
+            output.say(f"Not changed: {error.message}. {error.remedy}")
+
+    def _published(self, tail: str, side: Side | str) -> Visit:
+        """What stands of a gear now, shown and written."""
+        visit = self._visit(tail, side)
+        if visit is None:
+            raise TypeError("nothing is kept of a gear that was just kept")
+        self._run.publish(visit.result, visit.row.unit_entered)
+        return visit
 
     def _show(self, word: str, result: task.CheckResult, unit: LengthUnit) -> None:
         if word == "d":

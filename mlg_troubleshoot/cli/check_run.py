@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.decision.assessment import Judgement
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.json_form import CheckText
-    from mlg_troubleshoot.store import Record
 
 # One gear, and one before and after a repair, are shown in full.
 _FEW = 2
@@ -104,7 +103,7 @@ class Run:
         typed = by_hand.from_flags(self._flags, self.asked, self._place)
         result = task.check_inspection(typed, self.asked, self._place)
         try:
-            self.keep(result)
+            self._keep(result)
         finally:
             self.publish(result, LengthUnit.INCH)
         return result.exit_code
@@ -147,7 +146,7 @@ class Run:
         if wanted.annotate is not None and result.read is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
         # A report states what was kept.
-        self.keep(result, judged=found.entries)
+        self._keep(result, judged=found.entries)
         if wanted.report is not None:
             self.write_reports(result, wanted.report, unit)
         if not (wanted.keep or wanted.quiet) and sys.stderr.isatty():
@@ -287,33 +286,15 @@ class Run:
             )
         return output.say_written(written, quiet=self._wanted.quiet)
 
-    def keep(
-        self,
-        result: task.CheckResult,
-        before: Record | None = None,
-        judged: Sequence[Inspection] | None = None,
-    ) -> None:
-        """Add what was found to the store; what continues a kept inspection takes its place."""
-        if self._place is None or not (self._wanted.keep or self._asks):
+    def _keep(self, result: task.CheckResult, judged: Sequence[Inspection] | None = None) -> None:
+        """Add what was found to the store, if that is asked for."""
+        if self._place is None or not self._wanted.keep:
             return
-        from mlg_troubleshoot.life.folding import warnings_of
-        from mlg_troubleshoot.workflows.keep import Kept, is_same, keep, supersede
+        from mlg_troubleshoot.workflows.keep import keep
 
-        if before is not None:
-            if not is_same(before, result):
-                supersede(self._place, before, result)
-            warnings = warnings_of(self._place, [(before.tail_no, before.side)])
-            added = Kept(1, 0, tuple(warnings))
-        else:
-            with stages(quiet=self._wanted.quiet) as bar:
-                progress = partial(bar, "Keeping")
-                added = keep(
-                    result,
-                    self._place,
-                    progress,
-                    judged,
-                    amend=self._wanted.amend,
-                )
+        with stages(quiet=self._wanted.quiet) as bar:
+            progress = partial(bar, "Keeping")
+            added = keep(result, self._place, progress, judged, amend=self._wanted.amend)
         if not self._wanted.quiet:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""

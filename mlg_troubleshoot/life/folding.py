@@ -178,8 +178,10 @@ class GearLife:
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """Place of each record in the order in which they were recorded, by its hash."""
-        return {record.digest: place for place, record in enumerate(self.records)}
+        """Place of each record in the order in which they were recorded, by its hash; a correction
+        stands in the place of what it corrects.
+        """
+        return _places(self.records)
 
     @cached_property
     def visits(self) -> tuple[GearVisit, ...]:
@@ -191,16 +193,6 @@ class GearLife:
             for event in self.events
             if isinstance(event, KeptInspection) or event.record.kind in _WORK
         )
-
-    def versions(self, last: Record) -> list[Record]:
-        """An inspection from its first entry to the given one."""
-        chain = [last]
-        for record in reversed(self.records):
-            if chain[-1].kind is not RecordKind.CORRECTION:
-                break
-            if record.key == chain[-1].body["supersedes"]:
-                chain.append(record)
-        return chain[::-1]
 
 
 def lives(
@@ -339,7 +331,7 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
         if (r.day, r.joints) not in known and r.record.body.get("stated_by") not in sound
     ]
     events: list[Event] = [*stated, *repairs, *kept.values()]
-    at = {record.digest: place for place, record in enumerate(records)}
+    at = _places(records)
     events.sort(key=lambda event: at[event.record.digest])
     moments = [event.moment for event in events]
     order = in_order(moments)
@@ -350,6 +342,16 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
         _disagreements(key, events, moments),
         overhauls([moments[place] for place in order]),
     )
+
+
+def _places(records: Iterable[Record]) -> dict[str, int]:
+    by_key: dict[str, int] = {}
+    found: dict[str, int] = {}
+    for place, record in enumerate(records):
+        is_correction = record.kind is RecordKind.CORRECTION
+        before = by_key.get(record.body["supersedes"]) if is_correction else None
+        found[record.digest] = by_key[record.key] = place if before is None else before
+    return found
 
 
 def first_keys(records: Iterable[Record]) -> dict[str, str]:

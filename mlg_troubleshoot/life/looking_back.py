@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from mlg_troubleshoot.decision.fleet import Fleet
+from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_from
+from mlg_troubleshoot.life.state import GearKey
+from mlg_troubleshoot.store import RecordKind, Store, inspection_from
 
 # Newest inspections that a fleet is judged by, which give a share to a few percent; fewest gears.
 _MOST = 500
@@ -18,9 +20,12 @@ def expected_of(store: Store, gear: Gear) -> Fleet | None:
     from mlg_troubleshoot.decision.learning import learned
 
     joints = set(gear.joint_numbers)
-    last: dict[tuple[str, str], Record] = {}
+    last: dict[GearKey, Inspection] = {}
     for record in store.newest(RecordKind.INSPECTION, _MOST):
-        last.setdefault((record.tail_no, record.side), record)
-    found = [inspection_from(record) for record in last.values()]
-    rows = [row for row in found if row.clearance_in and set(row.clearance_in) <= joints]
+        if (record.tail_no, record.side) not in last:
+            row = inspection_from(record)
+            # A visit at which no joint was read says nothing of wear.
+            if row.clearance_in and set(row.clearance_in) <= joints:
+                last[record.tail_no, record.side] = row
+    rows = [*last.values()]
     return learned(gear, rows) if len(rows) >= _FEWEST else None

@@ -240,6 +240,7 @@ class _Known:
     failed: list[_Event] = field(default_factory=list)
     retracted: list[_Event] = field(default_factory=list)
     repairs: list[_Event] = field(default_factory=list)
+    checked: list[_Event] = field(default_factory=list)
 
     def add(self, visit: GearVisit) -> None:
         row = visit.inspection
@@ -252,6 +253,8 @@ class _Known:
             _put(tried, _outcome_of(visit))
         if row.is_repaired:
             _put(self.repairs, _repair_of(visit))
+        if row.rigging_checked is RiggingCheck.YES:
+            _put(self.checked, _Event(visit, visit.at))
 
     def forget_replaced(self) -> None:
         """Let go what is replaced by what is later by its date, at every visit that follows."""
@@ -303,10 +306,11 @@ class _AsOf:
         changed = self._readings()
         plunger = self._plunger()
         outcome = self._outcome()
-        if plunger is not None and plunger.visit is not self._visit:
-            read = plunger.visit.inspection
-            changed["readings_in"] = read.readings_in
-            changed["plunger_gauge_u_in"] = read.plunger_gauge_u_in
+        if plunger is not None and (readings := self._repeated(plunger)) != row.readings_in:
+            changed["readings_in"] = readings
+            changed["plunger_gauge_u_in"] = plunger.visit.inspection.plunger_gauge_u_in
+        if row.rigging_checked is None and self._is_rigging_checked():
+            changed["rigging_checked"] = RiggingCheck.YES
         if outcome is not None and outcome.visit is not self._visit:
             changed["outcome"] = outcome.visit.inspection.outcome
         changed |= self._in_order(plunger, outcome)
@@ -375,6 +379,8 @@ class _AsOf:
         clearance = {j: value for j, value in row.clearance_in.items() if j not in gone}
         entered = {j: text for j, text in row.entered.items() if j not in gone}
         gauge_u = {j: u for j, u in row.gauge_u_by_joint_in.items() if j not in gone}
+        again = {*row.measured_again}
+        questions = dict.fromkeys([row.unit_question] * bool(row.unit_question))
         for joint, event in taken.items():
             read = event.visit.inspection
             clearance[joint] = event.value
@@ -382,11 +388,20 @@ class _AsOf:
                 entered[joint] = read.entered[joint]
             if (u := read.gauge_u_of(joint)) != row.gauge_u_in:
                 gauge_u[joint] = u
+            again.update({joint}.intersection(read.measured_again))
+            if read.unit_question:
+                questions[read.unit_question] = None
             self._older.append(event.fact(FactKind.READING, joint, event.value))
         if taken:
             listed = Sentence.joined((fact.words for fact in self._older), ", ")
             self._said.append(Sentence.of("Readings of other visits stand as well: {}.", listed))
-        return {"clearance_in": clearance, "entered": entered, "gauge_u_by_joint_in": gauge_u}
+        return {
+            "clearance_in": clearance,
+            "entered": entered,
+            "gauge_u_by_joint_in": gauge_u,
+            "measured_again": tuple(sorted(again)),
+            "unit_question": " ".join(questions),
+        }
 
     def _plunger(self) -> _Event | None:
         """The plunger reading that stands; one that a repair replaced where nobody has tried the
@@ -414,6 +429,28 @@ class _AsOf:
         self._older += facts
         self._said.append(Sentence.of("The plunger reading of another visit stands: {}.", listed))
         return event
+
+    def _repeated(self, event: _Event) -> tuple[float, ...]:
+        """Plunger readings of a visit, after those that were typed earlier on its day without a
+        repair between them. [in]
+        """
+        together = [
+            e
+            for e in self._counting(self._known.plunger)
+            if event.visit.typed and e.visit.typed and e.at == event.at and _is_later(event, e)
+            if not any(_is_later(r, e) and not _is_later(r, event) for r in self._repairs)
+        ]
+        together.append(event)
+        read = [(e, each) for e in together for each in e.visit.inspection.readings_in]
+        if len(together) > 1 and self._is_own(event):
+            self._older += [e.fact(FactKind.PLUNGER, None, each) for e, each in read]
+        return tuple(each for _event, each in read)
+
+    def _is_rigging_checked(self) -> bool:
+        """Whether the rigging was looked at since the failure that stands."""
+        failed = [e for e in self._counting(self._known.failed) if not self._is_settled(e)]
+        checked = self._counting(self._known.checked)
+        return bool(failed) and any(not _is_later(failed[0], e) for e in checked)
 
     def _is_beyond(self, event: _Event) -> bool:
         return _is_beyond(event.visit.inspection.readings_in, self._row, self._gear)
@@ -458,6 +495,7 @@ class _AsOf:
         since += [
             r for r in others if r not in since and any(_is_later(r, e) for e in dated.values())
         ]
+        since += [r for r in others if r not in since and self._is_closed_by(outcome, r)]
         if own is not None:
             since = [r for r in since if self._now and _is_later(r, own)]
         if not since:
@@ -471,6 +509,14 @@ class _AsOf:
             changed["rigging_checked"] = RiggingCheck.CORRECTED
         self._say_repairs([r for r in since if not _is_later(self._at, r)])
         return changed | {name: _place(e, since, day) for name, e in dated.items()}
+
+    def _is_closed_by(self, outcome: _Event | None, repair: _Event) -> bool:
+        """Whether this visit is the first at which a gear that had failed retracted after its
+        repair.
+        """
+        first = [e for e in self._retracted if _is_later(e, repair)][:1]
+        is_own = outcome is not None and first == [outcome] and self._is_own(outcome)
+        return is_own and any(_is_later(repair, failed) for failed in self._known.failed)
 
     def _say_repairs(self, repairs: Sequence[_Event]) -> None:
         """Name repairs that may be later than this visit."""

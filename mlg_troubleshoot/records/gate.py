@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from datetime import datetime
+from datetime import date
 from numbers import Real
 
 from mlg_troubleshoot.decision.columns import (
@@ -24,7 +24,6 @@ from mlg_troubleshoot.decision.inspection import (
     Inspection,
     InvalidRow,
     RowSource,
-    Side,
 )
 from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
@@ -107,13 +106,18 @@ def judge_text(label: str, text: str, remedy: str) -> None:
         raise UsageError(f"{label} {text!r} is not a text", fault.remedy) from None
 
 
-def made_record_id(tail_no: str | None, side: Side | None, at: datetime) -> str:
-    """The id of an inspection that was entered by hand without one, by flags or at the prompts."""
-    return f"{tail_no}-{side}-{at:%Y%m%d-%H%M%S}"
+def made_record_id(inspection: Inspection) -> str:
+    """The id of a visit that was entered by hand without one, by flags or at the prompts: its gear
+    and its day.
+    """
+    day = inspection.inspection_date or date.today()
+    return f"{inspection.tail_no}-{inspection.side}-{day:%Y%m%d}"
 
 
-def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:
-    """Judge an inspection made in Python.
+def judge_again(
+    inspection: Inspection, options: ReadOptions, changes: Mapping[str, str] | None = None
+) -> Inspection:
+    """Judge an inspection made in Python, or one with other texts in some columns.
 
     Without `entered` its clearances and their uncertainties are readings in its convention, as in a
     table; with it they were read before and are radial. Numbers are inches.
@@ -122,19 +126,24 @@ def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:
     factor = given.convention.per_radial if given.entered and given.convention is not None else 1.0
     values = cells_of(given, options.joints, factor)
     required = [column.name for column in IDENTITY]
-    read = admit(
-        {name: value for name, value in values.items() if value is not None or name in required},
-        options,
-    )
+    changed = changes or {}
+    stays = {
+        name: value
+        for name, value in values.items()
+        if (value is not None or name in required) and name.removesuffix("_in") not in changed
+    }
+    read = admit(stays | {name: text for name, text in changed.items() if text}, options)
+    kept = {n: e for n, e in given.entered.items() if CLEARANCE.header(n) not in changed}
+    carried = {name: text for name, text in given.carried.items() if name not in changed}
     return replace(
         read,
-        entered=given.entered or read.entered,
+        entered={n: kept.get(n, e) for n, e in read.entered.items()},
         # Numbers are inches here: what was asked about the unit of the entry stands until it is
         # confirmed.
         unit_question=(
             "" if given.small_readings_true else given.unit_question or read.unit_question
         ),
-        carried=given.carried,
+        carried={**carried, **read.carried},
         warnings=tuple(dict.fromkeys((*given.warnings, *read.warnings))),
         source=given.source,
     )

@@ -184,6 +184,12 @@ def check_inspection(
     return _judge(found, [inspection], options, store=store)
 
 
+def check_gear(state: GearState, options: CheckOptions, store: Store) -> CheckResult:
+    """Judge what stands of a gear after all of its visits."""
+    found = CheckResult(gear=load_gear(options.gear), judgements=())
+    return _judge(found, [state.inspection], options, store=store, counting=[state])
+
+
 @overload
 def check(
     inspection: Inspection,
@@ -384,8 +390,11 @@ def _judge(
     on_judged: Progress | None = None,
     store: Store | None = None,
     outputs: Callable[[CheckResult, int], Sequence[BlockOutput]] | None = None,
+    counting: list[GearState | None] | None = None,
 ) -> CheckResult:
-    """Judge rows; the list is empty afterwards."""
+    """Judge rows, of gears whose state is `counting` if it is given; the list is empty
+    afterwards.
+    """
     if found.read is not None:
         blank = [
             n for n, row in enumerate(rows) if isinstance(row, Inspection) and row.says_nothing
@@ -394,8 +403,9 @@ def _judge(
             rows[:] = [row for n, row in enumerate(rows) if n not in set(blank)]
             found = replace(found, notes=(*found.notes, _set_aside(len(blank))))
     total = len(rows)
-    kept = _kept_visits(rows, store)
-    counting = _states(rows, found.gear, kept, typed=found.read is None)
+    if counting is None:
+        kept = _kept_visits(rows, store)
+        counting = _states(rows, found.gear, kept, typed=found.read is None)
     if total > 1:
         found = replace(found, notes=(*found.notes, *other_visits_count(counting)))
     blocks = [slice(start, start + AT_ONCE) for start in range(0, total, AT_ONCE)]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date
+from datetime import date, datetime
+from itertools import chain, count
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
@@ -16,9 +17,11 @@ from mlg_troubleshoot.decision.inspection import (
     surely_later,
 )
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import as_spelt, find, is_readable, warnings_of
 from mlg_troubleshoot.life.state import GearKey, key_of
 from mlg_troubleshoot.parallel import Progress
+from mlg_troubleshoot.records import ReadOptions, judge_again, made_record_id
 from mlg_troubleshoot.records.rows import is_made_for_row
 from mlg_troubleshoot.store import (
     NOT_CONTENT,
@@ -300,14 +303,6 @@ def correct(store: Store, wrong: Record, result: CheckResult) -> Record:
     return supersede(store, wrong, result)
 
 
-def is_same(kept: Record, result: CheckResult) -> bool:
-    """Whether a check found what is kept already."""
-    return all(
-        isinstance(j, Assessment) and same_inspection(kept, inspection_record(j.inspection))
-        for j in result.judgements
-    )
-
-
 def supersede(store: Store, wrong: Record, result: CheckResult) -> Record:
     """Append what takes the place of a kept inspection."""
     (judged,) = (j for j in result.judgements if isinstance(j, Assessment))
@@ -359,12 +354,43 @@ def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
     return store.known([moved.identity_hash])[moved.identity_hash]
 
 
-def moved_where_corrected(store: Store, digest: str, row: Inspection) -> str:
-    """The hash of a kept inspection that is continued, moved if its tail or side was corrected."""
-    found = [r for r in store.all() if r.digest == digest]
-    if not found or key_of(row) == (found[0].tail_no, found[0].side):
-        return digest
-    return move(store, found[0], key_of(row), "tail or side corrected at the prompts").digest
+def add_typed(store: Store, typed: Sequence[Inspection], since: datetime) -> list[str]:
+    """Add visits of one gear that were typed one after the other, all or none, under ids made of
+    its day; without what was kept `since` a moment by a program that ended before it said so. The
+    records of the gear that disagree now are returned.
+    """
+    tails = as_spelt([typed[0].tail_no], store)
+    rows = [replace(row, tail_no=tails[row.tail_no]) for row in typed]
+    own = [r for r in store.of_gear(*key_of(rows[0])) if r.kind is RecordKind.INSPECTION]
+    at = since.astimezone()
+    kept = {content_of(r) for r in own if r.recorded_at and at <= _moment(r.recorded_at)}
+    used = {record.record_id for record in own}
+    new = []
+    for row in rows:
+        made = made_record_id(row)
+        names = chain([made], (f"{made}-{number}" for number in count(2)))
+        record = inspection_record(replace(row, record_id=next(n for n in names if n not in used)))
+        if content_of(record) not in kept:
+            new.append(record)
+            used.add(record.record_id)
+    store.add(new)
+    return warnings_of(store, [key_of(rows[0])])
+
+
+def _moment(recorded_at: str) -> datetime:
+    return datetime.fromisoformat(recorded_at).astimezone()
+
+
+def amend(store: Store, gear: Gear, wrong: Record, changes: Mapping[str, str]) -> Record:
+    """Append an inspection with other texts in some columns; the one before stays readable."""
+    if wrong.kind not in _ENTERED:
+        raise UsageError(f"record {wrong.record_id!r} is a {wrong.kind}", "Give an inspection.")
+    right = judge_again(inspection_from(wrong), ReadOptions.of(gear), changes)
+    record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.key)
+    if content_of(record) == content_of(wrong):
+        raise UsageError(f"{wrong.record_id} says that already", "Give another value.")
+    store.add([record])
+    return record
 
 
 def _former_repair(wrong: Record, right: Inspection) -> list[Record]:

@@ -4,7 +4,7 @@ from mlg_troubleshoot.cli.prompts.ask import Asker, EntryInterruptedError
 from mlg_troubleshoot.cli.prompts.drafts import SavedEntries
 from mlg_troubleshoot.cli.prompts.entry import Entry
 from mlg_troubleshoot.cli.prompts.terminal import Terminal
-from mlg_troubleshoot.cli.prompts.visit import Visit, find_visit, reading_order, with_sitting
+from mlg_troubleshoot.cli.prompts.visit import Visit, continued, find_visit, reading_order
 
 __all__ = [
     "Asker",
@@ -13,7 +13,7 @@ __all__ = [
     "SavedEntries",
     "Terminal",
     "Visit",
+    "continued",
     "find_visit",
     "reading_order",
-    "with_sitting",
 ]

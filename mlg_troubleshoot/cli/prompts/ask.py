@@ -132,6 +132,7 @@ class Asker:
         for message in damaged:
             self._once(message)
         self._known = None
+        self._day = ""
         self.entry = Entry.new(self.gear, dict(given))
         with self._interrupted():
             if not {*HEADING[:2]} <= given.keys():
@@ -142,10 +143,11 @@ class Asker:
 
     def follow(self, visit: Visit) -> Entry | Visit | str:
         """Ask for what follows a result: another entry, another gear, or a word for what to show;
-        empty for the end.
+        empty for the end. An entry without a finding corrects the last one.
         """
         self._known = visit
-        keys = ["y = I did NEXT"] * bool(visit.todo) + ["d = details", "report"]
+        day = f" on {self._day}" * bool(self._day)
+        keys = [f"y = I did NEXT{day}"] * bool(visit.todo) + ["d = details", "report"]
         keys += [f"u = undo {visit.undoes}"] * bool(visit.undoes)
         self._say("   ".join([*keys, "new", "gear", "?"]), "dim")
         while True:
@@ -174,6 +176,8 @@ class Asker:
                 self._say(f"   {typed!r} is not understood. Type ? for the words.", "magenta")
             elif self.entry.typed == [DATE.name]:
                 self._day = self.entry.cells[DATE.name]
+            elif self.entry.typed and not (self.entry.has_findings or self._jump):
+                return self.entry
             else:
                 with self._interrupted():
                     self._save()
@@ -203,8 +207,7 @@ class Asker:
     def _resume(self, saved: Entry) -> None:
         self.saved.discard(self.entry.id)
         self.entry = saved
-        if saved.continues:
-            self._known = self.visit(*saved.gear_key)
+        self._known = self.visit(*saved.gear_key)
         read = sum(bool(text) for name, text in saved.cells.items() if joint_of(name))
         self._say(
             f"Continued: {saved.identity}, begun {saved.started:%Y-%m-%d %H:%M}, {read} joints"
@@ -219,10 +222,9 @@ class Asker:
             cells[DATE.name] = self._day
         if word == "new":
             return Entry.new(self.gear, cells)
-        todo = [*visit.todo] if word == "y" else []
         cells |= {UNIT.name: visit.row.unit_entered.value, CONVENTION.name: visit.row.convention}
         cells |= self.saved.offered()
-        return Entry.new(self.gear, cells, todo=todo, continues=visit.record.digest)
+        return Entry.new(self.gear, cells, [*visit.todo] if word == "y" else [])
 
     def _ask_all(self) -> Entry:
         """Ask what is open, then confirm what is unusual; the entry is complete."""
@@ -240,6 +242,8 @@ class Asker:
                     raise
                 self._undo()
             else:
+                # What is typed next was found on that day as well.
+                self._day = self.entry.cells.get(DATE.name, self._day)
                 return self.entry
 
     def _open(self) -> str:
@@ -508,7 +512,7 @@ class Asker:
 
     def _unusual(self) -> str:
         """What is unusual and not confirmed, in one line."""
-        if self.entry.todo is None and not self.entry.has_findings:
+        if not self.entry.has_findings and self.entry.todo is None:
             return "nothing was read and no outcome is stated: there is nothing to judge."
         if SMALL_READINGS_TRUE.name in self.entry.cells:
             return ""

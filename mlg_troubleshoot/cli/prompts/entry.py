@@ -81,17 +81,18 @@ _WORD = re.compile(rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w)[\s=:]*", re.IGN
 _NEXT_WORD = re.compile(rf"(?<![\w#])(?:{_NAMES})(?!\w)", re.IGNORECASE)
 _NEXT_JOINT = re.compile(rf"{_NEXT_WORD.pattern}|#", re.IGNORECASE)
 # The day of a part of an entry that has its own.
+_REPAIR = (RESTORED_JOINTS.name, RIGGING_CHECKED.name)
+_FACTS = (OUTCOME.name, PLUNGER, *_REPAIR)
 DAY_OF = {RESTORED_JOINTS.name: REPAIR_DATE, PLUNGER: "plunger_date", OUTCOME.name: "outcome_date"}
 
 _FOR_DAYS = ReadOptions(unit=LengthUnit.INCH, convention=ClearanceConvention.RADIAL)
 
 
-class Entry(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+class Entry(msgspec.Struct, kw_only=True):
     """The answers of one sitting as they were typed, in the order in which they came.
 
     A column that was asked for and not answered has an empty text. `todo`: the columns that NEXT
-    asks for, None for a new inspection; `given`: the columns that were not typed here;
-    `continues`: the hash of the kept inspection that this adds to.
+    asks for, None for a new inspection; `given`: the columns that were not typed here.
     """
 
     id: str
@@ -101,17 +102,12 @@ class Entry(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     given: list[str] = []
     todo: list[str] | None = None
     confirmed: list[str] = []
-    continues: str = ""
 
     @classmethod
-    def new(cls, gear: Gear, cells: dict[str, str], **more: list[str] | str) -> Entry:
+    def new(cls, gear: Gear, cells: dict[str, str], todo: list[str] | None = None) -> Entry:
         started = datetime.now()
         name = f"{started:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
-        return msgspec.convert(
-            {"id": name, "gear": gear.id, "started": started, "cells": cells}
-            | {"given": [*cells], **more},
-            cls,
-        )
+        return cls(id=name, gear=gear.id, started=started, cells=cells, given=[*cells], todo=todo)
 
     @property
     def unit(self) -> LengthUnit:
@@ -137,8 +133,7 @@ class Entry(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     @property
     def has_findings(self) -> bool:
         """Whether a reading, an outcome or work was typed."""
-        facts = (OUTCOME.name, PLUNGER, RESTORED_JOINTS.name, RIGGING_CHECKED.name)
-        return any(text for name, text in self.cells.items() if name in facts or joint_of(name))
+        return any(text for name, text in self.cells.items() if name in _FACTS or joint_of(name))
 
     @property
     def day(self) -> date:
@@ -179,9 +174,12 @@ class Entry(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 
     def row(self) -> dict[str, object]:
         """The answers as the cells of one row; each length stands under its own unit."""
-        cells: dict[str, object] = {RECORD_ID.name: self.id, DATE.name: self.day.isoformat()}
-        # Where nothing was read it says nothing.
-        cells[CONVENTION.name] = self.convention.value
+        # The convention says nothing where nothing was read.
+        cells: dict[str, object] = {
+            RECORD_ID.name: self.id,
+            DATE.name: self.day.isoformat(),
+            CONVENTION.name: self.convention.value,
+        }
         for name, text in self.cells.items():
             if name == PLUNGER and text:
                 for number, each in enumerate(text.split(";"), 1):
@@ -200,10 +198,37 @@ class Entry(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     def inspection(self, gear: Gear) -> Inspection:
         """What was typed, as one inspection."""
         read = admit(self.row(), ReadOptions.of(gear, asks=True))
-        if not self.confirmed:
+        names = ", ".join(f"#{joint_of(name)}" for name in self.confirmed if name in self.cells)
+        if not names:
             return read
-        names = ", ".join(f"#{joint_of(name)}" for name in self.confirmed)
         return replace(read, warnings=(*read.warnings, f"asked again and confirmed: {names}"))
+
+    def visits(self, gear: Gear) -> list[Inspection]:
+        """What was typed, as visits: what was found before a repair, the repair, and what was found
+        after it.
+        """
+        names = [*self.cells]
+        repair = [name for name in _REPAIR if self.cells.get(name) not in (None, "", "yes", "no")]
+        if not repair:
+            return [self.inspection(gear)]
+        last = max(map(names.index, repair))
+        done = self.cells.get(REPAIR_DATE) or self.day.isoformat()
+        facts = {name for name in names if joint_of(name) or name in (*_FACTS, *DAY_OF.values())}
+        found = facts - {*repair, REPAIR_DATE}
+        before = {name for name in found if names.index(name) < last}
+        parts = (
+            ({*before}, self.day.isoformat()),
+            ({*repair, REPAIR_DATE}, done),
+            (found - before, max(done, self.day.isoformat())),
+        )
+        rows = []
+        for own, day in parts:
+            cells = {n: text for n, text in self.cells.items() if n in own or n not in facts}
+            cells |= {DATE.name: day} | ({REPAIR_DATE: done} if REPAIR_DATE in own else {})
+            part = msgspec.structs.replace(self, cells=cells)
+            if part.has_findings:
+                rows.append(part.inspection(gear))
+        return rows
 
     def take(self, gear: Gear, words: Sequence[tuple[str, str]]) -> list[str]:
         """Take columns and their texts, all or none; the columns that were given are returned."""
