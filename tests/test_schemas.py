@@ -168,11 +168,9 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any
         wrong = row(record_id="N1-9", tail_no="N1", inspection_date="2024-03-20")
         run("check", table(folder, wrong), "--keep")
         run("history", "void", "N1-9", "--why", "another gear")
-        right = row(record_id="N1-2", tail_no="N1", inspection_date="2024-03-10")
-        run("history", "correct", "N1-2", table(folder, right))
+        run("history", "amend", "N1-2", "3=0.001in")
         work = ("--date", "2024-02-12", "--work-order", "W7")
         run("history", "repair", "N1", "LH", "--joint", "3", *work, "--landings", "410")
-        run("history", "rerig", "N1", "LH", *work)
         yield run
 
 

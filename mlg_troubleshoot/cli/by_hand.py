@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,7 @@ from mlg_troubleshoot.decision.columns import (
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.ranking import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
+from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.state import GearState, key_of
 from mlg_troubleshoot.units import LengthUnit
@@ -39,24 +40,18 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
     """Let the judge of table rows judge the flags; a refusal names the flag. An id that was made
     is free in the store.
     """
-    from mlg_troubleshoot.records import ReadOptions, admit, headers, made_record_id
+    from mlg_troubleshoot.records import ReadOptions, admit, made_record_id
 
-    options = ReadOptions.of(load_gear(declared.gear), declared)
+    gear = load_gear(declared.gear)
+    options = ReadOptions.of(gear, declared)
     own = {TAIL_NO.name: ("--tail", flags.tail), SIDE.name: ("--side", flags.side)}
     values = {column: text for column, (_, text) in own.items() if text is not None}
     labels = {column: f"{own[column][0]} {text!r}" for column, text in values.items()}
-    for pair in flags.values or ():
-        name, sign, text = pair.partition("=")
-        if not sign or not text.strip():
-            raise UsageError(
-                f"--set {pair!r} is not COLUMN=VALUE",
-                "Write for example --set 3=0.013in or --set outcome=FAILED.",
-            )
-        column = headers.column_named(name, options.joints)
-        if column in values:
-            raise UsageError(f"--set gives {column} twice", "Give each column once.")
-        values[column] = text
-        labels[column] = f"--set {pair!r}"
+    given = named_cells(flags.values or (), gear, "--set ")
+    if both := values.keys() & given:
+        raise UsageError(f"--set gives {both.pop()} twice", "Give each column once.")
+    labels |= {column: f"--set {column}={text!r}" for column, text in given.items()}
+    values |= given
     known = {*values, *([CONVENTION.name] if declared.convention else [])}
     needed = {TAIL_NO.name: "--tail", SIDE.name: "--side", CONVENTION.name: "--convention"}
     missing = [flag for column, flag in needed.items() if column not in known]
@@ -75,6 +70,26 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
     from mlg_troubleshoot.workflows.keep import under_a_free_id
 
     return under_a_free_id(read, place)
+
+
+def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, str]:
+    """Texts by column of COLUMN=VALUE, the columns by their own or their short names."""
+    from mlg_troubleshoot.records import ReadOptions, headers
+
+    joints = ReadOptions.of(gear).joints
+    values: dict[str, str] = {}
+    for pair in pairs:
+        name, sign, text = pair.partition("=")
+        if not sign or (flag and not text.strip()):
+            raise UsageError(
+                f"{flag}{pair!r} is not COLUMN=VALUE",
+                f"Write for example {flag}3=0.013in or {flag}outcome=FAILED.",
+            )
+        column = headers.column_named(name, joints)
+        if column in values:
+            raise UsageError(f"{flag}{column} is given twice", "Give each column once.")
+        values[column] = text.strip()
+    return values
 
 
 def given_cells(flags: Flags, declared: task.CheckOptions) -> dict[str, str]:

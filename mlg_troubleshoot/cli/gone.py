@@ -66,6 +66,8 @@ GONE = {
     "study --n2": "--size N1,N2,ITERATIONS sets the size of a paper design",
     "study --iterations": "--size N1,N2,ITERATIONS sets the size of a paper design",
     "history outcome": "repairs, readings and outcomes are kept as they are found",
+    "history correct": "mlg history amend RECORD COLUMN=VALUE, or --keep --amend with the table",
+    "history rerig": "rigging corrected at the prompts, or the column rigging_checked",
     "gear survey": "survey(readings, gear) in Python: docs/how-to/measured-gear.md",
     "gear separable": "a diagnosis says what would split its set of causes (mlg diagnose)",
     "gear new": "write the gear file: docs/how-to/own-gear.md shows a short one",

@@ -317,69 +317,35 @@ def repair(
     """Record joints that were restored: their wear starts again."""
     from mlg_troubleshoot.decision.sentences import joint_list
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.store import RecordKind
     from mlg_troubleshoot.workflows import history
 
     load_gear(records.gear).require_joints(joints, "--joint")
     restored = sorted(set(joints))
     place = records.kept
-    record = history.work(
-        place, RecordKind.REPAIR, (tail, side), day, work_order, landings, restored
-    )
+    record = history.repair(place, (tail, side), restored, day, work_order, landings)
     listed = joint_list(restored)
     _say_added(place, f"repair of {record.tail_no} {record.side}, {listed}", record)
 
 
 @options.flat
-def rerig(
-    *,
-    tail: Tail,
-    side: Side,
-    day: Day,
-    landings: Landings = None,
-    work_order: WorkOrder = None,
-    records: options.Records,
-) -> None:
-    """Record that the reversing valve was re-rigged; the wear of the joints continues."""
-    from mlg_troubleshoot.store import RecordKind
-    from mlg_troubleshoot.workflows import history
-
-    place = records.kept
-    gear_key = (tail, side)
-    record = history.work(
-        place,
-        RecordKind.RERIG,
-        gear_key,
-        day,
-        work_order,
-        landings,
-    )
-    _say_added(place, f"re-rigging of {record.tail_no} {record.side}", record)
-
-
-@options.flat
-def correct(
+def amend(
     *,
     record: RecordId,
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A table with the corrected inspection.")
+    values: Annotated[
+        list[str], typer.Argument(metavar="COLUMN=VALUE", help="E.g. 3=0.013in, landings=4000.")
     ],
     records: options.Records,
-    unit: options.Unit = None,
-    convention: options.Convention = None,
-    sheet: options.Sheet = None,
 ) -> None:
-    """Append a corrected inspection. The wrong one stays in the chain but no longer counts."""
-    from mlg_troubleshoot.cli.views import notes
+    """Correct values of an inspection; nothing behind = clears one. The old ones stay readable."""
+    from mlg_troubleshoot.cli.by_hand import named_cells
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.life.folding import find
     from mlg_troubleshoot.workflows import keep
-    from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 
-    asked = CheckOptions(gear=records.gear, unit=unit, convention=convention, sheet=sheet)
-    result = check_files([file], asked)
+    gear = load_gear(records.gear)
     place = records.kept
-    wrong, result = keep.row_of(place, record, result)
-    notes.show_problems(result.problems)
-    added = keep.correct(place, wrong, result)
+    changes = named_cells(values, gear)
+    added = keep.amend(place, gear, find(place, record), changes)
     _say_added(place, f"correction of {record} ({added.tail_no} {added.side})", added)
 
 
@@ -492,6 +458,6 @@ app = options.commands(
     epilog=EPILOG,
 )
 app.command(_SHOW, hidden=True)(show)
-for command in (repair, rerig, correct, void, move, verify, export):
+for command in (repair, amend, void, move, verify, export):
     app.command()(command)
 app.command("import")(import_chain)

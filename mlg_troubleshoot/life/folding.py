@@ -413,7 +413,7 @@ def _disagreements(
         if any(events[place].record.kind in _WORK for place in places):
             remedy += ", then mlg history repair"
         else:
-            remedy = f"mlg history correct {record} FILE, or {remedy}"
+            remedy = f"mlg history amend {record} COLUMN=VALUE, or {remedy}"
         gear = " ".join(key)
         warnings.append(
             f"{gear}: {sentence}. No forecast until this is corrected: {remedy}. After an overhaul"

@@ -414,7 +414,7 @@ def column_named(name: str, joints: Joints) -> str:
     if found.field is None:
         text = _snake(found.nearest or text)
         raise UsageError(
-            f"--set: {name!r} is not a column of the inspection table",
+            f"{name!r} is not a column of the inspection table",
             f"Give a joint or a column.{nearest(text, [*_SHORT, *_columns_like(text, joints)])}",
         )
     return found.field.name

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from datetime import date, datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -237,18 +237,15 @@ def _spelling(tail: str) -> str:
     return re.sub(r"[\s-]", "", tail).upper()
 
 
-def work(
+def repair(
     store: Store,
-    kind: RecordKind,
     gear: GearKey,
+    joints: Sequence[int],
     day: date | str,
-    work_order: str | None,
+    work_order: str | None = None,
     landings: float | str | None = None,
-    joints: Sequence[int] | None = None,
 ) -> Record:
-    """Record that joints were restored, or the reversing valve re-rigged: the joints wear on, the
-    plunger moved.
-    """
+    """Record that joints were restored."""
     key = _as_kept(store.gears(), key_of(*gear))
     given = {"inspection_date": day, "gear_landings": landings, "work_order": work_order}
     flags = {
@@ -262,10 +259,11 @@ def work(
     if done is None:
         raise UsageError(f"{labels['inspection_date']} is not a date", "Give the date of the work.")
     life_of(store, *key)
-    body: dict[str, Any] = {"landings": row.gear_landings, "work_order": work_order}
-    if joints is not None:
-        body["joints"] = list(joints)
-    return _added(store, Record(kind, work_order or "", *key, done.isoformat(), packed(body)))
+    body = {"landings": row.gear_landings, "work_order": work_order, "joints": list(joints)}
+    kind = RecordKind.REPAIR
+    record = Record(kind, work_order or "", *key, done.isoformat(), packed(body))
+    store.add([record])
+    return record
 
 
 def void(store: Store, record_id: str, why: str) -> Record:
@@ -290,11 +288,6 @@ def _unreadable(store: Store, digest: str) -> Record | None:
         return None
     found = [record for record in store.all() if record.digest.startswith(digest.lower())]
     return found[0] if len(found) == 1 and not is_readable(found[0]) else None
-
-
-def _added(store: Store, record: Record) -> Record:
-    store.add([record])
-    return record
 
 
 def import_file(store: Store, file: Path) -> Added:

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date, datetime
+from datetime import datetime
 from itertools import chain, count
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
+from mlg_troubleshoot.decision.columns import RECORD_ID, SIDE, TAIL_NO
 from mlg_troubleshoot.decision.inspection import (
     Inspection,
-    RiggingCheck,
-    RowSource,
     Side,
-    surely_later,
 )
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import as_spelt, find, is_readable, warnings_of
+from mlg_troubleshoot.life.folding import as_spelt, is_readable, warnings_of
 from mlg_troubleshoot.life.state import GearKey, key_of
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records import ReadOptions, judge_again, made_record_id
@@ -272,52 +270,6 @@ def under_a_free_id(made: Inspection, store: Store) -> Inspection:
     return free
 
 
-def row_of(store: Store, record_id: str, result: CheckResult) -> tuple[Record, CheckResult]:
-    """The record that is wrong, and what a check found of the row that is to take its place: the
-    only one of a table, or that with its id and gear.
-    """
-    wrong = find(store, record_id)
-    if len(result.judgements) == 1:
-        return wrong, result
-    of_wrong = wrong.record_id, wrong.tail_no, wrong.side
-    own: list[Judgement] = []
-    places: list[RowSource] = []
-    for judged in result.judgements:
-        row = judged.inspection if isinstance(judged, Assessment) else judged.row
-        if of_wrong == (row.record_id, row.tail_no, row.side):
-            own.append(judged)
-            places.append(row.source)
-    problems = [p for p in result.problems if RowSource(p.file, p.sheet, p.row) in places]
-    return wrong, replace(result, judgements=tuple(own), problems=tuple(problems))
-
-
-def correct(store: Store, wrong: Record, result: CheckResult) -> Record:
-    """Append the right inspection for a wrong one; the wrong one stays readable in the chain."""
-    judged = [j for j in result.judgements if isinstance(j, Assessment)]
-    if len(judged) != 1 or len(result.judgements) != 1:
-        raise UsageError(
-            f"a correction needs one valid inspection {wrong.record_id} of {wrong.tail_no}"
-            f" {wrong.side}, and the file has {len(judged)}",
-            "Give a file with the corrected row alone, or a table in which it has this record_id.",
-        )
-    return supersede(store, wrong, result)
-
-
-def supersede(store: Store, wrong: Record, result: CheckResult) -> Record:
-    """Append what takes the place of a kept inspection."""
-    (judged,) = (j for j in result.judgements if isinstance(j, Assessment))
-    right = judged.inspection
-    if (right.tail_no, right.side.value) != (wrong.tail_no, wrong.side):
-        raise UsageError(
-            f"the correction is for {right.tail_no} {right.side}, the record for {wrong.tail_no}"
-            f" {wrong.side}",
-            "Void the record (mlg history void) and keep the corrected one: mlg check FILE --keep",
-        )
-    record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.key)
-    store.add([*_former_repair(wrong, right), record])
-    return record
-
-
 def with_its_repairs(store: Store, record: Record) -> list[Record]:
     """A record, and the repairs that 0.2.0 kept beside the inspection that states them."""
     own = store.of_gear(record.tail_no, record.side)
@@ -385,31 +337,14 @@ def amend(store: Store, gear: Gear, wrong: Record, changes: Mapping[str, str]) -
     """Append an inspection with other texts in some columns; the one before stays readable."""
     if wrong.kind not in _ENTERED:
         raise UsageError(f"record {wrong.record_id!r} is a {wrong.kind}", "Give an inspection.")
+    if gear_columns := changes.keys() & {RECORD_ID.name, TAIL_NO.name, SIDE.name}:
+        raise UsageError(
+            f"{gear_columns.pop()} is not a value of an inspection",
+            "mlg history move RECORD TAIL SIDE moves it to another gear.",
+        )
     right = judge_again(inspection_from(wrong), ReadOptions.of(gear), changes)
     record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.key)
     if content_of(record) == content_of(wrong):
         raise UsageError(f"{wrong.record_id} says that already", "Give another value.")
     store.add([record])
     return record
-
-
-def _former_repair(wrong: Record, right: Inspection) -> list[Record]:
-    """The repair that a kept inspection states, where what takes its place states a later one."""
-    was = inspection_from(wrong)
-    if not was.is_repaired or not surely_later(right.repair_date, was.repair_date):
-        return []
-    at = was.repair_date
-    body = {"landings": None, "work_order": None, "stated_by": was.record_id, "at": _text(at)}
-    kinds = {
-        RecordKind.REPAIR: {"joints": sorted(was.restored_joints)} if was.restored_joints else None,
-        RecordKind.RERIG: {} if was.rigging_checked is RiggingCheck.CORRECTED else None,
-    }
-    return [
-        Record(kind, "", *key_of(was), _text(at)[:10], packed(body | more))
-        for kind, more in kinds.items()
-        if more is not None
-    ]
-
-
-def _text(at: date | None) -> str:
-    return "" if at is None else at.isoformat()

@@ -71,8 +71,7 @@ LIFE = (
         "--store",
         STORE,
     ),
-    ("history", "rerig", "N1", "LH", "--date", "2026-03-07", "--store", STORE),
-    ("history", "correct", "R2", "right.csv", "--store", STORE),
+    ("history", "amend", "R2", "landings=2102", "--store", STORE),
     ("history", "void", "R3", "--why", "wrong gear", "--store", STORE),
     ("history", "export", "old-chain.jsonl", "--store", STORE),
 )

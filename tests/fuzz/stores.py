@@ -42,9 +42,8 @@ READS = (
 ADDS = (
     ["history", "import", "chain.jsonl"],
     ["history", "repair", "N1", "LH", "--joint", "5", "--date", "2026-04-01"],
-    ["history", "rerig", "N1", "LH", "--date", "2026-04-01", "--landings", "2200"],
     ["history", "void", "R1", "--why", "wrong"],
-    ["history", "correct", "R1", "in.csv"],
+    ["history", "amend", "R1", "landings=2200"],
     ["check", "in.csv", "-q", "--keep"],
     ["check", "outside.csv", "-q", "--keep", "--report", "pages", "--format", "html"],
 )

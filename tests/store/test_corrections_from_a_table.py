@@ -1,5 +1,5 @@
-"""A table whose cells were corrected comes back: what is kept already stands once, and a record is
-corrected with the table itself.
+"""A table whose cells were corrected comes back: what is kept already stands once, and the table is
+settled as a whole.
 """
 
 from __future__ import annotations
@@ -45,19 +45,14 @@ def keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Keep:
     return kept
 
 
-def correct(folder: Path, record: str) -> Run:
-    return mlg("history", "correct", record, folder / "table.csv")
-
-
 def counting() -> list[str]:
     events = mlg("history", "N1", "LH", "--json", "--no-forecast").json["events"]
     return sorted(event["record_id"] for event in events if event["verdict"])
 
 
-def test_the_row_of_a_table_with_its_id_corrects_a_record(keep: Keep, tmp_path: Path) -> None:
+def test_a_table_that_says_what_a_record_was_amended_to_is_known(keep: Keep) -> None:
     keep()
-    keep(B={CLEARANCE: "0.002"})
-    assert "correction of B (N1 LH)" in correct(tmp_path, "B").err
+    assert "correction of B (N1 LH)" in mlg("history", "amend", "B", "3=0.002in").err
     assert "0 inspections kept" in keep(B={CLEARANCE: "0.002"}).err
 
 
@@ -66,20 +61,6 @@ def test_the_refusal_of_a_changed_row_says_how_the_table_is_settled(keep: Keep) 
     refused = keep(B={CLEARANCE: "0.002"}).err
     assert "kept already with other content: B (N1 LH 2026-02-01)" in refused
     assert "Settle the table as a whole" in " ".join(refused.split())
-
-
-def test_what_is_wrong_with_other_rows_of_the_table_is_not_said(keep: Keep, tmp_path: Path) -> None:
-    keep()
-    keep(B={CLEARANCE: "0.002"}, C={CLEARANCE: "many"})
-    assert "problem" not in correct(tmp_path, "B").err
-
-
-def test_what_is_wrong_with_the_row_itself_is(keep: Keep, tmp_path: Path) -> None:
-    keep()
-    keep(B={CLEARANCE: "many"})
-    refused = correct(tmp_path, "B")
-    assert "found 'many'" in refused.err
-    assert "needs one valid inspection B of N1 LH, and the file has 0" in refused.err
 
 
 def test_a_row_whose_bad_date_was_corrected_is_not_kept_a_second_time(keep: Keep) -> None:
@@ -98,10 +79,9 @@ def test_once_the_record_is_corrected_the_table_is_known(
 ) -> None:
     keep(B={DAY: "2026-02-31"})
     for _ in range(times):
-        keep(B={CLEARANCE: "0.002"})
-        correct(tmp_path, "B")
-        keep()
-        correct(tmp_path, "B")
+        for cells in ({"B": {CLEARANCE: "0.002"}}, {}):
+            keep(**cells)
+            settle(tmp_path, "--amend")
     assert "0 inspections kept" in keep().err
     assert counting() == [*OF_ROWS]
 

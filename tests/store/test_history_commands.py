@@ -13,11 +13,12 @@ from pathlib import Path
 import pypdf
 import pytest
 
-from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, Side
 from mlg_troubleshoot.gear import gear_file
+from mlg_troubleshoot.life.folding import life_of
 from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_record, packed
-from mlg_troubleshoot.units import ClearanceConvention
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.cli.conftest import Run, mlg, row
 
 from .places import table
@@ -176,29 +177,62 @@ def test_landings_left_grow_by_a_repair(tmp_path: Path, place: Path) -> None:
 
 def test_a_correction_counts_and_what_it_corrects_does_not(tmp_path: Path, place: Path) -> None:
     seeded((1, 0.001), (2, 0.02))
-    right = table(tmp_path, visit(2, 0.002), name="right.csv")
-    assert mlg("history", "correct", "N123-LH-2", right).code == 0
+    assert mlg("history", "amend", "N123-LH-2", "3=0.002in").code == 0
     assert joint_3(life())["readings"] == [[400.0, 0.001], [800.0, 0.002]]
     assert Store(place).verify()[1] is None
 
 
+@pytest.mark.parametrize(
+    ("values", "field", "value"),
+    [
+        (["landings=4000"], "gear_landings", 4000.0),
+        (["3="], "clearance_in", {}),
+        (["plunger=41thou", "outcome=FAILED"], "readings_in", (0.041,)),
+        (["convention=TOTAL_PLAY"], "clearance_in", {3: 0.0005}),
+        (["3=1.2thou"], "entered", {3: EnteredClearance("1.2thou", LengthUnit.THOU)}),
+        (["remarks=oil seen"], "carried", {"remarks": "oil seen"}),
+        (["date=2024-01-31"], "inspection_date", date(2024, 1, 31)),
+    ],
+)
+def test_an_amended_value_is_that_of_its_column(
+    tmp_path: Path, place: Path, values: list[str], field: str, value: object
+) -> None:
+    blank = {n: "" for n in visit(1, 0.001) if re.match(r"clearance_\d", n)}
+    keep(tmp_path, visit(1, 0.001) | blank | {"clearance_3_in": "0.001", "outcome": "RETRACTED"})
+    before = life_of(Store(place), "N123", "LH").inspections[0]
+    assert mlg("history", "amend", "N123-LH-1", *values).code == 0
+    (after,) = life_of(Store(place), "N123", "LH").inspections
+    found = getattr(after.inspection, field)
+    assert found == (pytest.approx(value) if field == "clearance_in" else value)
+    assert getattr(before.inspection, field) != found
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (["3=many"], "clearance_3"),
+        (["3=0.013"], "unit"),
+        (["tail=N7"], "mlg history move"),
+        (["outcom=FAILED"], "not a column"),
+        (["landings"], "is not COLUMN=VALUE"),
+        (["outcome=FAILED", "outcome=RETRACTED"], "given twice"),
+        (["landings=400"], "says that already"),
+    ],
+)
+def test_what_cannot_be_amended_is_refused(
+    tmp_path: Path, place: Path, values: list[str], said: str
+) -> None:
+    keep(tmp_path, visit(1, 0.001))
+    run = mlg("history", "amend", "N123-LH-1", *values)
+    assert (run.code, len(Store(place).all())) == (2, 1)
+    assert said in " ".join(run.err.split())
+
+
 def test_a_corrected_inspection_kept_again_is_known(tmp_path: Path, place: Path) -> None:
     keep(tmp_path, visit(1, 0.02))
-    mlg("history", "correct", "N123-LH-1", table(tmp_path, visit(1, 0.002), name="right.csv"))
+    mlg("history", "amend", "N123-LH-1", "3=0.002in")
     assert keep(tmp_path, visit(1, 0.002)).code == 0
     assert joint_3(life())["readings"] == [[400.0, 0.002]]
-
-
-def test_a_correction_of_another_gear_is_refused(tmp_path: Path, place: Path) -> None:
-    seeded((1, 0.001))
-    run = mlg(
-        "history",
-        "correct",
-        "N123-LH-1",
-        table(tmp_path, visit(1, 0.001, side="RH"), name="right.csv"),
-    )
-    assert run.code == 2
-    assert "N123 RH" in run.err
 
 
 def test_a_void_inspection_does_not_count(tmp_path: Path, place: Path) -> None:
@@ -232,9 +266,9 @@ def test_a_re_rigging_is_an_event_of_a_life_and_the_joints_wear_on(
     tmp_path: Path, place: Path
 ) -> None:
     seeded((1, 0.001), (3, 0.002))
-    assert (
-        mlg("history", "rerig", "N123", "LH", "--date", "2024-07-15", "--landings", "800").code == 0
-    )
+    done = ("rigging_checked=corrected", "date=2024-07-15", "repair_date=2024-07-15")
+    flags = ("--tail", "N123", "--side", "LH", "--convention", "RADIAL", "--keep")
+    mlg("check", *flags, *(f"--set={each}" for each in done), "--set", "landings=800")
     told = life()
     assert "rigging corrected" in [event["text"] for event in told["events"]]
     assert joint_3(told)["readings"] == [[400.0, 0.001], [1200.0, 0.002]]

@@ -137,7 +137,7 @@ def test_keeping_what_contradicts_the_store_keeps_it_and_warns(tmp_path: Path) -
     run = mlg("check", years(tmp_path, SLIP, only=[3], name="last"), "--keep")
     assert "1 inspection kept" in run.err
     assert "240 landings on 2026-03-01 (S4" in run.err
-    assert "mlg history correct" in run.err
+    assert "mlg history amend" in run.err
 
 
 # What history and fleet say of a life that contradicts itself.
@@ -196,12 +196,12 @@ def test_every_view_names_the_record_and_how_to_correct_it(
     else:
         text = re.sub(r"\s+", " ", mlg(*command).out)
     assert f"240 landings on 2026-03-01 (S4, {wrong})" in text
-    assert f"mlg history correct {wrong} FILE" in text
+    assert f"mlg history amend {wrong} COLUMN=VALUE" in text
 
 
 def test_a_correction_brings_the_forecast_back(tmp_path: Path) -> None:
     kept(tmp_path, SLIP)
-    mlg("history", "correct", "S4", years(tmp_path, {}, only=[3], name="right"))
+    mlg("history", "amend", "S4", "landings=2407")
     told = life()
     assert told["warnings"] == []
     assert told["next_inspection_landings"] == 0.0
@@ -241,7 +241,7 @@ def test_of_two_inspections_neither_is_called_the_right_one(tmp_path: Path) -> N
     (said,) = life("--no-forecast")["warnings"]
     assert "1672 landings on 2025-03-01 (S3" in said
     assert "240 landings on 2026-03-01 (S4" in said
-    assert "mlg history correct RECORD FILE" in said
+    assert "mlg history amend RECORD COLUMN=VALUE" in said
 
 
 # The order of time.

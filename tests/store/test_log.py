@@ -129,8 +129,7 @@ def two_stores(tmp_path: Path) -> tuple[Path, Path]:
     mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", "2026-02-01", "--store", first)
     mlg("history", "void", "R1", "--why", "twice", "--store", second)
     keep(second, visit("B1", "2026-02-03", outcome="RETRACTED"))
-    fixed = table(tmp_path, visit("R2", "2026-01-02", clearance_3_in="0.0121"), name="fixed.csv")
-    assert mlg("history", "correct", "R2", fixed, "--store", second).code == 0
+    assert mlg("history", "amend", "R2", "3=0.0121in", "--store", second).code == 0
     return first, second
 
 

@@ -194,7 +194,7 @@ def test_nothing_is_kept_where_a_trigger_would_take_the_records_away(place: Path
     taker = "CREATE TRIGGER t AFTER INSERT ON mlg_records BEGIN DELETE FROM mlg_records; END"
     changed(place, "DROP TRIGGER mlg_no_delete", taker)
     before = place.read_bytes()
-    run = mlg("history", "rerig", "N1", "LH", "--date", "2026-04-01", "--store", place)
+    run = mlg("history", "void", "R1", "--why", "x", "--store", place)
     assert run.code == 5
     assert "mlg history verify" in run.err
     assert place.read_bytes() == before
@@ -279,7 +279,7 @@ def test_a_password_is_never_shown(tmp_path: Path, url: str) -> None:
     for run in (
         keep(tmp_path, url),
         mlg("history", "--store", url),
-        mlg("history", "correct", "R1", places.table(tmp_path, row()), "--store", url),
+        mlg("history", "amend", "R1", "landings=1", "--store", url),
     ):
         assert run.code in (2, 5)
         assert "S3cret9" not in run.out + run.err

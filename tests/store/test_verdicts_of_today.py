@@ -72,8 +72,8 @@ def test_a_corrected_date_puts_no_verdict_on_another_inspection(place: Path) -> 
     keep(place, first)
     keep(place, visit("R1", "2026-02-04", gear_landings="900", **FAR))
     wrong = next(each for each in events() if each["date"] == "2026-01-04")
-    moved = table(place, first | {"inspection_date": "2026-02-04", "gear_landings": "101"})
-    assert mlg("history", "correct", wrong["hash"], moved).code == 0
+    values = ("date=2026-02-04", "landings=101")
+    assert mlg("history", "amend", wrong["hash"], *values).code == 0
     assert line()["verdict"] == "OUTSIDE_MARGIN"
     said = {each["gear_landings"]: each["verdict"] for each in events() if each["verdict"]}
     assert said == {101.0: "WITHIN_MARGIN", 900.0: "OUTSIDE_MARGIN"}

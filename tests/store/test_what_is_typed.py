@@ -40,7 +40,6 @@ def test_a_side_is_the_same_gear_in_a_flag_and_as_an_argument(place: Path, side:
     told = mlg("history", "N1", side, "--no-forecast", "--json").json["events"]
     assert len({event["hash"] for event in told}) == 2
     assert mlg("history", "repair", "N1", side, "--joint", "3", "--date", "2026-02-01").code == 0
-    assert mlg("history", "rerig", "N1", side, "--date", "2026-02-01").code == 0
     assert life_of(Store(place), "N1", side).key == ("N1", "LH")
 
 
@@ -49,7 +48,7 @@ def test_what_is_not_a_side_is_refused_wherever_it_is_typed(place: Path, side: s
     for command in (
         (*BY_HAND, "--side", side),
         ("history", "N1", side),
-        ("history", "rerig", "N1", side, "--date", "2026-02-01"),
+        ("history", "repair", "N1", side, "--joint", "3", "--date", "2026-02-01"),
     ):
         assert mlg(*command).code == 2
 
@@ -92,11 +91,8 @@ def refused(*more: object, command: tuple[str, ...] = REPAIR) -> Run:
         "4 Mar 1026",
     ],
 )
-@pytest.mark.parametrize("command", [REPAIR, ("history", "rerig", "N1", "LH")])
-def test_a_day_that_cannot_be_meant_is_refused(
-    place: Path, command: tuple[str, ...], day: str
-) -> None:
-    assert f"--date {day!r}" in refused("--date", day, command=command).err
+def test_a_day_that_cannot_be_meant_is_refused(place: Path, day: str) -> None:
+    assert f"--date {day!r}" in refused("--date", day).err
 
 
 def test_work_can_be_dated_until_tomorrow_and_not_later(place: Path) -> None:
@@ -123,8 +119,7 @@ def test_landings_are_kept_as_a_number(place: Path) -> None:
         ("history", "\udcff", "LH"),
         ("history", "\udcff"),
         ("history", "repair", "\udcff", "LH", "--joint", "3", "--date", "2026-02-01"),
-        ("history", "rerig", "\udcff", "LH", "--date", "2026-02-01"),
-        ("history", "rerig", "N1", "LH", "--date", "2026-02-01", "--work-order", "\udcff"),
+        (*REPAIR, "--date", "2026-02-01", "--work-order", "\udcff"),
         ("history", "void", "R1", "--why", "\udcff"),
         ("history", "void", "\udcff", "--why", "x"),
     ],
