@@ -216,7 +216,7 @@ class Sitting:
         """What stands of a gear now, shown and written."""
         visit = self._visit(tail, side)
         if visit is None:
-            raise TypeError("nothing is kept of a gear that was just kept")
+            raise TypeError(f"no records of {tail} {side} that were just kept")
         self._run.publish(visit.result, visit.row.unit_entered)
         return visit
 
