@@ -159,7 +159,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any
 
         for n in range(3):
             day = f"2024-0{n + 1}-10"
-            seen = {"inspection_date": day, "gear_landings": str(400 * n)}
+            seen = {"inspection_date": day, "gear_landings": str(400 * n), "rigging_checked": "yes"}
             rows = [
                 row(record_id=f"{tail}-{n}", tail_no=tail, **seen, clearance_3_in=f"0.00{n + 3}")
                 for tail in ("N1", "N2")

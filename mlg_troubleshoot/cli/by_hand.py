@@ -50,8 +50,8 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
     given = named_cells(flags.values or (), gear, "--set ")
     if both := values.keys() & given:
         raise UsageError(f"--set gives {both.pop()} twice", "Give each column once.")
-    labels |= {column: f"--set {column}={text!r}" for column, text in given.items()}
-    values |= given
+    labels |= {column: f"--set {pair!r}" for column, (pair, _text) in given.items()}
+    values |= {column: text for column, (_pair, text) in given.items()}
     known = {*values, *([CONVENTION.name] if declared.convention else [])}
     needed = {TAIL_NO.name: "--tail", SIDE.name: "--side", CONVENTION.name: "--convention"}
     missing = [flag for column, flag in needed.items() if column not in known]
@@ -72,12 +72,12 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
     return under_a_free_id(read, place)
 
 
-def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, str]:
-    """Texts by column of COLUMN=VALUE, the columns by their own or their short names."""
+def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, tuple[str, str]]:
+    """COLUMN=VALUE and its VALUE, by the column that is named by its own or a short name."""
     from mlg_troubleshoot.records import ReadOptions, headers
 
     joints = ReadOptions.of(gear).joints
-    values: dict[str, str] = {}
+    values: dict[str, tuple[str, str]] = {}
     for pair in pairs:
         name, sign, text = pair.partition("=")
         if not sign or (flag and not text.strip()):
@@ -88,7 +88,7 @@ def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, s
         column = headers.column_named(name, joints)
         if column in values:
             raise UsageError(f"{flag}{column} is given twice", "Give each column once.")
-        values[column] = text.strip()
+        values[column] = pair, text
     return values
 
 

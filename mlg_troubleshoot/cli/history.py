@@ -344,7 +344,7 @@ def amend(
 
     gear = load_gear(records.gear)
     place = records.kept
-    changes = named_cells(values, gear)
+    changes = {column: text.strip() for column, (_, text) in named_cells(values, gear).items()}
     added = keep.amend(place, gear, find(place, record), changes)
     _say_added(place, f"correction of {record} ({added.tail_no} {added.side})", added)
 
