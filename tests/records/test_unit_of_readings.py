@@ -49,16 +49,21 @@ def judged(gear: Gear, radial_in, read_in: LengthUnit, declared: LengthUnit, **m
 
 @pytest.mark.parametrize(("read_in", "declared"), TOO_SMALL)
 def test_a_worn_gear_read_in_a_larger_unit_is_not_judged(gear, read_in, declared):
-    row, problems = judged(gear, WORN_IN, read_in, declared)
+    row, (problem,) = judged(gear, WORN_IN, read_in, declared)
     assert isinstance(row, InvalidRow)
-    assert [problem.code for problem in problems] == ["readings_too_small"]
-
-
-@pytest.mark.parametrize(("read_in", "declared"), TOO_SMALL)
-def test_the_refusal_names_both_units_in_words(gear, read_in, declared):
-    _, (problem,) = judged(gear, WORN_IN, read_in, declared)
+    assert problem.code == "readings_too_small"
     assert f"read in {read_in.words}" in problem.remedy
     assert f"not in {declared.words}" in problem.remedy
+    assert "small_readings_true" in problem.remedy
+
+
+@pytest.mark.parametrize("answer", ["no", "perhaps"])
+def test_an_answer_that_confirms_nothing_leaves_the_row_invalid(gear, answer):
+    row, problems = judged(
+        gear, WORN_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, small_readings_true=answer
+    )
+    assert isinstance(row, InvalidRow)
+    assert "small_readings_true" in " ".join(f"{p.column} {p.remedy}" for p in problems)
 
 
 def test_the_refusal_names_a_cell_of_a_small_reading(gear, tmp_path):
@@ -71,12 +76,6 @@ def test_the_refusal_names_a_cell_of_a_small_reading(gear, tmp_path):
     assert (problem.cell, problem.column, problem.value) == ("F2", "clearance_2_mm", "0.004")
 
 
-def test_the_refusal_says_how_to_confirm_true_readings(gear):
-    _, (problem,) = judged(gear, WORN_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE)
-    assert "small_readings_true" in problem.remedy
-    assert "small_readings_true" in problem.remedy
-
-
 @pytest.mark.parametrize(
     "confirmed", [{"small_readings_true": "yes"}, {"small_readings_true": True}]
 )
@@ -85,6 +84,7 @@ def test_confirmed_small_readings_are_judged(gear, confirmed):
     assert isinstance(row, Inspection)
     assert not problems
     assert not row.unit_question
+    assert check(row, gear).verdict is Verdict.WITHIN_MARGIN
 
 
 def test_who_can_be_asked_has_the_row_of_too_small_readings_with_its_question(gear):
@@ -93,19 +93,6 @@ def test_who_can_be_asked_has_the_row_of_too_small_readings_with_its_question(ge
     row, problems = judge_row({**heading, **values}, replace(ReadOptions.of(gear), asks=True))
     assert not problems
     assert row.unit_question.startswith("10 of 10 readings")
-
-
-def test_an_answer_that_confirms_nothing_leaves_the_row_invalid(gear):
-    row, _ = judged(gear, WORN_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, small_readings_true="no")
-    assert isinstance(row, InvalidRow)
-
-
-def test_a_confirmation_that_cannot_be_read_makes_the_row_invalid(gear):
-    row, (problem,) = judged(
-        gear, NEW_IN, LengthUnit.INCH, LengthUnit.INCH, small_readings_true="perhaps"
-    )
-    assert isinstance(row, InvalidRow)
-    assert problem.column == "small_readings_true"
 
 
 @pytest.mark.parametrize("unit", UNITS)
@@ -119,30 +106,6 @@ def test_new_parts_in_their_own_unit_are_judged_without_a_question(gear, unit):
 def test_of_a_doubtful_row_only_the_readings_below_a_new_part_are_named(gear):
     row, _ = judged(gear, (0.0004, 0.0004, 0.0006), *2 * [LengthUnit.MILLIMETRE])
     assert row.unit_question.startswith("2 of 3 readings (#1, #2) are below the play of new parts")
-
-
-def test_readings_in_thou_are_not_asked_about_as_those_of_a_smaller_unit(gear):
-    row, _ = judged(gear, ALL_WORN_OUT_IN, *2 * [LengthUnit.THOU])
-    assert isinstance(row, Inspection)
-    assert not [warning for warning in row.warnings if "were they read in" in warning]
-
-
-def test_millimetres_mostly_over_the_limit_are_asked_about_as_thou(gear):
-    row, _ = judged(gear, [0.0125] * 10, *2 * [LengthUnit.MILLIMETRE])
-    assert any("were they read in thou," in warning for warning in row.warnings), row.warnings
-
-
-def test_a_reading_over_its_limit_is_asked_about_until_another_gauge_has_confirmed_it(gear):
-    worn = (0.003, 0.003, 0.025)
-    row, _ = judged(gear, worn, LengthUnit.INCH, LengthUnit.INCH)
-    assert any("(#3) is above the limit: was it read" in said for said in row.warnings)
-
-
-@pytest.mark.parametrize("again", [{"measured_again": "3"}, {"gauge_u_3_in": "0.0003"}])
-def test_a_reading_that_another_gauge_has_confirmed_is_not_asked_about(gear, again):
-    worn = (0.003, 0.003, 0.025)
-    row, _ = judged(gear, worn, LengthUnit.INCH, LengthUnit.INCH, **again)
-    assert not any("is above the limit: was it read" in said for said in row.warnings)
 
 
 def test_the_play_of_new_parts_is_stated_in_the_convention_of_the_row(gear):
@@ -162,11 +125,6 @@ def test_a_worn_gear_read_in_a_smaller_unit_is_not_judged(gear, read_in, declare
     assert isinstance(row, InvalidRow)
 
 
-def test_new_parts_in_millimetres_under_an_inch_header_are_asked_about(gear):
-    row, _ = judged(gear, NEW_IN, LengthUnit.MILLIMETRE, LengthUnit.INCH)
-    assert any("millimetres" in warning and "inches" in warning for warning in row.warnings)
-
-
 def test_readings_that_may_be_of_new_parts_or_of_another_unit_do_not_clear_the_gear(gear):
     row, problems = judged(gear, ALL_WORN_OUT_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE)
     assert not problems
@@ -174,13 +132,6 @@ def test_readings_that_may_be_of_new_parts_or_of_another_unit_do_not_clear_the_g
     assert found.verdict is Verdict.INCOMPLETE
     assert found.next_action.action is Action.CORRECT
     assert "inches" in found.headline
-
-
-def test_readings_confirmed_in_python_clear_the_gear(gear):
-    row, _ = judged(
-        gear, ALL_WORN_OUT_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, small_readings_true="yes"
-    )
-    assert check(row, gear).verdict is Verdict.WITHIN_MARGIN
 
 
 def test_one_small_reading_among_others_is_a_warning_that_says_the_same(gear):
@@ -194,22 +145,6 @@ def test_one_small_reading_among_others_is_a_warning_that_says_the_same(gear):
     assert "small_readings_true" in warning
 
 
-def test_two_readings_are_too_few_to_refuse_a_row_but_do_not_clear_it(gear):
-    row, _ = judged(
-        gear,
-        (0.013, 0.004, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        LengthUnit.INCH,
-        LengthUnit.THOU,
-    )
-    assert check(row, gear).verdict is Verdict.INCOMPLETE
-
-
-def test_two_small_readings_in_millimetres_do_not_clear_a_row(gear):
-    few = (0.013, 0.004, *[0.0] * 8)
-    row, _ = judged(gear, few, LengthUnit.INCH, LengthUnit.MILLIMETRE)
-    assert check(row, gear).verdict is Verdict.INCOMPLETE
-
-
 def in_two_units(gear: Gear, third: str, value: float):
     """Judge ten readings in inches, but the third under a header in another unit."""
     values = {f"clearance_{n}_in": 0.001 for n in range(1, 11) if n != 3}
@@ -217,44 +152,63 @@ def in_two_units(gear: Gear, third: str, value: float):
     return judge_row({**named, **values, third: value}, ReadOptions.of(gear))[0]
 
 
-@pytest.mark.parametrize("third", ["clearance_3_mm", "clearance_3_thou"])
-def test_inches_under_the_one_header_in_a_smaller_unit_do_not_clear_the_gear(gear, third):
-    row = in_two_units(gear, third, 0.013)
+@pytest.mark.parametrize(
+    ("third", "value", "verdict"),
+    [
+        ("clearance_3_mm", 0.013, Verdict.INCOMPLETE),
+        ("clearance_3_thou", 0.013, Verdict.INCOMPLETE),
+        ("clearance_3_mm", 0.033, Verdict.WITHIN_MARGIN),
+    ],
+)
+def test_inches_under_the_one_header_in_a_smaller_unit_do_not_clear_the_gear(
+    gear, third, value, verdict
+):
+    row = in_two_units(gear, third, value)
+    assert check(row, gear).verdict is verdict
+    asked = any("read in inches" in text for text in row.warnings)
+    assert asked is (verdict is Verdict.INCOMPLETE)
+
+
+@pytest.mark.parametrize("declared", [LengthUnit.THOU, LengthUnit.MILLIMETRE])
+def test_two_readings_are_too_few_to_refuse_a_row_but_do_not_clear_it(gear, declared):
+    row, _ = judged(gear, (0.013, 0.004, *[0.0] * 8), LengthUnit.INCH, declared)
     assert check(row, gear).verdict is Verdict.INCOMPLETE
-    assert any("read in inches" in text for text in row.warnings)
 
 
-def test_a_reading_in_its_own_unit_among_others_in_inches_is_judged(gear):
-    row = in_two_units(gear, "clearance_3_mm", 0.033)
-    assert check(row, gear).verdict is Verdict.WITHIN_MARGIN
+INCH, THOU, MILLIMETRE = LengthUnit.INCH, LengthUnit.THOU, LengthUnit.MILLIMETRE
+ASKED = ("were they read in", "(#3) is above the limit: was it read", "radial clearance (factor 2)")
 
 
-def test_a_gear_file_without_the_play_of_new_parts_asks_nothing(gear):
-    options = ReadOptions.of(gear)
-    values = {f"clearance_{n}_mm": value for n, value in enumerate(WORN_IN, 1)}
-    named = {
-        "record_id": "R",
-        "tail_no": "N",
-        "side": "LH",
-        "clearance_convention": "RADIAL",
-        **values,
-    }
-    silent = ReadOptions(joints=options.joints, limit_in=options.limit_in)
-    assert not judge_row(named, silent)[1]
-
-
-def test_radial_readings_declared_as_total_play_are_asked_about(gear):
-    values = {f"clearance_{n}_in": value for n, value in enumerate(NEW_IN, 1)}
-    named = {
-        "record_id": "R",
-        "tail_no": "N",
-        "side": "LH",
-        "clearance_convention": "TOTAL_PLAY",
-        **values,
-    }
-    row, problems = judge_row(named, ReadOptions.of(gear))
+@pytest.mark.parametrize(
+    ("radial_in", "read_in", "declared", "more", "asked"),
+    [
+        (NEW_IN, MILLIMETRE, INCH, {}, "millimetres, not in inches"),
+        ([0.0125] * 10, MILLIMETRE, MILLIMETRE, {}, "were they read in thou,"),
+        (ALL_WORN_OUT_IN, THOU, THOU, {}, ""),
+        ((0.003, 0.003, 0.025), INCH, INCH, {}, ASKED[1]),
+        ((0.003, 0.003, 0.025), INCH, INCH, {"measured_again": "3"}, ""),
+        ((0.003, 0.003, 0.025), INCH, INCH, {"gauge_u_3_in": "0.0003"}, ""),
+        (NEW_IN, INCH, INCH, {"clearance_convention": "TOTAL_PLAY"}, ASKED[2]),
+    ],
+)
+def test_readings_that_another_unit_or_convention_explains_are_asked_about(
+    gear, radial_in, read_in, declared, more, asked
+):
+    row, problems = judged(gear, radial_in, read_in, declared, **more)
     assert not problems
-    assert any("radial clearance (factor 2)" in warning for warning in row.warnings)
+    said = " ".join(row.warnings)
+    assert asked in said
+    assert asked or not any(words in said for words in ASKED)
+
+
+def test_flags_refuse_small_readings_until_they_are_confirmed():
+    given = [f"--set={n}={value}" for n, value in enumerate(WORN_IN, 1)]
+    flags = ("check", "--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--unit", "mm")
+    run = mlg(*flags, *given)
+    assert run.code == 2
+    assert "were they read in inches, not in millimetres?" in " ".join(run.err.split())
+    run = mlg(*flags, *given, "--set", "small_readings_true=yes", "--json")
+    assert run.one["verdict"] == "WITHIN_MARGIN"
 
 
 def test_python_asks_about_small_readings_in_inches(gear):
@@ -269,24 +223,6 @@ def test_python_asks_about_small_readings_in_inches(gear):
     )
     # In inches no larger unit explains them: they are judged, and asked about.
     assert any("below the play of new parts" in warning for warning in check(small, gear).warnings)
-
-
-def test_flags_refuse_small_readings():
-    given = [f"--set={n}={value}" for n, value in enumerate(WORN_IN, 1)]
-    run = mlg(
-        "check", "--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--unit", "mm", *given
-    )
-    assert run.code == 2
-    assert "were they read in inches, not in millimetres?" in " ".join(run.err.split())
-
-
-def test_flags_take_small_readings_that_are_confirmed():
-    given = [f"--set={n}={value}" for n, value in enumerate(WORN_IN, 1)]
-    run = mlg(
-        *("check", "--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--unit", "mm"),
-        *("--set", "small_readings_true=yes", "--json", *given),
-    )
-    assert run.json["inspections"][0]["verdict"] == "WITHIN_MARGIN"
 
 
 def test_a_sheet_of_inches_under_millimetre_headers_ends_with_nothing_judged(tmp_path):
