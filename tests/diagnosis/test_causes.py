@@ -61,24 +61,11 @@ def first(cause: Cause, scene: Scene) -> Candidate:
     return next(iter(cause.candidates(scene)))
 
 
-def test_the_catalogue_holds_the_causes_of_the_contract() -> None:
-    assert set(BY_NAME) == set(NEEDS)
-
-
-@pytest.mark.parametrize("name", NEEDS)
-def test_a_cause_says_which_columns_it_needs(name: str) -> None:
-    assert BY_NAME[name].needs == NEEDS[name]
-
-
-@pytest.mark.parametrize("name", NEEDS)
-def test_a_sign_is_fixed_only_where_physics_fixes_it(name: str) -> None:
-    assert BY_NAME[name].sign == ONE_SIGN.get(name, 0)
-
-
-@pytest.mark.parametrize("name", NEEDS)
-def test_a_cause_speaks_to_a_technician(name: str) -> None:
-    cause = BY_NAME[name]
-    assert min(map(len, (cause.sentence, cause.inspect, cause.separates))) > 15
+def test_a_cause_of_the_contract_says_its_columns_its_sign_and_what_to_inspect() -> None:
+    assert {name: cause.needs for name, cause in BY_NAME.items()} == NEEDS
+    assert {name: cause.sign for name, cause in BY_NAME.items() if cause.sign} == ONE_SIGN
+    for cause in BY_NAME.values():
+        assert min(map(len, (cause.sentence, cause.inspect, cause.separates))) > 15
 
 
 @pytest.mark.parametrize("name", SINGLE)
@@ -151,11 +138,6 @@ def test_a_lever_is_tilted_by_the_float_of_its_pivot_alone(scene: Scene) -> None
     assert cause.adjust(still, only(cause, still), 1.0).scaled["length.5-4"] == pytest.approx(
         1.0, abs=0.0
     )
-
-
-def test_tilt_shortens_and_never_lengthens(scene: Scene) -> None:
-    scaled = OutOfPlaneTilt().adjust(scene, only(OutOfPlaneTilt(), scene), 5.0).scaled
-    assert all(np.all(factor <= 1.0) for factor in scaled.values())
 
 
 def test_tilt_is_shown_as_the_bearing_span_that_it_implies() -> None:
@@ -254,12 +236,13 @@ def test_contact_is_tried_on_neighbours_only(scene: Scene) -> None:
     }
 
 
-def test_contact_never_adds_clearance(scene: Scene) -> None:
+def test_contact_takes_clearance_from_its_own_joints_only(scene: Scene) -> None:
     cause = JointContact()
     for candidate in cause.candidates(scene):
-        assert np.all(
-            cause.adjust(scene, candidate, 0.7).clearance_in <= scene.clearance_in + 1e-15
-        )
+        taken = scene.clearance_in - cause.adjust(scene, candidate, 0.7).clearance_in
+        assert np.min(taken) >= -1e-15
+        own = {int(joint) - 1 for joint in str(candidate.target).split()[1].split(",")}
+        assert not np.delete(taken, list(own), axis=1).any()
 
 
 def test_contact_takes_at_most_the_contribution_of_the_one_that_gives_less(
@@ -272,14 +255,6 @@ def test_contact_takes_at_most_the_contribution_of_the_one_that_gives_less(
         scene.over_in - adjusted_worst_case(gear.model, cause.adjust(scene, candidate, 1.0)).over_in
     )
     assert np.all(lost <= 1.02 * least + 1e-6)
-
-
-def test_contact_leaves_all_other_joints(scene: Scene) -> None:
-    cause = JointContact()
-    candidate = next(c for c in cause.candidates(scene) if c.target == "joints 7,9")
-    others = [0, 1, 2, 3, 4, 5, 7, 9]
-    moved = cause.adjust(scene, candidate, 0.9).clearance_in
-    assert np.array_equal(moved[:, others], scene.clearance_in[:, others])
 
 
 @pytest.mark.parametrize("name", ["gauge_bias", "technician_bias"])
@@ -345,15 +320,9 @@ def test_the_habit_of_one_technician_shifts_no_rows_of_others(scene: Scene) -> N
 
 
 def test_a_rigging_change_concerns_one_aircraft_or_one_of_its_gears(scene: Scene) -> None:
-    targets = {c.target for c in RiggingOffset().candidates(scene)}
-    assert {"tail N103", "tail N103 LH", "tail N103 RH"} <= targets
-
-
-def test_a_gear_and_its_aircraft_are_variants_of_one_name(scene: Scene) -> None:
-    keys = {
-        c.key for c in RiggingOffset().candidates(scene) if str(c.target).startswith("tail N103")
-    }
-    assert keys == {("rigging_offset", "tail N103")}
+    keys = {c.target: c.key for c in RiggingOffset().candidates(scene)}
+    for target in ("tail N103", "tail N103 LH", "tail N103 RH"):
+        assert keys[target] == ("rigging_offset", "tail N103")
 
 
 def test_a_gear_whose_worn_joints_were_never_read_has_no_rigging_change(gear: Gear) -> None:

@@ -60,18 +60,12 @@ def test_what_is_expected_lies_nearer_the_truth_than_the_readings_do() -> None:
     assert rms(gear.history().expected_in - gear.true_in) < 0.7 * rms(gear.read_in - gear.true_in)
 
 
-def test_readings_better_than_declared_are_recognised() -> None:
-    assert np.sqrt(worn(0.0002).history().reading_in2).max() == pytest.approx(0.0002, rel=0.25)
-
-
-def test_readings_as_good_as_declared_are_taken_as_declared() -> None:
-    assert np.sqrt(worn(DECLARED_IN).history().reading_in2).max() == pytest.approx(
-        DECLARED_IN, rel=0.2
-    )
-
-
-def test_readings_are_never_taken_to_be_worse_than_declared() -> None:
-    assert np.sqrt(worn(2.0 * DECLARED_IN).history().reading_in2).max() <= DECLARED_IN
+@pytest.mark.parametrize("error_in", [0.0002, DECLARED_IN, 2.0 * DECLARED_IN])
+def test_readings_better_than_declared_are_recognised_and_never_taken_to_be_worse(
+    error_in: float,
+) -> None:
+    taken = np.sqrt(worn(error_in).history().reading_in2).max()
+    assert taken == pytest.approx(min(error_in, DECLARED_IN), rel=0.25)
 
 
 def test_scatter_of_wear_about_its_line_is_told_from_errors_of_reading() -> None:
@@ -108,19 +102,11 @@ def test_exact_readings_are_kept() -> None:
     assert np.all(exact.reading_in2 == 0.0)
 
 
-def test_landings_that_are_missing_are_those_of_the_gear_on_average() -> None:
-    kilo, _known = landings_of(np.array([1000.0, np.nan, 3000.0, 500.0]), np.array([0, 0, 0, 1]))
-    assert kilo[1] == 2.0
-
-
-def test_nothing_is_learned_from_a_row_without_landings_where_others_have_them() -> None:
-    _kilo, known = landings_of(np.array([1000.0, np.nan]), np.array([0, 0]))
-    assert known.tolist() == [True, False]
-
-
-def test_without_any_landings_every_row_tells_its_gear_s_level() -> None:
-    _kilo, known = landings_of(np.full(2, np.nan), np.array([0, 0]))
-    assert known.all()
+def test_landings_that_are_missing_are_those_of_the_gear_on_average_and_teach_nothing() -> None:
+    kilo, known = landings_of(np.array([1000.0, np.nan, 3000.0, 500.0]), np.array([0, 0, 0, 1]))
+    assert (kilo[1], known.tolist()) == (2.0, [True, False, True, True])
+    # Without any landings every row tells its gear's level.
+    assert landings_of(np.full(2, np.nan), np.array([0, 0]))[1].all()
 
 
 def test_a_joint_that_is_tight_everywhere_stays_so() -> None:

@@ -9,7 +9,8 @@ import pytest
 from .blemished import judged, summarise
 from .simulator import Truth
 
-ZEROS = (("modification", "base B1"), ("modification", "base B3"))
+Name = tuple[str, str | None]
+ZEROS: tuple[Name, ...] = (("modification", "base B1"), ("modification", "base B3"))
 
 
 def truth(*causes: tuple[str, str | None], near: tuple[str, ...] = ()) -> Truth:
@@ -20,36 +21,32 @@ def said(*names: tuple[str, str | None]) -> list[dict[str, Any]]:
     return [{"cause": cause, "target": target} for cause, target in names]
 
 
-@pytest.mark.parametrize("name", ZEROS)
-def test_either_of_two_bases_is_right(name: tuple[str, str]) -> None:
-    assert judged("NAMED", said(name), [], truth(*ZEROS))["right"]
+STEP = ("date_step", None)
+SLIP, BIAS = ("convention_slip", "gauge G-03"), ("gauge_bias", "gauge G-03")
 
 
-def test_a_name_beside_the_right_one_is_wrong() -> None:
-    names = said(ZEROS[0], ("date_step", None))
-    found = judged("NAMED", names, [], truth(*ZEROS))
-    assert (found["right"], found["wrong"]) == (False, True)
-
-
-def test_a_cause_that_is_offered_is_in_the_set_and_not_right() -> None:
-    found = judged("AMBIGUOUS", [], said(ZEROS[0], ("date_step", None)), truth(*ZEROS))
-    assert (found["right"], found["in_set"], found["wrong"]) == (False, True, False)
-
-
-def test_a_name_that_is_partly_true_is_near_and_not_wrong() -> None:
-    hidden = truth(near=("gauge_bias",))
-    found = judged("NAMED", said(("gauge_bias", "gauge G-03")), [], hidden)
-    assert (found["right"], found["near"], found["wrong"]) == (False, True, False)
-
-
-def test_beside_a_blemish_only_the_listed_cause_is_asked_for() -> None:
-    hidden = truth(("convention_slip", "gauge G-03"), ("date_step", None))
-    found = judged("NAMED", said(("date_step", None)), [], hidden, "date_step")
-    assert (found["right"], found["wrong"]) == (True, False)
-
-
-def test_any_name_in_a_fleet_without_a_cause_is_wrong() -> None:
-    assert judged("NAMED", said(("date_step", None)), [], truth())["wrong"]
+@pytest.mark.parametrize(
+    ("names", "also", "hidden", "beside", "counted"),
+    [
+        ((ZEROS[0],), (), truth(*ZEROS), None, {"right", "in_set"}),
+        ((ZEROS[1],), (), truth(*ZEROS), None, {"right", "in_set"}),
+        ((ZEROS[0], STEP), (), truth(*ZEROS), None, {"wrong", "in_set"}),
+        ((), (ZEROS[0], STEP), truth(*ZEROS), None, {"in_set"}),
+        ((BIAS,), (), truth(near=("gauge_bias",)), None, {"near"}),
+        ((STEP,), (), truth(SLIP, STEP), "date_step", {"right", "in_set"}),
+        ((STEP,), (), truth(), None, {"wrong"}),
+    ],
+    ids=["a base", "another", "beside", "offered", "partly true", "blemish", "nothing"],
+)
+def test_a_name_is_right_in_the_set_near_or_wrong(
+    names: tuple[Name, ...],
+    also: tuple[Name, ...],
+    hidden: Truth,
+    beside: str | None,
+    counted: set[str],
+) -> None:
+    found = judged("NAMED", said(*names), said(*also), hidden, beside)
+    assert {key for key in ("right", "in_set", "near", "wrong") if found[key]} == counted
 
 
 def test_a_table_without_a_verdict_has_no_answer() -> None:
