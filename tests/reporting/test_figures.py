@@ -45,35 +45,24 @@ def test_a_sign_is_well_formed(of: str) -> None:
 
 def test_every_verdict_has_its_own_shape() -> None:
     assert len({SIGNS[verdict.value][0] for verdict in Verdict}) == len(Verdict)
-
-
-def test_every_verdict_of_a_diagnosis_has_its_own_shape() -> None:
     assert len({SIGNS[verdict][0] for verdict in ("NAMED", "AMBIGUOUS", "UNLISTED", "NONE")}) == 4
 
 
-def test_text_in_a_figure_is_escaped() -> None:
-    canvas = Canvas(10, 10, "<script>", "\"'")
+def test_text_in_a_figure_is_escaped_and_what_would_reorder_it_is_shown_as_its_code() -> None:
+    canvas = Canvas(10, 10, "<script>", "\"'a\u202eb")
     canvas.text(0, 0, "</svg><script>")
-    assert "<script>" not in canvas.svg()
-
-
-def test_what_would_reorder_the_text_of_a_figure_is_shown_as_its_code() -> None:
-    canvas = Canvas(10, 10, "a\u202eb")
     canvas.text(0, 0, "N1\u202d2")
+    assert "<script>" not in canvas.svg()
     assert not {"\u202e", "\u202d"} & set(canvas.svg())
     assert "N1‹U+202D›2" in canvas.svg()
 
 
-def test_bars_are_as_long_as_their_values() -> None:
-    canvas = Canvas(100, 40, "t")
-    ends = [draw_bar(canvas, Bar(value), 10, 0, 8, 20.0) for value in (1.0, 3.0)]
-    assert ends == [30.0, 70.0]
-
-
-def test_a_missing_bar_draws_none() -> None:
+def test_bars_are_as_long_as_their_values_and_a_missing_one_draws_none() -> None:
     canvas = Canvas(100, 40, "t")
     draw_bar(canvas, Bar(None), 10, 0, 8, 20.0)
     assert rectangles(canvas.svg()) == []
+    ends = [draw_bar(canvas, Bar(value), 10, 0, 8, 20.0) for value in (1.0, 3.0)]
+    assert ends == [30.0, 70.0]
 
 
 def test_a_gap_in_a_series_breaks_its_line() -> None:
@@ -120,12 +109,10 @@ def test_ticks_lie_within_their_axis(low: float, span: float) -> None:
     assert all(low - room <= tick <= high + room for tick in nice_ticks(low, high))
 
 
-def test_the_gauge_shows_the_worst_case_of_both_senses(judge: Judge) -> None:
-    assert ">−0.0429 / +0.0472</text>" in str(margin_gauge(judge(FAILURE), INCHES))
-
-
 def test_the_margin_of_the_gauge_is_drawn_to_the_scale_of_the_worst_case(judge: Judge) -> None:
     judged = judge(FAILURE)
+    assert ">−0.0429 / +0.0472</text>" in str(margin_gauge(judged, INCHES))
+    assert margin_gauge(judge(dict.fromkeys(range(1, 11), 0.0465)), INCHES) is None
     lines = re.findall(
         r'<line x1="([\d.]+)" y1="([\d.]+)" x2="([\d.]+)" y2="([\d.]+)"[^>]*stroke-width="4"',
         str(margin_gauge(judged, INCHES)),
@@ -136,10 +123,6 @@ def test_the_margin_of_the_gauge_is_drawn_to_the_scale_of_the_worst_case(judge: 
     drawn = float(lines[0][2]) - float(lines[0][0])
     expected = (judged.over_travel_in - judged.under_travel_in) / (2 * judged.margin_in)
     assert drawn / float(margin["width"]) == pytest.approx(expected, rel=0.01)
-
-
-def test_a_linkage_that_does_not_close_has_no_gauge(judge: Judge) -> None:
-    assert margin_gauge(judge(dict.fromkeys(range(1, 11), 0.0465)), INCHES) is None
 
 
 def arrow_lengths(gear: Gear, judge: Judge, clearance: dict[int, float]) -> list[float]:
@@ -153,12 +136,9 @@ def arrow_lengths(gear: Gear, judge: Judge, clearance: dict[int, float]) -> list
     return [((float(c) - float(a)) ** 2 + (float(d) - float(b)) ** 2) ** 0.5 for a, b, c, d in ends]
 
 
-def test_virtual_links_are_drawn_to_one_scale(gear: Gear, judge: Judge) -> None:
+def test_virtual_links_are_exaggerated_as_stated(gear: Gear, judge: Judge) -> None:
     three, five = arrow_lengths(gear, judge, FAILURE)
     assert three / five == pytest.approx(0.013 / 0.007, rel=0.02)
-
-
-def test_virtual_links_are_exaggerated_as_stated(gear: Gear, judge: Judge) -> None:
     drawn = schematic(gear, judge(FAILURE))
     # Joints 4 and 5 are 4.422 in apart in the reference; their markers tell the scale of the
     # drawing.
@@ -170,12 +150,8 @@ def test_virtual_links_are_exaggerated_as_stated(gear: Gear, judge: Judge) -> No
     }
     scale = (marks["5"] - marks["4"]) / 4.422
     assert drawn.exaggeration is not None
-    assert arrow_lengths(gear, judge, FAILURE)[0] == pytest.approx(
-        0.013 * scale * drawn.exaggeration, rel=0.02
-    )
-
-
-def test_small_clearances_are_not_blown_up(gear: Gear, judge: Judge) -> None:
+    assert three == pytest.approx(0.013 * scale * drawn.exaggeration, rel=0.02)
+    # Small clearances are not blown up.
     assert schematic(gear, judge(SOUND)).exaggeration == schematic(gear, judge(WORN)).exaggeration
 
 

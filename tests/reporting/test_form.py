@@ -55,7 +55,7 @@ def test_a_limit_stands_in_the_unit_and_the_convention_of_its_boxes(
     assert limit in readable((tmp_path / "form.html").read_text(encoding="utf-8"))
 
 
-def test_the_form_asks_for_side_unit_and_convention_and_fills_in_none(
+def test_the_form_asks_for_side_unit_convention_and_what_else_is_found_and_fills_in_none(
     gear: Gear, tmp_path: Path
 ) -> None:
     write_form(tmp_path / "form.html", gear)
@@ -67,6 +67,8 @@ def test_the_form_asks_for_side_unit_and_convention_and_fills_in_none(
         "thou",
         "mm",
         *(f"{c.value}: {c.meaning}" for c in ClearanceConvention),
+        *("Plunger, as found", "Second reading", "Date of the repair", "Plunger after the repair"),
+        *("Rigging and lock roller", "Restored joints", "Cannot reach", "Landings"),
     ):
         assert words in form
     assert "(default)" not in form
@@ -77,17 +79,6 @@ def test_the_form_has_the_boxes_of_the_prompts_in_their_order(gear: Gear, tmp_pa
     boxes = re.findall(r'data-asks="(\w+)"', (tmp_path / "form.html").read_text(encoding="utf-8"))
     joints = [f"clearance_{n}" for n in gear.joint_numbers]
     assert boxes == [*FIRST, *joints, *LAST]
-
-
-@pytest.mark.parametrize(
-    "label",
-    [
-        *("Plunger, as found", "Second reading", "Date of the repair", "Plunger after the repair"),
-        *("Rigging and lock roller", "Restored joints", "Cannot reach", "Landings"),
-    ],
-)
-def test_the_form_has_a_box_for_what_else_is_found(label: str, form: str) -> None:
-    assert label in form
 
 
 def test_without_an_engine_the_form_says_what_to_do(
