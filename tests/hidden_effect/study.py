@@ -328,10 +328,10 @@ AIMS: dict[str, str] = {
 }
 
 
-HEAD = ("| quantity | aim | measured | 95 % interval | fleets |", "|---|---|---|---|---|")
+HEAD = ("| quantity | aim | measured [%] (95 % interval) | fleets |", "|---|---|---|---|")
 
 
 def rate_line(name: str, aim: str, rate: Mapping[str, Any]) -> str:
     """A row of a table of rates, each with its interval."""
-    band = f"{100 * rate['low']:.1f}–{100 * rate['high']:.1f} %"
-    return f"| {name} | {aim} | {100 * rate['rate']:.1f} % | {band} | {rate['n']} |"
+    band = f"{100 * rate['low']:.1f}–{100 * rate['high']:.1f}"
+    return f"| {name} | {aim} | {100 * rate['rate']:.1f} ({band}) | {rate['n']} |"
