@@ -233,19 +233,22 @@ def test_a_number_that_matters_stands_in_the_section_it_links_to(row: list[str])
     assert [n for n in re.findall(r"\d+(?:\.\d+)?", value) if n not in details] == []
 
 
-# Paths that contributors are sent to, from the top or within the package.
+# Files and folders that a page names, from the top or within the package.
 NAMED_PATHS = sorted(
-    set(
-        re.findall(
-            r"`([\w-]+(?:/[\w.-]+)*(?:\.(?:py|toml|md)|/))`",
-            (ROOT / "docs/contributing.md").read_text(encoding="utf-8"),
+    {
+        path
+        for page in PAGES
+        if page.name != "changelog.md"
+        for path in re.findall(
+            r"`([a-z_]+/[\w./-]*(?:\.py|\.toml|\.md|/))`",
+            page.read_text(encoding="utf-8"),
         )
-    )
+    }
 )
 
 
 @pytest.mark.parametrize("path", NAMED_PATHS)
-def test_a_place_that_contributors_are_sent_to_exists(path: str) -> None:
+def test_a_file_that_a_page_names_exists(path: str) -> None:
     assert (ROOT / path).exists() or (ROOT / "mlg_troubleshoot" / path).exists()
 
 
