@@ -81,11 +81,3 @@ def test_joints_that_differ_by_less_than_1e_4_share_a_rank() -> None:
 
 def test_a_rank_range_spans_the_linkages() -> None:
     assert rank_ranges(np.array([[0.3, 0.2], [0.1, 0.2]])) == [(1, 2), (1, 2)]
-
-
-def test_the_leading_group_is_joints_2_to_5_on_every_linkage(table: IndexTable) -> None:
-    assert all(entry.rank_range[1] <= 4 for entry in table.joints[1:5])
-
-
-def test_each_of_joints_2_to_5_has_at_least_18_percent_on_every_linkage(table: IndexTable) -> None:
-    assert min(entry.first_order_spread[0] for entry in table.joints[1:5]) >= 0.18
