@@ -63,6 +63,8 @@ def kept(found: Run, path: Path, before: bytes, option: str) -> None:
         "check in.csv --extension other.toml --csv other.toml",
         "check in.csv --causes other.toml --csv other.toml",
         "check in.csv --gear mine.toml --csv mine.toml",
+        "check in.csv --force --map other.toml --csv other.toml",
+        "diagnose fleet.csv --map other.toml --write-extension other.toml",
         "diagnose fleet.csv --write-extension fleet.csv",
         "diagnose fleet.csv --gear mine.toml --write-extension mine-targets.toml",
         "study --gear mine.toml --csv hawker-800xp-ensemble.toml",

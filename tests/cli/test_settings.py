@@ -102,22 +102,6 @@ def test_a_file_of_headers_that_is_not_one_is_refused_with_words(
     assert "headers.toml" in found.err
 
 
-def test_a_file_of_headers_is_not_replaced(tmp_path: Path) -> None:
-    headers = tmp_path / "headers.toml"
-    headers.write_text('[headers]\n"Spiel Drei" = "clearance_4_in"', encoding="utf-8")
-    found = mlg("check", FAILURE, "--map", headers, "--csv", headers, "--force")
-    assert (found.code, "is one of the inputs" in found.err) == (2, True)
-    found = mlg("diagnose", FAILURE, "--map", headers, "--write-extension", headers, "--force")
-    assert (found.code, "is one of the inputs" in found.err) == (2, True)
-
-
-def test_a_diagnosis_that_cannot_be_concluded_writes_its_reason_as_json() -> None:
-    found = mlg("diagnose", FAILURE, "--json")
-    assert found.code == 3
-    assert found.json["verdict"] is None
-    assert "no row has a measured plunger displacement" in found.json["reason"]
-
-
 def test_a_format_without_a_report_is_said() -> None:
     assert "without --report DIR none is written" in mlg("check", FAILURE, "--format", "html").err
 

@@ -12,14 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
 
-from mlg_troubleshoot.cli.app import app
 from mlg_troubleshoot.diagnosis import Cause, DiagnosisTable, diagnose
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
 from mlg_troubleshoot.diagnosis.causes.reading import GaugeBias
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
+from tests.cli.conftest import Run, mlg
 
 from .conftest import fleet
 
@@ -195,8 +194,8 @@ def inspections(n: int, *cells: object, tails: int = 6) -> list[list[object]]:
     ]
 
 
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(app, ["diagnose", *arguments])
+def run(*arguments: object) -> Run:
+    return mlg("diagnose", *arguments)
 
 
 COMMANDS: dict[str, tuple[list[list[object]], tuple[str, ...], str]] = {
@@ -208,9 +207,9 @@ COMMANDS: dict[str, tuple[list[list[object]], tuple[str, ...], str]] = {
 @pytest.mark.parametrize("case", COMMANDS)
 def test_the_command_leaves_with_3_and_says_why_and_what_to_do(case: str, tmp_path: Path) -> None:
     rows, columns, why = COMMANDS[case]
-    found = run(str(write(tmp_path / "t.csv", rows, *columns)))
-    said = found.stderr
-    assert found.exit_code == 3
+    found = run(write(tmp_path / "t.csv", rows, *columns))
+    said = found.err
+    assert found.code == 3
     assert why in said
     assert "What to do:" in said
     assert "Traceback" not in said
@@ -218,7 +217,7 @@ def test_the_command_leaves_with_3_and_says_why_and_what_to_do(case: str, tmp_pa
 
 def test_json_gives_the_reason_where_nothing_is_concluded(tmp_path: Path) -> None:
     rows, columns, why = COMMANDS["five rows"]
-    said = json.loads(run(str(write(tmp_path / "t.csv", rows, *columns)), "--json").stdout)
+    said = json.loads(run(write(tmp_path / "t.csv", rows, *columns), "--json").out)
     assert said["verdict"] is None
     assert why in said["reason"]
 
@@ -230,8 +229,8 @@ def test_a_file_of_causes_that_is_not_valid_leaves_with_2(text: str, tmp_path: P
     found = run(
         str(write(tmp_path / "t.csv", rows, *columns)), "--causes", str(tmp_path / "own.py")
     )
-    assert found.exit_code == 2
-    assert "own.py" in found.stderr
+    assert found.code == 2
+    assert "own.py" in found.err
 
 
 def test_the_json_of_a_diagnosis_holds_no_invalid_number(tmp_path: Path) -> None:
@@ -241,13 +240,13 @@ def test_the_json_of_a_diagnosis_holds_no_invalid_number(tmp_path: Path) -> None
         str(write(tmp_path / "t.csv", rows, "plunger_displacement_in")),
         "--json",
     )
-    assert json.loads(found.stdout)["schema_version"] == 1
-    assert not {"NaN", "Infinity"} & set(found.stdout.split())
+    assert json.loads(found.out)["schema_version"] == 1
+    assert not {"NaN", "Infinity"} & set(found.out.split())
 
 
 def test_the_same_inspections_again_are_not_further_evidence(tmp_path: Path) -> None:
     rows = [[*row, 0.02 + 0.001 * k] for k, row in enumerate(inspections(15))]
-    said = run(str(write(tmp_path / "t.csv", [*rows, *rows], "plunger_displacement_in"))).stderr
+    said = run(write(tmp_path / "t.csv", [*rows, *rows], "plunger_displacement_in")).err
     assert "15 usable rows are too few" in said
 
 
@@ -256,15 +255,15 @@ def test_what_a_refused_table_lost_is_said(tmp_path: Path) -> None:
     rows[3][4] = "large"
     file = write(tmp_path / "t.csv", rows, "plunger_displacement_in")
     found = run(str(file))
-    assert "Note: 25 rows read: 1 with an error, 10 without a measured displacement" in found.stderr
-    assert "found 'large'" in found.stderr
-    warnings = json.loads(run(str(file), "--json").stdout)["warnings"]
+    assert "Note: 25 rows read: 1 with an error, 10 without a measured displacement" in found.err
+    assert "found 'large'" in found.err
+    warnings = json.loads(run(str(file), "--json").out)["warnings"]
     assert any("1 with an error" in said for said in warnings)
 
 
 def test_a_table_whose_only_linkage_does_not_close_is_refused_in_words(tmp_path: Path) -> None:
     (row,) = inspections(1, 0.02)
     row[5] = 5.0
-    found = run(str(write(tmp_path / "t.csv", [row], "plunger_displacement_in")))
-    assert found.exit_code == 3
-    assert "1 usable row is too few" in found.stderr
+    found = run(write(tmp_path / "t.csv", [row], "plunger_displacement_in"))
+    assert found.code == 3
+    assert "1 usable row is too few" in found.err

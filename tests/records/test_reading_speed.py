@@ -14,6 +14,7 @@ import zipfile
 import pytest
 
 from mlg_troubleshoot.records import ReadOptions, read_many
+from tests.benchmarks.made import HEADER, row
 from tests.machine import SLOWER
 
 MEASURE = """
@@ -38,56 +39,6 @@ if sys.argv[1].endswith("xlsx"):
     library = time.process_time() - start
 print(json.dumps([judged, peak, raw, library, *counts]))
 """
-NUMBERED = [f"clearance_{n}_in" for n in range(1, 11)] + [
-    f"axial_float_{n}_in" for n in range(1, 11)
-]
-HEADER = [
-    *(
-        "record_id",
-        "tail_no",
-        "side",
-        "clearance_convention",
-        "inspection_date",
-        "gear_landings",
-        "temperature_c",
-    ),
-    *(
-        "hydraulic_pressure_psi",
-        "approach",
-        "gauge_id",
-        "technician_id",
-        "gauge_u_in",
-        "plunger_gauge_u_in",
-    ),
-    *NUMBERED,
-    *(
-        "plunger_down_lock_in",
-        "plunger_displacement_in",
-        "plunger_displacement_2_in",
-        "margin_in",
-        "margin_u_in",
-    ),
-    *("outcome", "work_order"),
-]
-
-
-def row(number, rng):
-    """Return one inspection."""
-    return [
-        *(
-            f"R{number:06d}",
-            f"N{number % 300:03d}",
-            rng.choice(("LH", "RH")),
-            "RADIAL",
-            "2026-03-04",
-            number,
-            20.5,
-            3000,
-        ),
-        *("EXTENDING", f"G-{number % 7}", f"T{number % 20}", 0.0005, 0.001),
-        *(round(rng.uniform(0, 0.008), 4) for _ in range(20)),
-        *(0.03, round(rng.uniform(-0.05, 0.05), 4), 0.01, 0.03, 0.002, "RETRACTED", f"WO{number}"),
-    ]
 
 
 def write_workbook(path, package, rows):
@@ -96,7 +47,7 @@ def write_workbook(path, package, rows):
 
     rng = random.Random(1)
     lines = []
-    for number, cells in enumerate([HEADER, *(row(n, rng) for n in range(rows))], 1):
+    for number, cells in enumerate([HEADER, *(row(n, rng, 0.0) for n in range(rows))], 1):
         xml = "".join(
             (
                 f'<c r="{LETTERS[i]}{number}" t="inlineStr"><is><t>{c}</t></is></c>'
@@ -136,7 +87,7 @@ def test_fifty_thousand_rows_of_forty_columns_are_read_in_time_and_memory(tmp_pa
 def csv_text(rows):
     rng = random.Random(2)
     return "\n".join(
-        ",".join(map(str, cells)) for cells in [HEADER, *(row(n, rng) for n in range(rows))]
+        ",".join(map(str, cells)) for cells in [HEADER, *(row(n, rng, 0.0) for n in range(rows))]
     )
 
 
