@@ -34,19 +34,39 @@ def complain(name: str, document: Any) -> list[str]:
     return [f"{error.json_path}: {error.message}" for error in validator.iter_errors(document)]
 
 
+def objects(schema: Any) -> Iterator[Mapping[str, Any]]:
+    """Every object that a schema describes by its names."""
+    if isinstance(schema, dict):
+        if isinstance(schema.get("type"), str) and "properties" in schema:
+            yield schema
+        for part in schema.values():
+            yield from objects(part)
+    elif isinstance(schema, list):
+        for part in schema:
+            yield from objects(part)
+
+
 @pytest.mark.parametrize("name", schemas.NAMES + schemas.FILES)
-def test_every_schema_is_itself_valid(name: str) -> None:
-    jsonschema.Draft202012Validator.check_schema(schemas.schema(name))
+def test_every_schema_is_valid_and_allows_no_further_names(name: str) -> None:
+    schema = schemas.schema(name)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert all(part["additionalProperties"] is False for part in objects(schema))
+
+
+def test_the_contract_names_eight_outputs_that_state_the_version_of_their_schema() -> None:
+    assert set(schemas.NAMES) == {
+        *["check", "diagnose", "study", "fleet", "history", "life", "gear", "verify"],
+    }
+    for name in schemas.NAMES:
+        kinds = schemas.schema(name)["$defs"].values()
+        outputs = [k for k in kinds if k.get("description", "").startswith("Output of")]
+        assert outputs
+        assert all("schema_version" in kind["required"] for kind in outputs)
 
 
 def test_an_unknown_schema_is_refused() -> None:
     with pytest.raises(UsageError, match="there is no schema 'template'"):
         schemas.schema("template")
-
-
-def test_the_contract_names_eight_outputs_and_the_verification() -> None:
-    named = "check diagnose study fleet history life gear"
-    assert set(schemas.NAMES) == {*named.split(), "verify"}
 
 
 @pytest.mark.parametrize(
@@ -128,23 +148,6 @@ def test_a_study_of_any_kind_fits_its_schema(options: tuple[object, ...]) -> Non
     assert complain("study", mlg("study", *options, "--json").json) == []
 
 
-def objects(schema: Any) -> Iterator[Mapping[str, Any]]:
-    """Every object that a schema describes by its names."""
-    if isinstance(schema, dict):
-        if isinstance(schema.get("type"), str) and "properties" in schema:
-            yield schema
-        for part in schema.values():
-            yield from objects(part)
-    elif isinstance(schema, list):
-        for part in schema:
-            yield from objects(part)
-
-
-@pytest.mark.parametrize("name", schemas.NAMES + schemas.FILES)
-def test_no_object_of_a_schema_allows_further_names(name: str) -> None:
-    assert all(part["additionalProperties"] is False for part in objects(schemas.schema(name)))
-
-
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
     """Run on a store in which one gear has a life with every kind of record."""
@@ -199,14 +202,6 @@ def test_the_life_that_is_checked_has_lines_of_many_kinds(kept: Callable[..., An
 def test_an_empty_store_fits_its_schema(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MLG_STORE", str(tmp_path / "empty.sqlite"))
     assert complain("fleet", mlg("fleet", "--json", "-q").json) == []
-
-
-@pytest.mark.parametrize("name", schemas.NAMES)
-def test_every_output_states_the_version_of_its_schema(name: str) -> None:
-    kinds = schemas.schema(name)["$defs"].values()
-    outputs = [k for k in kinds if k.get("description", "").startswith("Output of")]
-    assert outputs
-    assert all("schema_version" in kind["required"] for kind in outputs)
 
 
 @pytest.mark.parametrize(

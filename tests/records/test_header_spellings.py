@@ -93,11 +93,7 @@ def test_a_mapped_header_is_read_as_the_caller_says(read, table, key):
     assert not result.problems
     assert result.rows[0].clearance_in[3] == pytest.approx(0.33 / 25.4)
     assert any('"Play J3" clearance_3_mm' in note for note in result.notes)
-
-
-def test_a_column_mapped_to_carry_is_not_read(read, table):
-    text = table((*HEADER, "clearance_1_in", "Play J3"), [(*GOOD, 0.001, 0.33)])
-    result = read(text, column_map={"Play J3": "carry"})
+    result = read(text, column_map={key: "carry"})
     assert result.rows[0].clearance_in == {1: 0.001}
     assert result.rows[0].carried == {"Play J3": "0.33"}
 
@@ -128,52 +124,37 @@ def test_identity_headers_as_people_write_them_are_understood(read, table):
     assert sum("read as" in note for note in result.notes) == 1
 
 
-def test_an_unknown_column_is_kept_and_named(read, table):
-    result = read(table((*HEADER, "clearance_3_in", "Stroke (mm)"), [(*GOOD, 0.013, 17)]))
-    assert result.rows[0].carried == {"Stroke (mm)": "17"}
-    assert any('carried to the report: "Stroke (mm)"' in note for note in result.notes)
+@pytest.mark.parametrize(
+    ("headers", "cells", "carried"),
+    [
+        (("Stroke (mm)",), (17,), {"Stroke (mm)": "17"}),
+        (("Joint 3 remarks",), ("worn",), {"Joint 3 remarks": "worn"}),
+        (("Remarks", "Comments"), ("a", "b"), {"remarks": "a", "Comments": "b"}),
+        (("remarks", "remarks"), ("a", "b"), {"remarks": "a", "remarks (again)": "b"}),
+    ],
+)
+def test_a_column_that_no_one_knows_is_kept_and_named(read, table, headers, cells, carried):
+    result = read(table((*HEADER, "clearance_3_in", *headers), [(*GOOD, 0.013, *cells)]))
+    assert not result.problems
+    assert result.rows[0].carried == carried
+    if "Stroke (mm)" in headers:
+        assert any('carried to the report: "Stroke (mm)"' in note for note in result.notes)
 
 
-def test_a_column_of_remarks_about_a_joint_is_kept(read, table):
-    result = read(table((*HEADER, "clearance_3_in", "Joint 3 remarks"), [(*GOOD, 0.013, "worn")]))
-    assert result.rows[0].carried == {"Joint 3 remarks": "worn"}
+@pytest.mark.parametrize(
+    ("header", "known"),
+    [
+        ("Clearance #3 – drag strut knuckle (in)", [False, True]),
+        ("Clearance #2 – locking pin (in)", [True, False]),
+    ],
+)
+def test_the_names_of_the_joints_are_those_of_the_gear_that_is_given(read, table, header, known):
+    text = table((*HEADER, header), [(*GOOD, 0.013)])
+    other = Joints(names=("", "torque link", "drag strut knuckle"))
+    assert [not read(text, **more).problems for more in ({}, {"joints": other})] == known
 
 
 def test_a_misspelt_optional_column_is_kept_and_its_likely_name_given(read, table):
     result = read(table((*HEADER, "clearance_3_in", "temprature_c"), [(*GOOD, 0.013, 20)]))
     assert not result.problems
     assert any("temperature_c" in note and "--map" in note for note in result.notes)
-
-
-def test_two_columns_of_remarks_are_both_kept(read, table):
-    result = read(
-        table((*HEADER, "clearance_3_in", "Remarks", "Comments"), [(*GOOD, 0.013, "a", "b")])
-    )
-    assert not result.problems
-    assert result.rows[0].carried == {"remarks": "a", "Comments": "b"}
-
-
-def test_two_columns_of_remarks_of_one_name_are_both_kept(read, table):
-    result = read(
-        table((*HEADER, "clearance_3_in", "remarks", "remarks"), [(*GOOD, 0.013, "a", "b")])
-    )
-    assert result.rows[0].carried == {"remarks": "a", "remarks (again)": "b"}
-
-
-def test_the_names_of_another_gear_are_known_when_given(read, table):
-    text = table((*HEADER, "Clearance #3 – drag strut knuckle (in)"), [(*GOOD, 0.013)])
-    assert read(text).problems
-    assert not read(text, joints=Joints(names=("", "", "drag strut knuckle"))).problems
-
-
-def test_the_names_of_the_shipped_gear_are_not_known_with_another(read, table):
-    text = table((*HEADER, "Clearance #2 – locking pin (in)"), [(*GOOD, 0.013)])
-    assert not read(text).problems
-    assert read(text, joints=Joints(names=("torque link", "drag strut knuckle"))).problems
-
-
-def test_a_header_cell_in_a_csv_file_is_named_by_its_letter(read, table):
-    (problem,) = read(
-        table((*HEADER, "clearance_1_in", "J12 (in)"), [(*GOOD, 0.001, 0.001)])
-    ).problems
-    assert (problem.sheet, problem.row, problem.cell, problem.column) == (None, 1, "F1", "J12 (in)")

@@ -43,14 +43,11 @@ def test_a_pattern_stands_for_what_it_matches(folder):
     assert [row.record_id for row in result.rows] == ["A1", "B1", "B2"]
 
 
-def test_a_pattern_that_matches_nothing_is_a_problem(folder):
-    assert [p.code for p in read_many([str(folder / "*.tsv")], ReadOptions()).problems] == [
-        "file_not_found"
-    ]
-
-
-def test_a_folder_without_tables_is_a_problem(tmp_path):
-    assert [p.code for p in read_many([tmp_path], ReadOptions()).problems] == ["file_not_found"]
+def test_a_pattern_or_a_folder_without_tables_is_a_problem(folder):
+    (folder / "empty").mkdir()
+    for source in (str(folder / "*.tsv"), folder / "empty"):
+        problems = read_many([source], ReadOptions()).problems
+        assert [p.code for p in problems] == ["file_not_found"]
 
 
 def test_problems_and_rows_name_their_file(folder):
