@@ -38,6 +38,11 @@ def test_a_cell_acts_on_neither_stream(column: str, table: Table) -> None:
     harmless(mlg("check", table(row(**{column: in_a_table(HOSTILE)}))))
 
 
+def test_a_header_and_a_command_act_on_neither_stream(table: Table) -> None:
+    harmless(mlg("check", table(row(**{in_a_table(HOSTILE): "x"}))))
+    harmless(mlg("[/b]\x1b[31m"))
+
+
 @pytest.mark.parametrize("column", ["record_id", "tail_no"])
 @pytest.mark.parametrize("rows", [1, 2])
 def test_markup_in_an_identity_is_shown_as_it_is(column: str, rows: int, table: Table) -> None:
@@ -53,16 +58,6 @@ def test_a_record_id_of_two_lines_stays_on_one(table: Table) -> None:
     assert not any(
         line.startswith("= WITHIN_MARGIN N9") for line in mlg("check", path).out.splitlines()
     )
-
-
-def test_two_inspections_of_one_gear_side_by_side_show_their_ids_as_they_are(table: Table) -> None:
-    found = mlg("check", table(row(record_id="[b]A"), row(record_id="[/b]B")))
-    harmless(found)
-    assert "Before and after" in found.out
-
-
-def test_a_header_acts_on_neither_stream(table: Table) -> None:
-    harmless(mlg("check", table(row(**{in_a_table(HOSTILE): "x"}))))
 
 
 @pytest.mark.parametrize("command", ["check", "diagnose"])
@@ -92,10 +87,6 @@ def test_a_file_name_acts_on_neither_stream(command: str, tmp_path: Path) -> Non
 )
 def test_a_flag_acts_on_neither_stream(flags: tuple[str, ...]) -> None:
     harmless(mlg(*HAND, "--convention", "RADIAL", "--set", "3=0.001in", *flags))
-
-
-def test_a_command_that_does_not_exist_is_shown_as_it_is() -> None:
-    harmless(mlg("[/b]\x1b[31m"))
 
 
 def test_a_gear_file_acts_on_neither_stream(tmp_path: Path) -> None:

@@ -78,11 +78,10 @@ def test_only_what_is_measured_and_worn_beyond_a_new_part_can_be_restored_with_a
     ]
 
 
-def test_restoring_joint_three_alone_is_too_close(gear: Gear) -> None:
+def test_restoring_joint_three_alone_is_too_close_and_three_and_five_clear_the_failure(
+    gear: Gear, judge: Judge
+) -> None:
     assert 0.90 <= probabilities_after(gear, (3,))[0] < 0.95
-
-
-def test_restoring_joints_three_and_five_clears_the_failure(gear: Gear, judge: Judge) -> None:
     assert probabilities_after(gear, (3, 5))[0] >= 0.95
     sets = judge(FULL_FAILURE).repair_sets
     assert sets is not None
@@ -94,15 +93,10 @@ def sets_of_failure(gear: Gear) -> tuple[tuple[int, ...], ...]:
     return tuple(s.joints for s in repair_sets(gear, inspected(FULL_FAILURE), MARGIN_IN))
 
 
-def test_every_repair_set_reaches_95_percent(
+def test_every_repair_set_reaches_95_percent_and_contains_no_joint_too_many(
     gear: Gear, sets_of_failure: tuple[tuple[int, ...], ...]
 ) -> None:
     assert probabilities_after(gear, *sets_of_failure).min() >= 0.95
-
-
-def test_no_repair_set_contains_a_joint_too_many(
-    gear: Gear, sets_of_failure: tuple[tuple[int, ...], ...]
-) -> None:
     # Joint 3 is over its limit and must be in every set.
     smaller = [
         tuple(j for j in joints if j != spare)
@@ -148,12 +142,19 @@ def test_a_restored_joint_has_the_clearance_of_a_new_part(gear: Gear) -> None:
     )
 
 
-def test_a_gear_that_needs_no_repair_has_no_repair_set(gear: Gear) -> None:
-    assert repair_sets(gear, inspected(dict.fromkeys(range(1, 6), 0.0006)), MARGIN_IN) == ()
-
-
-def test_a_gear_without_a_sufficient_set_has_no_repair_set(gear: Gear) -> None:
-    assert repair_sets(gear, inspected(every_joint(0.005)), 0.004) == ()
+@pytest.mark.parametrize(
+    ("read", "margin_in"),
+    [
+        (dict.fromkeys(range(1, 6), 0.0006), MARGIN_IN),
+        (every_joint(0.001), MARGIN_IN),
+        (every_joint(0.005), 0.004),
+    ],
+    ids=["no repair needed", "within", "no set suffices"],
+)
+def test_a_gear_that_needs_no_repair_or_that_none_helps_has_no_repair_set(
+    gear: Gear, read: dict[int, float], margin_in: float
+) -> None:
+    assert repair_sets(gear, inspected(read), margin_in) == ()
 
 
 def test_only_measured_joints_are_proposed_for_repair(gear: Gear) -> None:
@@ -163,10 +164,6 @@ def test_only_measured_joints_are_proposed_for_repair(gear: Gear) -> None:
     assert {j for s in found for j in s.joints} <= {2, 3, 5}
 
 
-def test_a_gear_within_its_margin_has_no_repair_sets(judge: Judge) -> None:
-    assert judge(every_joint(0.001)).repair_sets == ()
-
-
 def test_a_joint_worn_by_its_allowance_brings_the_worst_case_to_the_margin(gear: Gear) -> None:
     clearance = every_joint(0.0017)
     found = allowance(gear, inspected(clearance))
@@ -174,25 +171,13 @@ def test_a_joint_worn_by_its_allowance_brings_the_worst_case_to_the_margin(gear:
         worn = clearance | {joint: clearance[joint] + found[joint]}
         row = np.array([[worn[j] for j in range(1, 11)]])
         assert worst_case(gear.model, row).magnitude_in[0] == pytest.approx(MARGIN_IN, abs=2e-5)
-
-
-def test_a_joint_with_more_amplification_has_less_allowance(gear: Gear) -> None:
-    found = allowance(gear, inspected(every_joint(0.0017)))
+    # The more amplification the less, and never beyond the limit of the joint.
     assert found[2] < found[1] < found[6]
+    assert found[6] == pytest.approx(0.0058)
 
 
-def test_an_allowance_ends_at_the_limit_of_the_joint_where_that_comes_before_the_margin(
-    gear: Gear,
-) -> None:
-    assert allowance(gear, inspected(every_joint(0.0017)))[6] == pytest.approx(0.0058)
-
-
-def test_a_gear_beyond_its_margin_has_no_allowance(judge: Judge) -> None:
-    found = judge(FAILURE)
-    assert {finding.allowance_in for finding in found.joints} == {None}
-
-
-def test_an_unmeasured_joint_has_no_allowance(judge: Judge) -> None:
+def test_an_unmeasured_joint_and_a_gear_beyond_its_margin_have_no_allowance(judge: Judge) -> None:
+    assert {finding.allowance_in for finding in judge(FAILURE).joints} == {None}
     found = judge({3: 0.001})
     assert [f.joint for f in found.joints if f.allowance_in is not None] == [3]
 

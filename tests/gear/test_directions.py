@@ -98,19 +98,12 @@ def test_a_global_search_of_directions_and_stroke_finds_hardly_more_than_the_rul
         assert 0.0 <= best - found <= short_by * best
 
 
-@given(clearance=clearances)
-def test_over_travel_is_never_negative_and_under_travel_never_positive(
-    gear: Gear, clearance: np.ndarray
-) -> None:
-    worst = worst_case(gear.model, clearance)
-    assert worst.under_in[0] <= 0.0 <= worst.over_in[0]
-
-
 @given(clearance=clearances, direction=arrays(float, 10, elements=st.floats(-np.pi, np.pi)))
 def test_no_other_directions_go_beyond_the_worst_ones_by_more_than_that(
     gear: Gear, clearance: np.ndarray, direction: np.ndarray
 ) -> None:
     worst = worst_case(gear.model, clearance)
+    assert worst.under_in[0] <= 0.0 <= worst.over_in[0]
     moved = float(gear.model.displacement(links_from(clearance, direction)))
     assert worst.under_in[0] * 1.0004 - 1e-9 <= moved <= worst.over_in[0] * 1.0004 + 1e-9
 
@@ -124,15 +117,11 @@ def test_the_reported_directions_give_the_reported_displacements(gear: Gear) -> 
     assert under == pytest.approx(worst.under_in, abs=1e-14)
 
 
-def test_the_magnitude_is_the_larger_sense_and_its_directions_govern(gear: Gear) -> None:
-    worst = worst_case(gear.model, np.full((1, 10), 0.0075))
+def test_the_larger_sense_governs(gear: Gear) -> None:
+    worst = worst_case(gear.model, FAILURE)
     assert worst.magnitude_in[0] == worst.over_in[0] > -worst.under_in[0]
     assert np.array_equal(worst.governing_directions, worst.over_directions)
-
-
-def test_under_travel_governs_where_it_is_larger(gear: Gear) -> None:
     # Both senses of a linkage whose output is read the other way round.
-    worst = worst_case(gear.model, FAILURE)
     turned = type(worst)(
         -worst.under_in, -worst.over_in, worst.under_directions, worst.over_directions
     )
@@ -173,14 +162,17 @@ def test_a_joint_without_clearance_still_has_the_direction_in_which_it_would_act
     assert tiny / 1e-5 == pytest.approx(gear.model.plunger_amplification(), rel=1e-3)
 
 
-def test_without_clearance_the_plunger_does_not_move(gear: Gear) -> None:
-    worst = worst_case(gear.model, np.zeros(10))
-    assert (worst.over_in[0], worst.under_in[0]) == pytest.approx((0.0, 0.0), abs=1e-15)
-
-
-def test_a_gear_that_does_not_close_is_nan_and_the_others_of_the_batch_are_not(gear: Gear) -> None:
+def test_without_clearance_nothing_moves_and_what_does_not_close_is_beyond_every_margin(
+    gear: Gear,
+) -> None:
+    still = worst_case(gear.model, np.zeros(10))
+    assert (still.over_in[0], still.under_in[0]) == pytest.approx((0.0, 0.0), abs=1e-15)
     worst = worst_case(gear.model, np.array([[0.005] * 10, [0.05] * 10]))
     assert np.isnan(worst.magnitude_in).tolist() == [False, True]
+    clearance = np.zeros((2, 10))
+    clearance[1, 0] = 100.0
+    chance = chance_beyond(gear.model, clearance, np.array([MARGIN_IN, 1e9]), 64)
+    assert chance.tolist() == [0.0, 1.0]
 
 
 def test_the_failure_case_exceeds_its_margin_in_a_quarter_of_random_directions(gear: Gear) -> None:
@@ -230,25 +222,9 @@ def test_gears_worn_up_to_the_limit_exceed_with_worst_directions_in_97_percent(
     assert beyond.mean() == pytest.approx(0.97, abs=0.015)
 
 
-def test_the_chance_is_zero_without_clearance(gear: Gear) -> None:
-    assert chance_beyond(gear.model, np.zeros((2, 10)), np.full(2, MARGIN_IN), 64).tolist() == [
-        0.0,
-        0.0,
-    ]
-
-
-def test_a_position_that_does_not_close_counts_as_beyond_the_margin(gear: Gear) -> None:
-    clearance = np.zeros((1, 10))
-    clearance[0, 0] = 100.0
-    assert chance_beyond(gear.model, clearance, np.array([1e9]), 64)[0] == 1.0
-
-
-def test_the_same_directions_are_used_at_every_call() -> None:
-    assert np.array_equal(random_directions(10, 100), random_directions(10, 100))
-
-
-def test_random_directions_lie_on_the_circle() -> None:
+def test_random_directions_lie_on_the_circle_and_are_the_same_at_every_call() -> None:
     turns = random_directions(10, 1000)
+    assert np.array_equal(turns, random_directions(10, 1000))
     assert turns.min() >= 0.0
     assert turns.max() < 2 * np.pi
 

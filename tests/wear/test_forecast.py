@@ -47,12 +47,9 @@ def test_a_last_reading_is_scored_by_what_is_forecast_from_those_before_it(
     assert found == pytest.approx([expected], rel=0.05)
 
 
-def test_quantiles_come_one_row_a_usage(model: WearModel) -> None:
+def test_quantiles_come_one_row_a_unit_and_usage(model: WearModel) -> None:
     assert model.forecast("part 1", [1.6, 1.8]).quantile(ENDS).shape == (2, 3)
     assert model.usage_to_limit("part 1", 2.5).quantile(ENDS).shape == (3,)
-
-
-def test_many_units_come_one_row_a_unit(model: WearModel) -> None:
     units = ["part 1", "part 2", "read once"]
     assert model.forecast(units, [[1.6, 1.8], [1.7, 1.9], [2.0, 2.2]]).quantile(ENDS).shape == (
         3,
@@ -213,9 +210,6 @@ def test_a_path_that_is_not_valid_is_refused(
 ) -> None:
     with pytest.raises(UsageError, match=said):
         WearPath("a", usage, value)
-
-
-def test_nothing_read_at_all_is_refused() -> None:
     with pytest.raises(UsageError, match="no path has a reading"):
         fit_wear([WearPath("a", [], [])])
 
