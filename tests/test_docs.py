@@ -165,6 +165,20 @@ def test_every_script_that_is_named_exists() -> None:
     assert [s for s in scripts if not (ROOT / s).is_file()] == []
 
 
+# Options of other programs that a page runs.
+OF_OTHERS = {"--cases", "--no-deps", "--owner", "--pwprompt", "--strict"}
+
+
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if p.name not in {"changelog.md", "figures.md"}], ids=lambda p: p.name
+)
+def test_every_option_that_a_page_names_exists(page: Path) -> None:
+    params = [p for _path, command in docs_examples.all_commands() for p in command.params]
+    known = {option for p in params for option in (*p.opts, *p.secondary_opts)}
+    named = set(re.findall(r"(?<![\w-])--[a-z][\w-]+", page.read_text(encoding="utf-8")))
+    assert named - known - OF_OTHERS - {"--version", "--help", "--help-all"} == set()
+
+
 def test_the_python_version_is_that_of_the_project() -> None:
     wanted = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
         "requires-python"
