@@ -116,12 +116,15 @@ def columns_table() -> str:
 
 
 def names_table(module: str) -> str:
-    """The public names of a module with the first sentence of each docstring."""
+    """The public names of a module with the first sentence of each docstring; of a room those that
+    the package has not.
+    """
     door = importlib.import_module(module)
     lines = ["| name | is |", "|---|---|"]
     for name in sorted(door.__all__, key=str.lower):
         thing = getattr(door, name)
-        if inspect.ismodule(thing):
+        above = getattr(importlib.import_module("mlg_troubleshoot"), name, None)
+        if inspect.ismodule(thing) or (thing is above and "." in module):
             continue
         text = " ".join((inspect.getdoc(thing) or "").split("\n\n")[0].split())
         text = re.sub(r":\w+:`~?([^`]+)`", r"`\1`", text.replace("``", "`")).replace("|", "\\|")
