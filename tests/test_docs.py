@@ -75,6 +75,13 @@ def test_a_page_shows_what_its_commands_print_today(page: Path, tmp_path: Path) 
     assert docs_examples.refreshed(text, tmp_path) == text, OUT_OF_DATE
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_a_page_says_in_its_first_lines_for_whom_it_is_and_how_long_it_takes(page: Path) -> None:
+    beginning = " ".join(page.read_text(encoding="utf-8").split()[:70])
+    assert re.search(r"\bfor\b|One page", beginning, re.IGNORECASE)
+    assert re.search(r"minute|look up", beginning, re.IGNORECASE)
+
+
 def test_there_are_sessions() -> None:
     assert len(SESSIONS) > 5
 
