@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from functools import cached_property, lru_cache
 from math import inf
+from operator import itemgetter
 
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, RiggingCheck, Side, plain_tail
@@ -30,6 +31,8 @@ LEAST_OF_A_HASH = 6
 _WORK = (RecordKind.REPAIR, RecordKind.RERIG)
 # Contents that stay unpacked: those of the gears that are being worked on, not of a fleet. [1]
 _UNPACKED = 4096
+# What a clock counts in. [s]
+_TICK_S = 1e-6
 
 
 # Who judges is not part of what a record says, but decides whether it can be read.
@@ -40,9 +43,13 @@ def _inspection_of(record: Record, _judge: Judge | None) -> Inspection:
 
 @dataclass(frozen=True, slots=True)
 class KeptInspection:
-    """An inspection as it stands after corrections, unpacked when it is asked for."""
+    """An inspection as it stands after corrections, unpacked when it is asked for.
+
+    first: as it was entered, which decides what was typed before it.
+    """
 
     record: Record
+    first: Record
 
     @property
     def inspection(self) -> Inspection:
@@ -52,9 +59,9 @@ class KeptInspection:
     def moment(self) -> Moment:
         return Moment.of(self.inspection)
 
-    def visit(self, place: int) -> GearVisit:
+    def visit(self, place: float) -> GearVisit:
         row = self.inspection
-        return GearVisit(row, place, typed=row.source.file is None)
+        return GearVisit(row, place, row.source.file is None, self.record.digest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +95,11 @@ class Repair:
     def moment(self) -> Moment:
         return Moment(self.day, self.landings, restored=self.joints)
 
-    def visit(self, place: int) -> GearVisit:
+    @property
+    def first(self) -> Record:
+        return self.record
+
+    def visit(self, place: float) -> GearVisit:
         """The visit of a repair that was recorded by itself."""
         record = self.record
         at = record.body.get("at")
@@ -105,7 +116,7 @@ class Repair:
             rigging_checked=None if self.joints else RiggingCheck.CORRECTED,
             repair_date=datetime.fromisoformat(at) if at else day,
         )
-        return GearVisit(row, place, typed="stated_by" not in record.body)
+        return GearVisit(row, place, "stated_by" not in record.body, record.digest)
 
 
 Event = KeptInspection | Repair
@@ -143,6 +154,7 @@ class GearLife:
 
     key: GearKey
     records: tuple[Record, ...]
+    places: Mapping[str, float]
     events: tuple[Event, ...]
     warnings: tuple[str, ...]
     overhauls: Mapping[int, frozenset[int]] = field(default_factory=dict)
@@ -172,16 +184,25 @@ class GearLife:
         """Restorations of joints and re-riggings."""
         return tuple(event for event in self.events if isinstance(event, Repair))
 
+    @cached_property
+    def voided(self) -> list[Record]:
+        """Inspections that no longer count, as they were entered."""
+        one = first_keys(self.records)
+        standing = {one[each.first.key] for each in self.inspections}
+        return [
+            r
+            for r in self.records
+            if r.kind is RecordKind.INSPECTION and one[r.key] not in standing
+        ]
+
     @property
     def latest(self) -> KeptInspection | None:
         return self.inspections[-1] if self.inspections else None
 
-    @cached_property
-    def places(self) -> dict[str, int]:
-        """Place of each record in the order in which they were recorded, by its hash; a correction
-        stands in the place of what it corrects.
-        """
-        return _places(self.records)
+    def _place(self, first: Record) -> float:
+        """When something was entered first; what was moved here, at its former gear."""
+        entered = first.body.get("entered")
+        return self.places[first.digest] if entered is None else _clock(entered)
 
     @cached_property
     def visits(self) -> tuple[GearVisit, ...]:
@@ -189,7 +210,7 @@ class GearLife:
         time.
         """
         return tuple(
-            event.visit(self.places[event.record.digest])
+            event.visit(self._place(event.first))
             for event in self.events
             if isinstance(event, KeptInspection) or event.record.kind in _WORK
         )
@@ -302,23 +323,27 @@ def is_readable(record: Record) -> bool:
 def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     kept: dict[str, KeptInspection] = {}
     others: dict[str, Record] = {}
-    records = _as_recorded(_readable_or_not_void(records))
+    places = _by_clock(_readable_or_not_void(records))
+    records = [*places]
     one = first_keys(records)
+    # The visit that each version of it is of.
+    roots: dict[str, str] = {}
     for record in records:
-        key_of_record = one[record.key]
+        own = one[record.key]
         if record.kind is RecordKind.INSPECTION:
-            kept.setdefault(key_of_record, KeptInspection(record))
+            roots[own] = own
+            kept.setdefault(own, KeptInspection(record, record))
         elif record.kind is RecordKind.CORRECTION:
-            wrong = one.get(record.body["supersedes"])
-            first = next((k for k, s in kept.items() if wrong in (k, one[s.record.key])), None)
-            if first is not None:
-                kept[first] = KeptInspection(record)
+            wrong = one.get(record.body["supersedes"], "")
+            root = roots[own] = roots.get(wrong, wrong)
+            if root in kept:
+                kept[root] = replace(kept[root], record=record)
         elif record.kind is RecordKind.VOID:
-            gone = one.get(record.body["voids"])
-            kept = {k: s for k, s in kept.items() if gone not in (k, one[s.record.key])}
-            others = {k: r for k, r in others.items() if k != gone}
+            gone = one.get(record.body["voids"], "")
+            kept.pop(roots.get(gone, gone), None)
+            others.pop(gone, None)
         elif record.kind is not RecordKind.ASSESSMENT:
-            others.setdefault(key_of_record, record)
+            others.setdefault(own, record)
     stated = [repair for each in kept.values() for repair in Repair.stated(each)]
     # A repair that an inspection states is that of the same day which was recorded by itself; one
     # that came with an inspection falls with it.
@@ -331,27 +356,17 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
         if (r.day, r.joints) not in known and r.record.body.get("stated_by") not in sound
     ]
     events: list[Event] = [*stated, *repairs, *kept.values()]
-    at = _places(records)
-    events.sort(key=lambda event: at[event.record.digest])
+    events.sort(key=lambda event: places[event.first])
     moments = [event.moment for event in events]
     order = in_order(moments)
     return GearLife(
         key,
         tuple(records),
+        {record.digest: at for record, at in places.items()},
         tuple(events[place] for place in order),
         _disagreements(key, events, moments),
         overhauls([moments[place] for place in order]),
     )
-
-
-def _places(records: Iterable[Record]) -> dict[str, int]:
-    by_key: dict[str, int] = {}
-    found: dict[str, int] = {}
-    for place, record in enumerate(records):
-        is_correction = record.kind is RecordKind.CORRECTION
-        before = by_key.get(record.body["supersedes"]) if is_correction else None
-        found[record.digest] = by_key[record.key] = place if before is None else before
-    return found
 
 
 def first_keys(records: Iterable[Record]) -> dict[str, str]:
@@ -362,18 +377,22 @@ def first_keys(records: Iterable[Record]) -> dict[str, str]:
     return {r.key: first_of.setdefault((r.kind, *r.content), r.key) for r in records}
 
 
-def _as_recorded(records: Sequence[Record]) -> list[Record]:
-    """Records in the order in which they were recorded: that of the chain, and of two chains that
-    were merged by their clocks.
+def _by_clock(records: Iterable[Record]) -> dict[Record, float]:
+    """Records in the order in which they were recorded, with their clocks; of one chain a record
+    never comes before the one that it follows, whatever its clock says. [s]
     """
-    if not any(record.origin for record in records):
-        return [*records]
+    found: dict[Record, float] = {}
+    last = 0.0
+    for record in records:
+        at = _clock(record.recorded_at) or float(record.seq)
+        if not record.origin:
+            at = last = max(at, last + _TICK_S)
+        found[record] = at
+    return dict(sorted(found.items(), key=itemgetter(1)))
 
-    def when(record: Record) -> float:
-        stamp = record.recorded_at
-        return datetime.fromisoformat(stamp).timestamp() if stamp else -inf
 
-    return sorted(records, key=when)
+def _clock(stamp: str) -> float:
+    return datetime.fromisoformat(stamp).timestamp() if stamp else 0.0
 
 
 def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:

@@ -30,11 +30,10 @@ def judge_lives(
             found[place, _NOW] = now
         if not every:
             continue
-        digests = {life.places[kept.record.digest]: kept.record.digest for kept in life.inspections}
+        inspected = {kept.record.digest for kept in life.inspections}
         for state in states(known, gear):
-            digest = digests.get(int(state.visit.place))
-            if digest:
-                found[place, digest] = state
+            if state.visit.digest in inspected:
+                found[place, state.visit.digest] = state
     said = dict(zip(found, _judged([*found.values()], gear, table), strict=True))
     return [
         replace(

@@ -29,6 +29,8 @@ from mlg_troubleshoot.units import Sentence
 
 GearKey = tuple[str, str]
 _DAY = timedelta(days=1)
+# That of a repair of which nobody stated the day, where the order of entry says what came first.
+_SOME_DAY = date(2000, 1, 1)
 # Rows that one note names at most.
 _MOST_NAMED = 6
 
@@ -40,11 +42,13 @@ class GearVisit:
 
     place: its place in the log; infinite until it is kept. [1]
     typed: whether it was typed; rows of a table are in no order.
+    digest: the hash of its record; empty until it is kept.
     """
 
     inspection: Inspection
     place: float = inf
     typed: bool = False
+    digest: str = ""
 
     @property
     def at(self) -> date | None:
@@ -311,8 +315,9 @@ class _AsOf:
             changed["plunger_gauge_u_in"] = plunger.visit.inspection.plunger_gauge_u_in
         if row.rigging_checked is None and self._is_rigging_checked():
             changed["rigging_checked"] = RiggingCheck.YES
-        if outcome is not None and outcome.visit is not self._visit:
-            changed["outcome"] = outcome.visit.inspection.outcome
+        stands = None if outcome is None else outcome.visit.inspection.outcome
+        if stands is not row.outcome:
+            changed["outcome"] = stands
         changed |= self._in_order(plunger, outcome)
         said = [*self._said, *filter(None, [_as_found(row, self._gear)])]
         if not changed and not said:
@@ -350,7 +355,8 @@ class _AsOf:
         if self._is_own(event) and not self._now:
             return True
         is_before = self._now or _is_later(self._at, event.occasion)
-        repairs = (r for r in self._of(joint) if r.visit is not event.visit)
+        # A row tells of a joint how it was left.
+        repairs = (r for r in self._of(joint) if joint is None or r.visit is not event.visit)
         return is_before and all(_is_later(event, r) for r in repairs)
 
     def _readings(self) -> dict[str, Any]:
@@ -412,7 +418,7 @@ class _AsOf:
         if own is not None and not self._now:
             return own
         newest = _newest(self._counting(self._known.plunger))
-        replaced = [e for e in newest if any(r.visit is not e.visit for r in self._later(e))]
+        replaced = [e for e in newest if self._later(e)]
         standing = [
             e for e in newest if e not in replaced and (self._is_beyond(e) or self._counts_for(e))
         ]
@@ -475,8 +481,8 @@ class _AsOf:
             self._said.append(f"{fact.record} states that this gear failed{when}: {then}.")
             return event
         tried = [e for e in _newest(self._retracted) if self._counts_for(e)]
-        if row.outcome is not None or not tried:
-            return own
+        if not tried or (row.outcome is Outcome.RETRACTED and not self._now):
+            return None if row.outcome is Outcome.FAILED else own
         self._older.append(tried[-1].fact(FactKind.RETRACTED))
         return tried[-1]
 
@@ -489,26 +495,28 @@ class _AsOf:
         row = self._row
         found = {"plunger_date": plunger, "outcome_date": outcome}
         dated = {name: event for name, event in found.items() if event is not None}
-        own = _repair_of(self._visit) if row.is_repaired else None
+        own = [_repair_of(self._visit)] if row.is_repaired else []
         others = [r for r in self._repairs if not self._is_own(r)]
-        since = [r for r in others if not _is_later(self._at, r)]
-        since += [
-            r for r in others if r not in since and any(_is_later(r, e) for e in dated.values())
+        since = [
+            r
+            for r in others
+            if not _is_later(self._at, r)
+            or any(_is_later(r, e) for e in dated.values())
+            or self._is_closed_by(outcome, r)
         ]
-        since += [r for r in others if r not in since and self._is_closed_by(outcome, r)]
-        if own is not None:
-            since = [r for r in since if self._now and _is_later(r, own)]
-        if not since:
-            taken = {name: e for name, e in dated.items() if not self._is_own(e)}
-            mine = [] if own is None else [own]
-            return {name: _place(e, mine, row.repair_date) for name, e in taken.items()}
-        day = max((_day_of(r.at) for r in since if r.at is not None), default=self._visit.at)
-        joints = frozenset(row.restored_joints).union(*(r.joints for r in since))
+        if own:
+            since = [r for r in since if self._now and not _is_later(own[0], r)]
+        repairs = [*own, *since]
+        if not repairs or not (since or any(not self._is_own(e) for e in dated.values())):
+            return {}
+        days = (_day_of(r.at) for r in repairs if r.at is not None)
+        day = max(days, default=self._visit.at or _SOME_DAY)
+        joints = frozenset[int]().union(*(r.joints for r in repairs))
         changed: dict[str, Any] = {"restored_joints": tuple(sorted(joints)), "repair_date": day}
-        if any(r.visit.inspection.rigging_checked is RiggingCheck.CORRECTED for r in since):
+        if any(r.visit.inspection.rigging_checked is RiggingCheck.CORRECTED for r in repairs):
             changed["rigging_checked"] = RiggingCheck.CORRECTED
         self._say_repairs([r for r in since if not _is_later(self._at, r)])
-        return changed | {name: _place(e, since, day) for name, e in dated.items()}
+        return changed | {name: _place(e, self._repairs, day) for name, e in dated.items()}
 
     def _is_closed_by(self, outcome: _Event | None, repair: _Event) -> bool:
         """Whether this visit is the first at which a gear that had failed retracted after its
@@ -534,11 +542,8 @@ class _AsOf:
             self._said.append(f"{done.record_id} states a repair of {what} {when}: {then}.")
 
 
-def _place(event: _Event, repairs: Iterable[_Event], repaired: date | None) -> date | None:
+def _place(event: _Event, repairs: Iterable[_Event], day: date) -> date:
     """A day before the repair, after it, or the same for what cannot be ordered."""
-    if repaired is None:
-        return event.at
-    day = _day_of(repaired)
     if any(_is_later(repair, event) for repair in repairs):
         return day - _DAY
     return day + _DAY if all(_is_later(event, repair) for repair in repairs) else day

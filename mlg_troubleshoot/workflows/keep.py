@@ -16,7 +16,7 @@ from mlg_troubleshoot.decision.inspection import (
 )
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import as_spelt, is_readable, warnings_of
+from mlg_troubleshoot.life.folding import as_spelt, is_readable, lives_of, warnings_of
 from mlg_troubleshoot.life.state import GearKey, key_of
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records import ReadOptions, judge_again, made_record_id
@@ -62,53 +62,42 @@ def inspections_of(judgements: Iterable[Judgement]) -> list[Inspection]:
 
 class _KnownContents:
     """What a store and the rows before say of the gears of a call: an inspection is known by its
-    gear, its day and what was found, and by its id where each of two states one.
+    gear, its day and what was found, and by its id where each of two states one. What was voided
+    is known as well, and stays void.
     """
 
-    def __init__(self, store: Store, tails: set[str]) -> None:
+    def __init__(self, store: Store, tails: Collection[str]) -> None:
         self._contents: dict[bytes, list[Record]] = {}
         self._without_day: dict[bytes, list[Record]] = {}
         # What each id of a gear stands for on each day, and those that stand without a day.
         self._by_id: dict[tuple[str, ...], Record] = {}
-        # What a table without ids said of a gear on a day, and the last version of each record.
-        self._unnamed: dict[tuple[str, ...], list[Record]] = {}
-        self._latest: dict[str, Record] = {}
         self._undated: dict[tuple[str, ...], Record] = {}
-        self._void: set[str] = set()
-        for record in store.of_aircraft(tails):
-            if not is_readable(record):
-                continue
-            if record.kind in _ENTERED:
-                self.add(record)
-            elif record.kind is RecordKind.VOID:
-                self._void.add(record.body["voids"])
+        # What a table without ids said of a gear on a day.
+        self._unnamed: dict[tuple[str, ...], list[Record]] = {}
+        self._stand: list[Record] = []
+        self._void: list[Record] = []
+        gears = [key for key in store.gears() if key[0] in tails]
+        for life in lives_of(store, gears).values():
+            self._void += life.voided
+            for each in life.inspections:
+                self.add(each.record, each.first)
+                self._stand.append(each.record)
 
-    def add(self, record: Record) -> None:
+    def add(self, record: Record, first: Record | None = None) -> None:
         self._contents.setdefault(content_of(record), []).append(record)
         self._without_day.setdefault(content_of(record, with_day=False), []).append(record)
         whose = record.record_id, record.tail_no, record.side
         self._undated.pop(whose, None)
         if not record.day:
             self._undated[whose] = record
-        if record.kind is RecordKind.INSPECTION:
-            self._by_id[*whose, record.day] = record
-            if is_made_for_row(record.record_id):
-                self._unnamed.setdefault((*whose[1:], record.day), []).append(record)
-        else:
-            self._latest[record.body["supersedes"]] = record
-
-    def __contains__(self, record: Record) -> bool:
-        return self.same(record) is not None
+        for day in {record.day, (first or record).day}:
+            self._by_id[*whose, day] = record
+        if is_made_for_row(record.record_id):
+            self._unnamed.setdefault((*whose[1:], record.day), []).append(record)
 
     def same(self, record: Record) -> Record | None:
         alike = self._contents.get(content_of(record), ())
         return next((each for each in alike if _may_be_one(each, record)), None)
-
-    def latest(self, record: Record) -> Record:
-        """The last version of a kept inspection."""
-        while (later := self._latest.get(record.key)) is not None:
-            record = later
-        return record
 
     def otherwise(self, record: Record, stand: Collection[str]) -> Record | None:
         """The record that stands for the same inspection with other content: under its id on its
@@ -130,18 +119,26 @@ class _KnownContents:
             found = next((each for each in left if _is_mostly(each, record)), None)
         return found
 
+    def new(self, record: Record) -> Record | None:
+        """A record to add; None if it was voided, which it stays. Under the id of a void one it is
+        another.
+        """
+        named = [each for each in self._void if each.content[:4] == record.content[:4]]
+        if any(same_inspection(each, record) for each in named):
+            return None
+        return replace(record, identity=()) if named else record
+
     def told(self, records: Iterable[Record]) -> Iterator[Record]:
         """What is kept of some records."""
         for record in records:
             yield from self._contents.get(content_of(record), ())
 
-    def vanished(self, files: Collection[str], stand: set[str]) -> list[str]:
+    def vanished(self, files: Collection[str], stand: Collection[str]) -> list[str]:
         """Inspections that a file said when it was kept, and that its rows no longer say."""
         return [
             f"{record.record_id} ({record.tail_no} {record.side} {record.day or 'no date'})"
-            for record in self._by_id.values()
-            if record.key and stand.isdisjoint((record.key, self.latest(record).key))
-            if record.key not in self._void
+            for record in self._stand
+            if record.key not in stand
             if (inspection_from(record).source.file or "") in files
         ]
 
@@ -184,15 +181,17 @@ def keep(
     new = 0
     for done, (row, record) in enumerate(zip(rows, made, strict=True), 1):
         progress(done, len(rows))
-        if record in known:
+        if known.same(record) is not None:
             continue
         other = known.otherwise(record, stand)
         if other is None:
-            records.append(record)
+            fresh = known.new(record)
+            if fresh is None:
+                continue
+            records.append(fresh)
         else:
-            other = known.latest(other)
             changed.append((other, record))
-            stand |= {other.key, other.body.get("supersedes", "")}
+            stand.add(other.key)
             if amend:
                 amended = replace(row, record_id=other.record_id)
                 kind = RecordKind.CORRECTION
@@ -299,8 +298,16 @@ def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
         raise UsageError(
             f"{wrong.record_id} is of {' '.join(gear)} already", "Give another tail or side."
         )
+    own = lives_of(store, [(wrong.tail_no, wrong.side)])[wrong.tail_no, wrong.side]
+    first = next(each.first for each in own.inspections if each.record.digest == wrong.digest)
+    entered = first.body.get("entered", first.recorded_at)
     row = replace(inspection_from(wrong), tail_no=gear[0], side=Side(gear[1]))
-    moved = inspection_record(under_a_free_id(row, store), moved_from=wrong.key)
+    there = lives_of(store, [gear]).get(gear)
+    if there and any(each.record.record_id == row.record_id for each in there.inspections):
+        row = under_a_free_id(row, store)
+    moved = inspection_record(row, moved_from=wrong.key, entered=entered)
+    # Moved back it is no record that stands there already and was moved away.
+    moved = replace(moved, identity=())
     gone = [voids(each, why, moved_to=gear) for each in with_its_repairs(store, wrong)]
     store.add([*gone, moved])
     return store.known([moved.identity_hash])[moved.identity_hash]

@@ -6,7 +6,6 @@ import shutil
 import sqlite3
 from contextlib import closing
 from datetime import UTC, datetime
-from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -106,18 +105,6 @@ def imported(into: Path, *stores: Path) -> Path:
     return into
 
 
-def state(store: Path) -> Any:
-    """What every gear is found to be, and what each visit to it states."""
-    return {
-        key: (
-            sorted(each.inspection.record_id for each in life.inspections),
-            sorted((each.day, sorted(each.joints)) for each in life.repairs),
-            fleet(store).get(" ".join(key)),
-        )
-        for key, life in lives(Store(store)).items()
-    }
-
-
 @pytest.fixture
 def two_stores(tmp_path: Path) -> tuple[Path, Path]:
     """One table kept in both; then each records, corrects and voids on its own."""
@@ -131,39 +118,6 @@ def two_stores(tmp_path: Path) -> tuple[Path, Path]:
     keep(second, visit("B1", "2026-02-03", outcome="RETRACTED"))
     assert mlg("history", "amend", "R2", "3=0.0121in", "--store", second).code == 0
     return first, second
-
-
-def test_two_stores_merge_to_one_whichever_takes_the_other(
-    two_stores: tuple[Path, Path], tmp_path: Path
-) -> None:
-    found = []
-    for order in permutations(two_stores):
-        merged = tmp_path / f"{order[0].stem}{order[1].stem}.sqlite"
-        found.append(state(imported(merged, *order)))
-    assert found[0] == found[1]
-    names, repairs, gear = found[0]["N123", "LH"]
-    assert names == ["B1", "R2", "R3", "R4"]
-    assert repairs == [("2026-02-01", [3])]
-    assert gear["next_action"].startswith("Go on") or gear["verdict"] == "WITHIN_MARGIN"
-
-
-def test_a_merged_store_takes_the_same_once_and_verifies(two_stores: tuple[Path, Path]) -> None:
-    first, second = two_stores
-    imported(first, second)
-    count = len(Store(first).all())
-    assert mlg("history", "import", exported(second), "--store", first).code == 0
-    assert len(Store(first).all()) == count
-    assert mlg("history", "verify", "--store", first).code == 0
-
-
-def test_what_is_merged_and_merged_back_is_known(two_stores: tuple[Path, Path]) -> None:
-    first, second = two_stores
-    imported(first, second)
-    imported(second, first)
-    assert state(first) == state(second)
-    assert mlg("history", "import", exported(second), "--store", first).err.startswith(
-        "Imported: 0 records"
-    )
 
 
 def test_a_merged_record_keeps_its_hash_its_clock_and_its_writer(

@@ -12,7 +12,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Fact, FactKind, Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.state import GearState, GearVisit, state_now, states
+from mlg_troubleshoot.life.state import GearState, GearVisit, states
 from tests.cli.conftest import Run, mlg, row
 from tests.decision.conftest import every_joint, inspected
 
@@ -39,18 +39,6 @@ def at(gear: Gear) -> At:
 
     def last(*rows: Inspection) -> GearState:
         return states([GearVisit(each) for each in rows], gear)[-1]
-
-    return last
-
-
-@pytest.fixture
-def typed(gear: Gear) -> At:
-    """The state today of what was typed, one after the other."""
-
-    def last(*rows: Inspection) -> GearState:
-        found = state_now([GearVisit(r, n, typed=True) for n, r in enumerate(rows)], gear)
-        assert found is not None
-        return found
 
     return last
 
@@ -179,41 +167,6 @@ def test_what_was_replaced_by_the_repair_of_its_own_row_is_said(at: At) -> None:
     day = {"restored_joints": (3,), "repair_date": FEB, "plunger_date": JAN}
     found = at(of(MAR, {3: SOUND}, readings_in=(FAR,), **day, **RETRACTED)).inspection
     assert "As found, before the repair: plunger +0.0460 in on 2026-01-01" in found.warnings[-1]
-
-
-# What is typed later on one day happened later on that day.
-
-
-def test_a_failure_that_is_typed_after_a_repair_of_its_day_is_a_new_one(typed: At) -> None:
-    found = typed(of(JAN, **FAILED), repaired(JAN, 3), of(JAN, {3: SOUND}, **FAILED)).inspection
-    assert found.standing_outcome is Outcome.FAILED
-
-
-def test_a_day_that_is_typed_as_it_went_ends_closed(typed: At) -> None:
-    found = typed(
-        of(JAN, {3: WORN}, **FAILED, readings_in=(FAR,)),
-        repaired(JAN, 3),
-        of(JAN, {3: SOUND}, readings_in=(0.012,)),
-        of(JAN, **RETRACTED),
-    ).inspection
-    assert (found.standing_outcome, found.standing_readings_in) == (Outcome.RETRACTED, (0.012,))
-    assert found.clearance_in == {3: SOUND}
-
-
-def test_a_typed_repair_replaces_what_was_typed_before_it(typed: At) -> None:
-    found = typed(of(JAN, {3: WORN}, readings_in=(FAR,), **FAILED), repaired(JAN, 3)).inspection
-    assert (found.clearance_in, found.standing_readings_in, found.standing_outcome) == (
-        {},
-        (),
-        None,
-    )
-
-
-def test_rows_of_a_table_are_in_no_order_even_when_they_are_kept(gear: Gear) -> None:
-    rows = [of(JAN, **FAILED), repaired(JAN, 3), of(JAN, **RETRACTED)]
-    found = state_now([GearVisit(r, n) for n, r in enumerate(rows)], gear)
-    assert found is not None
-    assert found.inspection.outcome is Outcome.FAILED
 
 
 def test_ten_thousand_rows_of_one_gear_take_a_moment(gear: Gear) -> None:
