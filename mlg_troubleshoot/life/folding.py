@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from functools import cached_property, lru_cache
-from math import inf
 from operator import itemgetter
 
 from mlg_troubleshoot.decision.assessment import Verdict
@@ -223,20 +222,11 @@ def lives(
     return _lives(store.all() if tail is None else store.of_gear(tail, side))
 
 
-def lives_of(
-    store: Store, keys: Collection[GearKey], up_to: float = inf
-) -> dict[GearKey, GearLife]:
-    """The lives of some gears; of their records up to a number, as they were corrected or voided
-    since.
-    """
+def lives_of(store: Store, keys: Collection[GearKey]) -> dict[GearKey, GearLife]:
+    """The lives of some gears."""
     wanted = set(keys)
     records = store.of_aircraft({tail for tail, _side in wanted})
-    later = (RecordKind.CORRECTION, RecordKind.VOID)
-    return _lives(
-        each
-        for each in records
-        if (each.tail_no, each.side) in wanted and (each.seq <= up_to or each.kind in later)
-    )
+    return _lives(each for each in records if (each.tail_no, each.side) in wanted)
 
 
 def _lives(records: Iterable[Record]) -> dict[GearKey, GearLife]:

@@ -496,16 +496,14 @@ class _AsOf:
         found = {"plunger_date": plunger, "outcome_date": outcome}
         dated = {name: event for name, event in found.items() if event is not None}
         own = [_repair_of(self._visit)] if row.is_repaired else []
-        others = [r for r in self._repairs if not self._is_own(r)]
         since = [
             r
-            for r in others
-            if not _is_later(self._at, r)
-            or any(_is_later(r, e) for e in dated.values())
+            for r in self._repairs
+            if not self._is_own(r) and (self._now or not own)
+            if any(_is_later(r, e) for e in dated.values())
             or self._is_closed_by(outcome, r)
+            or not _is_later(own[0] if own else self._at, r)
         ]
-        if own:
-            since = [r for r in since if self._now and not _is_later(own[0], r)]
         repairs = [*own, *since]
         if not repairs or not (since or any(not self._is_own(e) for e in dated.values())):
             return {}

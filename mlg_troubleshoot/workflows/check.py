@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.decision.judge_rows import AT_ONCE, assess
-from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.decision.prediction import Extension
 from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear, listed
 from mlg_troubleshoot.errors import ExitCode, OutputError, UsageError
@@ -363,13 +362,6 @@ def read_inspections(
     frame = frame_of(read.rows, options.joints)
     frame.attrs.update(problems=read.problems, notes=read.notes)
     return frame
-
-
-def next_step(gear: Gear, measured: Mapping[int, float]) -> Step:
-    """NEXT of a gear of which some clearances are known. [in]"""
-    row = replace(trial_inspection(gear), clearance_in=dict(measured))
-    (judged,) = assess([row], gear, load_index_table(gear))
-    return judged.next_action
 
 
 def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Assessment] | None:
@@ -787,14 +779,3 @@ def annotate(
     verdicts = {row: each.columns for row, each in said.items()}
     over_limit = {row: each.over_limit for row, each in said.items()}
     return annotate_workbook(source, out, read, verdicts, over_limit)
-
-
-def trial_inspection(gear: Gear) -> Inspection:
-    """A gear with every joint at twice its limit."""
-    return Inspection(
-        record_id="trial",
-        tail_no="trial",
-        side=Side.LH,
-        convention=ClearanceConvention.RADIAL,
-        clearance_in={joint.number: 2.0 * joint.limit.value for joint in gear.joints},
-    )

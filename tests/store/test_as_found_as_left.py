@@ -38,7 +38,7 @@ ROWS = [
     ("#3", "26 thou (limit 15)", "1.5 thou"),
     ("#5", "14 thou", "restored, not read"),
 ]
-_ROW = re.compile(r'<tr><th scope="row">(.*?)</th><td>(.*?)</td><td>(.*?)</td></tr>')
+_ROW = re.compile(r'<th scope="row">(.*?)</th><td>(.*?)</td><td>(.*?)</td>')
 
 
 def written(folder: Path, pattern: str) -> list[tuple[str, ...]]:
