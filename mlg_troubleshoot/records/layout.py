@@ -241,7 +241,6 @@ class Columns:
         self.is_long = self._tell_long()
         self._settle_duplicates()
         self._look_for_missing()
-        self._look_for_unused()
 
     def at(self, *columns: Column) -> list[int]:
         """Where some columns stand, refused or not."""
@@ -396,6 +395,7 @@ class Columns:
                 )
 
     def _look_for_missing(self) -> None:
+        """Report the columns that a table needs, and those that the mapping names."""
         is_known = self._table.side or all(visit.side for visit in self.visits)
         needed = (TAIL_NO,) if is_known else (TAIL_NO, SIDE)
         missing = {c.name: f"a column {c.name}" for c in needed if not self.at(c)}
@@ -413,9 +413,6 @@ class Columns:
                 remedy += f' If "{hint}" is meant, pass --map "{hint}={name}".'
             place = CellPlace(self._row, name)
             self._table.tell("column_missing", None, expected, remedy, place)
-
-    def _look_for_unused(self) -> None:
-        """Report the keys of the mapping that name no column."""
         headers = [p.header for p in self.placed if p.header]
         for key in self._options.column_map:
             if not any(_names(key, p.header, p.index) for p in self.placed):

@@ -191,16 +191,6 @@ class TableInHand:
         self.tell(fault.code, found, fault.expected, fault.remedy, place)
 
 
-def to_correct(row: Inspection | InvalidRow, *headers: str) -> InvalidRow:
-    """A row that cannot be judged before these columns of it are corrected."""
-    known = row.correct if isinstance(row, InvalidRow) else ()
-    understood = row.understood if isinstance(row, InvalidRow) else row
-    named = tuple(dict.fromkeys((*headers, *known)))
-    cells = row.cells if isinstance(row, InvalidRow) else ()
-    identity = row.record_id, row.tail_no, row.side
-    return InvalidRow(*identity, named, row.warnings, row.source, understood, cells)
-
-
 @dataclass(frozen=True, slots=True)
 class ColumnReading:
     """How one column (or one line of a form) was read.

@@ -20,7 +20,7 @@ from mlg_troubleshoot.decision.inspection import (
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.life.chronology import Moment, contradictions
 from mlg_troubleshoot.records.cells import column_letters, quote
-from mlg_troubleshoot.records.model import SheetLayout, to_correct
+from mlg_troubleshoot.records.model import SheetLayout
 from mlg_troubleshoot.units import SLIPS
 
 
@@ -41,29 +41,44 @@ def settle_duplicates(
         if len(places) == 1:
             continue
         found = [rows[place] for place in places]
-        bare = [_content(row, invalid_content) for row in found]
-        if all(b is not None and b == bare[0] for b in bare):
-            for place in places[1:]:
-                row = rows[place]
+        bare = [
+            invalid_content.get(row.source)
+            if isinstance(row, InvalidRow)
+            else replace(row, source=RowSource(), warnings=(), entered={})
+            for row in found
+        ]
+        is_same = all(b is not None and b == bare[0] for b in bare)
+        for place, row in list(zip(places, found, strict=True))[is_same:]:
+            if is_same:
                 note = f"the same inspection as {where(found[0].source)}"
                 rows[place] = replace(row, warnings=(*row.warnings, note))
-            continue
-        for place, row in zip(places, found, strict=True):
+                continue
             others = [where(other.source) for other in found[:4] if other is not row][:3]
             if len(found) > len(others) + 1:
                 others[-1] += f" and {len(found) - 1 - len(others)} more"
             header, cell = cell_of(row.source, layouts, RECORD_ID)
-            problems.append(_problem(record_id, row.source, others, header, cell))
-            rows[place] = to_correct(row, header)
+            problems.append(
+                Problem(
+                    "record_id_duplicate",
+                    row.source.file,
+                    row.source.sheet,
+                    row.source.row,
+                    header,
+                    cell,
+                    record_id,
+                    "a record id that no other inspection of the file has;"
+                    f" {', '.join(others)} also has it",
+                    "Keep the right row, or give each inspection its own record id.",
+                )
+            )
+            identity = row.record_id, row.tail_no, row.side
+            invalid = (
+                row
+                if isinstance(row, InvalidRow)
+                else InvalidRow(*identity, (), row.warnings, row.source, row)
+            )
+            rows[place] = replace(invalid, correct=tuple(dict.fromkeys((header, *invalid.correct))))
     return problems
-
-
-def _content(
-    row: Inspection | InvalidRow, invalid_content: Mapping[RowSource, int]
-) -> Inspection | int | None:
-    if isinstance(row, InvalidRow):
-        return invalid_content.get(row.source)
-    return replace(row, source=RowSource(), warnings=(), entered={})
 
 
 def where(source: RowSource) -> str:
@@ -78,24 +93,11 @@ def cell_of(
     does not have it.
     """
     for layout in layouts:
-        if (layout.file, layout.sheet) == (source.file, source.sheet):
-            for column in layout.columns:
-                if column.read_as == wanted.name:
-                    return (
-                        column.header,
-                        f"{column_letters(column.index)}{column.row or source.row}",
-                    )
+        is_there = (layout.file, layout.sheet) == (source.file, source.sheet)
+        for column in layout.columns if is_there else ():
+            if column.read_as == wanted.name:
+                return column.header, f"{column_letters(column.index)}{column.row or source.row}"
     return wanted.name, None
-
-
-def _problem(
-    record_id: str, source: RowSource, others: list[str], header: str, cell: str | None
-) -> Problem:
-    shown = ", ".join(others)
-    expected = f"a record id that no other inspection of the file has; {shown} also has it"
-    remedy = "Keep the right row, or give each inspection its own record id."
-    place = source.file, source.sheet, source.row, header, cell
-    return Problem("record_id_duplicate", *place, record_id, expected, remedy)
 
 
 # Rows of a gear before and after that a row is compared with: enough for a median, few enough to
@@ -112,7 +114,7 @@ _SCALES: tuple[tuple[float, str], ...] = tuple(
     for factor, words in ((slip.factor, slip.too_large), (1.0 / slip.factor, slip.too_small))
 )
 
-GearKey = tuple[str, Side]
+Rows = Sequence[Inspection | InvalidRow]
 Clearances = Mapping[int, float]
 
 
@@ -121,7 +123,7 @@ Clearances = Mapping[int, float]
 _DIFFERENT = 5
 
 
-def copies(rows: Sequence[Inspection | InvalidRow]) -> dict[int, str]:
+def copies(rows: Rows) -> dict[int, str]:
     """Name the rows, by their place, that repeat every clearance of an earlier row of the gear."""
     first: dict[object, Inspection] = {}
     found: dict[int, str] = {}
@@ -141,13 +143,13 @@ def copies(rows: Sequence[Inspection | InvalidRow]) -> dict[int, str]:
     return found
 
 
-def slips(rows: Sequence[Inspection | InvalidRow]) -> dict[int, str]:
+def slips(rows: Rows) -> dict[int, str]:
     """Suggest slips for rows, by their place, that do not fit the other inspections of the gear."""
-    gears: dict[GearKey, list[int]] = {}
+    gears: dict[tuple[str, Side], list[int]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection) and row.clearance_in:
             gears.setdefault((row.tail_no, row.side), []).append(place)
-    usual: dict[GearKey, Clearances] = {}
+    usual: dict[tuple[str, Side], Clearances] = {}
     found: dict[int, str] = {}
     for gear, places in gears.items():
         if len(places) <= _FEWEST:
@@ -197,30 +199,28 @@ def one_aircraft(rows: list[Inspection | InvalidRow]) -> list[str]:
     return notes
 
 
-def order_warnings(
-    rows: Sequence[Inspection | InvalidRow], layouts: Sequence[SheetLayout]
-) -> dict[int, str]:
+def order_warnings(rows: Rows, layouts: Sequence[SheetLayout]) -> dict[int, str]:
     """Name the rows of one gear whose landings run backwards as its dates go on, each with its
     cell.
     """
-    gears: dict[GearKey, list[tuple[int, Inspection]]] = {}
+    gears: dict[tuple[str, str], list[int]] = {}
+    moments: dict[int, Moment] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection):
-            gears.setdefault((row.tail_no, row.side), []).append((place, row))
+            moments[place] = Moment.of(row)
+            gears.setdefault((row.tail_no, row.side), []).append(place)
     found: dict[int, str] = {}
-    for (tail, side), seen in gears.items():
-        if len(seen) == 1:
+    for (tail, side), places in gears.items():
+        if len(places) == 1:
             continue
 
-        def name(n: int, seen: list[tuple[int, Inspection]] = seen) -> str:
-            source = seen[n][1].source
-            cells = [
-                cell for column in (LANDINGS, DATE) if (cell := cell_of(source, layouts, column)[1])
-            ]
-            return ", ".join([where(source), *cells])
+        def name(n: int, places: list[int] = places) -> str:
+            source = rows[places[n]].source
+            cells = [cell_of(source, layouts, column)[1] for column in (LANDINGS, DATE)]
+            return ", ".join([where(source), *filter(None, cells)])
 
-        for n, said in contradictions([Moment.of(row) for _place, row in seen], name).items():
-            found[seen[n][0]] = (
+        for n, said in contradictions([moments[place] for place in places], name).items():
+            found[places[n]] = (
                 f"{tail} {side}: {said}. Unless the gear was overhauled in between, correct the"
                 " landings or the date."
             )

@@ -6,7 +6,7 @@ import math
 import re
 import zlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import date, timedelta
 from functools import lru_cache
@@ -39,6 +39,7 @@ from mlg_troubleshoot.decision.inspection import (
     InvalidRow,
     Outcome,
     RowSource,
+    Side,
 )
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.gear import ROUNDING_IN
@@ -102,6 +103,7 @@ _MISSING_CONVENTION = (
 _FIELDS = frozenset(each.name for each in fields(Inspection))
 
 
+_DIGIT = re.compile(r"\d")
 _A_DAY = timedelta(days=1)
 _MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
 
@@ -117,9 +119,15 @@ _NO_END = "Measure with a gauge that reaches further, or leave it blank if it wa
 
 
 @lru_cache(4096)
-def _spoken(text: str) -> tuple[bool, ClearanceConvention | None, LengthUnit | None]:
-    """Whether a text says that the gear failed, and the convention or the unit that it is."""
-    return says_failed(text), convention_word(text), UNIT_SPELLINGS.get(plain_text(text).lower())
+def _spoken(
+    header: str, cell: Filled
+) -> tuple[bool, ClearanceConvention | None, LengthUnit | None]:
+    """Whether a cell says that the gear failed or answers whether it did, and the convention or the
+    unit that it is.
+    """
+    text = cell if isinstance(cell, str) else ""
+    failed = says_failed(text) or answers_outcome(header, cell)
+    return failed, convention_word(text), UNIT_SPELLINGS.get(plain_text(text).lower())
 
 
 @dataclass(slots=True)
@@ -201,43 +209,41 @@ class RowReader:
         self._table = table
         self._is_several = is_several
         self._options = table.options
-        self._placed = {p.index: p for p in placed}
-        self._width = 0
+        self._placed: dict[int, PlacedField] = {}
         good = [(p.index, p.field) for p in placed if p.field is not None and not p.refused]
         self._refused = [p.index for p in placed if p.refused]
         self._at = {known.column: index for index, known in reversed(good)}
         # Without a column of record ids a row is named after its place and content.
         self._makes_ids = all(p.field is None or p.field.column is not RECORD_ID for p in placed)
         # Clearances stand first, in the order of the joints, whatever the order of their columns.
-        ordered = sorted(
-            good, key=lambda each: each[1].number or 0 if each[1].column is CLEARANCE else math.inf
-        )
+        good.sort(key=lambda each: each[1].number or 0 if each[1].column is CLEARANCE else math.inf)
         self._lengths: list[tuple[int, Field, _LengthKind]] = [
             (index, known, (known.column, known.unit, known.column.is_above_zero(known.number)))
-            for index, known in ordered
-            if known.column.is_length
-        ]
-        self._others = [
-            (index, known.column)
             for index, known in good
-            if not known.column.is_length and known.column not in (CONVENTION, UNIT, JOINT)
+            if known.column.is_length
         ]
         # The readings of a fleet repeat: what was understood once is not taken apart again.
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)
+        value_of = lru_cache(_REMEMBERED)(self._one_value)
+        self._others = [
+            (index, known.column, self._one_value if known.column is RECORD_ID else value_of)
+            for index, known in sorted(good, key=itemgetter(0))
+            if not known.column.is_length and known.column not in (CONVENTION, UNIT, JOINT)
+        ]
+        self._blankable = [index for index, known in good if known.column.blank_by_word]
         self._unread: dict[int, str] = {}
         # What is only carried, and may still say that the gear failed or how it was read.
         self._unread_words: list[PlacedField] = []
         self._suspects: list[tuple[PlacedField, str, bool]] = []
         # What a number format adds counts where a unit does.
-        self._plain: list[int] = []
+        self._worded: set[int] = set()
         self._add(placed)
-        self._blankable = [index for index, known in good if known.column.blank_by_word]
         self.not_measured: Counter[str] = Counter()
-        self._without_unit: set[str | None] = set()
         self.invalid_content: dict[RowSource, int] = {}
+        self._without_unit: set[str | None] = set()
         self._row = Row(0, [])
         self._suffix = ""
-        self._cells: Cells = ()
+        self._cells: list[Cell] = []
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
         # Somewhere it is tomorrow already.
@@ -250,21 +256,21 @@ class RowReader:
         self._written_days = 0
         self._waiting: dict[RowSource, tuple[AmbiguousDateError, Cell, CellPlace]] = {}
 
-    def _add(self, placed: Sequence[PlacedField]) -> None:
+    def _add(self, placed: Iterable[PlacedField]) -> None:
         """Take columns whose cells travel to the report, each under its own name, and are searched
         for what may be a reading or a failure.
         """
         taken = {column.name for column in self._at if column.carried} | {*self._unread.values()}
         for p in placed:
             self._placed[p.index] = p
-            self._width = max(self._width, p.index + 1)
             column = None if p.field is None else p.field.column
-            is_number = column is not None and column.holds in (Holds.LENGTH, Holds.NUMBER)
-            if not is_number and column not in (TAIL_NO, RECORD_ID):
-                self._plain.append(p.index)
-            if (p.field is None or p.field.column.carried) and not (p.refused or p.is_settled):
+            if column is not None and (
+                column.holds in (Holds.LENGTH, Holds.NUMBER) or column in (TAIL_NO, RECORD_ID)
+            ):
+                self._worded.add(p.index)
+            if (column is None or column.carried) and not (p.refused or p.is_settled):
                 self._unread_words.append(p)
-            if p.field is not None or p.refused:
+            if column is not None or p.refused:
                 continue
             name = p.header or f"column {column_letters(p.index)}"
             while name in taken:
@@ -280,26 +286,20 @@ class RowReader:
         """Read one row; every bad cell is reported once."""
         self._begin(row)
         found = _Found(self._read_convention())
-        self._read_cells(found, self._read_row_unit())
+        self._read_lengths(found, self._read_row_unit())
+        self._read_others(found)
+        self._carry(found)
         asked = self._unit_questions(found)
         if self._suspects:
             asked += self.ask_about(self._cells, outcome=found.values.get(OUTCOME))
         asked += row.questions
-        question = Sentence.joined(asked) if asked else ""
         source = RowSource(self._table.file, self._table.sheet, row.number)
         for index, fault in sorted(self._faults, key=itemgetter(0)):
             if isinstance(fault, AmbiguousDateError):
                 self._waiting[source] = fault, self._cells[index], self._place(index)
             else:
                 self._tell(index, fault)
-        record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
-        if SIDE not in self._at:
-            side = row.visit.side or self._table.side
-        if record_id is not None and not self._makes_ids:
-            record_id += self._suffix
-        if row.visit.day:
-            found.values[DATE] = self._day_of(row.visit.day)
-        identity = {"record_id": record_id, "tail_no": tail_no, "side": side}
+        identity = {column.name: found.values.pop(column, None) for column in IDENTITY}
         given = {**identity, "convention": found.convention, "source": source}
         if self._bad or row.bad or None in given.values():
             bad = sorted(index for index in self._bad if index >= 0)
@@ -317,18 +317,8 @@ class RowReader:
             )
         self._warn(found)
         said = (*found.warnings, *row.warnings)
+        question = Sentence.joined(asked) if asked else ""
         return self._inspection(found, **given, unit_question=question, warnings=said)
-
-    def _day_of(self, text: str) -> date | None:
-        """The day of a visit, as the heading of its readings says it."""
-        if text not in self._days_of_visits:
-            self._days_of_visits[text] = None
-            try:
-                day = read_date(text, self._options.dates, self._latest)
-                self._days_of_visits[text] = day
-            except CellFaultError as fault:
-                self._table.tell_fault(fault, text, CellPlace(None, DATE.name))
-        return self._days_of_visits[text]
 
     @staticmethod
     def _inspection(found: _Found, **given: Any) -> Inspection:
@@ -357,25 +347,9 @@ class RowReader:
             **given,
         )
 
-    def _read_cells(self, found: _Found, row_unit: LengthUnit | None) -> None:
-        """Read every cell but those that say how to read the others."""
-        if self._makes_ids:
-            found.values[RECORD_ID] = self._made_id()
-        self._read_lengths(found, row_unit)
-        for index, column in self._others:
-            value = self._noted(column, index)
-            if value is not None and column.carried:
-                found.carried[column.name] = value
-            elif value is not None:
-                found.values[column] = value
-        for index, name in self._unread.items():
-            cell = self._cells[index]
-            if cell is not None:
-                found.carried[name] = writable(show(cell))
-        self._look_for_words(found)
-
     def _read_lengths(self, found: _Found, row_unit: LengthUnit | None) -> None:
         scale = found.scale
+        usual = self._options.clearance_confirm_above_in
         for index, of, kind in self._lengths:
             cell = self._cells[index]
             if cell is None:
@@ -395,35 +369,69 @@ class RowReader:
             found.lengths.setdefault(of.column, {})[number] = length
             if of.column is CLEARANCE:
                 found.entered[number] = entered
-                if length > self._options.clearance_confirm_above_in + ROUNDING_IN:
-                    found.warnings.append(self._confirm_text(number, length, entered, scale))
+                if length > usual + ROUNDING_IN:
+                    slip = scale_slip(length, entered.unit, scale, usual)
+                    facts = str(entered), Length.brief(length), Length.brief(usual)
+                    said = "joint {}: {} is {} radial, above {}: check the reading.{}"
+                    check = Sentence.of(said, number, *facts, f" {slip}" if slip else "")
+                    found.warnings.append(check)
             elif of.column is PLUNGER_DISPLACEMENT:
                 found.plunger.append((length, entered.unit))
 
-    def _value(self, column: Column, index: int) -> Any:
-        cell = self._cells[index]
-        # Gears that nobody can name are not one gear.
-        if cell is not None and not (column is TAIL_NO and is_no_name(cell)):
+    def _read_others(self, found: _Found) -> None:
+        """Read the cells that are not lengths, and whose they are."""
+        row = self._row
+        for index, column, value_of in self._others:
+            cell = self._cells[index]
+            if cell is None and column not in IDENTITY:
+                continue
             if column is DATE:
-                return self._read_date(cell)
-            if column.holds is Holds.MOMENT:
-                return read_moment(cell, self._options.dates, self._latest)
-            if column.holds is Holds.JOINTS:
-                return read_joints(cell, self._options.joints.numbers)
-            return read_value(
-                column,
-                cell,
-                self._placed[index].header,
-                decimal_comma=self._table.decimal_comma,
-            )
-        if column not in IDENTITY:
-            return None
-        remedy = (
-            "Enter it; a row without it cannot be used."
-            if column.choices is None
-            else f"Enter {column.asked}; it has no default."
-        )
-        raise CellFaultError(f"{column.name}_missing", column.asked, remedy)
+                self._note_date(cell)
+            try:
+                value = value_of(index, column, cell)
+            except CellFaultError as fault:
+                self._fault(index, fault)
+                continue
+            if column.carried:
+                found.carried[column.name] = value
+            else:
+                found.values[column] = value
+        side = row.visit.side or self._table.side
+        if self._makes_ids:
+            found.values[RECORD_ID] = self._made_id(side)
+        elif self._suffix and RECORD_ID in found.values:
+            found.values[RECORD_ID] += self._suffix
+        if SIDE not in self._at:
+            found.values[SIDE] = side
+        if row.visit.day:
+            found.values[DATE] = self._day_of(row.visit.day)
+
+    def _day_of(self, text: str) -> date | None:
+        """The day of a visit, as the heading of its readings says it."""
+        if text not in self._days_of_visits:
+            self._days_of_visits[text] = None
+            try:
+                self._days_of_visits[text] = self._read_day(text)
+            except CellFaultError as fault:
+                self._table.tell_fault(fault, text, CellPlace(None, DATE.name))
+        return self._days_of_visits[text]
+
+    def _one_value(self, index: int, column: Column, cell: Cell) -> Any:
+        """Read a cell that holds no length."""
+        # Gears that nobody can name are not one gear.
+        if cell is None or (column is TAIL_NO and is_no_name(cell)):
+            remedy = "Enter it; a row without it cannot be used."
+            if column.choices is not None:
+                remedy = f"Enter {column.asked}; it has no default."
+            raise CellFaultError(f"{column.name}_missing", column.asked, remedy)
+        if column is DATE:
+            return self._read_day(cell)
+        if column.holds is Holds.MOMENT:
+            return read_moment(cell, self._options.dates, self._latest)
+        if column.holds is Holds.JOINTS:
+            return read_joints(cell, self._options.joints.numbers)
+        header = self._placed[index].header
+        return read_value(column, cell, header, decimal_comma=self._table.decimal_comma)
 
     def _warn(self, found: _Found) -> None:
         """Say what of a good row is of no use, or unusual."""
@@ -435,65 +443,45 @@ class RowReader:
                 "every clearance is 0: a zero is read as measured; leave a joint blank if it was"
                 " not measured"
             )
-        idle = [
-            f"#{joint}"
-            for joint in found.lengths.get(GAUGE_U, {})
-            if joint and joint not in clearance
-        ]
+        gauges = found.lengths.get(GAUGE_U, {})
+        idle = ", ".join(f"#{joint}" for joint in gauges if joint and joint not in clearance)
         if idle:
             found.warnings.append(
-                f"standard uncertainty of the gauge at joint {', '.join(idle)} is not used: the"
-                " joint has no reading"
+                f"standard uncertainty of the gauge at joint {idle} is not used: the joint has no"
+                " reading"
             )
 
-    def ragged(self, row: int, cells: Cells, expected: int) -> InvalidRow:
-        """Refuse a row that does not have as many fields as the header."""
-        comma = len(cells) > expected and any(
-            isinstance(c, str) and c.strip() == "0" for c in cells
-        )
-        remedy = (
-            "A decimal comma in a comma-separated file splits a number in two: write 0.013, or"
-            " separate the columns by semicolons."
-            if comma
-            else "Check the separators and the quotation marks of this row."
-        )
-        first = cells[0] if self._at.get(RECORD_ID) == 0 and cells else None
-        record_id = plain_text(first) or None if isinstance(first, str) else None
-        why = FileRefusedError(
-            "row_field_count",
-            f"{len(cells)} fields",
-            f"{expected} fields, as in the header",
-            remedy,
-        )
-        return self.faulty(row, cells, why, record_id)
-
-    def faulty(
-        self, row: int, cells: Cells, why: FileRefusedError, record_id: str | None = None
-    ) -> InvalidRow:
-        shown = quote(",".join(map(show, cells)), 80)
+    def faulty(self, row: int, cells: Cells, why: FileRefusedError) -> InvalidRow:
+        """Refuse a row as a whole; its first cell may name it."""
         problem = why.problem
-        self._table.tell(
-            problem.code, f"{why}: {shown}", problem.expected, problem.remedy, CellPlace(row)
-        )
+        shown = f"{why}: {quote(','.join(map(show, cells)), 80)}"
+        self._table.tell(problem.code, shown, problem.expected, problem.remedy, CellPlace(row))
+        is_named = problem.code == "row_field_count" and self._at.get(RECORD_ID) == 0
+        name = plain_text(show(cells[0])) if is_named else ""
         source = RowSource(self._table.file, self._table.sheet, row)
-        return InvalidRow(record_id, None, None, ("row",), (), source)
+        return InvalidRow(name or None, None, None, ("row",), (), source)
 
     def _begin(self, row: Row) -> None:
         """Take up a row: fill it to the width of the header, and leave out what was not
         measured.
         """
         cells = row.cells
-        if len(cells) > self._width:
+        width = len(self._placed)
+        if len(cells) > width:
             # Something stands to the right of the last header.
-            self._add([PlacedField(i, "", None) for i in range(self._width, len(cells))])
-        cells += [None] * (self._width - len(cells))
-        for index in self._plain:
-            cells[index] = stored(cells[index])
+            self._add(PlacedField(i, "", None) for i in range(width, len(cells)))
+        cells += [None] * (width - len(cells))
+        for index, cell in enumerate(cells):
+            if cell.__class__ is OddCell and index not in self._worded:
+                cells[index] = stored(cell)
         for index in self._blankable:
             cell = cells[index]
-            if cell.__class__ is str and cell.strip().casefold() in NOT_MEASURED:
-                self.not_measured[cell.strip()] += 1
-                cells[index] = None
+            # None of the words ends in a digit.
+            if cell.__class__ is str and not cell[-1].isdigit():
+                word = cell.strip()
+                if word.casefold() in NOT_MEASURED:
+                    self.not_measured[word] += 1
+                    cells[index] = None
         self._row = row
         # What tells the record ids of several visits apart.
         self._suffix = f" {row.visit}".rstrip() if self._is_several else ""
@@ -501,21 +489,22 @@ class RowReader:
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
 
-    def _look_for_words(self, found: _Found) -> None:
-        """Stop a row in which a column that is only carried says that the gear failed, or that the
+    def _carry(self, found: _Found) -> None:
+        """Carry what is not read; stop a row in which it says that the gear failed, or that the
         clearances were read in another way or another unit.
         """
+        for index, name in self._unread.items():
+            if self._cells[index] is not None:
+                found.carried[name] = writable(show(self._cells[index]))
         units = {entered.unit for entered in found.entered.values()}
         stated = found.convention
         for placed in self._unread_words:
             cell = self._cells[placed.index]
-            if cell is None:
+            # None of the words has a digit; a single one may be an answer.
+            if cell is None or (isinstance(cell, str) and cell[1:] and _DIGIT.search(cell)):
                 continue
-            text = cell if isinstance(cell, str) else ""
-            failed, said, unit = _spoken(text)
-            if found.values.get(OUTCOME) is not Outcome.FAILED and (
-                failed or answers_outcome(placed.header, cell)
-            ):
+            failed, said, unit = _spoken(placed.header, cell)
+            if failed and found.values.get(OUTCOME) is not Outcome.FAILED:
                 column = OUTCOME
             elif said is not None and (stated is None or said.per_radial != stated.per_radial):
                 column = CONVENTION
@@ -544,19 +533,17 @@ class RowReader:
             if cell is None:
                 continue
             header = placed.header or column_letters(placed.index)
-            meant = ""
             if (nearest or of_joint) and self._may_be_length(cell, is_sure=is_sure):
-                meant = (
-                    f'a reading, pass --map "{header}={nearest or CLEARANCE.name}" (a length with'
-                )
-                meant += " its unit)"
+                target = nearest or CLEARANCE.name
+                meant = f'a reading, pass --map "{header}={target}" (a length with its unit)'
             elif outcome is None and may_be_outcome(cell) and may_ask_outcome(header):
                 meant = f'what the gear did, pass --map "{header}={OUTCOME.name}"'
-            if meant:
-                asked.append(
-                    f"{header!r} is not read and says {quote(cell, 40)}: if it is {meant}; else"
-                    f' "{header}=carry".'
-                )
+            else:
+                continue
+            asked.append(
+                f"{header!r} is not read and says {quote(cell, 40)}: if it is {meant}; else"
+                f' "{header}=carry".'
+            )
         return asked
 
     def _may_be_length(self, cell: Filled, *, is_sure: bool) -> bool:
@@ -570,38 +557,30 @@ class RowReader:
             is_sure or unit is not None or value % 1.0 > 0.0
         )
 
-    def _made_id(self) -> str:
-        cells = [show(cell) for cell in self._cells]
+    def _made_id(self, side: Side | None) -> str:
         # Sheets of both sides may hold the same row.
-        side = self._row.visit.side or self._table.side
-        cells += [] if side is None else [side.value]
-        cells += [self._suffix] * bool(self._suffix)
+        cells = [*map(show, self._cells), *filter(None, (side, self._suffix))]
         content = zlib.crc32("\x1f".join(cells).encode("utf-8", "replace"))
         name = PurePath(self._table.file or "-").stem
         return f"{'stdin' if name == '-' else name}-{self._row.number}-{content:08x}"
 
     def _read_convention(self) -> ClearanceConvention | None:
         index = self._at.get(CONVENTION)
-        declared = self._options.convention
+        found: ClearanceConvention | None = self._options.convention
         if index is not None and self._cells[index] is not None:
-            found: ClearanceConvention | None = self._noted(CONVENTION, index)
-            return found
-        if declared is None and index is not None:
+            found = self._read_how(index, CONVENTION)
+        elif found is None and index is not None:
             self._fault(index, CellFaultError("convention_missing", *_MISSING_CONVENTION))
-        elif declared is None:
+        elif found is None:
             self._bad.add(-1)
-            self._table.tell(
-                "convention_missing",
-                None,
-                *_MISSING_CONVENTION,
-                CellPlace(self._row.number, CONVENTION.name),
-            )
-        return declared
+            place = CellPlace(self._row.number, CONVENTION.name)
+            self._table.tell("convention_missing", None, *_MISSING_CONVENTION, place)
+        return found
 
-    def _noted(self, column: Column, index: int) -> Any:
-        """Read a cell and note its fault."""
+    def _read_how(self, index: int, column: Column) -> Any:
+        """Read a cell that says how to read the others, or note its fault."""
         try:
-            return self._value(column, index)
+            return self._one_value(index, column, self._cells[index])
         except CellFaultError as fault:
             self._fault(index, fault)
             return None
@@ -610,24 +589,16 @@ class RowReader:
         index = self._at.get(UNIT)
         if index is None or self._cells[index] is None:
             return self._options.unit
-        unit = self._noted(UNIT, index)
-        against = [
-            (i, of.unit)
-            for i, of, _ in self._lengths
-            if of.unit not in (None, unit) and self._cells[i] is not None
-        ]
-        if unit is None or not against:
-            return unit or self._options.unit
-        i, header_unit = against[0]
-        self._fault(
-            index,
-            CellFaultError(
-                "unit_contradiction",
-                f"{header_unit}, as the header {self._placed[i].header!r} says",
-                "The row and the header name different units. Correct the one that is wrong.",
-            ),
-        )
-        return self._options.unit
+        unit: LengthUnit | None = self._read_how(index, UNIT)
+        for i, of, _ in self._lengths if unit else ():
+            if of.unit not in (None, unit) and self._cells[i] is not None:
+                expected = f"{of.unit}, as the header {self._placed[i].header!r} says"
+                remedy = (
+                    "The row and the header name different units. Correct the one that is wrong."
+                )
+                self._fault(index, CellFaultError("unit_contradiction", expected, remedy))
+                return self._options.unit
+        return unit or self._options.unit
 
     def _one_length(
         self,
@@ -703,19 +674,6 @@ class RowReader:
         more = radial_in + 2.0 * ROUNDING_IN
         return f"{shown} is over the limit; how far is not known", more
 
-    def _confirm_text(
-        self, joint: int, radial_in: float, text: EnteredClearance, scale: ClearanceConvention
-    ) -> str:
-        slip = scale_slip(radial_in, text.unit, scale, self._options.clearance_confirm_above_in)
-        return Sentence.of(
-            "joint {}: {} is {} radial, above {}: check the reading.{}",
-            joint,
-            str(text),
-            Length.brief(radial_in),
-            Length.brief(self._options.clearance_confirm_above_in),
-            f" {slip}" if slip else "",
-        )
-
     def _fault(self, index: int, fault: CellFaultError) -> None:
         """Note a fault; where the cell bears the verdict, the row cannot be judged then."""
         self._faults.append((index, fault))
@@ -740,7 +698,11 @@ class RowReader:
             return self._row.places[index]
         return CellPlace.at(self._row.number, index, self._placed[index].header)
 
-    def _read_date(self, cell: Filled) -> date:
+    def _read_day(self, cell: Filled) -> date:
+        return read_date(cell, self._options.dates, self._latest)
+
+    def _note_date(self, cell: Cell) -> None:
+        """Note which orders of day and month a date leaves to the others of its column."""
         if isinstance(cell, OddCell) and cell.day is not None:
             self._typed_days[cell.day.day > 12] += 1
         if isinstance(cell, str):
@@ -748,7 +710,6 @@ class RowReader:
             self._written_days += bool(orders)
             # A year first says nothing of the order of day and month in other cells.
             self._date_orders &= orders if orders - {DateOrder.YMD} else self._date_orders
-        return read_date(cell, self._options.dates, self._latest)
 
     def settle_dates(self, rows: list[Inspection | InvalidRow]) -> str:
         """Date the rows whose numbers only the other rows of the column explain; what was

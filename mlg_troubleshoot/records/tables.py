@@ -117,7 +117,7 @@ def read_table(
     used = " and ".join(map(str, header.rows_used))
     placed = f"the header is in row {used}" if header.row > 1 else ""
     read, carried = columns.notes()
-    about = "; ".join([*table.notes(), *_hidden_notes(sheet, len(columns.placed), header.row)])
+    about = "; ".join(table.notes())
     against = _against_title(titles, options.convention)
     out.notes += filter(
         None, (against, "; ".join(filter(None, (placed, read, said))), carried, about)
@@ -218,6 +218,18 @@ _FRACTION = re.compile(r"(?<![\d.,/\-])\d{0,3}[.,]\d+(?![\d.,/\-])|\d\s*(?:thou|
 _RULE = re.compile(r"[-=_*.\s]{3,}")
 
 
+def _ragged(cells: Cells, width: int) -> FileRefusedError:
+    """Refuse a row that does not have as many fields as the header."""
+    remedy = "Check the separators and the quotation marks of this row."
+    if len(cells) > width and any(show(cell).strip() == "0" for cell in cells):
+        remedy = (
+            "A decimal comma in a comma-separated file splits a number in two: write 0.013, or"
+            " separate the columns by semicolons."
+        )
+    expected = f"{width} fields, as in the header"
+    return FileRefusedError("row_field_count", f"{len(cells)} fields", expected, remedy)
+
+
 class _Table:
     """The rows of one table: inspections, and what stands between them."""
 
@@ -231,6 +243,7 @@ class _Table:
         out: Collected,
     ) -> None:
         self._sheet = sheet
+        self._header_row = header.row
         self._columns = columns
         self._table = table
         self._out = out
@@ -266,6 +279,9 @@ class _Table:
         self._is_marked: bool | None = None
         self._second: FileRefusedError | None = None
         self._telling = [columns.at(column) for column in (TAIL_NO, SIDE, CLEARANCE, JOINT)]
+        self._named = {
+            i: column for column in (RECORD_ID, TAIL_NO, JOINT) for i in columns.at(column)
+        }
         self._evidence = columns.at(CLEARANCE, PLUNGER_DISPLACEMENT, OUTCOME)
 
     def take(self, number: int, cells: Cells) -> None:
@@ -289,7 +305,8 @@ class _Table:
             and len(cells) != width
             and (any(cells[width:]) or (len(cells) < width and not self._may_be_short))
         ):
-            self._out.rows.append(self._reader.ragged(number, cells, width))
+            why = _ragged(cells, width)
+            self._out.rows.append(self._reader.faulty(number, cells, why))
         else:
             for row in self._by_visits(number, cells):
                 if self._folder is None:
@@ -333,8 +350,11 @@ class _Table:
     def _begins_again(self, number: int, cells: Cells) -> FileRefusedError | None:
         """Refuse what stands below the header of another table: its columns may be others."""
         options = self._table.options
-        telling = [cells[i] for kind in self._telling for i in kind if i < len(cells)]
-        words = [cell for cell in telling if isinstance(cell, str) and not cell.isdecimal()]
+        words = [
+            cell
+            for i in chain(*self._telling[:2])
+            if i < len(cells) and isinstance(cell := cells[i], str) and not cell.isdecimal()
+        ]
         if all(recognise(word, options.joints) is UNKNOWN for word in words):
             return None
         fields = [recognise(cell, options.joints).field for cell in cells if isinstance(cell, str)]
@@ -360,13 +380,15 @@ class _Table:
         if marked and (len(filled) == 1 or self._is_marked is False):
             return first
         self._is_marked = marked if self._is_marked is None else self._is_marked
+        *telling, _joint = self._telling
+        if not any(filled.isdisjoint(kind) for kind in telling) and not _RULE.fullmatch(first):
+            return ""
         texts = {i: cell for i in filled if isinstance(cell := cells[i], str)}
         if len(texts) == len(filled) and all(map(_RULE.fullmatch, texts.values())):
             return first
         named = {min(filled): RECORD_ID}
         if not filled.isdisjoint(self._evidence):
-            columns = (RECORD_ID, TAIL_NO, JOINT)
-            named = {i: column for column in columns for i in self._columns.at(column)}
+            named = self._named
         for index in filled.intersection(named, texts):
             # A gear whose side stands elsewhere may have any tail.
             is_whole = named[index] is TAIL_NO and self._table.side is not None
@@ -468,29 +490,23 @@ class _Table:
         shown = ", ".join(map(repr, [*words][:4]))
         for cells in _counted(words.total(), "1 cell", "{} cells"):
             notes.append(f"{cells} with {shown} read as not measured")
+        facts = self._sheet.facts
+        hidden = sum(row > self._header_row for row in facts.hidden_rows)
+        both = "1 hidden or filtered row was also read", "{} hidden or filtered rows were also read"
+        notes += _counted(hidden, *both)
+        width = len(self._columns.placed)
+        for first, last in facts.hidden_columns:
+            ends = dict.fromkeys(column_letters(index) for index in (first, min(last, width - 1)))
+            notes += [f"hidden column {' to '.join(ends)} was also read"] * (first < width)
+        for what, found in (
+            ("formulas were read by their last calculated values", facts.formulas),
+            ("cells that are struck through were also read", facts.struck),
+        ):
+            counts = [f"{column_letters(i)} ({n})" for i, n in sorted(found.items()) if i < width]
+            notes += [f"{what}: column {', '.join(counts)}"] if counts else []
         return notes
 
 
 def _counted(count: int, one: str, several: str) -> list[str]:
     """Say how many there are, if there are any."""
     return [one if count == 1 else several.format(count)] * bool(count)
-
-
-def _hidden_notes(sheet: Sheet, width: int, header_row: int) -> list[str]:
-    facts = sheet.facts
-    hidden = sum(row > header_row for row in facts.hidden_rows)
-    notes = _counted(
-        hidden,
-        "1 hidden or filtered row was also read",
-        "{} hidden or filtered rows were also read",
-    )
-    for first, last in facts.hidden_columns:
-        ends = dict.fromkeys(column_letters(index) for index in (first, min(last, width - 1)))
-        notes += [f"hidden column {' to '.join(ends)} was also read"] * (first < width)
-    for what, found in (
-        ("formulas were read by their last calculated values", facts.formulas),
-        ("cells that are struck through were also read", facts.struck),
-    ):
-        counts = [f"{column_letters(i)} ({n})" for i, n in sorted(found.items()) if i < width]
-        notes += [f"{what}: column {', '.join(counts)}"] if counts else []
-    return notes

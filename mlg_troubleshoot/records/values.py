@@ -176,21 +176,26 @@ def read_length(
     return found.to_inches(value), found, text
 
 
+def _with_point(text: str, decimal_comma: bool) -> tuple[str, bool]:
+    """A number as text without its sign and with a point; and whether it is negative."""
+    sign = _SIGNED.match(text)
+    body = text if sign is None else text[sign.end() :]
+    if decimal_comma and _COMMA_NUMBER.fullmatch(body):
+        body = body.replace(",", ".")
+    return body, sign is not None and sign[1] != "+"
+
+
 def _written_length(
     text: str, decimal_comma: bool, expected: str, unit: LengthUnit | None
 ) -> tuple[float, LengthUnit | None]:
     if _NOT_FINITE.fullmatch(text):
         raise CellFaultError("not_finite", expected)
-    sign = _SIGNED.match(text)
-    body = text[sign.end() :] if sign is not None else text
-    if decimal_comma and _COMMA_NUMBER.fullmatch(body):
-        body = body.replace(",", ".")
+    body, is_negative = _with_point(text, decimal_comma)
     try:
         written = parse_length(body)
     except UsageError:
         raise _length_fault(text, body, expected, unit) from None
-    negative = sign is not None and sign[1] != "+"
-    return (-written.value if negative else written.value), written.unit
+    return (-written.value if is_negative else written.value), written.unit
 
 
 _EXAMPLES = {LengthUnit.INCH: "0.013", LengthUnit.THOU: "13", LengthUnit.MILLIMETRE: "0.33"}
@@ -238,7 +243,9 @@ def read_value(
             units=tuple(filter(None, (column.unit.lstrip("°").lower(),))),
         )
     if column.holds is Holds.YES_NO:
-        return _read_yes_no(cell)
+        if (answer := _yes_no(cell)) is None:
+            raise CellFaultError("not_yes_or_no", "yes or no", "Enter yes or no.")
+        return answer
     if column is OUTCOME:
         return _read_outcome(cell, header)
     if column.choices is not None:
@@ -277,27 +284,20 @@ def read_number(
 def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[str, ...]) -> float:
     for unit in units:
         if text.lower().endswith(unit):
-            text = text[: -len(unit)].rstrip().rstrip("°").rstrip()
-            break
-    sign = _SIGNED.match(text)
-    if sign is not None:
-        text = ("" if sign[1] == "+" else "-") + text[sign.end() :]
-    if "," in text or decimal_comma:
-        if _UNCLEAR_GROUP.fullmatch(text):
-            remedy = (
-                f"{text!r} may be a thousand or a fraction. Enter it without a separator for"
-                " thousands."
-            )
-            raise CellFaultError("ambiguous_number", expected, remedy)
-        if decimal_comma and _COMMA_NUMBER.fullmatch(text):
-            text = text.replace(",", ".")
-        elif _COMMA_NUMBER.fullmatch(text):
-            raise _comma_fault(text, expected)
+            text = text[: -len(unit)].rstrip("° ")
+    body, is_negative = _with_point(text, decimal_comma)
+    if ("," in text or decimal_comma) and _UNCLEAR_GROUP.fullmatch(text):
+        remedy = (
+            f"{text!r} may be a thousand or a fraction. Enter it without a separator for thousands."
+        )
+        raise CellFaultError("ambiguous_number", expected, remedy)
+    if _COMMA_NUMBER.fullmatch(body):
+        raise _comma_fault(text, expected)
     if _NOT_FINITE.fullmatch(text):
         raise CellFaultError("not_finite", expected)
-    if not _PLAIN.fullmatch(text) or vanishes(text, float(text)):
+    if not _PLAIN.fullmatch(body) or vanishes(body, float(body)):
         raise CellFaultError("not_a_number", expected)
-    return float(text)
+    return -float(body) if is_negative else float(body)
 
 
 def is_no_name(cell: Filled) -> bool:
@@ -363,17 +363,9 @@ _YES_NO = {
 
 
 def _yes_no(cell: Filled) -> bool | None:
-    if isinstance(cell, OddCell):
-        return _YES_NO.get(cell.text.strip().casefold()) if cell.kind is OddKind.BOOLEAN else None
+    if isinstance(cell, OddCell) and cell.kind is not OddKind.BOOLEAN:
+        return None
     return _YES_NO.get(show(cell).strip().casefold())
-
-
-def _read_yes_no(cell: Filled) -> bool:
-    """Read the answer to a question: yes or no."""
-    said = _yes_no(cell)
-    if said is None:
-        raise CellFaultError("not_yes_or_no", "yes or no", "Enter yes or no.")
-    return said
 
 
 _OUTCOME_WORDS = {
@@ -460,7 +452,7 @@ class AmbiguousDateError(CellFaultError):
     days: the day by each order.
     """
 
-    def __init__(self, days: Mapping[DateOrder, date], expected: str) -> None:
+    def __init__(self, days: Mapping[DateOrder | None, date], expected: str) -> None:
         super().__init__("date_ambiguous", expected)
         self.days = days
 
@@ -478,14 +470,42 @@ def read_date(cell: Filled, order: DateOrder | None = None, latest: date = date.
     if isinstance(cell, OddCell):
         if cell.kind is not OddKind.DATE:
             raise odd_cell_fault(cell, expected)
-        day = cell.day
+        days: dict[DateOrder | None, date] = {} if cell.day is None else {order: cell.day}
     else:
-        day = _written_day(plain_text(cell), order, expected, latest)
-    if day is None or not 1950 <= day.year <= 2100:
+        days = _written_days(plain_text(cell), order, expected)
+        # A day to come is not one that was meant, where another reading is.
+        days = {each: day for each, day in days.items() if day <= latest} or days
+    if len(set(days.values())) > 1:
+        raise AmbiguousDateError(days, expected)
+    day = next(iter(days.values()), date.min)
+    if not 1950 <= day.year <= 2100:
         raise CellFaultError("date_out_of_range", expected)
     if day > latest:
         raise CellFaultError("date_in_the_future", f"{expected}, not after {latest.isoformat()}")
     return day
+
+
+def _written_days(
+    text: str, order: DateOrder | None, expected: str
+) -> dict[DateOrder | None, date]:
+    """The days that a text may mean, in the order that is stated or else by each order."""
+    no_such_day = "The calendar does not have this day."
+    try:
+        day = written_day(text)
+    except ValueError:
+        raise CellFaultError("date_invalid", expected, no_such_day) from None
+    days = readings(text)
+    if day is not None:
+        return {order: day}
+    if days is None:
+        raise CellFaultError("date_invalid", expected)
+    fitting: dict[DateOrder | None, date] = {
+        each: found for each, found in days.items() if order in (None, each)
+    }
+    if not fitting:
+        in_order = "" if order is None else f" in the order {order.words}"
+        raise CellFaultError("date_invalid", f"{expected}{in_order}", no_such_day)
+    return fitting
 
 
 def read_moment(cell: Filled, order: DateOrder | None = None, latest: date = date.max) -> date:
@@ -519,26 +539,3 @@ def read_joints(cell: Filled, numbers: Collection[int]) -> tuple[int, ...]:
         remedy = f"{unknown[0]!r} is not a joint of this gear. Enter numbers with blanks between."
         raise CellFaultError("joints_unknown", expected, remedy)
     return tuple(sorted({int(word) for word in found}))
-
-
-def _written_day(text: str, order: DateOrder | None, expected: str, latest: date) -> date:
-    no_such_day = "The calendar does not have this day."
-    try:
-        day = written_day(text)
-    except ValueError:
-        raise CellFaultError("date_invalid", expected, no_such_day) from None
-    if day is not None:
-        return day
-    days = readings(text)
-    if days is None:
-        raise CellFaultError("date_invalid", expected)
-    if order in days:
-        return days[order]
-    if not days or order is not None:
-        in_order = "" if order is None else f" in the order {order.words}"
-        raise CellFaultError("date_invalid", f"{expected}{in_order}", no_such_day)
-    # A day to come is not one that was meant, where another reading is.
-    days = {order: day for order, day in days.items() if day <= latest} or days
-    if len(set(days.values())) > 1:
-        raise AmbiguousDateError(days, expected)
-    return next(iter(days.values()))

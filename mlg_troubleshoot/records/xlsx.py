@@ -1,11 +1,11 @@
 """Workbooks of Excel and LibreOffice (.xlsx, .xlsm), read by openpyxl behind a guard.
 
-Openpyxl finds the sheets and walks over the rows. What stands in a cell is taken here, since it
-would hide a formula without a result (blank), a date outside the calendar (an error value) and the
-escaped characters of a text, refuse a whole sheet for ``NaN`` in a number, and tell neither hidden
-rows nor which results are of formulas. Texts and styles are also taken here: its model of the
-styles refuses workbooks of other programs for a colour it does not know, and a text with ``x005F_``
-in it would lose that.
+Openpyxl finds the sheets. What stands in a cell is taken here, since it would hide a formula
+without a result (blank), a date outside the calendar (an error value) and the escaped characters of
+a text, refuse a whole sheet for ``NaN`` in a number or for a rule below the rows, and tell neither
+hidden rows nor which results are of formulas. Texts and styles are also taken here: its model of
+the styles refuses workbooks of other programs for a colour it does not know, and a text with
+``x005F_`` in it would lose that.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, cast
-from xml.etree.ElementTree import Element, fromstring, iterparse
+from xml.etree.ElementTree import Element, TreeBuilder, XMLParser, fromstring, iterparse
 
 from openpyxl.reader.excel import ExcelReader
 from openpyxl.utils.cell import column_index_from_string, range_boundaries
@@ -29,7 +29,6 @@ from openpyxl.worksheet._reader import (
     INLINE_STRING,
     ROW_TAG,
     VALUE_TAG,
-    WorkSheetParser,
 )
 from openpyxl.xml.constants import SHEET_MAIN_NS
 
@@ -210,7 +209,78 @@ class XlsxSheet(Sheet):
 
     def _read(self) -> Iterator[NumberedRow]:
         with damage(f"sheet {self.name!r} cannot be read"):
-            yield from (row for row in _Rows(self).parse() if row[1])
+            number = 0
+            for element in self.elements():
+                is_hidden = element.get("hidden") in _TRUE
+                if element.tag == COL_TAG and is_hidden:
+                    ends = int(element.get("min", "")) - 1, int(element.get("max", "")) - 1
+                    self.facts.hidden_columns.append(ends)
+                if element.tag != ROW_TAG:
+                    continue
+                place = element.get("r") or str(number + 1)
+                number = int(place if place.isdecimal() else place.removesuffix(".0"))
+                cells: list[Cell] = []
+                index = -1
+                for each in element:
+                    index = self._index(each.get("r"), str(number), index + 1)
+                    cell = self._cell(each, index)
+                    if cell is None:
+                        continue
+                    if index >= MAX_COLUMNS or number > MAX_ROWS:
+                        raise outside_limits(self.name, index, number)
+                    cells.extend([None] * (index + 1 - len(cells)))
+                    cells[index] = cell
+                if cells and is_hidden:
+                    self.facts.hidden_rows.add(number)
+                if cells:
+                    yield number, cells
+
+    def _index(self, reference: str | None, row: str, following: int) -> int:
+        """The column of a cell, counted from 0; without a reference it follows the one before."""
+        if reference is None:
+            return following
+        letters = reference.removesuffix(row)
+        if not letters.isalpha():
+            raise damaged(f"cell {reference!r} of sheet {self.name!r} is in row {row}")
+        return column_index_from_string(letters) - 1
+
+    def _cell(self, element: Element, index: int) -> Cell:
+        value = inline = None
+        has_formula = False
+        for child in element:
+            if child.tag == VALUE_TAG:
+                value = child.text
+            elif child.tag == INLINE_STRING:
+                inline = child
+            has_formula = has_formula or child.tag == FORMULA_TAG
+        style = element.get("s")
+        if value:
+            cell = self._value(element.get("t", "n"), style, value)
+        elif has_formula:
+            cell = None if element.get("t") == "str" else OddCell(OddKind.NO_VALUE, NO_VALUE_TEXT)
+        else:
+            cell = None if inline is None else _text(inline)
+        if cell is not None and style in self.book.struck:
+            self.facts.struck[index] += 1
+        if cell is not None and value and has_formula:
+            self.facts.formulas[index] += 1
+        return cell
+
+    def _value(self, kind: str, style: str | None, value: str) -> Cell:
+        if kind == "n":
+            number = float(value)
+            if vanishes(value, number):
+                return value
+            shown = self.book.formats.get(style) if style else None
+            epoch = self.book.epoch_1904
+            return number if shown is None else shown.cell(number, epoch_1904=epoch)
+        if kind == "s":
+            return self.book.strings[int(value)]
+        if kind == "e":
+            return OddCell(OddKind.ERROR, value)
+        if kind == "b":
+            return OddCell(OddKind.BOOLEAN, "TRUE" if value.strip() in _TRUE else "FALSE")
+        return iso_date_cell(value) if kind == "d" else _shown(value)
 
     def covered(self) -> int:
         """Return how many cells its merged cells and links cover."""
@@ -232,99 +302,28 @@ class XlsxSheet(Sheet):
         return max((len(cells) for _, cells in self.rows()), default=0)
 
     def elements(self) -> Iterator[Element]:
+        """The columns that are described, then the rows, each until the next one is asked for."""
         stream = Stream(self.book.archive, self.part)
-        for _, element in iterparse(stream):
-            if element.tag == ROW_TAG:
-                yield element
-                element.clear()
-                stream.end_item()
-            elif element.tag == COL_TAG:
-                yield element
-            elif element.tag == DATA_TAG:
-                return
-
-
-class _Rows(WorkSheetParser):
-    def __init__(self, sheet: XlsxSheet) -> None:
-        super().__init__(cast(Any, None), cast(Any, sheet.book.strings), data_only=True)
-        self._sheet = sheet
-        self._formats = sheet.book.formats
-        self._struck = sheet.book.struck
-
-    def parse(self) -> Generator[NumberedRow]:
-        """Read the rows only: what stands behind them, such as rules, can make openpyxl refuse the
-        whole sheet.
-        """
-        for element in self._sheet.elements():
-            if element.tag == ROW_TAG:
-                yield self.parse_row(element)
-            elif element.get("hidden") in _TRUE:
-                self._sheet.facts.hidden_columns.append(
-                    (int(element.get("min", "")) - 1, int(element.get("max", "")) - 1)
-                )
-
-    def parse_row(self, row: Any) -> tuple[int, list[Any]]:
-        """Return the number of a row and its cells, in their columns."""
-        number, found = super().parse_row(row)
-        cells: list[Cell] = []
-        for index, cell in cast(list[tuple[int, Cell]], found):
-            if cell is not None:
-                cells.extend([None] * (index + 1 - len(cells)))
-                cells[index] = cell
-        if cells and row.get("hidden") in _TRUE:
-            self._sheet.facts.hidden_rows.add(number)
-        return number, cells
-
-    def parse_cell(self, element: Element) -> Any:
-        """Return the column, counted from 0, and the content of a cell."""
-        index = self._column(element.get("r"))
-        value = element.findtext(VALUE_TAG)
-        formula = element.find(FORMULA_TAG) is not None
-        if value or formula:
-            kind = element.get("t", "n")
-            cell = self._value(kind, element.get("s"), value)
-        else:
-            inline = element.find(INLINE_STRING)
-            cell = None if inline is None else _text(inline)
-        if cell is None:
-            return index, None
-        if index >= MAX_COLUMNS or self.row_counter > MAX_ROWS:
-            raise outside_limits(self._sheet.name, index, self.row_counter)
-        if element.get("s") in self._struck:
-            self._sheet.facts.struck[index] += 1
-        if formula and not (isinstance(cell, OddCell) and cell.kind is OddKind.NO_VALUE):
-            self._sheet.facts.formulas[index] += 1
-        return index, cell
-
-    def _column(self, reference: str | None) -> int:
-        if reference is None:
-            self.col_counter += 1
-        else:
-            letters = reference.rstrip("0123456789")
-            if reference[len(letters) :] != str(self.row_counter):
-                raise damaged(
-                    f"cell {reference!r} of sheet {self._sheet.name!r} is in row {self.row_counter}"
-                )
-            self.col_counter = column_index_from_string(letters)
-        return self.col_counter - 1
-
-    def _value(  # noqa: PLR0911 - one return for each kind of cell
-        self, kind: str, style: str | None, value: str | None
-    ) -> Cell:
-        if not value:
-            return None if kind == "str" else OddCell(OddKind.NO_VALUE, NO_VALUE_TEXT)
-        if kind == "n":
-            number = float(value)
-            if vanishes(value, number):
-                return value
-            shown = self._formats.get(style) if style else None
-            if shown is None:
-                return number
-            return shown.cell(number, epoch_1904=self._sheet.book.epoch_1904)
-        if kind == "s":
-            return self._sheet.book.strings[int(value)]
-        if kind == "e":
-            return OddCell(OddKind.ERROR, value)
-        if kind == "b":
-            return OddCell(OddKind.BOOLEAN, "TRUE" if value.strip() in _TRUE else "FALSE")
-        return iso_date_cell(value) if kind == "d" else _shown(value)
+        builder = TreeBuilder()
+        parser = XMLParser(target=builder)
+        data: Element | None = None
+        while piece := stream.read():
+            parser.feed(piece)
+            # The builder gives what stands there so far: rows are taken from it piece by piece.
+            root: Element | None = builder.close()
+            if root is None:
+                continue
+            if data is None:
+                data = root.find(DATA_TAG)
+                yield from root.iter(COL_TAG) if data is not None else ()
+            if data is not None:
+                is_whole = root[-1] is not data
+                rows = data[:] if is_whole else data[:-1]
+                for row in rows:
+                    yield row
+                    stream.end_item()
+                del data[: len(rows)]
+                if is_whole:
+                    return
+        parser.close()
+        yield from () if data is None else data
