@@ -61,7 +61,7 @@ WAYS = {
 BUDGETS: dict[str, int] = {
     "(top)": 9679,
     "cli": 29147,
-    "decision": 32772,
+    "decision": 32509,
     "diagnosis": 35621,
     "gear": 11306,
     "geometry": 5881,

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.arrays import Array, Mask, Places, frozen
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import RiggingCheck
@@ -41,8 +42,9 @@ _WORN = SHARES > 1.0
 _ERRORS, _GAUSS = np.polynomial.hermite_e.hermegauss(5)
 _WEIGHTS = np.array([_GAUSS / _GAUSS.sum()], np.float64)
 
-# States drawn of a cause. [1]
-STATES = 256
+# States drawn of failures of the joints, and of each other kind. [1]
+STATES = 192
+_OTHERS = 64
 # Contexts less likely than this move no chance that is stated. [1]
 _NEGLIGIBLE = 1e-4
 
@@ -179,6 +181,17 @@ def _read_exactly(cases: Cases) -> tuple[Mask, _Joints]:
         for name in ("cells", "worn", "transforms", "excess_in2")
     )
     return exact, _Joints(*joined)
+
+
+def _share_within(margin_in: float) -> Array:
+    """Share of each cell within the margin. [1]"""
+    return np.asarray(np.clip((margin_in - np.abs(_AT)) / _CELL_IN + 0.5, 0.0, 1.0))
+
+
+@lru_cache(maxsize=4)
+def _even(dimensions: int, n: int) -> Array:
+    """Even numbers from 0 to 1, the same for every gear, shape (dimensions, n). [1]"""
+    return frozen(random_directions(dimensions, n).T / (2.0 * np.pi))
 
 
 def _noise(excess_in2: Array) -> Array:
@@ -333,21 +346,19 @@ class Belief:
         return float(likely * even * out * np.sqrt(2.0 * np.pi) * u / width)
 
     @cached_property
-    def _before(self) -> Array:
-        """Transform of the joints before each one, (contexts, joints, frequencies)."""
+    def _others(self) -> Array:
+        """Transform of all joints but each one, and of the linkage, (contexts, joints, …)."""
         transforms = self._joints[2]
-        before = np.ones_like(transforms)
-        np.cumprod(transforms[:, :-1], axis=1, out=before[:, 1:])
-        return before
+        joints = range(transforms.shape[1])
+        each = [np.delete(transforms, j, axis=1).prod(axis=1) for j in joints]
+        return np.stack(each, axis=1) * self._noise[self._contexts][:, None]
 
     @cached_property
     def worn(self) -> Array:
         """All joints but one as they are, that one worn (10)."""
-        _cells, worn, transforms = self._joints
+        worn = self._joints[1]
         pins, levels = self._contexts
-        after = np.ones_like(transforms)
-        after[:, :-1] = np.cumprod(transforms[:, :0:-1], axis=1)[:, ::-1]
-        others = self._noise[pins, levels][:, None] * self._before * after * _transform(worn)
+        others = self._others * _transform(worn)
         share = np.zeros(worn.shape[1])
         for factor, likelihood in zip(self._factors, self._seen_at, strict=True):
             seen = np.conj(_transform(likelihood))
@@ -360,67 +371,103 @@ class Belief:
         found = (1.0 - rigging) * share + rigging * (self._rigging_levels @ self._left_worn)
         return np.asarray(np.clip(found, 0.0, 1.0))
 
+    @property
+    def worn_by_leverage(self) -> Array:
+        """Chance of each joint to be worn, times how far it moves the plunger against the one that
+        moves it most: a worn joint that hardly moves it is hardly the cause. [1]
+        """
+        amplification = responses(self.gear)[0].amplification
+        return np.asarray(self.worn * amplification / amplification.max())
+
     @cached_property
     def states(self) -> States:
-        """Drawn failures of the joints, the same ones whoever else is judged."""
+        """Drawn failures, the same ones whoever else is judged."""
         rng = np.random.default_rng(1)
-        moved, worn, stands = self._backwards(rng, 0, STATES)
-        turns = np.cos(2.0 * np.pi * rng.random(moved.shape))
+        cause = np.repeat([0, 1], [STATES, _OTHERS])
+        moved, worn, stands, held = self._backwards(cause)
+        moved = moved[:STATES]
+        level = rng.choice(len(WEAR), _OTHERS, p=_normal(self._rigging_levels))
+        rigging = rng.random((_OTHERS, worn.shape[1])) < self._left_worn[level]
+        mean, spread = PRIORS.cosine
+        loaded = mean + spread * rng.standard_normal(moved.shape)
+        free = np.cos(2.0 * np.pi * rng.random(moved.shape))
+        turns = np.where(held[:STATES, None], loaded, free)
         reach = responses(self.gear)[0].amplification * self.gear.new_parts_in
-        return States(worn, moved, reach * turns, stands, self.margin_in)
+        counts = [STATES, _OTHERS, _OTHERS]
+        return States(
+            np.repeat(np.diag(np.divide(self.chances, counts)), counts, axis=1),
+            np.vstack([worn[:STATES], rigging, worn[STATES:]]),
+            moved,
+            reach * turns,
+            stands[:STATES],
+            self.margin_in,
+        )
 
-    def chance_of_any(self, groups: Sequence[Sequence[int]]) -> list[float]:
-        """Chance that any joint of each group, by their places, is worn, whatever the cause. [1]"""
-        rng = np.random.default_rng(2)
-        _moved, elsewhere, _stands = self._backwards(rng, 1, STATES)
-        level = rng.choice(len(WEAR), STATES, p=_normal(self._rigging_levels))
-        rigging = rng.random(elsewhere.shape) < self._left_worn[level]
-        found = []
-        for group in groups:
-            by_cause = [
-                float(worn[:, list(group)].any(axis=1).mean())
-                for worn in (self.states.worn, rigging, elsewhere)
-            ]
-            drawn = float(np.dot(by_cause, self.chances))
-            # None is less likely than its likeliest joint, which is not drawn.
-            found.append(max(drawn, float(self.worn[list(group)].max())))
-        return found
-
-    def _backwards(self, rng: np.random.Generator, cause: int, n: int) -> tuple[Array, Mask, Array]:
-        """Draw what each joint moves and whether it is worn, given where the plunger was read."""
+    def second_repair(self, restored: Mask) -> float:
+        """Chance that the plunger is beyond its margin once some joints are new (11). [1]"""
         pins, levels = self._contexts
-        cells, worn_cells, _transforms = self._joints
-        posterior = self._stands[pins, levels] * self._seen_at[cause][pins] + 1e-300
-        steps = np.cumsum(_normal(self._weights[cause][pins, levels]))
-        of = np.searchsorted(steps, (np.arange(n) + rng.random()) / n).clip(max=len(steps) - 1)
-        place = _drawn(rng, posterior[of])
-        sums = _density(self._noise[pins, levels][:, None] * self._before)
-        stands = np.asarray(_AT[place] + _CELL_IN * (rng.random(n) - 0.5))
-        moved = np.empty((n, cells.shape[1]))
+        transforms = self._joints[2]
+        gone = transforms[:, restored].prod(axis=1)
+        stay = self._noise[pins, levels] * transforms[:, ~restored].prod(axis=1)
+        reach = _reach(self.gear)[0] * self.gear.new_parts_in / self.gear.limits_in
+        new = [
+            _moved(reach[restored], np.zeros(restored.sum()), held=held) for held in (False, True)
+        ]
+        fresh = _transform(np.array(new)).prod(axis=1)[pins]
+        weight = _density(np.conj(gone) * _transform(self._seen_at[0][pins])) * _density(stay)
+        weight *= self._factors[0][pins, levels][:, None]
+        inside = _density(np.conj(fresh) * _transform(_share_within(self.margin_in)))
+        out = 1.0 - inside
+        return float(np.clip(np.sum(weight * out) / max(float(weight.sum()), 1e-300), 0.0, 1.0))
+
+    def chance_of_any(self, joints: Sequence[int]) -> float:
+        """Chance that any of some joints, by their places, is worn, whatever the cause. [1]"""
+        each, worn = self.worn[list(joints)], self.states.worn[:, list(joints)]
+        # Drawn is only how often several are.
+        several = self.states.causes.sum(axis=0) @ (worn.sum(axis=1) - worn.any(axis=1))
+        return float(max(each.sum() - several, each.max()))
+
+    def _backwards(self, cause: Places) -> tuple[Array, Mask, Array, Mask]:
+        """Draw failures of some causes: what each joint moves and whether it is worn, given where
+        the plunger was read; where it stands, and whether pins are held.
+        """
+        pins, levels = self._contexts
+        cells, worn_cells, transforms = self._joints
+        n, joints = len(cause), cells.shape[1]
+        even = _even(2 * joints + 3, n)
+        weights = np.array([each[pins, levels] for each in self._weights])
+        of = _drawn(even[0], weights[cause])
+        posterior = self._stands[pins, levels] * np.array(self._seen_at)[:, pins] + 1e-300
+        place = _drawn(even[1], posterior[cause, of])
+        before = np.ones_like(transforms)
+        before[:, 1:] = np.cumprod(transforms[:, :-1], axis=1)
+        sums = _density(self._noise[pins, levels][:, None] * before)
+        stands = np.asarray(_AT[place] + _CELL_IN * (even[2] - 0.5))
+        moved = np.empty((n, joints))
         worn = np.empty(moved.shape, bool)
         middle = _CELLS // 2
-        reach, _bend = _reach(self.gear)
-        for j in range(moved.shape[1] - 1, -1, -1):
-            # No joint moves the plunger by more than this.
-            most = min(int(np.ceil(2.2 * reach[j] / _CELL_IN)) + 1, middle - 1)
-            offsets = np.arange(-most, most + 1)
-            own = cells[of, j, middle - most : middle + most + 1]
-            own = own * sums[of[:, None], j, (place[:, None] - offsets) % _CELLS] + 1e-300
-            chosen = offsets[_drawn(rng, own)]
+        for j in range(joints - 1, -1, -1):
+            some = np.flatnonzero(cells[:, j].max(axis=0) > 1e-12)
+            most = int(np.abs(some - middle).max())
+            round_about = np.concatenate(
+                [sums[:, j, -most:], sums[:, j], sums[:, j, :most]], axis=1
+            )
+            left = sliding_window_view(round_about, 2 * most + 1, axis=1)[of, place]
+            own = cells[of, j, middle - most : middle + most + 1][:, ::-1]
+            chosen = most - _drawn(even[3 + j], own * left + 1e-300)
             cell = middle + chosen
             moved[:, j] = _AT[cell]
             whole = np.maximum(cells[of, j, cell], 1e-300)
-            worn[:, j] = rng.random(n) * whole < worn_cells[of, j, cell]
+            worn[:, j] = even[3 + joints + j] * whole < worn_cells[of, j, cell]
             place = (place - chosen) % _CELLS
-        return moved, worn, stands
+        return moved, worn, stands, pins[of] == 1
 
     def clearances_in(self, joint: int, at: Sequence[float]) -> list[float]:
         """Quantiles of the clearance of the joint at a place, its wear weighed by the reading.
         [in]
         """
         pins, levels = self._contexts
-        after = np.prod(self._joints[2][:, joint + 1 :], axis=1)
-        others = self._noise[pins, levels] * self._before[:, joint] * after
+        others = self._others[:, joint]
         weight = sum(
             factor[pins, levels, None] * seen[pins]
             for factor, seen in zip(self._factors, self._seen_at, strict=True)
@@ -459,27 +506,31 @@ def _normal(weights: Array) -> Array:
     return weights / total if total > 0.0 else np.full(len(weights), 1.0 / len(weights))
 
 
-def _drawn(rng: np.random.Generator, weights: Array) -> Places:
+def _drawn(even: Array, weights: Array) -> Places:
     """One place of each row, by its weights."""
     steps = np.cumsum(weights, axis=1)
-    at = rng.random(len(steps)) * steps[:, -1]
+    at = even * steps[:, -1]
     return np.asarray((steps < at[:, None]).sum(axis=1).clip(max=weights.shape[1] - 1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class States:
-    """Drawn failures of the joints of one gear.
+    """Drawn failures of one gear.
 
     Attributes
     ----------
-    worn : ndarray of bool, shape (STATES, joints)
-        Joints beyond their limit in a failure of the joints.
+    causes : ndarray, shape (3, n)
+        Weight of each state as a failure of the joints, of the rigging, of something else: the
+        first `STATES` are of the joints. [1]
+    worn : ndarray of bool, shape (n, joints)
+        Joints beyond their limit.
     moved_in, fresh_in : ndarray, shape (STATES, joints)
         By how much each joint moves the plunger in a failure of the joints, and would if new. [in]
     stands_in : ndarray, shape (STATES,)
         Where the plunger stands then. [in]
     """
 
+    causes: Array
     worn: Mask
     moved_in: Array
     fresh_in: Array
@@ -493,21 +544,6 @@ class States:
         left = self.stands_in[:, None] - (self.moved_in - self.fresh_in) @ sets.T.astype(float)
         return np.asarray(np.abs(left) > self.margin_in)
 
-    def second_repair(self, sets: Mask) -> Array:
-        """Chance of that, by set (11). [1]"""
-        return np.asarray(self.stays_out(sets).mean(axis=0))
-
-    def second_once_read(self, restored: Mask, joints: Places) -> Array:
-        """The same once `joints` are read and what was found worn is restored with some others:
-        each in turn being the one beyond its limit; last, none of them. [1]
-        """
-        sets = np.repeat(restored[None], len(joints) + 1, axis=0)
-        sets[np.arange(len(joints)), joints] = True
-        worn = self.worn[:, joints]
-        of = np.column_stack([worn, ~worn.any(axis=1)]).astype(float)
-        out = (self.stays_out(sets) * of).sum(axis=0)
-        return np.asarray(out / np.maximum(of.sum(axis=0), 1.0))
-
 
 @lru_cache(maxsize=8)
 def usual_of(gear: Gear, fleet: Fleet) -> tuple[Array, float]:
@@ -515,7 +551,7 @@ def usual_of(gear: Gear, fleet: Fleet) -> tuple[Array, float]:
     and with held pins, and how rarely work on it leaves its worn joints as they are. [1]
     """
     levels = np.array(fleet.levels or LEVELS)
-    beyond = np.abs(_AT) > gear.margin.value
+    beyond = 1.0 - _share_within(gear.margin.value)
     whole, excess = _unread(gear, (True,) * len(gear.joints))
     out = _density(_noise(excess) * whole) @ beyond @ levels
     left = (1.0 - (1.0 - PRIORS.overlooked) * (WEAR @ _WORN)) ** len(gear.joints)
@@ -547,7 +583,7 @@ def _imagined(gear: Gear) -> tuple[Array, Array, Array]:
     """
     joints = len(gear.joints)
     reach, bend = _reach(gear)
-    even = random_directions(2 * joints, _IMAGINED).T / (2.0 * np.pi)
+    even = _even(2 * joints, _IMAGINED)
     turned = np.cos(2.0 * np.pi * even[:joints])
     steps = np.cumsum(WEAR, axis=1)
     share = np.array(

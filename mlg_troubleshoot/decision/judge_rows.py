@@ -236,11 +236,12 @@ def _with_chances(
     for row in np.flatnonzero(cases.beyond_margin).tolist():
         belief = beliefs[row]
         if belief is not None and sets[row]:
-            members = np.array([np.isin(numbers, each.joints) for each in sets[row]])
-            second = belief.states.second_repair(members).tolist()
             found[row] = tuple(
-                replace(each, second_repair_probability=chance)
-                for each, chance in zip(sets[row], second, strict=True)
+                replace(
+                    each,
+                    second_repair_probability=belief.second_repair(np.isin(numbers, each.joints)),
+                )
+                for each in sets[row]
             )
     return found
 

@@ -23,7 +23,9 @@ def explain(one: Cases) -> Posterior:
     every = [*gear.link_groups, gear.joint_numbers]
     places = [[gear.joint_numbers.index(n) for n in group] for group in every]
     # Nothing is surer than what drawn states allow.
-    *chances, worn = np.clip(belief.chance_of_any(places), 1e-4, 1.0 - 1e-4).tolist()
+    *chances, worn = np.clip(
+        [belief.chance_of_any(each) for each in places], 1e-4, 1.0 - 1e-4
+    ).tolist()
     groups = [GroupChance(*each) for each in zip(gear.link_groups, chances, strict=True)]
     groups.sort(key=lambda group: -group.probability)
     intervals = tuple(

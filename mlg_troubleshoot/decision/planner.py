@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from mlg_troubleshoot.decision import sentences
 from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Verdict
 from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.choice import Choice, Possible, choose
 from mlg_troubleshoot.decision.inspection import InvalidRow, RiggingCheck
 from mlg_troubleshoot.decision.plan import (
     Action,
@@ -31,26 +31,9 @@ from mlg_troubleshoot.decision.plan import (
 )
 from mlg_troubleshoot.decision.plunger_reading import Compared
 from mlg_troubleshoot.decision.prediction import BatchPrediction
-from mlg_troubleshoot.decision.priors import PRIORS
-from mlg_troubleshoot.decision.repair import removable
-from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
+from mlg_troubleshoot.decision.priors import PRIORS, THRESHOLDS
+from mlg_troubleshoot.decision.repair import removable, restored
 from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
-
-# A cause counts as excluded below this chance. [1]
-_EXCLUDED = 1 - CONFORMANCE
-# Joints read in one round of a gear that failed: until this share of what may be worn in the area
-# is read, two at least. [1]
-_TOGETHER = 0.6
-# Joints beyond those over their limit that a repair to be tried may hold. [1]
-_MOST_EXTRA = 2
-# They are chosen among as many joints, those that move the plunger most.
-_MOST_TRIED = 6
-# Shares of its limit beyond which a joint is worn whatever its gauge. [1]
-_SURELY_WORN = 1.5
-# What one repair may be above the chance that the shop accepts over all: most are far below it, and
-# the average of simulated gears stays below it. [1]
-_FOR_ONE_REPAIR = 4
 
 
 def _doubted(cases: Cases, beliefs: Sequence[Belief | None]) -> Mask:
@@ -59,7 +42,7 @@ def _doubted(cases: Cases, beliefs: Sequence[Belief | None]) -> Mask:
     """
     gear = cases.gear
     read = cases.filled(0.0)
-    near = read - gear.limits_in <= 2.0 * cases.gauge_u_in
+    near = read - gear.limits_in <= THRESHOLDS.doubtful * cases.gauge_u_in
     contradicts = np.zeros_like(near)
     rows = np.flatnonzero(cases.over_limit.any(axis=1) & np.isfinite(cases.plunger_in))
     for row in rows.tolist():
@@ -67,7 +50,7 @@ def _doubted(cases: Cases, beliefs: Sequence[Belief | None]) -> Mask:
         if belief is not None:
             contradicts[row] = 1.0 - belief.worn > gear.second_repair_chance.value
     may_be = cases.over_limit & cases.reachable & ~cases.own_gauge
-    may_be &= read <= _SURELY_WORN * gear.limits_in
+    may_be &= read <= THRESHOLDS.surely_worn * gear.limits_in
     return np.asarray(may_be & (near | contradicts))
 
 
@@ -126,12 +109,9 @@ def _predict_tried(cases: Cases, courses: Sequence[_PlanBuilder]) -> None:
     rows = [i for i, course in enumerate(courses) if course.tried is not None]
     if not rows:
         return
-    some = cases.take(np.array(rows))
     numbers = np.array(cases.gear.joint_numbers)
     tried = [course.tried for course in courses if course.tried is not None]
-    members = np.array([np.isin(numbers, each.joints) for each in tried])
-    now = some.filled(cases.gear.limits_in)
-    after = some.predict(np.where(members, np.minimum(now, cases.gear.new_parts_in), now))
+    some, after = restored(cases, rows, [np.isin(numbers, each.joints) for each in tried])
     within = after.probability_within(some.margin_in, some.margin_u_in)
     for k, row in enumerate(rows):
         found = replace(
@@ -150,15 +130,7 @@ class _BatchContext:
         self.cases = cases
         self.judged = judged
         self.beliefs = beliefs
-        amplification = responses(gear)[0].amplification
-        # Amplification of each joint as a share of the largest. [1]
-        self.leverage: Array = np.asarray(amplification / amplification.max())
         self.numbers = gear.joint_numbers
-        self.restore_min = np.array([joint.restore.value for joint in gear.joints])
-        self.access_min = np.array([area.access.value for area in gear.areas])
-        self.inside = np.array(
-            [[joint.area == area.name for joint in gear.joints] for area in gear.areas]
-        )
         self.complained = cases.complained
         self.over = cases.over_limit & cases.restorable
         self.removable = removable(cases)
@@ -166,7 +138,7 @@ class _BatchContext:
         self.doubted = _doubted(cases, beliefs)
         u = np.hypot(cases.plunger_u_in, cases.margin_u_in)
         apart = np.abs(np.abs(cases.plunger_in) - cases.margin_in)
-        self.at_edge: Mask = np.asarray(apart < 2.0 * u)
+        self.at_edge: Mask = np.asarray(apart < THRESHOLDS.doubtful * u)
 
 
 class _PlanBuilder:
@@ -183,8 +155,6 @@ class _PlanBuilder:
         self.inspection = self.cases.inspections[row]
         self.steps: list[Step] = []
         self.tried: RepairSet | None = None
-        # Chance of a second repair up to which one repair is taken for enough. [1]
-        self.accepted = _FOR_ONE_REPAIR * self.gear.second_repair_chance.value
         self.taken_again = False
         self.opened: frozenset[str] = frozenset()
         self.over_limit = self._joints(self.cases.over_limit[row])
@@ -244,7 +214,7 @@ class _PlanBuilder:
         """A gear that failed and was repaired: the plunger says whether the repair holds."""
         beyond = self.judged.plunger.beyond[self.row]
         if self.over:
-            return self._try(self.over)
+            return self._try(self.cases.over_limit[self.row])
         if self.over_limit:
             # The plunger is read after these are restored, whatever it reads before.
             return self._restore_over_limit()._stop_for_today()
@@ -263,212 +233,77 @@ class _PlanBuilder:
         return at_edge or self.inspection.is_plunger_in_doubt
 
     def _failed(self) -> Plan:
-        """A gear that failed: the plunger first, then whatever is likeliest per minute."""
-        joints, rigging, elsewhere = self.belief.chances
+        """A gear that failed: the plunger first, then what has the fewest expected minutes."""
         if not self.read_plunger or self._again():
             self._read_the_plunger(again=self.read_plunger)
-        if not self.read_plunger:
-            if joints < elsewhere:
-                return self._restore_over_limit()._end(End.NOT_EXPLAINED)
-            following = self._worth_reading(None)
-            if following:
-                return self._read_and_restore(following)
-            return self._to_repair(joints, rigging)
-        if joints + rigging < _EXCLUDED:
-            return self._elsewhere()
-        return self._to_repair(joints, rigging)
-
-    def _elsewhere(self) -> Plan:
-        """The joints are not the cause; what is over its limit is restored nevertheless."""
-        if self.over and self.over == self.over_limit:
-            return self._try(self.over)
-        return self._restore_over_limit()._end(End.NOT_EXPLAINED)
-
-    def _to_repair(self, joints: float, rigging: float) -> Plan:
+        joints, _rigging, elsewhere = self.belief.chances
+        if not self.read_plunger and joints < elsewhere:
+            return self._restore_over_limit()._end(End.NOT_EXPLAINED)
         f = self.facts
         i = self.row
-        best = self._repair()
-        unread = self._joints(f.open[i])
-        following = self._worth_reading(best) if unread else ()
-        if following:
-            minutes = minutes_to_measure(self.gear, unread, self.opened)
-        elif best is not None:
-            # In vain are the sound joints, and the plunger's reading after the repair.
-            sound = [n for n in best.joints if n not in self.over_limit]
-            minutes = minutes_to_restore(self.gear, sound, self.opened)
-            minutes += self.gear.plunger_reading.value
-        else:
-            minutes = np.inf
-        if not self.looked and self.read_plunger:
-            check = self.gear.rigging_check.value
-            # No sound joint is restored before the rigging was looked at, unless it is excluded.
-            tears = not following and best is not None and set(best.joints) > set(self.over_limit)
-            worth = rigging > _EXCLUDED and (tears or rigging * minutes > joints * check)
-            # What is over its limit is restored whatever the cause: a reading of it in doubt is
-            # taken again in any case, so before the check, which it may spare.
-            again = (worth or not following) and self._reread()
-            if worth and (rigging > 0.5 or not again):
-                self._check_rigging()
-                if rigging > 0.5:
-                    return self._restore_over_limit()._end(End.NOT_EXPLAINED)
-                joints /= 1.0 - (1.0 - PRIORS.overlooked) * rigging
-        if following:
-            return self._read_and_restore(following)
-        # A failure of the joints that is sent away stays outside its margin: against a rigging
-        # that was looked at, the likelier cause decides.
-        likely = joints >= 0.5 and self.belief.chances[2] <= 1.0 - PRIORS.usual
-        if best is not None and (likely or set(best.joints) <= set(self.over_limit)):
-            return self._try(best.joints)
-        if best is not None:
-            return self._elsewhere()
-        if joints < 0.5 or not self.over:
-            explained = joints >= 0.5
-            return self._end(End.CANNOT_CLEAR if explained else End.NOT_EXPLAINED)
-        return self._try(self.over)
+        possible = Possible(
+            over=self.cases.over_limit[i],
+            worn=f.removable[i],
+            spare=self.cases.restorable[i],
+            unread=f.open[i],
+            doubted=f.doubted[i],
+            looked=self.looked or not self.read_plunger,
+            opened=self.opened,
+        )
+        return self._follow(choose(self.gear, self.belief, possible))
 
-    def _read_and_restore(self, following: tuple[int, ...]) -> Plan:
+    def _follow(self, choice: Choice) -> Plan:
+        """Do what was chosen; what comes after it is the expected course."""
+        joints, rigging, elsewhere = self.belief.chances
+        if choice.then is not None:
+            self._check_rigging()
+            if rigging > 0.5:
+                return self._restore_over_limit()._end(End.NOT_EXPLAINED)
+            rigging *= PRIORS.overlooked
+            choice = choice.then
+        if choice.read:
+            return self._read_and_restore(choice.read)
+        if choice.restore is not None:
+            return self._try(choice.restore, self.belief.second_repair(choice.restore))
+        if self.over:
+            return self._try(self.cases.over_limit[self.row])
+        explained = joints > rigging + elsewhere
+        return self._end(End.CANNOT_CLEAR if explained else End.NOT_EXPLAINED)
+
+    def _read_and_restore(self, places: tuple[int, ...]) -> Plan:
         """Read joints, then the expected repair."""
-        self._measure(following)
-        worn = self.belief.worn * self.facts.leverage
-        numbers = self.numbers
-        likely = sorted(following, key=lambda n: -worn[numbers.index(n)])
+        over = self.cases.over_limit[self.row]
+        if over[list(places)].all():
+            self._reread()
+            return self._try(over)
+        self._measure(tuple(self.numbers[j] for j in places))
+        worn = self.belief.worn_by_leverage
         # What is over its limit already does not suffice, or there would be nothing to read: one
         # joint more is restored on average.
-        joints = (*self.over, *likely[:1])
-        without = [n for n in joints if not self.cases.restorable[self.row, numbers.index(n)]]
+        joints = self.facts.over[self.row].copy()
+        joints[max(places, key=lambda j: float(worn[j]))] = True
+        without = self._joints(joints & ~self.cases.restorable[self.row])
         if without:
             return self._restore_over_limit()._stop_for_today(without)
         return self._try(joints, expected=True)
-
-    def _repair(self) -> RepairSet | None:
-        """The quickest repair after which a second one is at most as likely as the shop accepts;
-        None without one.
-
-        Offered are what is over its limit with the fewest more, and what holds in the worst case.
-        What is over its limit is restored in any case, if not today: until then no reading is worth
-        more than it is with every spare at hand.
-        """
-        f = self.facts
-        i = self.row
-        over_limit = self.cases.over_limit[i]
-        over = np.flatnonzero(over_limit)
-        more = np.flatnonzero(f.removable[i] & ~over_limit)
-        more = more[
-            np.argsort(-np.abs(self.belief.states.moved_in[:, more]).mean(axis=0), kind="stable")
-        ][:_MOST_TRIED]
-        chosen = [
-            (*over, *extra)
-            for count in range(_MOST_EXTRA + 1)
-            for extra in combinations(more, count)
-        ]
-        chosen = [places for places in chosen if places]
-        if not chosen:
-            return None
-        members = np.zeros((len(chosen), len(self.gear.joints)), bool)
-        for row, places in enumerate(chosen):
-            members[row, list(places)] = True
-        second = self.belief.states.second_repair(members)
-        shut = [k for k, area in enumerate(self.gear.areas) if area.name not in self.opened]
-        opened = (members[:, None, :] & f.inside[shut]).any(axis=2)
-        minutes = members @ f.restore_min + opened @ f.access_min[shut]
-        sure = [
-            each
-            for each in self.sets
-            if (each.second_repair_probability or 0.0) <= self.accepted
-            and set(self.over_limit) <= set(each.joints)
-        ]
-        enough = np.flatnonzero(second <= self.accepted)
-        if len(enough):
-            best = enough[np.lexsort((second[enough], np.round(minutes[enough], 6)))[0]]
-        elif sure or not len(over):
-            return sure[0] if sure else None
-        elif f.open[i].any():
-            return None
-        else:
-            # Nothing is left to read: what is over its limit is restored, and the plunger decides.
-            best = 0
-        if second[best] > 0.5 and not len(over):
-            return None
-        joints = tuple(np.array(self.numbers)[members[best]].tolist())
-        tried = RepairSet(
-            joints,
-            np.nan,
-            np.nan,
-            minutes_to_measure(self.gear, joints),
-            minutes_to_restore(self.gear, joints),
-            RepairKind.TRY,
-            float(second[best]),
-        )
-        quicker = [s for s in sure if s.minutes < tried.minutes]
-        today = self.over == self.over_limit
-        if today and all(set(each.joints) != set(tried.joints) for each in self.sets):
-            self.tried = tried
-        return quicker[0] if quicker else tried
-
-    def _worth_reading(self, best: RepairSet | None) -> tuple[int, ...]:
-        """The joints to read next; none where a repair is quicker than what reading may save."""
-        f = self.facts
-        i = self.row
-        # A worn joint that hardly moves the plunger is hardly the cause.
-        # Rounded: both ends of one link are worth the same, and noise must not order them.
-        worn = np.round(self.belief.worn * f.leverage, 4)
-        chosen: tuple[int, ...] = ()
-        most = -1.0
-        for area in self.gear.areas:
-            inside = [
-                j
-                for j, joint in enumerate(self.gear.joints)
-                if f.open[i, j] and joint.area == area.name
-            ]
-            inside.sort(key=lambda j: -worn[j] / self.gear.joints[j].access.value)
-            total = sum(worn[j] for j in inside)
-            taken = 0.0
-            group: list[int] = []
-            for j in inside:
-                group.append(j)
-                taken += worn[j]
-                if len(group) > 1 and taken >= _TOGETHER * total:
-                    break
-            numbers = tuple(self.numbers[j] for j in group)
-            if not group:
-                continue
-            rate = taken / minutes_to_measure(self.gear, numbers, self.opened)
-            if rate > most:
-                chosen = numbers
-                most = rate
-        if best is None or not chosen:
-            return chosen
-        sound = [n for n in best.joints if n not in self.over_limit]
-        if not sound:
-            return ()
-        # A reading saves the sound joints where it finds one worn that is enough without them, or
-        # none, after which what is over its limit may be enough. It opens no area that the repair
-        # opens anyway.
-        places = np.array([self.numbers.index(n) for n in chosen])
-        second = self.belief.states.second_once_read(self.cases.over_limit[i], places)
-        worn = self.belief.worn[places]
-        spared = 1.0 - float(np.prod(1.0 - worn * (1.0 - second[:-1])))
-        if second[-1] <= self.accepted:
-            spared += float(np.prod(1.0 - worn))
-        anyway = self.opened | {self.gear.joint(n).area for n in (*self.over_limit, *chosen)}
-        saved = spared * minutes_to_restore(self.gear, sound, anyway)
-        opened = self.opened | {self.gear.joint(n).area for n in best.joints}
-        return chosen if saved > minutes_to_measure(self.gear, chosen, opened) else ()
 
     def _left_unread(self) -> list[int]:
         """Joints that nobody read and that no step reads."""
         asked = {n for step in self.steps for n in step.joints}
         return [n for n in self._joints(~self.cases.measured[self.row]) if n not in asked]
 
-    def _try(self, joints: Sequence[int], *, expected: bool = False) -> Plan:
+    def _try(self, members: Mask, second: float | None = None, *, expected: bool = False) -> Plan:
         """Restore, read the plunger, retract the gear: done. Where something over its limit must
         wait for its spare, that comes after it.
         """
         waits = self.over != self.over_limit
         if waits and not expected:
             return self._restore_over_limit()._stop_for_today()
-        ranked = self._joints(np.array([n in joints for n in self.numbers]))
-        self._restore(ranked, expected=expected)
+        joints = self._joints(members)
+        if second is not None and all({*each.joints} != {*joints} for each in self.sets):
+            minutes = minutes_to_measure(self.gear, joints), minutes_to_restore(self.gear, joints)
+            self.tried = RepairSet(joints, np.nan, np.nan, *minutes, RepairKind.TRY, second)
+        self._restore(joints, expected=expected)
         if waits:
             return self._stop_for_today()
         self._read_the_plunger()

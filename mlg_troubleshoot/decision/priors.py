@@ -74,4 +74,33 @@ class Priors:
         return self.joints_for_one_elsewhere / (1.0 + self.joints_for_one_elsewhere)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """Numbers of the rule for NEXT that are not part of the model.
+
+    Attributes
+    ----------
+    one_repair : float
+        So many times the chance of a second repair that a shop accepts over all, one repair may
+        have for one more joint: most repairs have far less. [1]
+    sent_away : float
+        Second repairs that a failure of the joints costs which is sent elsewhere. [1]
+    surely_worn : float
+        Shares of its limit beyond which a joint is worn whatever its gauge. [1]
+    doubtful : float
+        Standard uncertainties within which a reading is too near to its limit or margin. [1]
+    movable, together : int
+        Joints whose sets are weighed, and joints that are read in one round, at most: what a batch
+        has time for. [1]
+    """
+
+    one_repair: float = 4.0
+    sent_away: float = 2.0
+    surely_worn: float = 1.5
+    doubtful: float = 2.0
+    movable: int = 7
+    together: int = 4
+
+
 PRIORS = Priors()
+THRESHOLDS = Thresholds()

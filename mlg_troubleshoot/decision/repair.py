@@ -1,11 +1,10 @@
-"""What to restore: all subsets of all gears as one array, the best checked exactly; and what
+"""What to restore: all subsets of a gear by the expansion, the best checked exactly; and what
 re-rigging would do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -15,13 +14,12 @@ from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Rigging,
 from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
-from mlg_troubleshoot.decision.second_order import Response, responses
+from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
 
-# Repair sets that are shown, and gears searched at once: more do not fit the cache. [1]
+# Repair sets that are shown. [1]
 _SHOWN = 5
-_ROWS = 32
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
 # may be off. [in]
 _ABOUT_IN = 5e-4
@@ -29,210 +27,80 @@ _ABOUT_IN = 5e-4
 _AS_NEW_IN = 1e-4
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Subsets:
-    """All subsets of a gear's joints, the quickest to restore first, then the smallest.
-
-    Attributes
-    ----------
-    members : ndarray of bool, shape (subsets, joints)
-        Which joints each holds.
-    weights : ndarray, shape (subsets, joints)
-        The same as 0 and 1, for sums. [1]
-    minutes : ndarray, shape (subsets,)
-        Minutes to restore them. [min]
-    binary : ndarray of int, shape (subsets,)
-        Each as a number, its joints being the digits from the last on.
-    alike : ndarray of int, shape (subsets,)
-        The same number for subsets of equally many joints in equal minutes.
-    joints : sequence of tuple of int
-        Numbers of the joints of each.
-    to_measure : sequence of float
-        Minutes to read them. [min]
-    """
-
-    members: Mask
-    weights: Array
-    minutes: Array
-    binary: Places
-    alike: Places
-    joints: Sequence[tuple[int, ...]]
-    to_measure: Sequence[float]
-
-
 @lru_cache(maxsize=4)
-def subsets_of(gear: Gear) -> Subsets:
-    """Enumerate the subsets of a gear's joints in the order of their minutes."""
+def subsets_of(gear: Gear) -> tuple[Mask, Array]:
+    """All subsets of a gear's joints, the quickest to restore first, then the smallest, and the
+    minutes of each. [min]
+    """
     n = len(gear.joints)
     members = ((np.arange(2**n)[:, None] >> np.arange(n)) & 1).astype(bool)
     numbers = np.array(gear.joint_numbers)
     minutes = np.array([minutes_to_restore(gear, numbers[row].tolist()) for row in members])
     order = np.lexsort((members.sum(axis=1), np.round(minutes, 6)))
-    members = members[order]
-    minutes = minutes[order]
-    joints = [tuple(numbers[row].tolist()) for row in members]
-    keys = np.column_stack([np.round(minutes, 6), members.sum(axis=1)])
-    alike = np.cumsum(np.r_[0, np.any(np.diff(keys, axis=0) != 0.0, axis=1)])
-    return Subsets(
-        members,
-        members.astype(float),
-        minutes,
-        order,
-        alike,
-        joints,
-        [minutes_to_measure(gear, each) for each in joints],
-    )
-
-
-def _surest(table: Subsets, slack_in: Array, among: Mask) -> Places:
-    """The quickest of some subsets; of equally many joints in equal minutes the one with most
-    slack; −1 if none.
-    """
-    first = np.argmax(among, axis=1)
-    rows = np.arange(len(among))
-    alike = among & (table.alike[first][:, None] == table.alike)
-    # Rounded: both ends of one link leave the same, and rounding noise must not choose between
-    # them.
-    found = np.argmax(np.where(alike, np.round(slack_in, 7), -np.inf), axis=1)
-    return np.where(among[rows, first], found, -1)
+    return members[order], minutes[order]
 
 
 def removable(cases: Cases) -> Mask:
     """Joints that can be restored with a gain: measured, and worn beyond a new part."""
-    return (
-        cases.measured
-        & cases.restorable
-        & (cases.filled(0.0) > cases.gear.new_parts_in + _AS_NEW_IN)
-    )
+    worn = cases.filled(0.0) > cases.gear.new_parts_in + _AS_NEW_IN
+    return np.asarray(cases.measured & cases.restorable & worn)
 
 
-def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Array:
-    """How far each subset, restored, stays inside the conformance limit, (n, subsets): margin less
-    worst case less its guard band, unmeasured joints at their limit. [in]
-
-    By the second-order expansion, anchored at the exact worst case `worst_in`; −inf for a subset
-    that restores what is new or unmeasured, or leaves a joint over its limit.
-    """
-    table = subsets_of(cases.gear)
-    linkages = responses(cases.gear)
-    worn = removable(cases)
-    now = cases.filled(cases.gear.limits_in)
-    less = np.where(worn, now - cases.gear.new_parts_in, 0.0)
-    over = cases.over_limit & cases.restorable
-    # A subset must contain every joint over its limit, and no joint that gains nothing.
-    barred = (~worn).astype(float) @ table.weights.T + over.astype(float) @ (
-        1.0 - table.weights.T
-    ) > 0.0
-    # Restoring a clearance also lowers the slopes, and so the uncertainty from the other readings.
-    readings = (cases.gauge_u_in * cases.measured) ** 2
-    slack = np.empty(barred.shape)
-    for start in range(0, len(cases), _ROWS):
-        part = slice(start, start + _ROWS)
-        some = now[part]
-        gone = less[part]
-        members = _restored_worst(linkages, some, gone)
-        geometry = _variance(members)[table.binary]
-        first = members[0, table.binary]
-        falls = first[0] - first
-        after = worst_in[part] - falls
-        # What the expansion misses grows with the square of the drop.
-        square = (falls / np.maximum(falls[-1], 1e-12)) ** 2
-        after += _third_order(cases, some - gone, after[-1]) * square
-        model = model_uncertainty(after, cases.residual_u_in)
-        gauges = u_clearances_in[part] ** 2 - _variance_drop(
-            linkages[0], table, some, gone, readings[part]
-        )
-        u = np.sqrt(np.maximum(gauges, 0.0) + cases.margin_u_in[part] ** 2 + geometry + model**2)
-        slack[part] = (cases.margin_in[part] - after - SCORE * u).T
-    return np.where(barred | ~np.isfinite(slack), -np.inf, slack)
-
-
-def _restored_worst(linkages: Sequence[Response], now_in: Array, less_in: Array) -> Array:
-    """Worst case with each subset restored, by the expansion, (linkages, subsets, n): the subsets
-    as binary numbers, each made of the one without its last joint. [in]
-    """
-    sense, magnitude, slopes, curvature = (
-        np.array(each)
-        for each in (
-            [linkage.sense(now_in) for linkage in linkages],
-            [linkage.magnitude(now_in) for linkage in linkages],
-            [linkage.slopes(now_in) for linkage in linkages],
-            [linkage.worst_curvature for linkage in linkages],
-        )
-    )
-    less = less_in.T
-    count = len(less)
-    worst = np.empty((len(linkages), 2**count, len(now_in)))
-    worst[:, 0] = magnitude
-    added = np.empty_like(worst[:, : 2 ** (count - 1)])
-    for j in range(count):
-        bend = sense * less[j]
-        added[:, 0] = (0.5 * bend * curvature[:, j, j, None] - slopes[:, :, j]) * less[j]
-        for k in range(j):
-            pair = bend * curvature[:, k, j, None] * less[k]
-            np.add(added[:, : 2**k], pair[:, None], out=added[:, 2**k : 2 ** (k + 1)])
-        np.add(worst[:, : 2**j], added[:, : 2**j], out=worst[:, 2**j : 2 ** (j + 1)])
-    return worst
-
-
-def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
-    """What the expansion misses with everything restored. [in]"""
-    if cases.extension is not None:
-        return np.zeros(len(least_in))
-    reference = responses(cases.gear)[0]
-    sense = reference.sense(least_in)
-    links = reference.worst_links(least_in, sense)
-    missed = sense * cases.gear.model.displacement(list(links)) - expanded_in
-    return np.where(np.isfinite(missed), missed, 0.0)
-
-
-def _variance_drop(
-    linkage: Response, table: Subsets, clearance_in: Array, less_in: Array, variance_in2: Array
-) -> Array:
-    """What restoring each subset takes from the variance that the readings cause, to first order.
-    [in²]
-    """
-    turned = (variance_in2 * linkage.slopes(clearance_in)) @ linkage.worst_curvature
-    return 2.0 * linkage.sense(clearance_in) * (table.weights @ (less_in * turned).T)
-
-
-def _variance(members: Array) -> Array:
-    """Variance over the ensemble, without a copy of all of it. [in²]"""
-    n = len(members)
-    total = np.zeros_like(members[0])
-    square = np.zeros_like(members[0])
-    for member in members[1:]:
-        off = member - members[0]
-        total += off
-        square += np.multiply(off, off, out=off)
-    return np.asarray(np.maximum(square - total * total / n, 0.0) / max(n - 1, 1))
-
-
-def calibrated(cases: Cases, slack_in: Array) -> Array:
-    """What a search found, shifted so that it is exact for the quickest subset of each gear that is
-    about sufficient. [in]
-    """
-    near = _surest(subsets_of(cases.gear), slack_in, slack_in >= -_ABOUT_IN)
-    rows = np.flatnonzero(near > 0)
-    if not len(rows):
-        return slack_in
-    prediction, _ = _restored(cases, rows, near[rows])
-    u = prediction.standard_uncertainty(cases.margin_u_in[rows])
-    exact = cases.margin_in[rows] - prediction.displacement_in - SCORE * u
-    shift = np.zeros(len(cases))
-    shift[rows] = np.where(np.isfinite(exact), exact - slack_in[rows, near[rows]], 0.0)
-    return slack_in + shift[:, None]
-
-
-def _restored(cases: Cases, rows: Places, places: Places) -> tuple[Prediction, Array]:
-    """The exact prediction of some gears, each with one subset restored, and its probability."""
-    some = cases.take(rows)
+def restored(cases: Cases, rows: Sequence[int], sets: Sequence[Mask]) -> tuple[Cases, Prediction]:
+    """Some gears, each with a set restored, unmeasured joints at their limit."""
+    some = cases.take(np.array(rows))
     now = some.filled(cases.gear.limits_in)
-    after = np.where(
-        subsets_of(cases.gear).members[places], np.minimum(now, cases.gear.new_parts_in), now
-    )
-    found = some.predict(after)
-    return found, found.probability_within(some.margin_in, some.margin_u_in)
+    return some, some.predict(np.where(sets, np.minimum(now, cases.gear.new_parts_in), now))
+
+
+class Sets:
+    """The sets of joints that may be restored on one gear.
+
+    Attributes
+    ----------
+    members : ndarray of bool, shape (sets, joints)
+        Every joint over its limit is in each, and none that gains nothing.
+    slack_in : ndarray, shape (sets,)
+        How far the worst case stays inside the conformance limit: margin less worst case less its
+        guard band, by the second-order expansion, anchored at the exact worst case. [in]
+    """
+
+    def __init__(self, cases: Cases, upper: Prediction, row: int) -> None:
+        gear = cases.gear
+        members, minutes = subsets_of(gear)
+        over = (cases.over_limit & cases.restorable)[row]
+        allowed = ~(members & ~removable(cases)[row]).any(axis=1)
+        allowed &= (members | ~over).all(axis=1)
+        self.row = row
+        self.members = members[allowed]
+        self.minutes = minutes[allowed]
+        now = cases.filled(gear.limits_in)[[row]]
+        after = np.where(self.members, np.minimum(now, gear.new_parts_in), now)
+        each = np.array([linkage.magnitude(after) for linkage in responses(gear)])
+        reference = responses(gear)[0]
+        worst = each[0] + upper.displacement_in[row] - reference.magnitude(now)
+        read = (reference.slopes(after) * cases.gauge_u_in[row] * cases.measured[row]) ** 2
+        variance = read.sum(axis=1) + model_uncertainty(worst, cases.residual_u_in) ** 2
+        variance += cases.margin_u_in[row] ** 2
+        variance += each.var(axis=0, ddof=1) if len(each) > 1 else 0.0
+        # Rounded: both ends of one link leave the same, and noise must not choose between them.
+        self.slack_in = np.round(cases.margin_in[row] - worst - SCORE * np.sqrt(variance), 7)
+
+    def quickest(self, among: Mask) -> int:
+        """The quickest of some; of equally many joints in equal minutes that with most slack."""
+        first = int(np.argmax(among))
+        size = self.members.sum(axis=1)
+        alike = among & (self.minutes == self.minutes[first]) & (size == size[first])
+        return int(np.argmax(np.where(alike, self.slack_in, -np.inf)))
+
+    def sufficient(self) -> list[int]:
+        """Those that suffice, the quickest first, none within another; none if none is needed."""
+        left = self.slack_in >= 0.0
+        found: list[int] = []
+        while left.any() and len(found) < _SHOWN:
+            found.append(self.quickest(left))
+            left &= (self.members[found[-1]] & ~self.members).any(axis=1)
+        return [k for k in found if self.members[k].any()]
 
 
 def repair_sets(cases: Cases, upper: Prediction, wanted: Places) -> list[tuple[RepairSet, ...]]:
@@ -244,41 +112,34 @@ def repair_sets(cases: Cases, upper: Prediction, wanted: Places) -> list[tuple[R
     by the exact worst case.
     """
     result: list[tuple[RepairSet, ...]] = [()] * len(cases)
-    if not len(wanted):
+    each = [Sets(cases, upper, row) for row in wanted.tolist()]
+    near = [
+        (sets, sets.quickest(about))
+        for sets in each
+        if (about := sets.slack_in >= -_ABOUT_IN).any()
+    ]
+    if near:
+        # Shifted so that it is exact for the quickest set that is about sufficient.
+        some, after = restored(cases, [s.row for s, _ in near], [s.members[k] for s, k in near])
+        guard = SCORE * after.standard_uncertainty(some.margin_u_in)
+        exact = some.margin_in - after.displacement_in - guard
+        for (sets, k), slack in zip(near, exact.tolist(), strict=True):
+            sets.slack_in = sets.slack_in + np.nan_to_num(slack - sets.slack_in[k])
+    asked = [(sets, k) for sets, _ in near for k in sets.sufficient()]
+    if not asked:
         return result
-    some = cases.take(wanted)
-    table = subsets_of(cases.gear)
-    slack = search(some, upper.displacement_in[wanted], upper.u_clearances_in[wanted])
-    chosen = _quickest_sets(table, calibrated(some, slack))
-    rows = np.repeat(np.arange(len(wanted)), [len(places) for places in chosen])
-    if not len(rows):
-        return result
-    sets = np.concatenate(chosen)
-    prediction, p = _restored(some, rows, sets)
-    for k in np.flatnonzero(p >= CONFORMANCE):
-        which = sets[k]
-        row = int(wanted[rows[k]])
-        minutes = table.to_measure[which], float(table.minutes[which])
-        moved = float(prediction.displacement_in[k])
-        held = RepairSet(table.joints[which], moved, float(p[k]), *minutes, RepairKind.SURE)
-        result[row] = (*result[row], held)
+    some, after = restored(cases, [s.row for s, _ in asked], [s.members[k] for s, k in asked])
+    within = after.probability_within(some.margin_in, some.margin_u_in)
+    numbers = np.array(cases.gear.joint_numbers)
+    for (sets, k), moved, p in zip(
+        asked, after.displacement_in.tolist(), within.tolist(), strict=True
+    ):
+        if p >= CONFORMANCE:
+            joints = tuple(numbers[sets.members[k]].tolist())
+            minutes = minutes_to_measure(cases.gear, joints), float(sets.minutes[k])
+            held = RepairSet(joints, moved, p, *minutes, RepairKind.SURE)
+            result[sets.row] = (*result[sets.row], held)
     return result
-
-
-def _quickest_sets(table: Subsets, slack_in: Array) -> Sequence[Places]:
-    """Places of the quickest sufficient subsets of each gear, none within another; none where none
-    is needed.
-    """
-    open_sets = slack_in >= 0.0
-    members = table.weights
-    chosen: list[list[int]] = [[] for _ in range(len(slack_in))]
-    for _ in range(_SHOWN):
-        best = _surest(table, slack_in, open_sets)
-        for row in np.flatnonzero(best > 0):
-            chosen[row].append(int(best[row]))
-        # Drop the sets that contain the set just chosen.
-        open_sets &= members[best] @ members.T < members[best].sum(axis=1, keepdims=True)
-    return [np.array(places, dtype=np.intp) for places in chosen]
 
 
 def rigging_alternative(

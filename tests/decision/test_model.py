@@ -67,12 +67,13 @@ def drawn_shares(rng: np.random.Generator, gear: Gear, read: Mapping[int, float]
     return share
 
 
-def drawn_pins(rng: np.random.Generator, n: int, joints: int, held: Array) -> Array:
-    """(4), the cosines."""
+def drawn_pins(rng: np.random.Generator, joints: int, held: Array, sign: Array) -> Array:
+    """(4), the cosines of gears whose held pins rest with one sign."""
+    n = len(held)
     free = np.cos(2.0 * np.pi * rng.random((n, joints)))
     mean, spread = PRIORS.cosine
-    sign = rng.choice([-1.0, 1.0], n)[:, None]
-    return np.where(held[:, None], sign * (mean + spread * rng.standard_normal((n, joints))), free)
+    loaded = sign[:, None] * (mean + spread * rng.standard_normal((n, joints)))
+    return np.where(held[:, None], loaded, free)
 
 
 def usual_chances(gear: Gear) -> tuple[Array, float]:
@@ -86,7 +87,7 @@ def usual_chances(gear: Gear) -> tuple[Array, float]:
     reach = response.amplification * gear.limits_in * share
     out = []
     for held in (False, True):
-        x = (reach * drawn_pins(rng, n, 10, np.full(n, held))).sum(axis=1)
+        x = (reach * drawn_pins(rng, 10, np.full(n, held), rng.choice([-1.0, 1.0], n))).sum(axis=1)
         x += PRIORS.linkage_u_in * rng.standard_normal(n)
         out.append(np.mean(np.abs(x) > MARGIN_IN))
     return np.array(out), float(np.mean(PRIORS.overlooked ** (share > 1.0).sum(axis=1)))
@@ -102,7 +103,8 @@ def simulated(
     second = np.diag(response.curvature).reshape(-1, 2).sum(axis=1) / 4.0 * gear.limits_in**2
     share = drawn_shares(rng, gear, read, n)
     held = rng.random(n) < PRIORS.loaded
-    moved = reach * share * drawn_pins(rng, n, 10, held)
+    sign = rng.choice([-1.0, 1.0], n)
+    moved = reach * share * drawn_pins(rng, 10, held, sign)
     x = moved.sum(axis=1) + np.where(held, 0.0, share**2 @ second)
     x += PRIORS.linkage_u_in * rng.standard_normal(n)
     likely = np.exp(-0.5 * ((y - x) / PLUNGER_U_IN) ** 2)
@@ -120,7 +122,7 @@ def simulated(
     of_rigging = left * density * PLUNGER_U_IN * np.sqrt(2.0 * np.pi)
     of_rigging /= PRIORS.joints_for_one_misrigged
     weight = of_joints + of_else + of_rigging
-    fresh = response.amplification * gear.new_parts_in * drawn_pins(rng, n, 10, held)
+    fresh = response.amplification * gear.new_parts_in * drawn_pins(rng, 10, held, sign)
     stays = np.abs(x[:, None] - (moved - fresh) @ sets.T.astype(float)) > MARGIN_IN
     causes = np.array([of_joints.sum(), of_rigging.sum(), of_else.sum()]) / weight.sum()
     return Truth(
@@ -140,7 +142,12 @@ def believed(gear: Gear, read: Mapping[int, float], y: float, sets: Array) -> Tr
         gauge_u_in=GAUGE_U_IN,
     )
     (found,) = believe(Cases.of(gear, [row]))
-    return Truth(np.array(found.chances), found.worn, found.states.second_repair(sets), np.inf)
+    return Truth(
+        np.array(found.chances),
+        found.worn,
+        np.array([found.second_repair(one) for one in sets]),
+        np.inf,
+    )
 
 
 def some_sets(worn: Array) -> Array:

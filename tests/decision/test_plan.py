@@ -53,8 +53,8 @@ def test_before_any_reading_one_joint_is_expected_to_be_restored(judge: Judge) -
 
 def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) -> None:
     steps = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).plan.steps
-    # Sidestay 15 min with joints of 10 and 15 min, still open for two restorations of 120 min each.
-    assert [step.minutes for step in steps[:3]] == [12.0, 40.0, 240.0]
+    # Sidestay 15 min with three joints of 35 min, still open for two restorations of 120 min each.
+    assert [step.minutes for step in steps[:3]] == [12.0, 50.0, 240.0]
 
 
 def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: Judge) -> None:

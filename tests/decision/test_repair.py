@@ -14,7 +14,6 @@ from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import allowances
 from mlg_troubleshoot.decision.plan import minutes_to_measure
 from mlg_troubleshoot.decision.prediction import predict
-from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
@@ -52,20 +51,6 @@ def probabilities_after(gear: Gear, *repairs: tuple[int, ...]) -> np.ndarray:
     )
     found = predict(gear, [inspected({})] * n, rows, np.ones((n, 10), bool), np.full(n, 0.0005))
     return found.probability_within(np.full(n, MARGIN_IN), np.zeros(n))
-
-
-def test_every_subset_is_expanded_at_the_clearances_that_it_leaves(gear: Gear) -> None:
-    now = np.random.default_rng(5).uniform(0.001, 0.01, (3, 10))
-    less = now - 0.0005
-    linkages = responses(gear)
-    found = repair._restored_worst(linkages, now, less)
-    table = repair.subsets_of(gear)
-    for place, members in zip(table.binary, table.members, strict=True):
-        left = np.where(members, now - less, now)
-        for linkage, worst in zip(linkages, found[:, place], strict=True):
-            over, under = linkage.worst(left)
-            expected = np.where(linkage.sense(now) > 0.0, over, -under)
-            np.testing.assert_allclose(worst, expected, rtol=0, atol=1e-14)
 
 
 def test_only_what_is_measured_and_worn_beyond_a_new_part_can_be_restored_with_a_gain(
@@ -191,17 +176,15 @@ def test_the_search_knows_what_every_set_leaves_with_unread_joints_at_their_limi
         gear,
         [inspected({j: value for j, value in joints.items() if j not in unread}, margin_in=0.045)],
     )
-    upper = predict_batch(cases).upper
-    found = repair.search(cases, upper.displacement_in, upper.u_clearances_in)
-    sets = np.flatnonzero(np.isfinite(found[0]))
-    now, n = cases.filled(gear.limits_in)[0], len(sets)
-    rows = np.where(repair.subsets_of(gear).members[sets], np.minimum(0.0005, now), now)
+    found = repair.Sets(cases, predict_batch(cases).upper, 0)
+    now, n = cases.filled(gear.limits_in)[0], len(found.members)
+    rows = np.where(found.members, np.minimum(0.0005, now), now)
     exact = predict(
         gear, cases.inspections * n, rows, np.repeat(cases.measured, n, axis=0), np.full(n, 0.0005)
     )
     slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(n))
-    assert n >= 64
-    assert found[0, sets] == pytest.approx(slack, abs=0.0005)
+    assert n >= 63
+    assert found.slack_in == pytest.approx(slack, abs=0.0005)
 
 
 def test_an_allowance_counts_on_what_an_extension_adds(gear: Gear) -> None:
@@ -218,19 +201,12 @@ def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_re
 ) -> None:
     joints = every_joint(0.003, j1=0.004, j3=0.009, j4=0.005, j5=0.006)
     cases = Cases.of(gear, [inspected(joints, margin_in=0.045, gauge_u_in=0.003)])
-    upper = predict_batch(cases).upper
-    found = repair.search(cases, upper.displacement_in, upper.u_clearances_in)
-    sets = np.flatnonzero(np.isfinite(found[0]))
-    rows = np.where(repair.subsets_of(gear).members[sets], 0.0005, cases.clearance_in)
-    exact = predict(
-        gear,
-        cases.inspections * len(sets),
-        rows,
-        np.ones(rows.shape, bool),
-        np.full(len(sets), 0.003),
-    )
-    slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(len(sets)))
-    assert found[0, sets] == pytest.approx(slack, abs=0.0005)
+    found = repair.Sets(cases, predict_batch(cases).upper, 0)
+    rows = np.where(found.members, 0.0005, cases.clearance_in)
+    n = len(rows)
+    exact = predict(gear, cases.inspections * n, rows, np.ones(rows.shape, bool), np.full(n, 0.003))
+    slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(n))
+    assert found.slack_in == pytest.approx(slack, abs=0.0005)
 
 
 def test_a_set_that_only_just_suffices_is_found(gear: Gear) -> None:
@@ -258,11 +234,12 @@ def test_a_set_that_only_just_suffices_is_found(gear: Gear) -> None:
 def test_a_set_that_the_exact_prediction_does_not_confirm_is_not_offered(
     gear: Gear, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    cases, table = Cases.of(gear, [inspected(FULL_FAILURE)]), repair.subsets_of(gear)
-    # A search that holds joint 3 alone to suffice, which leaves less than 95 %.
-    alone = (table.members.sum(axis=1) == 1) & table.members[:, 2]
-    held = np.where(alone, 0.01, -np.inf)[None]
-    monkeypatch.setattr(repair, "search", lambda *_given: held)
-    monkeypatch.setattr(repair, "calibrated", lambda _cases, found: found)
+    cases = Cases.of(gear, [inspected(FULL_FAILURE)])
+
+    def alone(sets: repair.Sets) -> list[int]:
+        # A search that holds joint 3 alone to suffice, which leaves less than 95 %.
+        return np.flatnonzero(sets.members.sum(axis=1) == 1).tolist()
+
+    monkeypatch.setattr(repair.Sets, "sufficient", alone)
     upper = cases.predict(cases.filled(gear.limits_in))
     assert repair.repair_sets(cases, upper, np.array([0])) == [()]
