@@ -139,7 +139,12 @@ def result_of(records: list[dict[str, Any]], first_seed: int) -> dict[str, Any]:
 
 def markdown(result: dict[str, Any]) -> tuple[str, str, str]:
     """Return the tables of a result: rates, bins, and how far they are off elsewhere."""
-    rates = [study.rate_line(name, AIMS[name], rate) for name, rate in result["rates"].items()]
+    # Of fewer fleets an interval says next to nothing; the result has them.
+    rates = [
+        study.rate_line(name, AIMS[name], rate)
+        for name, rate in result["rates"].items()
+        if rate["n"] >= 10
+    ]
     stated = ["| stated | causes | mean stated | act |", "|---|---|---|---|"]
     for low, high, count, mean, acts in result["bins"]:
         rate = study._rate(round(acts * count), count)
