@@ -223,12 +223,32 @@ def named(name: str) -> set[tuple[str, str | None]]:
     return {(c.candidate.cause.name, c.candidate.target) for c in found(name).causes}
 
 
-def test_directions_under_load_are_named() -> None:
-    assert named("loads") == {("load_directions", None)}
+DIRECTIONS, OTHER_LINKAGE = ("load_directions", None), ("geometry", None)
 
 
-def test_nothing_is_named_where_nothing_departs() -> None:
-    assert found("nothing").verdict == "NONE"
+@pytest.mark.parametrize(
+    ("name", "causes"),
+    [
+        ("loads", {DIRECTIONS}),
+        ("loads and a gauge", {DIRECTIONS, ("gauge_bias", "gauge G-2")}),
+        ("one pin turned", {DIRECTIONS}),
+        ("convention", {("convention_slip", "technician T-2")}),
+        ("re-rigged by half", {("rigging_offset", "tail N103")}),
+        ("oval on another linkage", {("oval_wear", "joint 4"), OTHER_LINKAGE}),
+        ("a linkage that nobody calibrated", {OTHER_LINKAGE}),
+        ("all readings 1.7 times as large", {OTHER_LINKAGE}),
+        ("unread, worn with the read ones", set()),
+    ],
+)
+def test_what_acts_is_named_and_nothing_else(
+    name: str, causes: set[tuple[str, str | None]]
+) -> None:
+    assert named(name) == causes
+
+
+@pytest.mark.parametrize("name", ["nothing", "unread"])
+def test_where_nothing_departs_nothing_is_found(name: str) -> None:
+    assert found(name).verdict == "NONE"
 
 
 def test_the_intervals_of_the_factors_hold_the_true_ones() -> None:
@@ -254,21 +274,13 @@ def test_rows_of_other_tails_are_predicted_as_well_as_noise_allows() -> None:
     assert gain.rms_after_in < 1.3 * 0.0015 < 0.3 * gain.rms_before_in
 
 
-def test_a_gauge_that_reads_off_is_named_beside_the_directions() -> None:
-    assert named("loads and a gauge") == {("load_directions", None), ("gauge_bias", "gauge G-2")}
-
-
 def test_readings_against_the_prediction_are_not_a_wrong_sign_where_clearances_explain_them() -> (
     None
 ):
     d = found("loads against")
     assert named("loads against") == {("gauge_bias", "gauge G-2")}
     assert d.beside[0].candidate.cause.name == "load_directions"
-
-
-def test_readings_against_the_prediction_are_likelier_directions_than_another_linkage() -> None:
-    chances = found("loads against").probabilities
-    assert chances[("load_directions", None)] > chances[("geometry", None)]
+    assert d.probabilities[DIRECTIONS] > d.probabilities[OTHER_LINKAGE]
 
 
 def test_a_bend_beside_the_directions_is_on_no_list_and_leaves_them_as_likely() -> None:
@@ -346,10 +358,6 @@ def test_the_further_data_of_a_distance_are_more_where_the_rival_leads() -> None
     assert beliefs.further(3.0, 0.0) < beliefs.further(3.0, 2.0) < beliefs.further(2.0, 2.0)
 
 
-def test_one_pin_far_off_and_the_others_alike_are_directions_under_load() -> None:
-    assert named("one pin turned") == {("load_directions", None)}
-
-
 def test_the_extension_predicts_the_plunger_as_loaded(gear: Gear) -> None:
     table = FLEETS["loads"](gear)
     extension = ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200)
@@ -389,12 +397,7 @@ def test_readings_against_the_prediction_that_no_clearance_tells_of_are_refused(
     own = np.random.default_rng(5).normal(-0.012, 0.004, 120)
     unrelated = fleet(gear.model, lambda _t, over: own - over)
     with pytest.raises(InconclusiveDataError, match="times the predicted"):
-        diagnose(
-            gear.model,
-            unrelated,
-            gear.discrepancies,
-            ensemble=gear.ensemble_models[1:],
-        )
+        diagnose(gear.model, unrelated, gear.discrepancies, ensemble=gear.ensemble_models[1:])
 
 
 @pytest.mark.slow
@@ -410,12 +413,7 @@ def test_small_readings_that_the_clearances_explain_are_directions_and_no_wrong_
 def test_readings_in_another_unit_are_refused(gear: Gear) -> None:
     table = fleet(gear.model, lambda _t, over: (1.0 / 25.4 - 1.0) * over, rows=200, noise_in=0.0001)
     with pytest.raises(InconclusiveDataError, match="times the predicted"):
-        diagnose(
-            gear.model,
-            table,
-            gear.discrepancies,
-            ensemble=gear.ensemble_models[1:],
-        )
+        diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:])
 
 
 def test_a_table_of_the_other_sign_is_still_refused(gear: Gear) -> None:
@@ -459,37 +457,17 @@ def test_what_the_joints_add_is_together_the_displacement(gear: Gear) -> None:
         assert block.shared_in[:, :10].sum(axis=1) == pytest.approx(scene.over_in)
 
 
-def test_a_technician_who_writes_the_other_convention_is_named() -> None:
-    assert named("convention") == {("convention_slip", "technician T-2")}
-
-
-def test_a_re_rigged_tail_that_reads_half_is_not_a_convention_slip() -> None:
-    assert named("re-rigged by half") == {("rigging_offset", "tail N103")}
-
-
 def test_digits_that_everybody_cuts_off_name_no_cause_and_no_column() -> None:
     cut = found("digits cut off")
     assert not cut.causes
     assert set(cut.unlisted_variables) <= {"all rows"}
 
 
-def test_an_oval_bore_is_named_beside_another_linkage() -> None:
-    assert named("oval on another linkage") == {("oval_wear", "joint 4"), ("geometry", None)}
-
-
 @pytest.mark.slow
 def test_one_pin_beside_its_worst_direction_in_another_linkage_stays_possible() -> None:
     chances = found("one pin turned on another linkage").probabilities
     assert chances[("direction_not_worst_case", "joint 4")] > 0.3
-    assert chances[("geometry", None)] > 0.3
-
-
-def test_readings_beyond_the_bound_are_another_linkage_and_no_resting_place_of_pins() -> None:
-    assert named("a linkage that nobody calibrated") == {("geometry", None)}
-
-
-def test_a_scale_of_that_size_is_not_put_down_to_the_rate_alone() -> None:
-    assert named("all readings 1.7 times as large") == {("geometry", None)}
+    assert chances[OTHER_LINKAGE] > 0.3
 
 
 def test_a_clearance_in_the_other_convention_is_listed_as_entered_and_as_used() -> None:
@@ -509,14 +487,6 @@ def test_nothing_is_corrected_where_no_convention_is_named() -> None:
 
 def test_a_convention_never_changes_a_prediction() -> None:
     assert found("convention").terms == ()
-
-
-def test_joints_that_nobody_read_are_not_a_cause() -> None:
-    assert found("unread").verdict == "NONE"
-
-
-def test_unread_joints_that_wear_with_the_read_ones_of_their_gear_are_not_a_cause() -> None:
-    assert named("unread, worn with the read ones") == set()
 
 
 def test_an_aircraft_whose_unread_joints_may_be_worn_is_not_named_as_re_rigged() -> None:
@@ -557,12 +527,9 @@ def test_an_effect_of_one_tail_alone_is_unlisted_with_its_variable() -> None:
 def test_a_sure_cause_is_named_although_what_acts_beside_it_cannot_be_told() -> None:
     d = found("a gauge and a scale")
     assert (d.verdict, named("a gauge and a scale")) == ("NAMED", {("gauge_bias", "gauge G-2")})
-
-
-def test_what_cannot_be_told_beside_a_sure_cause_is_a_set_of_its_own() -> None:
-    d = found("a gauge and a scale")
     beside = {c.candidate.cause.name for c in d.beside}
     assert (beside, d.also_possible) == ({"calibration_rate", "load_directions"}, ())
+    assert not {c.candidate.key for c in d.beside} & set(d.ruled_out)
 
 
 def test_a_sure_cause_is_fitted_with_what_acts_beside_it() -> None:
@@ -584,11 +551,6 @@ def test_what_acts_beside_a_sure_cause_stays_in_what_is_left() -> None:
     (cause,) = d.causes
     assert d.residual_u_in == pytest.approx(np.std(d.misfit_in - cause.effect_in))
     assert not d.remainder_is_noise
-
-
-def test_what_is_in_the_set_is_not_said_to_be_ruled_out() -> None:
-    d = found("a gauge and a scale")
-    assert not {c.candidate.key for c in d.beside} & set(d.ruled_out)
 
 
 def test_the_lines_say_what_may_act_beside_a_sure_cause_and_what_to_read() -> None:

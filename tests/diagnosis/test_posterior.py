@@ -368,10 +368,6 @@ def test_what_moves_with_a_column_is_as_likely_beforehand_whatever_the_number_of
     assert share["unlisted", "day"] == pytest.approx(share["unlisted", "side"])
 
 
-def test_what_a_probability_is_said_from_is_odds_of_nine_to_one() -> None:
-    assert np.exp(Beliefs().odds) == pytest.approx(9.0)
-
-
 def test_at_the_stated_distance_the_wrong_cause_is_ruled_out_with_80_percent_power() -> None:
     # The difference of the log likelihoods has a mean of half the squared distance, and the
     # distance as its standard deviation.

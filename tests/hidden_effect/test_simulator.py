@@ -76,15 +76,13 @@ def _hide(*effects: EffectSpec, **changes: object) -> FleetSpec:
 
 
 @pytest.mark.parametrize("name", linkage.names())
-def test_the_published_failure_case_comes_out_on_every_linkage(name: str) -> None:
+def test_every_linkage_has_the_published_failure_case_and_the_rate_of_the_drawing(
+    name: str,
+) -> None:
     geometry = linkage.load(name)
-    assert physics.worst_case(geometry, _failure_case())[0] == pytest.approx(0.0472, abs=2e-4)
-
-
-@pytest.mark.parametrize("name", linkage.names())
-def test_the_calibration_rate_agrees_with_the_drawing_data(name: str) -> None:
     stored = json.loads((FOLDER / "coordinates.json").read_text(encoding="utf-8"))["linkages"][name]
-    assert linkage.load(name).rate == pytest.approx(stored["calibration_rate"], abs=2e-5)
+    assert physics.worst_case(geometry, _failure_case())[0] == pytest.approx(0.0472, abs=2e-4)
+    assert geometry.rate == pytest.approx(stored["calibration_rate"], abs=2e-5)
 
 
 def test_every_loop_closes_to_a_ten_billionth_of_an_inch() -> None:

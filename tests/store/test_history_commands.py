@@ -96,6 +96,12 @@ def joint_3(told: dict[str, object]) -> dict[str, object]:
     return found
 
 
+def repair(day: str, landings: int) -> None:
+    """Enter that joint 3 of N123 LH was restored."""
+    joint = ("history", "repair", "N123", "LH", "--joint", "3")
+    assert mlg(*joint, "--date", day, "--landings", str(landings)).code == 0
+
+
 def test_a_check_keeps_only_when_asked(tmp_path: Path, place: Path) -> None:
     mlg("check", table(tmp_path, visit(1, 0.001)))
     assert not place.exists()
@@ -132,19 +138,7 @@ def test_a_tail_in_another_spelling_is_not_merged_in_silence(tmp_path: Path, pla
 
 def test_a_repair_starts_the_wear_of_its_joints_again(tmp_path: Path, place: Path) -> None:
     seeded((1, 0.003), (2, 0.006))
-    repair = (
-        "history",
-        "repair",
-        "N123",
-        "LH",
-        "--joint",
-        "3",
-        "--date",
-        "2024-08-01",
-        "--landings",
-        "810",
-    )
-    assert mlg(*repair).code == 0
+    repair("2024-08-01", 810)
     seeded((3, 0.0008))
     told = life()
     assert joint_3(told)["readings"] == [[1200.0, 0.0008]]
@@ -155,18 +149,7 @@ def test_a_repair_starts_the_wear_of_its_joints_again(tmp_path: Path, place: Pat
 def test_landings_left_grow_by_a_repair(tmp_path: Path, place: Path) -> None:
     keep(tmp_path, visit(0, 0.0005), visit(1, 0.0025), visit(2, 0.0045))
     before = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
-    mlg(
-        "history",
-        "repair",
-        "N123",
-        "LH",
-        "--joint",
-        "3",
-        "--date",
-        "2024-08-01",
-        "--landings",
-        "801",
-    )
+    repair("2024-08-01", 801)
     after = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
     assert isinstance(before, dict)
     assert isinstance(after, dict)
@@ -306,7 +289,7 @@ def test_verify_says_what_fits_and_names_what_does_not(tmp_path: Path, place: Pa
 
 def test_an_export_is_imported_with_its_chain(tmp_path: Path, place: Path) -> None:
     seeded((1, 0.001), (2, 0.002))
-    mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", "2024-08-01")
+    repair("2024-08-01", 810)
     assert mlg("history", "export", tmp_path / "chain.jsonl").code == 0
     kinds = [
         json.loads(line)["kind"] for line in (tmp_path / "chain.jsonl").read_text().splitlines()
@@ -369,15 +352,11 @@ def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(
     assert told["gears"][0]["worst_joint"] == 3
 
 
-def test_a_fleet_of_one_gear_is_one_gear(tmp_path: Path, place: Path) -> None:
-    keep(tmp_path, visit(1, 0.001))
-    assert mlg("fleet", "--no-forecast").out.startswith("1 gear, ")
-
-
 def test_a_fleet_without_landings_has_no_forecast_and_says_null(
     tmp_path: Path, place: Path
 ) -> None:
     keep(tmp_path, {k: v for k, v in visit(1, 0.001).items() if k != "gear_landings"})
+    assert mlg("fleet", "--no-forecast").out.startswith("1 gear, ")
     (gear,) = mlg("fleet", "--json").json["gears"]
     assert gear["landings_to_limit"] is None
     assert gear["next_inspection_landings"] is None
@@ -431,18 +410,7 @@ def test_the_fleet_page_has_a_line_a_gear_that_links_to_its_life(
 
 def test_the_page_of_a_life_is_a_log_book_in_the_order_of_time(tmp_path: Path, place: Path) -> None:
     seeded((1, 0.0101))
-    mlg(
-        "history",
-        "repair",
-        "N123",
-        "LH",
-        "--joint",
-        "3",
-        "--date",
-        "2024-05-01",
-        "--landings",
-        "500",
-    )
+    repair("2024-05-01", 500)
     seeded((2, 0.0007))
     assert mlg("history", "N123", "LH", "--no-forecast", "--report", tmp_path).code == 0
     (file,) = tmp_path.glob("*life*.html")
