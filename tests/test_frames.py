@@ -299,19 +299,6 @@ def test_a_table_that_is_not_there_names_those_that_are() -> None:
     assert "joints" in caught.value.remedy
 
 
-def test_a_diagnosis_that_finds_nothing_shows_its_verdict_and_its_suspects() -> None:
-    rng = np.random.default_rng(0)
-    x = rng.uniform(1.0, 2.0, 40)
-    found = mlg.diagnose_simulation(
-        lambda p: p["slope"] * x[:, None],
-        (x + 0.1 * rng.standard_normal(40))[:, None],
-        [mlg.Suspect("slope", 1.0, 0.1)],
-    )
-    assert found.verdict == "NONE"
-    assert "verdict NONE" in found._repr_html_()
-    assert found.to_frame()["named"].tolist() == [False]
-
-
 PICTURES = [
     ("check", {"row": 3, "unit": "mm"}),
     ("gear", {}),

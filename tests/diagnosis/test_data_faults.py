@@ -125,27 +125,16 @@ def test_what_is_found_in_a_row_does_not_depend_on_the_rows_weighed_with_it(
     assert {fault.place for fault in together} == {10, ROW, 90, 110}
 
 
-def test_the_row_and_the_record_of_the_source_are_named(gear: Gear, sound: DiagnosisTable) -> None:
-    (fault,) = screen_faults(gear.model, clearance(25.4)(sound))[1]
-    assert (fault.row, fault.record_id) == (sound.row[ROW], sound.record_id[ROW])
-
-
-def test_the_suggestion_is_what_was_meant(gear: Gear, sound: DiagnosisTable) -> None:
-    (fault,) = screen_faults(gear.model, clearance(25.4)(sound))[1]
-    assert fault.suggested is not None
-    assert float(fault.suggested) == pytest.approx(0.011, abs=1e-5)
-
-
-def test_the_repair_is_in_the_analysis_only(gear: Gear, sound: DiagnosisTable) -> None:
+def test_a_slip_is_named_with_its_row_and_repaired_in_the_analysis_only(
+    gear: Gear, sound: DiagnosisTable
+) -> None:
     table = clearance(25.4)(sound)
     before = table.clearance_in.copy()
-    repaired = screen_faults(gear.model, table)[0]
+    repaired, (fault,), _usable = screen_faults(gear.model, table)
+    assert (fault.row, fault.record_id) == (sound.row[ROW], sound.record_id[ROW])
+    assert float(fault.suggested or "nan") == pytest.approx(0.011, abs=1e-5)
     assert np.array_equal(table.clearance_in, before)
     assert repaired.clearance_in[ROW, 2] == pytest.approx(0.011, abs=1e-5)
-
-
-def test_other_cells_are_not_touched(gear: Gear, sound: DiagnosisTable) -> None:
-    repaired = screen_faults(gear.model, clearance(25.4)(sound))[0]
     others = np.ones(sound.clearance_in.shape, bool)
     others[ROW, 2] = False
     assert np.array_equal(repaired.clearance_in[others], sound.clearance_in[others])
@@ -255,22 +244,16 @@ def restored(gear: Gear, table: DiagnosisTable) -> set[int]:
     return {fault.row - 2 for fault in found if fault.kind == "restored_joint"}
 
 
-def test_rows_whose_worst_joint_was_restored_between_the_readings_are_named(gear: Gear) -> None:
+def test_rows_whose_worst_joint_was_restored_between_the_readings_are_named_and_no_cause(
+    gear: Gear,
+) -> None:
     table, rows, _moved = restored_between_the_readings(gear)
     found = diagnose(gear.model, table, gear.discrepancies)
+    assert found.verdict == "NONE"
     assert {fault.row - 2 for fault in found.faults} == rows
     assert {(f.column, f.kind) for f in found.faults} == {("clearance_4_in", "restored_joint")}
     assert all(float(fault.suggested or "nan") < 0.002 for fault in found.faults)
-
-
-def test_the_fleet_of_such_rows_is_not_named(gear: Gear) -> None:
-    table, _rows, _moved = restored_between_the_readings(gear)
-    assert diagnose(gear.model, table, gear.discrepancies).verdict == "NONE"
-
-
-def test_what_to_do_about_such_rows_is_said(gear: Gear) -> None:
-    table, rows, _moved = restored_between_the_readings(gear)
-    said = seven_lines(diagnose(gear.model, table, gear.discrepancies))
+    said = seven_lines(found)
     assert f"Enter the clearances of {len(rows)} rows" in said[-1].text
     assert "joint restored between its reading and the plunger's" in said[0].text
 

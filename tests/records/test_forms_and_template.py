@@ -57,7 +57,11 @@ def fill_table(sheet, row, values):
             sheet.cell(row, cell.column).value = values[cell.value]
 
 
-def test_the_untouched_template_says_that_there_is_nothing_in_it(template):
+@pytest.mark.parametrize("chosen", [{}, {"Unit": "mm", "Clearance convention": "RADIAL"}])
+def test_of_an_untouched_template_it_is_said_that_there_is_nothing_in_it(template, chosen):
+    book = openpyxl.load_workbook(template)
+    fill_form(book["Form"], chosen)
+    book.save(template)
     result = read_inspections(template, ReadOptions())
     assert [p.code for p in result.problems] == ["no_rows"]
     assert result.rows == ()
@@ -159,13 +163,6 @@ def test_a_bad_value_of_a_form_is_named_at_its_cell(template):
         ("Form", "Clearance #3", "B11", "-1"),
     ]
     assert isinstance(result.rows[0], InvalidRow)
-
-
-def test_a_form_with_only_unit_and_convention_chosen_is_untouched(template):
-    book = openpyxl.load_workbook(template)
-    fill_form(book["Form"], {"Unit": "mm", "Clearance convention": "RADIAL"})
-    book.save(template)
-    assert [p.code for p in read_inspections(template, ReadOptions()).problems] == ["no_rows"]
 
 
 def test_a_form_that_is_partly_filled_in_is_an_inspection_with_problems(template):
@@ -306,18 +303,6 @@ def own_gear(tmp_path, *changes):
 def headers_and_comments(path):
     sheet = openpyxl.load_workbook(path)["Inspections"]
     return {cell.value: cell.comment.text for cell in sheet[1]}
-
-
-@pytest.mark.parametrize("unit", list(LengthUnit))
-def test_a_template_is_in_the_unit_that_is_asked_for(tmp_path, unit):
-    assert mlg("template", tmp_path / "t.xlsx", "--columns", "all", "--unit", unit.value).code == 0
-    lengths = [
-        name
-        for name in headers_and_comments(tmp_path / "t.xlsx")
-        if name.startswith(("clearance_1", "margin"))
-    ]
-    assert lengths[:2] == [f"clearance_1_{unit}", f"clearance_10_{unit}"]
-    assert {f"margin_{unit}", f"margin_u_{unit}"} <= {*lengths}
 
 
 def test_a_template_says_the_numbers_of_its_gear(tmp_path):

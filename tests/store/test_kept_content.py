@@ -192,18 +192,8 @@ def test_every_kind_of_record_that_the_program_keeps_is_read_again(
         ),
     )
     assert mlg("check", table, "--keep").code == 0
-    mlg(
-        "history",
-        "repair",
-        "N123",
-        "LH",
-        "--joint",
-        "3",
-        "--date",
-        "2025-04-01",
-        "--landings",
-        "805",
-    )
+    done = ("--joint", "3", "--date", "2025-04-01", "--landings", "805")
+    mlg("history", "repair", "N123", "LH", *done)
     mlg("history", "amend", "W1", "landings=810")
     mlg("history", "void", "R2", "--why", "another aircraft")
     kept = {record.kind for record in Store(place).all()}

@@ -4,9 +4,8 @@ say of them.
 
 from __future__ import annotations
 
-import csv
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
 from pathlib import Path
@@ -27,7 +26,9 @@ from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
 from mlg_troubleshoot.store import Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.index_tables import load_index_table
-from tests.cli.conftest import mlg, row
+from tests.cli.conftest import Run, mlg, row
+
+from .places import table
 
 View = Callable[[], Mapping[str, Any]]
 # Landings and the readings of #3 and #5 at the yearly inspections of one gear. [1, in, in]
@@ -44,14 +45,6 @@ QUANTILES = ("landings_to_limit", "landings_to_margin")
 @pytest.fixture(autouse=True)
 def _place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MLG_STORE", str(tmp_path / "store.sqlite"))
-
-
-def write(path: Path, rows: Sequence[Mapping[str, str]]) -> Path:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    return path
 
 
 def years(
@@ -71,7 +64,7 @@ def years(
             "gear_landings": f"{landings.get(n, stated)}",
         }
         rows.append(row(record_id=f"S{n + 1}", tail_no="N507", side="LH", **when, **read))
-    return write(folder / f"{name}.csv", rows)
+    return table(folder, *rows, name=f"{name}.csv")
 
 
 def kept(folder: Path, landings: Mapping[int, float]) -> None:
@@ -85,6 +78,12 @@ def gear_of_the_fleet(*more: str) -> dict[str, Any]:
 
 def life(*more: str) -> dict[str, Any]:
     return dict(mlg("history", "N507", "LH", "--json", *more).json)
+
+
+def restored(joints: Iterable[int], day: str, landings: str) -> Run:
+    """Enter a repair of joints of N507 LH."""
+    of = [f"--joint={joint}" for joint in joints]
+    return mlg("history", "repair", "N507", "LH", *of, "--date", day, "--landings", landings)
 
 
 def words_of(page: Path) -> str:
@@ -215,18 +214,7 @@ def test_the_readings_of_a_life_that_contradicts_itself_stand_by_date(tmp_path: 
 
 def test_a_repair_whose_landings_contradict_the_inspections_is_named(tmp_path: Path) -> None:
     kept(tmp_path, {})
-    run = mlg(
-        "history",
-        "repair",
-        "N507",
-        "LH",
-        "--joint",
-        "3",
-        "--date",
-        "2025-06-01",
-        "--landings",
-        "81",
-    )
+    run = restored([3], "2025-06-01", "81")
     assert "81 landings on 2025-06-01 (repair" in run.err
     assert "mlg history void" in run.err
 
@@ -474,18 +462,7 @@ def test_a_joint_that_was_over_its_limit_before_and_is_not_read_again_still_coun
 def test_a_joint_that_was_restored_is_over_its_limit_no_more() -> None:
     worn = inspection(1, "2024-01-01", 400, 0.001)
     add([[replace(worn, clearance_in={**worn.clearance_in, 3: 0.012})]])
-    mlg(
-        "history",
-        "repair",
-        "N507",
-        "LH",
-        "--joint",
-        "3",
-        "--date",
-        "2024-02-01",
-        "--landings",
-        "410",
-    )
+    restored([3], "2024-02-01", "410")
     assert gear_of_the_fleet()["next_inspection_landings"] > 0.0
 
 
@@ -515,8 +492,8 @@ def undated_after_sound_ones(folder: Path, **undated: str) -> None:
     ]
     worn = {f"clearance_{n}_in": "0.006" for n in range(1, 11)}
     last = row(record_id="Z", tail_no="N507", side="LH", **{**worn, **undated})
-    assert mlg("check", write(folder / "sound.csv", sound), "--keep").code in (0, 1)
-    assert mlg("check", write(folder / "undated.csv", [last]), "--keep").code == 1
+    assert mlg("check", table(folder, *sound), "--keep").code in (0, 1)
+    assert mlg("check", table(folder, last), "--keep").code == 1
 
 
 @pytest.mark.parametrize(
@@ -534,11 +511,5 @@ def test_a_repair_after_an_undated_inspection_takes_its_place(tmp_path: Path) ->
     undated_after_sound_ones(tmp_path, gear_landings="240")
     said = "No landings left"
     assert said in " ".join(mlg("history", "N507", "LH").out.split())
-    for_all = [f"--joint={n}" for n in range(1, 11)]
-    assert (
-        mlg(
-            "history", "repair", "N507", "LH", *for_all, "--date", "2025-09-01", "--landings", "950"
-        ).code
-        == 0
-    )
+    assert restored(range(1, 11), "2025-09-01", "950").code == 0
     assert said not in " ".join(mlg("history", "N507", "LH").out.split())
