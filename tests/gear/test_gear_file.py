@@ -207,6 +207,8 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
             r"moving\.6: expected a point that has",
         ),
         ('area = "sidestay"', 'area = "cockpit"', r"joints\.1\.area: .*'cockpit'"),
+        ('hinge_point = "6"\n', "", r"planes\.link_assembly\.hinge_point: expected a name"),
+        ("dihedral_deg = 48.92\n", "", r"planes\.link_assembly\.dihedral_deg: expected a number"),
         ("schema = 2", "schema = = 2", r"copy\.toml: cannot be read as TOML"),
     ],
 )
@@ -268,19 +270,6 @@ def test_what_is_wrong_with_an_ensemble_is_named_with_its_member(
     assert f"hawker-800xp-ensemble.toml{words}" in caught.value.message
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('hinge_point = "6"\n', "", "hinge_point: expected a name"),
-        ("dihedral_deg = 48.92\n", "", "dihedral_deg: expected a number"),
-    ],
-)
-def test_a_second_plane_says_how_it_is_hinged(edited: Edit, old: str, new: str, words: str) -> None:
-    with pytest.raises(GearFileError) as caught:
-        load_gear(edited(old, new))
-    assert f"planes.link_assembly.{words}" in caught.value.message
-
-
 def test_a_gear_file_of_an_earlier_version_is_refused_with_the_page_that_tells_the_change(
     edited: Edit,
 ) -> None:
@@ -294,12 +283,9 @@ def test_a_gear_file_without_an_ensemble_predicts_with_its_reference_alone(edite
     assert len(load_gear(edited('ensemble = "hawker-800xp-ensemble.toml"\n', "")).ensemble) == 1
 
 
-def test_the_joints_carry_the_names_that_the_paper_gives_them(gear: Gear) -> None:
+def test_the_joints_carry_the_names_of_the_paper_and_one_to_five_are_critical(gear: Gear) -> None:
     names = {2: "locking pin", 3: "short link inner bearing", 5: "short link outer bearing"}
     assert {number: gear.joint(number).name for number in names} == names
-
-
-def test_joints_one_to_five_are_critical_and_the_others_are_not(gear: Gear) -> None:
     assert [joint.number for joint in gear.joints if joint.critical] == [1, 2, 3, 4, 5]
 
 
