@@ -152,17 +152,6 @@ def test_a_reading_is_overruled_by_two_of_its_standard_errors_at_most(
     assert 0.02 - 0.0011 < likely_clearances(table).likely_in[5, 2] < 0.02
 
 
-def test_an_unread_joint_is_expected_to_be_worn_more_where_the_joints_of_its_gear_are(
-    plain: DiagnosisTable,
-) -> None:
-    worn_gear = (plain.factors["tail_no"] == "N103") & (plain.factors["side"] == "LH")
-    clearance = plain.clearance_in * np.where(worn_gear, 2.0, 1.0)[:, None]
-    clearance[:, 9] = np.nan
-    likely = likely_clearances(replace(plain, clearance_in=clearance)).likely_in
-    unread, read = likely[worn_gear, 9].mean(), likely[worn_gear, :9].mean()
-    assert likely[~worn_gear, 9].mean() < unread < read
-
-
 def fleet_of(plain: DiagnosisTable, together: float, apart: float) -> tuple[DiagnosisTable, Array]:
     """A fleet that reads all joints but the last, and its clearances; gears and their joints wear
     apart by these.

@@ -147,13 +147,6 @@ class Pen:
         return rows
 
 
-def _merged(sheet: Rows, width: int) -> list[str]:
-    letters = openpyxl.utils.get_column_letter
-    start = next(i for i, cell in enumerate(sheet[1]) if cell is not None)
-    stops = range(start, len(sheet[1]), width)
-    return [f"{letters(i + 1)}1:{letters(i + width)}1" for i in stops]
-
-
 def _what(
     what: str, pen: Pen, found: dict[int, float]
 ) -> tuple[list, list, str | None, list[Visit]]:

@@ -110,58 +110,35 @@ def journey(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return found
 
 
-def test_a_new_column_is_read(journey):
-    assert journey["read"] == 41.0
-
-
-def test_a_new_column_is_read_under_its_other_spelling(journey):
-    assert journey["spelled"] == 41.0
-
-
-def test_a_value_beyond_the_range_of_a_new_column_is_refused_with_its_range(journey):
-    assert journey["refused"] == ["air humidity percent from 0 to 100 percent"]
-
-
-def test_a_new_column_stands_in_the_template_with_its_meaning(journey):
-    assert journey["template"] == "Optional. Humidity of the air, 0 to 100 percent."
-
-
-def test_a_new_column_is_kept(journey):
-    assert journey["kept"] == 41.0
-
-
-def test_a_new_column_is_read_back_from_the_store(journey):
-    assert journey["read back"] is True
-
-
-def test_the_gate_of_kept_records_takes_a_new_column(journey):
-    assert journey["gate"] == ""
+@pytest.mark.parametrize(
+    ("where", "found"),
+    [
+        ("read", 41.0),
+        ("spelled", 41.0),
+        ("refused", ["air humidity percent from 0 to 100 percent"]),
+        ("template", "Optional. Humidity of the air, 0 to 100 percent."),
+        ("kept", 41.0),
+        ("read back", True),
+        ("gate", ""),
+        ("from Python", 41.0),
+        ("diagnosis", [41.0]),
+        ("words", "humidity"),
+        (
+            "docs",
+            ["| `air_humidity_percent` | optional | Humidity of the air, 0 to 100 percent. |"],
+        ),
+    ],
+)
+def test_a_new_column_is_known_wherever_columns_are(journey, where, found):
+    assert journey[where] == found
 
 
 def test_the_gate_of_kept_records_knows_the_range_of_a_new_column(journey):
     assert "400 is not a number from 0 to 100" in journey["gate of a damaged record"]
 
 
-def test_a_new_column_is_judged_from_python(journey):
-    assert journey["from Python"] == 41.0
-
-
-def test_a_new_column_is_offered_to_the_diagnosis(journey):
-    assert journey["diagnosis"] == [41.0]
-
-
 def test_a_new_column_is_on_the_report(journey):
     assert re.search(r"air humidity percent</dt>\s*<dd>\s*(<bdi>)?41", journey["report"])
-
-
-def test_a_new_column_is_named_in_sentences(journey):
-    assert journey["words"] == "humidity"
-
-
-def test_a_new_column_is_listed_on_its_page(journey):
-    assert journey["docs"] == [
-        "| `air_humidity_percent` | optional | Humidity of the air, 0 to 100 percent. |"
-    ]
 
 
 @cache
