@@ -7,7 +7,15 @@ import json
 
 import pytest
 
-from mlg_troubleshoot.units import Length, LengthUnit, Sentence, said_in
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.units import (
+    Length,
+    LengthUnit,
+    Sentence,
+    parse_length,
+    said_in,
+    with_unit,
+)
 
 THOU, MM = LengthUnit.THOU, LengthUnit.MILLIMETRE
 
@@ -65,3 +73,10 @@ def test_joined_sentences_are_said_in_one_unit() -> None:
 def test_a_copied_sentence_still_knows_its_lengths() -> None:
     sentence = copy.deepcopy(Sentence.of("worst case {} {{}}", Length(0.0472)))
     assert sentence.said_in(THOU) == "worst case 47.2 thou {}"
+
+
+def test_a_unit_may_end_with_a_full_stop_and_no_length_is_below_zero() -> None:
+    assert [LengthUnit.parse(unit) for unit in ("in.", "mm.")] == [LengthUnit.INCH, MM]
+    assert (with_unit("0.013 in.", MM), with_unit("13", THOU)) == ("0.013 in.", "13 thou")
+    with pytest.raises(UsageError):
+        parse_length("-0.013 in")

@@ -286,6 +286,12 @@ def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(
             "value = nan",
             r"targets\.toml: targets\[1\]\.value: expected a number",
         ),
+        (
+            "targets",
+            "value = 0.0472",
+            "value = 0.0472\nat_most = 0.05",
+            r"value: expected one of value with tolerance, at_least, at_most",
+        ),
         ("targets", "{ 3 = 0.013", "{ 3 = true", r"clearance_in\.3: expected a number"),
         (
             "targets",

@@ -163,6 +163,9 @@ def test_a_correction_counts_and_what_it_corrects_does_not(tmp_path: Path, place
     assert mlg("history", "amend", "N123-LH-2", "3=0.002in").code == 0
     assert joint_3(life())["readings"] == [[400.0, 0.001], [800.0, 0.002]]
     assert Store(place).verify()[1] is None
+    correction = Store(place).all()[-1].digest[:10]
+    assert mlg("history", "void", correction, "--why", "another aircraft").code == 0
+    assert joint_3(life())["readings"] == [[400.0, 0.001]]
 
 
 @pytest.mark.parametrize(

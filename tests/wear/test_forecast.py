@@ -201,6 +201,7 @@ def test_one_reading_of_one_unit_is_enough_for_a_wide_forecast() -> None:
     ("usage", "value", "said"),
     [
         ([2.0, 1.0], [0.0, 0.0], "ascend"),
+        ([-1.0, 1.0], [0.0, 0.0], "ascend from 0"),
         ([0.0], [np.nan], "finite"),
         ([0.0, 1.0], [0.0], "one value a usage|2 usages"),
     ],
