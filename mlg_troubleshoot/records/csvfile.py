@@ -8,6 +8,7 @@ import io
 import re
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, Cell, Cells
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
@@ -31,29 +32,21 @@ _QUOTE_BUDGET = 20_000_000
 
 def decode(data: bytes) -> tuple[str, list[str]]:
     """Decode a text file: UTF-8, UTF-16 or Windows-1252."""
-    if data.startswith(codecs.BOM_UTF8):
-        data = data[3:]
-    elif data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return _strictly(data, "utf-16"), ["read as UTF-16 text"]
+    head = data[:4096]
+    ways = [("utf-8-sig", []), ("cp1252", ["read as Windows-1252 text, because it is not UTF-8"])]
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        ways = [("utf-16", ["read as UTF-16 text"])]
     elif len(data) >= 4:
-        head = data[:4096]
         even = head[0::2].count(0)
         odd = head[1::2].count(0)
         for order, own, other in (("little", odd, even), ("big", even, odd)):
             if own > len(head) * 0.3 and other < len(head) * 0.05:
                 note = f"read as UTF-16 text ({order}-endian, without a byte order mark)"
-                return _strictly(data, f"utf-16-{order[0]}e"), [note]
-    try:
-        return data.decode("utf-8"), []
-    except UnicodeDecodeError:
-        return _strictly(data, "cp1252"), ["read as Windows-1252 text, because it is not UTF-8"]
-
-
-def _strictly(data: bytes, encoding: str) -> str:
-    try:
-        return data.decode(encoding)
-    except UnicodeDecodeError:
-        raise not_text() from None
+                ways = [(f"utf-16-{order[0]}e", [note])]
+    for encoding, notes in ways:
+        with suppress(UnicodeDecodeError):
+            return data.decode(encoding), notes
+    raise not_text()
 
 
 def _too_large(what: str, row: int | None = None) -> FileRefusedError:

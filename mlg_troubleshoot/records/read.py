@@ -30,8 +30,6 @@ from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet
 from mlg_troubleshoot.records.tables import Collected, read_form, read_table
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from mlg_troubleshoot.records.frames import Frame
 
     Source = str | Path | BinaryIO | Frame
@@ -53,6 +51,8 @@ _PACKED: tuple[tuple[str, bytes, str], ...] = (
 )
 _SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods", ".numbers"))
 
+_ZIP_MAGICS = (b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")
+_HTML = (b"<!doctype html", b"<html", b"<table", b"<head", b"<body")
 _OLE_MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _WORKBOOK_NAMES = frozenset((".xlsx", ".xlsm", ".xls", ".xlsb", ".xltx", ".xltm"))
 _OTHERS: tuple[tuple[bytes, str], ...] = (
@@ -67,6 +67,8 @@ _OTHERS: tuple[tuple[bytes, str], ...] = (
     (b"SQLite format 3", "a database"),
     (b"\x7fELF", "a program"),
     (b"MZ", "a program"),
+    *((mark, "a web page (HTML), whatever its name") for mark in _HTML),
+    *((mark, "an XML file, whatever its name") for mark in (b"<?xml", b"<workbook")),
 )
 
 File = str | Path | BinaryIO
@@ -147,51 +149,43 @@ def expand(source: Source) -> list[Source]:
 
 
 def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
-    if is_frame(source):
-        return _read_frame(as_frame(source), options, ticker)
-    source = cast("File", source)
-    label = writable(
-        str(source if isinstance(source, str | Path) else getattr(source, "name", STDIN_NAME))
-    )
+    label = FRAME
+    kind = "frame"
     digest: str | None = None
-    kind = "unreadable"
+    labels: Sequence[object] = ()
     found = Collected()
-    suffix = Path(label).suffix.lower()
     try:
-        data = load_bytes(source)
-        digest = hashlib.sha256(data).hexdigest()
-        book = open_book(data, label, options)
-        del data
-        kind = book.kind
-        if suffix != f".{kind}" and suffix in _SUFFIXES - {".tsv", ".txt"}:
-            found.notes.append(f"the file is of kind {kind}, whatever its name")
-        found.notes += book.notes
-        _read_book(book, options, label, ticker, found)
+        if is_frame(source):
+            sheet = FrameSheet(as_frame(source))
+            labels = sheet.labels
+            rows = sheet.rows()
+            found = read_table(
+                sheet, sheet.header, rows, options, file=FRAME, delimiter=None, tick=ticker
+            )
+        else:
+            kind = "unreadable"
+            file = cast("File", source)
+            is_named = isinstance(file, str | Path)
+            label = writable(str(file if is_named else getattr(file, "name", STDIN_NAME)))
+            data = load_bytes(file)
+            digest = hashlib.sha256(data).hexdigest()
+            book = open_book(data, label, options)
+            del data
+            kind = book.kind
+            suffix = Path(label).suffix.lower()
+            if suffix != f".{kind}" and suffix in _SUFFIXES - {".tsv", ".txt"}:
+                found.notes.append(f"the file is of kind {kind}, whatever its name")
+            found.notes += book.notes
+            _read_book(book, options, label, ticker, found)
+        if not found.rows and not found.problems:
+            raise FileRefusedError("no_rows", "it contains no inspection")
     except FileRefusedError as refusal:
         # A reader that stops halfway has not seen the whole table: none of its rows are used.
         found.rows.clear()
         found.layouts.clear()
         found.problems[:] = [replace(refusal.problem, file=label)]
-    found.notes[:] = [f"{label}: {note}" for note in found.notes]
-    found.unread[:] = [f"{label}: {note}" for note in found.unread]
     found.unread_sheets[:] = [f"{label}, {sheet}" for sheet in found.unread_sheets]
-    return FileRead(label, kind, digest, len(found.rows)), found
-
-
-def _read_frame(frame: pd.DataFrame, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
-    sheet = FrameSheet(frame)
-    try:
-        found = read_table(
-            sheet, sheet.header, sheet.rows(), options, file=FRAME, delimiter=None, tick=ticker
-        )
-    except FileRefusedError as refusal:
-        found = Collected(problems=[replace(refusal.problem, file=FRAME)])
-    if not found.rows and not found.problems:
-        found.problems.append(
-            replace(FileRefusedError("no_rows", "it is empty").problem, file=FRAME)
-        )
-    found.notes[:] = [f"{FRAME}: {note}" for note in found.notes]
-    return FileRead(FRAME, "frame", None, len(found.rows), sheet.labels), found
+    return FileRead(label, kind, digest, len(found.rows), labels), found
 
 
 def load_bytes(source: File) -> bytes:
@@ -231,26 +225,22 @@ def load_bytes(source: File) -> bytes:
     return data
 
 
-def _sniffed(data: bytes, name: str) -> str:
-    """What kind of file it is, by its first bytes, not by its name."""
+def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
+    """Open a file by what it holds, whatever its name; what is not a table is refused."""
     if not data.strip(b" \t\r\n\0\xef\xbb\xbf"):
-        raise FileRefusedError(
-            "file_empty", "the file holds nothing but blanks" if data else "the file is empty"
-        )
-    if data.startswith((b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")):
-        return "zip"
+        what = "the file holds nothing but blanks" if data else "the file is empty"
+        raise FileRefusedError("file_empty", what)
     if data.startswith(_OLE_MAGIC):
-        return "ole"
+        from mlg_troubleshoot.records.xls import xls_book
+
+        return xls_book(data)
+    suffix = Path(label).suffix.lower()
+    if data.startswith(_ZIP_MAGICS):
+        return _packed(data, suffix)
     head = data[:2048].lstrip(b"\xef\xbb\xbf \t\r\n")
     for magic, what in _OTHERS:
-        if head.startswith(magic):
+        if head.startswith(magic) or head.lower().startswith(magic):
             raise FileRefusedError("file_kind", what)
-    low = head.lower()
-    if low.startswith((b"<!doctype html", b"<html", b"<table", b"<head", b"<body")):
-        raise FileRefusedError("file_kind", "a web page (HTML), whatever its name")
-    if low.startswith((b"<?xml", b"<workbook")):
-        raise FileRefusedError("file_kind", "an XML file, whatever its name")
-    suffix = Path(name).suffix.lower()
     if suffix in _WORKBOOK_NAMES:
         raise FileRefusedError(
             "file_kind",
@@ -259,19 +249,12 @@ def _sniffed(data: bytes, name: str) -> str:
             "If it is a CSV file, rename it to .csv. Otherwise open it in a spreadsheet program and"
             " save it as .xlsx.",
         )
-    return "text"
+    return csv_book(data, lambda cells: header_score(cells, options))
 
 
-def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
-    kind = _sniffed(data, label)
-    if kind == "text":
-        return csv_book(data, lambda cells: header_score(cells, options))
-    if kind == "ole":
-        from mlg_troubleshoot.records.xls import xls_book
-
-        return xls_book(data)
-    if b"workbook.xml" not in (names := data.lower()):
-        suffix = Path(label).suffix.lower()
+def _packed(data: bytes, suffix: str) -> Workbook:
+    names = data.lower()
+    if b"workbook.xml" not in names:
         packed = [what for end, mark, what in _PACKED if mark in data or end == suffix]
         if b"[content_types]" not in names and b"PK\x05\x06" in data[22:]:
             packed.append(_PACKED[-1][2])
@@ -325,8 +308,6 @@ def _read_book(
         else:
             raise _no_header(candidate)
         found.join(part, f"sheet {sheet.name!r}: " if len(chosen) > 1 else "")
-    if not found.rows and not found.problems:
-        raise FileRefusedError("no_rows", "it contains no inspection")
 
 
 def _names(candidates: Iterable[_Candidate]) -> str:
@@ -419,8 +400,8 @@ def _no_header(candidate: _Candidate) -> FileRefusedError:
 def _finish(results: Sequence[_Found]) -> ReadResult:
     """Join the files, compare the rows with each other, and put the problems in order."""
     out = Collected()
-    for _, found in results:
-        out.join(found, "")
+    for file, found in results:
+        out.join(found, f"{file.name}: ")
     rows = out.rows
     problems = out.problems
     alike = one_aircraft(rows)
