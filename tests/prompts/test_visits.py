@@ -85,7 +85,7 @@ def test_a_failure_after_the_repair_on_its_day_counts(
     sit("N1 LH", "restored 2", "", "4", "")
     sit("N1 LH", "f p 40", "")
     said = capsys.readouterr().out
-    assert "counts as older" not in said
+    assert "than the repair" not in said
     assert "OUTSIDE MARGIN, MEASURED" in said[said.rindex("N1 LH") :]
 
 

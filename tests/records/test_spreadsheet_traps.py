@@ -370,6 +370,7 @@ def test_21_the_same_record_twice_is_read_with_a_warning(read, table):
     assert not result.problems
     assert len(result.inspections) == 2
     assert "the same inspection as row 2" in result.rows[1].warnings[0]
+    assert result.rows[0].warnings == ()
 
 
 def test_21_two_different_records_under_one_id_are_errors(read, table):

@@ -111,7 +111,6 @@ def test_an_action_stands_alone_on_paper(
 ) -> None:
     words = readable(summary[0])
     assert all(judgement.in_brief in words for judgement in batch)
-    assert "go on</td>" not in summary[0]
 
 
 def test_of_gears_outside_the_margin_the_one_farther_beyond_its_own_stands_first(

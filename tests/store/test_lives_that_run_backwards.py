@@ -404,6 +404,7 @@ def test_a_reading_five_standard_deviations_tighter_is_taken_for_a_restoration_a
     key = ("A", "LH")
     found = suggestions([key], {key: Forecast(departures={3: -deviations, 4: deviations})})
     assert len([words for words in found if "#3 read much tighter" in words]) == told
+    assert "#4" not in " ".join(found)
 
 
 # A gear that is outside its margin or has a joint over its limit is due now.

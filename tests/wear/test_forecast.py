@@ -175,6 +175,7 @@ def test_what_falls_is_forecast_as_what_grows_seen_in_a_mirror(model: WearModel)
     assert 9.0 - mirrored.forecast("part 1", [1.6]).quantile(0.5) == pytest.approx(
         model.forecast("part 1", [1.6]).quantile(0.5), rel=0.03
     )
+    assert mirrored.scores(["part 3"]) == pytest.approx(-model.scores(["part 3"]), abs=0.1)
     assert mirrored.usage_to_limit("part 1", 9.0 - 2.5).quantile(0.5) == pytest.approx(
         model.usage_to_limit("part 1", 2.5).quantile(0.5), rel=0.03
     )
