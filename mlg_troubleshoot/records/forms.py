@@ -24,7 +24,7 @@ from mlg_troubleshoot.decision.columns import (
     Column,
 )
 from mlg_troubleshoot.decision.inspection import Side
-from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, column_letters, show
+from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, column_letters, quote, show
 from mlg_troubleshoot.records.headers import UNKNOWN, recognise
 from mlg_troubleshoot.records.layout import Columns, Header, mapped_to
 from mlg_troubleshoot.records.model import CellPlace, ReadOptions
@@ -111,7 +111,7 @@ class Form(Header):
         ids = columns.at(RECORD_ID)
         row = self.lines[ids[0]].row if ids else self.row
         for column, visit in visits.items():
-            cells = []
+            found = Row(row, [], visit=visit)
             for line, p in zip(self.lines, columns.placed, strict=True):
                 own, shared = (
                     line.cells[i] if i < len(line.cells) else None
@@ -120,9 +120,19 @@ class Form(Header):
                 is_measured = p.field is None or p.field.column in _MEASURED
                 # Above the readings a line may say it once for all columns.
                 is_own = is_measured and line.row >= self.measured_from
-                cells.append(own if own is not None or is_own else shared)
-            places = [CellPlace.at(line.row, column, line.label) for line in self.lines]
-            yield Row(row, cells, places, visit)
+                is_read = any(i < len(line.cells) and line.cells[i] is not None for i in visits)
+                if is_own and not is_read and shared is not None and line.column is not CLEARANCE:
+                    # So may one that no column of readings fills; next to a reading stands a limit.
+                    is_own = line.column is PLUNGER_DISPLACEMENT
+                    if is_own:
+                        found.questions.append(
+                            f"{line.label!r} says {quote(shared, 40)} in a column that is not read:"
+                            f" if it is a reading, move it to column {column_letters(column)}; else"
+                            " delete it."
+                        )
+                found.cells.append(own if own is not None or is_own else shared)
+                found.places.append(CellPlace.at(line.row, column, line.label))
+            yield found
 
     def note(self, visits: Mapping[int, Occasion]) -> str:
         """Say which columns of numbers are the readings, if there are several."""

@@ -129,10 +129,16 @@ def _words(text: str) -> frozenset[str]:
 
 _FOREIGN_UNITS = _words("cm um μm µm micron microns m ft foot feet dm nm cms metre meter")
 _CONVENTION_WORDS = _words("radial diametral diametrical diameter diam dia play")
-_PLUNGER = re.compile(r"plung|\brv\b|reversing|(?:over|under)[ -]?travel|mid[ -]?position")
+_PLUNGER = re.compile(
+    r"plu?ng|\bplg|\brv\b|reversing|(?:over|under)[ -]?travel|mid[ -]?pos|spool|piston|kolben"
+    r"|st(?:ö|oe)(?:ß|ss)el"
+)
 _MARGIN = re.compile(r"margin|marge|spielraum|\ballow|\bpermi(?:tted|ssible)\b|\btolerance\b")
 # Words of readings, and of numbers that are given next to readings.
-_READING_WORDS = _words("reading gap slop looseness wear displacement displ spiel offset")
+_READING_WORDS = _words(
+    "reading gap slop looseness wear displacement displ disp spiel offset deviation stroke hub tir"
+    " actual measured measurement ist istwert messwert"
+)
 _REFERENCE_WORDS = _words("limit limits max maximum min minimum nominal new part drawing")
 _CLEARANCE_WORDS = _words("clearance clearances clr")
 _JOINT_WORDS = _words("joint jt j no nr number #")
@@ -260,9 +266,9 @@ def recognise(header: str, joints: Joints) -> Recognition:
     )
 
 
-def suspect(header: str, joints: Joints) -> tuple[str, bool]:
-    """The column of readings that an unread header may name, else empty; and whether any number
-    may be one, or only a fraction.
+def suspect(header: str, joints: Joints) -> tuple[str | None, bool]:
+    """The column of readings that an unread header may name, empty where it names nothing known,
+    None where it names something else; and whether any number may be one, or only a fraction.
     """
     text = tidy(header).replace("_", " ")
     if _MARGIN.search(text):
@@ -272,7 +278,7 @@ def suspect(header: str, joints: Joints) -> tuple[str, bool]:
     has_unit = bool(units.known or units.foreign)
     plain = {word for word in said if not word.isdigit()} - _JOINT_WORDS
     if plain and plain <= _REFERENCE_WORDS:
-        return "", False
+        return None, False
     numbers = {int(n) for n in re.findall(r"\d+", text)} & {*joints.numbers}
     is_plunger = _PLUNGER.search(text) is not None
     is_reading = bool(said & (_CLEARANCE_WORDS | _CONVENTION_WORDS | _READING_WORDS))
@@ -280,7 +286,7 @@ def suspect(header: str, joints: Joints) -> tuple[str, bool]:
     is_sure = is_plunger or is_reading or named or has_unit
     sure = is_sure and not said & _OTHER_MATTER
     if not (sure or is_plunger or numbers or said & joints.vocabulary or not text):
-        return "", False
+        return (None if said & _OTHER_MATTER else ""), False
     fitting = [*numbers] or joints.called(said)
     joint = fitting[0] if len(fitting) == 1 else joints.numbers[0]
     return (PLUNGER_DISPLACEMENT if is_plunger else CLEARANCE).header(

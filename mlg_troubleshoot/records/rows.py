@@ -234,7 +234,7 @@ class RowReader:
         self._unread: dict[int, str] = {}
         # What is only carried, and may still say that the gear failed or how it was read.
         self._unread_words: list[PlacedField] = []
-        self._suspects: list[tuple[PlacedField, str, bool]] = []
+        self._suspects: list[tuple[PlacedField, str | None, bool]] = []
         # What a number format adds counts where a unit does.
         self._worded: set[int] = set()
         self._add(placed)
@@ -533,7 +533,10 @@ class RowReader:
             if cell is None:
                 continue
             header = placed.header or column_letters(placed.index)
-            if (nearest or of_joint) and self._may_be_length(cell, is_sure=is_sure):
+            is_named = bool(nearest) or of_joint
+            if (nearest is not None or of_joint) and self._may_be_length(
+                cell, is_sure=is_sure, is_named=is_named
+            ):
                 target = nearest or CLEARANCE.name
                 meant = f'a reading, pass --map "{header}={target}" (a length with its unit)'
             elif outcome is None and may_be_outcome(cell) and may_ask_outcome(header):
@@ -546,15 +549,17 @@ class RowReader:
             )
         return asked
 
-    def _may_be_length(self, cell: Filled, *, is_sure: bool) -> bool:
-        """Whether a cell holds a length of a usual size: any number, or only a fraction."""
+    def _may_be_length(self, cell: Filled, *, is_sure: bool, is_named: bool) -> bool:
+        """Whether a cell holds a length of a usual size: any number, a fraction, or only one with
+        its unit.
+        """
         # What is asked about may have either point.
         comma = self._table.decimal_comma or (isinstance(cell, str) and "," in cell)
         value, unit = written_number(cell, decimal_comma=comma)
         usual = list(LengthUnit) if is_sure else [LengthUnit.INCH, LengthUnit.MILLIMETRE]
         size = min(abs(each.to_inches(value)) for each in ([unit] if unit else usual))
         return 0.0 < size <= self._options.plunger_hard_max_in and (
-            is_sure or unit is not None or value % 1.0 > 0.0
+            is_sure or unit is not None or (is_named and value % 1.0 > 0.0)
         )
 
     def _made_id(self, side: Side | None) -> str:

@@ -373,7 +373,8 @@ _OUTCOME_WORDS = {
     **_each(
         "failed|fail|fails|failure|failed to retract|did not retract|not retracted|ng|nok|not ok"
         "|nicht ok|nio|nicht in ordnung|u s|unserviceable|defekt|ausfall|did not lock"
-        "|did not lock up",
+        "|did not lock up|no good|reject|rejected|stuck|jammed|hung up|unretracted|no retraction"
+        "|kaputt|nicht eingefahren|échec|échoué|fallo|falló|fallito|mislukt",
         Outcome.FAILED,
     ),
 }
@@ -384,9 +385,16 @@ def in_words(text: str) -> str:
     return re.sub(r"[\W_]+", " ", tidy(text).replace(".", "")).strip()
 
 
+_TELLS_FAILURE = re.compile(
+    r"(?<!no )(?<!not )(?<!never )(?<!without )"
+    r"\b(?:failed|did not retract|not retracted|retracted no|no retraction|nicht eingefahren)\b"
+)
+
+
 def says_failed(text: str) -> bool:
-    """Whether a text says that the gear failed, wherever it stands."""
-    return _OUTCOME_WORDS.get(in_words(text)) is Outcome.FAILED
+    """Whether a text says that the gear failed, wherever it stands and whatever follows."""
+    words = in_words(text)
+    return _OUTCOME_WORDS.get(words) is Outcome.FAILED or _TELLS_FAILURE.search(words) is not None
 
 
 def may_be_outcome(cell: Filled) -> bool:

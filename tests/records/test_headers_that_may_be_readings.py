@@ -33,6 +33,7 @@ CARRIED = (
 PLUNGER = (
     *("Plunger reading 1", "Plunger displ.", "RV plunger", "plunger 1st", "plunger pos.", "RV 1"),
     *("Plunger mid-position", "plunger_mm_read", "Plunger (measured)", "reversing valve", "Plgr"),
+    *("plg disp", "Kolben", "Stößel", "mid pos deviation", "spool", "Messwert", "stroke", "actual"),
 )
 JOINTS = (
     *("6 extension lever end (in)", "play 6 (in)", "radial 6 (in)", "extension lever end"),
@@ -81,7 +82,7 @@ def test_a_failure_is_seen_whatever_the_header_is(header: str, word: str) -> Non
 
 
 @pytest.mark.parametrize("value", ["0.06", "0.06 in", "1.5 mm"])
-@pytest.mark.parametrize("header", PLUNGER[:-1])
+@pytest.mark.parametrize("header", PLUNGER)
 def test_a_number_that_may_be_of_the_plunger_is_asked_about(header: str, value: str) -> None:
     assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
 
@@ -97,6 +98,12 @@ def test_a_number_that_may_be_a_clearance_is_asked_about(header: str, value: str
 def test_a_number_that_may_be_the_margin_of_the_gear_is_asked_about(
     header: str, value: str
 ) -> None:
+    assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
+
+
+@pytest.mark.parametrize("value", ["0.06 in", "60 thou", '.06"', "1.5 mm"])
+@pytest.mark.parametrize("header", ["プランジャ", "stantuffo", "check", "x", "P"])
+def test_a_length_with_its_unit_is_asked_about_under_any_header(header: str, value: str) -> None:
     assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
 
 
@@ -118,6 +125,8 @@ def test_carry_answers_the_question(header: str) -> None:
         ("week 3", "17"),
         ("mod 2", "1"),
         ("OAT", "21.5"),
+        ("humidity", "0.45"),
+        ("gauge", "0.5 in"),
         ("joint 6 part no", "9"),
         ("plunger s/n", ""),
     ],
@@ -159,7 +168,12 @@ def test_a_question_that_is_mapped_is_answered(header: str, value: str, outcome:
 
 
 @pytest.mark.parametrize(
-    "word", ["NOK", "n.i.O.", "u/s", "unserviceable", "did not lock up", "NG?"]
+    "word",
+    [
+        *("NOK", "n.i.O.", "u/s", "unserviceable", "did not lock up", "NG?", "stuck", "échec"),
+        *("FAILED 2x", "failed, see WO", "gear did not retract", "retracted: no", "no good"),
+        "FAILED - RETRACTED 2nd attempt",
+    ],
 )
 def test_further_words_of_failure_stop_a_row(word: str) -> None:
     assert judged(["status"], [word]).verdict is Verdict.INVALID
@@ -176,6 +190,8 @@ def test_an_outcome_that_is_in_doubt_is_not_taken_as_sure(word: str) -> None:
         (["greased"], ["yes"]),
         (["photo taken"], ["yes"]),
         (["status"], ["OK"]),
+        (["notes"], ["not failed"]),
+        (["outcome", "notes"], ["RETRACTED", "bush replaced; no failed part found"]),
         (["outcome", "Locked up"], ["RETRACTED", "yes"]),
     ],
 )

@@ -180,3 +180,16 @@ def test_a_workbook_with_several_visits_in_a_row_is_not_annotated(tmp_path: Path
     done = mlg("check", file, "--annotate", tmp_path / "out.xlsx")
     assert done.code == ExitCode.NOT_WRITTEN
     assert "Give each visit a row of its own" in done.err
+
+
+@pytest.mark.parametrize("line", [["Outcome", "FAILED"], ["Plunger displacement (in)", 0.0748]])
+@pytest.mark.parametrize("label", ["Outcome", "Result 2"])
+@pytest.mark.parametrize("at", [3, 4, 99])
+def test_what_stands_once_beside_columns_that_are_not_read_counts(
+    line: list[object], label: str, at: int
+) -> None:
+    lines = [["Joint", "New part (in)", "Found (in)"], *([n, 0.0005, 0.001] for n in range(1, 11))]
+    who = [["Tail", "N1"], ["Side", "LH"], ["Unit", "in"], ["Convention", "RADIAL"]]
+    who.insert(at, [label if line[0] == "Outcome" else line[0], line[1]])
+    result = check(workbook([*lines, [], *who]), advice=False)
+    assert result.exit_code is not ExitCode.FINE
