@@ -500,8 +500,9 @@ class RowReader:
         stated = found.convention
         for placed in self._unread_words:
             cell = self._cells[placed.index]
-            # None of the words has a digit; a single one may be an answer.
-            if cell is None or (isinstance(cell, str) and cell[1:] and _DIGIT.search(cell)):
+            # No word has a digit, but a sentence may; a single one may be an answer.
+            is_word = isinstance(cell, str) and cell[1:] and " " not in cell
+            if cell is None or (is_word and _DIGIT.search(cell)):
                 continue
             failed, said, unit = _spoken(placed.header, cell)
             if failed and found.values.get(OUTCOME) is not Outcome.FAILED:
