@@ -91,7 +91,7 @@ def test_the_size_to_which_virtual_links_are_drawn_is_stated(failure: Made) -> N
 def test_a_repair_set_stands_with_its_minutes_and_what_it_leaves(judge: Judge, worn: Made) -> None:
     best, section = judge(WORN).repair_sets[0], worn.text.split("Repair sets")[1]
     left = f"{best.predicted_displacement_in:.4f} in"
-    assert re.search(rf"#3, #4 and #5 sure {left} > 99\.9 % 0 % {best.minutes:.0f} ", section)
+    assert re.search(rf"#3, #4 and #5 sure {left} > 99\.9 % < 0\.1 % {best.minutes:.0f} ", section)
 
 
 def test_identity_stands_before_the_verdict(failure: Made) -> None:
