@@ -25,7 +25,7 @@ from mlg_troubleshoot.decision.inspection import (
     surely_later,
 )
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.units import Sentence
+from mlg_troubleshoot.units import Length, Sentence
 
 GearKey = tuple[str, str]
 _DAY = timedelta(days=1)
@@ -387,7 +387,7 @@ class _AsOf:
         gauge_u = {j: u for j, u in row.gauge_u_by_joint_in.items() if j not in gone}
         again = {*row.measured_again}
         questions = dict.fromkeys([row.unit_question] * bool(row.unit_question))
-        for joint, event in taken.items():
+        for joint, event in sorted(taken.items(), key=lambda each: (each[1].visit.place, each[0])):
             read = event.visit.inspection
             clearance[joint] = event.value
             if joint in read.entered and read.convention is row.convention:
@@ -399,7 +399,8 @@ class _AsOf:
                 questions[read.unit_question] = None
             self._older.append(event.fact(FactKind.READING, joint, event.value))
         if taken:
-            listed = Sentence.joined((fact.words for fact in self._older), ", ")
+            by_visit = groupby(self._older, key=lambda fact: (fact.date, fact.record))
+            listed = Sentence.joined((_of_one_visit([*facts]) for _, facts in by_visit), "; ")
             self._said.append(Sentence.of("Readings of other visits stand as well: {}.", listed))
         return {
             "clearance_in": clearance,
@@ -538,6 +539,13 @@ class _AsOf:
                 else "this visit may be older or newer, so its worse readings count"
             )
             self._said.append(f"{done.record_id} states a repair of {what} {when}: {then}.")
+
+
+def _of_one_visit(facts: Sequence[Fact]) -> Sentence:
+    """Readings of one visit in words: ``#3 0.0130 in, #5 0.0040 in on 2026-01-15 (R1)``."""
+    *others, last = facts
+    read = (Sentence.of("#{} {}", fact.joint, Length(fact.value_in or 0.0)) for fact in others)
+    return Sentence.joined((*read, last.words), ", ")
 
 
 def _place(event: _Event, repairs: Iterable[_Event], day: date) -> date:

@@ -13,7 +13,7 @@ from mlg_troubleshoot.cli.views.tables import (
     next_words,
     what_follows,
 )
-from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, VerdictTone
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
 from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
@@ -37,9 +37,12 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
     def lines_of(texts: Sequence[Text]) -> int:
         return sum(len(each.wrap(screen, screen.width)) for each in texts)
 
+    screen.width = min(screen.width, WIDE)
     row = judgement.row
     title = word(f"{row.tail_no or 'tail ?'} {row.side or 'side ?'}  ", "bold")
-    title.append(f"[{MARKS[judgement.verdict]}] {judgement.title}", TONES[judgement.tone])
+    is_judged = isinstance(judgement, Assessment)
+    said = screen.said(judgement.headline) if is_judged else judgement.title
+    title.append(f"[{MARKS[judgement.verdict]}] {said}", TONES[judgement.tone])
     origin = word(f"{row.record_id or 'record ?'}: {gear.provenance}. {_DISCLAIMER}", "dim")
     body = [origin, title, *_body(judgement, screen, detail=detail)]
     notes = [text(f"* {screen.said(note)}") for note in judgement.warnings]
@@ -66,12 +69,10 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
 def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> list[Text]:
     """What was found and NEXT; with `detail` what stands behind them."""
     lines: list[tuple[str, str]] = []
-    if isinstance(judgement, Assessment):
-        lines.append((judgement.headline, "bold" if judgement.tone is VerdictTone.RED else ""))
-        if detail:
-            lines += [(said, "") for said in _numbers(judgement)]
-            posterior = judgement.posterior
-            lines += [] if posterior is None else [(posterior.text, "")]
+    if isinstance(judgement, Assessment) and detail:
+        lines += [(said, "") for said in _numbers(judgement)]
+        posterior = judgement.posterior
+        lines += [] if posterior is None else [(posterior.text, "")]
     lines.append((next_words(judgement), "bold"))
     if isinstance(judgement, Assessment):
         follows = what_follows(judgement)
