@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.json_form import CheckText
 
-# One gear, and one before and after a repair, are shown in full.
-_FEW = 2
 # Inspections that --report writes at most: HTML and PDF of one take 0.1 s, and their judgements
 # stand in memory until then. [1]
 _MOST_REPORTS = 1000
@@ -116,6 +114,11 @@ class Run:
                 "Give either a FILE or the values of one gear.",
             )
         for file in map(Path, self._files):
+            if file.name.startswith("~$"):
+                raise UsageError(
+                    f"{file} is the lock file of a workbook that is open",
+                    f"Give the workbook: {file.with_name(file.name[2:])}.",
+                )
             if file.name == "-" or file.exists() or not file.parent.is_dir():
                 continue
             near = get_close_matches(file.name, [each.name for each in file.parent.iterdir()], 1)
@@ -188,7 +191,7 @@ class Run:
             from mlg_troubleshoot.workflows.keep import inspections_of
 
             outputs.append(task.BlockOutput(inspections_of, found.entries.extend))
-        if total <= _FEW or wanted.report is not None:
+        if total == 1 or wanted.report is not None:
             outputs.append(task.BlockOutput(tuple, found.held.extend))
         return outputs
 
@@ -241,13 +244,10 @@ class Run:
         notes.show_problems(result.problems)
         screen = output.console(unit=unit)
         screen.asks = self._asks
-        if len(lines) < _FEW and result.judgements:
-            one_gear.show(result.judgements[0], result.gear, screen, detail=detail)
-        elif lines:
+        if len(lines) > 1:
             batch.show(lines, result.gear, screen)
-            both = task.before_and_after(result.judgements)
-            if both is not None:
-                batch.show_before_and_after(*both, screen)
+        elif result.judgements:
+            one_gear.show(result.judgements[0], result.gear, screen, detail=detail)
         if lines or result.judgements:
             notes.show_unread(result.unread_files, screen)
 

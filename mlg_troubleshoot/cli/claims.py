@@ -90,7 +90,7 @@ def _reports(folder: Path, others: Outputs) -> Outputs:
                 f"Give {option} another name.",
             )
     try:
-        known = [*real.iterdir()] if real.is_dir() else []
+        known = [*real.iterdir()] if real.exists() else []
     except OSError as error:
         raise OutputError(
             f"--report {folder} cannot be read: {error.strerror}",

@@ -103,8 +103,9 @@ def show(
         raise UsageError(
             f"{tail} has two gears here, and JSON shows one", f"Run: mlg history {tail} LH --json"
         )
-    latest = found.lives[0].latest
-    unit = shown.unit(LengthUnit.INCH if latest is None else latest.inspection.unit_entered)
+    rows = [kept.inspection for kept in found.lives[0].inspections]
+    units = [row.unit_entered for row in rows if row.entered]
+    unit = shown.unit(units[-1] if units else LengthUnit.INCH)
     for life in found.lives:
         if shown.as_json:
             output.write_json(life_json.life_as_json(life, found.forecasts[life.key], known))

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
+from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Any
 
 from rich.cells import cell_len
@@ -271,10 +272,20 @@ def joint(number: int | None) -> str:
     return "-" if number is None else f"#{number}"
 
 
-def say(message: str) -> None:
-    """Write a message to stderr; one that cannot be written changes no result."""
+def say(message: str, indent: int = 0) -> None:
+    """Write a message to stderr, on a terminal folded between words; one that cannot be written
+    changes no result.
+    """
+    lines = [visible(line) for line in message.split("\n")]
+    if sys.stderr.isatty():
+        fold = TextWrapper(
+            console(to_stderr=True).width - indent,
+            break_long_words=False,
+            break_on_hyphens=False,
+        ).wrap
+        lines = [part for line in lines for part in fold(line) or [""]]
     with suppress(OSError):
-        print(visible(message), file=sys.stderr, flush=True)
+        print("\n".join(" " * indent + line for line in lines), file=sys.stderr, flush=True)
 
 
 def say_written(written: Iterable[WrittenReport], *, quiet: bool = False) -> list[Path]:

@@ -335,7 +335,8 @@ def _readings(
     by = f"measured by {row.technician_id}" if row.technician_id else ""
     how = ", ".join(filter(None, (again, convention, by)))
     # What is over its limit stands first.
-    for joint in sorted(joints, key=lambda n: not gear.joint(n).is_over_limit(row.clearance_in[n])):
+    over_first = {n: not gear.joint(n).is_over_limit(row.clearance_in[n]) for n in sorted(joints)}
+    for joint in sorted(over_first, key=over_first.__getitem__):
         value = row.clearance_in[joint]
         text = f"#{joint} {_entered(row, joint)}"
         limit = gear.joint(joint)

@@ -26,7 +26,7 @@ class Place:
     there.
     """
 
-    REMEDY = "Give a file that you may write to, or postgresql+psycopg://USER@HOST/DATABASE."
+    REMEDY = "Give a file in a folder that you may write to, or the URL of a PostgreSQL store."
 
     def __init__(self, given: str) -> None:
         if "://" not in given and _LIKE_A_URL.match(given):

@@ -364,17 +364,6 @@ def read_inspections(
     return frame
 
 
-def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Assessment] | None:
-    """Return two inspections of one gear in the order of their dates: before and after a repair."""
-    judged = [j for j in judgements if isinstance(j, Assessment)]
-    gears = {(j.inspection.tail_no, j.inspection.side) for j in judged}
-    if not len(judgements) == len(judged) == 2 or len(gears) > 1:
-        return None
-    first, second = judged
-    one, two = (j.inspection.inspection_date for j in judged)
-    return (second, first) if one is not None and two is not None and two < one else (first, second)
-
-
 def _judge(
     found: CheckResult,
     rows: list[Inspection | InvalidRow],

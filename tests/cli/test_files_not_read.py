@@ -68,3 +68,17 @@ def test_a_file_alone_that_cannot_be_read_exits_3(bad: Path) -> None:
 def test_causes_without_their_extension_are_refused(table: Table) -> None:
     found = mlg("check", table(row()), "--causes", "nope.py")
     assert (found.code, "--causes was given without" in found.err) == (2, True)
+
+
+def test_the_lock_file_of_an_open_workbook_is_named(tmp_path: Path) -> None:
+    (tmp_path / "~$fleet.xlsx").write_text("J. Smith")
+    run = mlg("check", tmp_path / "~$fleet.xlsx")
+    assert run.code == 2
+    assert f"Give the workbook: {tmp_path / 'fleet.xlsx'}" in run.err
+
+
+def test_a_store_that_cannot_be_made_has_a_remedy_for_a_technician(table: Table) -> None:
+    run = mlg("check", table(row()), "--keep", "--store", "/proc/1/s.sqlite")
+    assert run.code == 5
+    assert "nothing was kept" in run.err
+    assert "://" not in run.err

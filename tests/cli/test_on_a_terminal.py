@@ -137,3 +137,15 @@ def test_a_batch_fits_the_terminal(start: Start) -> None:
     plain = [line for line in child.before.splitlines() if "258-" in line]
     assert len(plain) == 12
     finish(child)
+
+
+@pytest.mark.parametrize("columns", [60, 80])
+def test_a_message_is_folded_between_words(start: Start, tmp_path: Path, columns: int) -> None:
+    table = tmp_path / "bad.csv"
+    table.write_text("record_id,tail_no,side,clearance_3_in\nR1,N1,middle,many\n")
+    child = start("check", "bad.csv", cwd=tmp_path, COLUMNS=str(columns), NO_COLOR="1")
+    child.expect(pexpect.EOF)
+    lines = child.before.splitlines()
+    assert max(map(len, lines)) <= columns
+    for whole in ("TOTAL_PLAY", "clearance_convention", "'middle'"):
+        assert whole in child.before

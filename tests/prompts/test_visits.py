@@ -99,6 +99,23 @@ def test_last_weeks_forms_give_last_weeks_days(sit: Sit, life: Life, now: Now) -
     assert now().clearance_in[2] == 0.002
 
 
+def test_what_is_typed_before_and_after_a_repair_in_one_entry_stands_so(
+    sit: Sit, life: Life, now: Now
+) -> None:
+    asked = ("8", "11", "26", "restored 2", "p 12", "#2 4", "r", "#4 6", "done")
+    screen = sit(*failed(*asked), "p 12", "#2 4", "").screen
+    for refused in ("plunger displacement 46 thou", "#2 26 thou", "outcome FAILED"):
+        assert f"{refused} was typed before the repair".lower() in screen.lower()
+    found = [visit.inspection for visit in life().visits]
+    assert [row.clearance_in for row in found[:3]] == [
+        {3: 0.004, 5: 0.0055, 2: 0.013},
+        {},
+        {4: 0.003},
+    ]
+    assert [row.restored_joints for row in found] == [(), (2,), (), (), ()]
+    assert (now().clearance_in[2], now().standing_readings_in) == (0.002, (0.012,))
+
+
 # One day of a gear, as it is found and as it stands on the forms.
 DAY = (
     failed("8", "11", "26", "6", "14", "done"),

@@ -21,6 +21,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     Entry,
     column_of,
     joint_of,
+    label_of,
     split_words,
 )
 from mlg_troubleshoot.cli.prompts.visit import Visit
@@ -305,7 +306,7 @@ class Asker:
         text = self.entry.cells.pop(name)
         self._jump = ""
         self.entry.confirmed = [each for each in self.entry.confirmed if each != name]
-        self._say(f"– undone: {_label(name)} {text or 'no answer'}", "magenta")
+        self._say(f"– undone: {label_of(name)} {text or 'no answer'}", "magenta")
 
     def _answer(self, name: str, typed: str) -> None:
         """Take an answer; a line of words counts at every question but those of a name."""
@@ -429,6 +430,7 @@ class Asker:
                 continue
             if number not in self.gear.joint_numbers:
                 raise UsageError(f"there is no joint #{number}", "Type for example #3 13.")
+            self.entry.require_untyped(name)
             self._jump = name
             if text:
                 self._answer_joint(name, text)
@@ -604,11 +606,6 @@ class Asker:
             else:
                 self._say("\nNothing was typed. Begin again with: mlg check")
             raise EntryInterruptedError from None
-
-
-def _label(name: str) -> str:
-    number = joint_of(name)
-    return f"#{number}" if number else column_of(name).plain
 
 
 def _plain(text: str) -> str:

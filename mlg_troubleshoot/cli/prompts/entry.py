@@ -203,12 +203,28 @@ class Entry(msgspec.Struct, kw_only=True):
             return read
         return replace(read, warnings=(*read.warnings, f"asked again and confirmed: {names}"))
 
+    def _repair(self) -> list[str]:
+        """The columns that state a repair."""
+        return [name for name in _REPAIR if self.cells.get(name) not in (None, "", "yes", "no")]
+
+    def require_untyped(self, name: str) -> None:
+        """Refuse a second value of what was found before a repair: one would be lost."""
+        names = [*self.cells]
+        is_found = name in (OUTCOME.name, PLUNGER) or joint_of(name)
+        if not (is_found and self.cells.get(name)):
+            return
+        if any(names.index(each) > names.index(name) for each in self._repair()):
+            raise UsageError(
+                f"{label_of(name)} {self.cells[name]} was typed before the repair",
+                "End this entry with done; then type what was found after the repair.",
+            )
+
     def visits(self, gear: Gear) -> list[Inspection]:
         """What was typed, as visits: what was found before a repair, the repair, and what was found
         after it.
         """
         names = [*self.cells]
-        repair = [name for name in _REPAIR if self.cells.get(name) not in (None, "", "yes", "no")]
+        repair = self._repair()
         if not repair:
             return [self.inspection(gear)]
         last = max(map(names.index, repair))
@@ -238,6 +254,8 @@ class Entry(msgspec.Struct, kw_only=True):
             taken[name] = self._accepted(gear, name, text, taken.get(name, ""))
             if day:
                 taken[DAY_OF[name]] = day_of(day, self.started.date())
+        for name in taken:
+            self.require_untyped(name)
         for name, text in taken.items():
             self.give(name, text)
         return [*taken]
@@ -268,6 +286,12 @@ def joint_of(name: str) -> int | None:
     """The joint whose clearance a column holds; None for any other column."""
     head, _, number = name.rpartition("_")
     return int(number) if head == CLEARANCE.name and number.isdecimal() else None
+
+
+def label_of(name: str) -> str:
+    """What a column is called on the screen: ``#3``, or its name in words."""
+    number = joint_of(name)
+    return f"#{number}" if number else column_of(name).plain
 
 
 def column_of(name: str) -> Column:

@@ -1,4 +1,4 @@
-"""A batch: one line per gear, worst first; two inspections of one gear side by side."""
+"""A batch: one line per gear, worst first."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, word
 from mlg_troubleshoot.cli.views.tables import MARKS, TONES, Cell
-from mlg_troubleshoot.decision.assessment import Assessment, Verdict
+from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.visible import visible
 
 
 def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole) -> None:
@@ -85,34 +84,3 @@ def _cells(line: Listed, screen: DataConsole) -> dict[str, Cell]:
         cells["margin"] = screen.length(line.margin_in)
         cells["chance"] = "-" if line.chance is None else percent(line.chance)
     return cells
-
-
-def show_before_and_after(before: Assessment, after: Assessment, screen: DataConsole) -> None:
-    def change(one: float | None, two: float | None) -> tuple[str, str, str]:
-        first, second = ("-" if value is None else screen.length(value) for value in (one, two))
-        return (
-            first,
-            second,
-            "" if one is None or two is None else screen.length(two - one, sign=True),
-        )
-
-    both = before, after
-    lengths: dict[str, list[float | None]] = {
-        "worst case": [a.deciding_in for a in both],
-        "margin": [a.margin_in for a in both],
-        "measured": [a.inspection.measured_displacement_in for a in both],
-    }
-    for found in zip(before.joints, after.joints, strict=True):
-        read = [f.clearance_in for f in found]
-        if read != [None, None]:
-            lengths[f"#{found[0].joint} {found[0].name}"] = read
-    chances = [a.probability_within_margin for a in both]
-    verdicts = [Text(a.title, style=TONES[a.tone]) for a in both]
-    within = ["-" if p is None else percent(p) for p in chances]
-    rows: list[list[Cell]] = [["verdict", *verdicts, ""]]
-    for label, values in lengths.items():
-        rows.append([f"{label} {screen.unit}", *change(*values)])
-    rows.insert(4, ["probability within", *within, ""])
-    screen.print("Before and after", style="bold")
-    names = [f"{visible(a.inspection.record_id, one_line=True)}>" for a in both]
-    print_table(screen, ("", *names, "change>"), rows)
