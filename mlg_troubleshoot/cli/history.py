@@ -239,7 +239,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
     if helped := repair_sentence(lines):
-        console.print(said_in(helped, unit))
+        console.print(helped)
     _show_joints(console, life, life_as_json(life, ahead, gear)["joints"], ahead, gear)
 
 

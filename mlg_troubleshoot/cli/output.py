@@ -36,7 +36,6 @@ WIDEST = 120
 _PLAIN = "mlg.plain"
 # Between the cells of a table in a template.
 _CELL = "│"
-_MARK = re.compile(r"[<>]\d*$")
 # Room that the last column of a table gets before other columns are left out for it, and rows that
 # are printed where all of them are listed elsewhere.
 _LEAST = 27
@@ -128,17 +127,15 @@ class DataConsole(Console):
     def length(self, value_in: float, *, sign: bool = False) -> str:
         return self.unit.shown(value_in, sign=sign)
 
-    def sentence(self, said: str) -> None:
-        self.print(self.said(said))
-
     def said(self, sentence: str) -> str:
         """Say a sentence of this program, its lengths in the unit that the user reads."""
         said = said_in(sentence, self.unit)
         return at_prompt(said) if self.asks else said
 
     def print(self, *objects: Any, **how: Any) -> None:
-        """Print; a text is data, made visible before it is measured."""
-        super().print(*(text(each) if isinstance(each, str) else each for each in objects), **how)
+        """Print; a text is data, made visible before it is measured, and a sentence is said."""
+        said = (text(self.said(each)) if isinstance(each, str) else each for each in objects)
+        super().print(*said, **how)
 
     def on_broken_pipe(self) -> None:
         self.quiet = True
@@ -205,8 +202,7 @@ def print_table(
     others: str = "",
     folded: str = "",
 ) -> None:
-    """Print a table without rules; a heading may end with ``>``, which aligns its column to the
-    right, or ``<``, and its greatest width.
+    """Print a table without rules; a heading that ends with ``>`` aligns its column to the right.
 
     With `spare` a column that says nothing is left out, and on a narrow screen those of `spare`,
     the first first; then only the last column, or the one that is named, is folded. Of many rows
@@ -214,7 +210,7 @@ def print_table(
     """
     shown = rows[:_LINES] if others else rows
     cells = [[word(each) if isinstance(each, str) else each for each in row] for row in shown]
-    kept = {_MARK.sub("", heading): place for place, heading in enumerate(headings)}
+    kept = {heading.removesuffix(">"): place for place, heading in enumerate(headings)}
     last = folded or [*kept][-1]
     wide = {
         name: max(*map(cell_len, name.split("\n")), 1, *(row[place].cell_len for row in cells))
@@ -231,11 +227,9 @@ def print_table(
     gap = 2 if sum(wide[name] + 2 for name in kept) - 2 <= screen.width else 1
     table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
     for name, place in kept.items():
-        mark = headings[place].removeprefix(name)
         table.add_column(
             name,
-            justify="right" if mark.startswith(">") else "left",
-            max_width=int(mark[1:]) if mark[1:] else None,
+            justify="right" if headings[place].endswith(">") else "left",
             overflow="fold",
             no_wrap=spare is not None and name != last,
         )
@@ -265,11 +259,6 @@ def word(data: str | None, style: str = "") -> Text:
     none.
     """
     return Text("?" if data is None else visible(data, one_line=True), style=style)
-
-
-def joint(number: int | None) -> str:
-    """Return a joint for a cell: ``#3``, and a dash without one."""
-    return "-" if number is None else f"#{number}"
 
 
 def say(message: str, indent: int = 0) -> None:

@@ -1,6 +1,6 @@
 """Random scripts of typing errors: none is taken as a value, none leads to another question.
 
-``python -m tests.prompts.test_typing_errors 300`` runs as many.
+``python -m tests.prompts.test_typing_errors 300`` runs as many; a second number is the first seed.
 """
 
 from __future__ import annotations
@@ -8,18 +8,20 @@ from __future__ import annotations
 import random
 import sys
 import tempfile
+from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from mlg_troubleshoot.life.folding import life_of
-from mlg_troubleshoot.store import Store
-from tests.prompts import scripted
-from tests.prompts.scripted import Sit, sitting
+from mlg_troubleshoot.cli.prompts import Asker, Entry, SavedEntries
+from mlg_troubleshoot.gear.gear_file import load_gear
+from tests.prompts.scripted import ScriptedTerminal
 
-HEAD = ("N1", "LH", "thou", "play", "f", "46")
-READINGS = {f"#{n} ": str(n + 4) for n in range(1, 11)}
+RIGHT = {
+    **{"Tail": "N1", "Side": "LH", "Unit": "thou", "A cl": "play", "Did ": "f", "Plun": "46"},
+    **{f"#{n} ": str(n + 4) for n in range(1, 11)},
+}
 # What is refused at each question; an Enter is an answer where the prompt says what it means.
 WRONG = {
     "Tail": ("", "?!", "-", "n/a"),
@@ -32,46 +34,36 @@ WRONG = {
 }
 
 
-def script(seed: int, sit: Sit, store: Path) -> None:
+class Typist(ScriptedTerminal):
+    """Answers each question, sometimes wrongly first."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(())
+        self.chance = random.Random(seed)
+        self.asked: list[tuple[str, str]] = []
+
+    def ask(self, prompt: str) -> str:
+        word = next((text for begin, text in RIGHT.items() if prompt.startswith(begin)), "")
+        if (wrong := _wrong_at(prompt)) and self.chance.random() < 0.4:
+            word = self.chance.choice(wrong)
+        self.asked.append((prompt.partition(" (")[0], word))
+        assert len(self.asked) < 400
+        return word
+
+
+def _wrong_at(prompt: str) -> tuple[str, ...]:
+    return next((wrong for begin, wrong in WRONG.items() if prompt.startswith(begin)), ())
+
+
+def run_script(seed: int, folder: Path) -> None:
     """One gear, typed with errors before each answer."""
-    chance = random.Random(seed)
-    asked: list[tuple[str, str]] = []
-    typed: list[str] = []
-
-    class Typist(list[str]):
-        """Answers each question, sometimes wrongly first."""
-
-        def pop(self, _at: int = 0) -> str:
-            prompt = terminal.screen.rpartition("\n")[2]
-            right = answer_to(prompt)
-            key = next((k for k in WRONG if prompt.startswith(k)), "")
-            word = chance.choice(WRONG[key]) if key and chance.random() < 0.4 else right
-            asked.append((prompt, word))
-            typed.append(word)
-            return word
-
-        def __bool__(self) -> bool:
-            return len(typed) < 400
-
-    def answer_to(prompt: str) -> str:
-        if prompt.startswith("#"):
-            return next(text for key, text in READINGS.items() if prompt.startswith(key))
-        begins = ("Tail", "Side", "Unit", "A cl", "Did ", "Plun")
-        return next((a for b, a in zip(begins, HEAD, strict=True) if prompt.startswith(b)), "")
-
-    terminal = scripted.ScriptedTerminal(())
-    terminal._typed = Typist()
-    scripted_terminal = scripted.ScriptedTerminal
-    scripted.ScriptedTerminal = lambda *_a: terminal
-    try:
-        sit()
-    finally:
-        scripted.ScriptedTerminal = scripted_terminal
-    for (prompt, word), (following, _) in pairwise(asked):
-        key = next((k for k in WRONG if prompt.startswith(k)), "")
-        if key and word in WRONG[key]:
-            assert following.partition(" (")[0] == prompt.partition(" (")[0], (prompt, word)
-    found = life_of(Store(store), "N1", "LH").inspections[-1].inspection
+    gear = load_gear()
+    typist = Typist(seed)
+    entry = Asker(gear, typist, SavedEntries(folder / f"{seed}.sqlite")).begin({})
+    for (prompt, word), (following, _) in pairwise(typist.asked):
+        assert word not in _wrong_at(prompt) or following == prompt, (seed, prompt, word)
+    assert isinstance(entry, Entry)
+    (found,) = entry.visits(gear)
     assert {n: str(x) for n, x in found.entered.items()} == {
         n: f"{n + 4} thou" for n in range(1, 11)
     }
@@ -79,18 +71,16 @@ def script(seed: int, sit: Sit, store: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "seed", [pytest.param(s, marks=() if s < 3 else pytest.mark.slow) for s in range(30)]
+    "seeds", [range(10), pytest.param(range(10, 300), marks=pytest.mark.slow)], ids=len
 )
-def test_no_typing_error_is_taken_or_leads_elsewhere(
-    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    store = tmp_path / "store.sqlite"
-    script(seed, sitting(store, monkeypatch), store)
+def test_no_typing_error_is_taken_or_leads_elsewhere(seeds: Iterable[int], tmp_path: Path) -> None:
+    for seed in seeds:
+        run_script(seed, tmp_path)
 
 
 if __name__ == "__main__":
-    for number in range(int(sys.argv[1])):
-        with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
-            place = Path(folder) / "store.sqlite"
-            script(number, sitting(place, patch), place)
-    print(f"{sys.argv[1]} scripts: every error was refused at its own question")
+    count, first = (*map(int, sys.argv[1:]), 0)[:2]
+    with tempfile.TemporaryDirectory() as place:
+        for number in range(first, first + count):
+            run_script(number, Path(place))
+    print(f"{count} scripts: every error was refused at its own question")

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from mlg_troubleshoot.cli.prompts.drafts import SavedEntries
 from mlg_troubleshoot.cli.prompts.entry import (
@@ -24,6 +23,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     label_of,
     split_words,
 )
+from mlg_troubleshoot.cli.prompts.terminal import Terminal
 from mlg_troubleshoot.cli.prompts.visit import Visit
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
@@ -92,14 +92,6 @@ _QUESTIONS = {
 }
 
 
-class Screen(Protocol):
-    """Where questions are shown and lines are typed."""
-
-    def say(self, text: str, style: str = "") -> None: ...
-
-    def ask(self, prompt: str) -> str: ...
-
-
 class BackError(Exception):
     """The last answer is to be taken back."""
 
@@ -117,7 +109,7 @@ class Asker:
     """
 
     gear: Gear
-    screen: Screen
+    screen: Terminal
     saved: SavedEntries
     visit: Callable[[str, Side], Visit | None] = lambda _tail, _side: None
     order: Callable[[Entry], tuple[int, ...]] = lambda _entry: ()

@@ -52,18 +52,13 @@ def show_unread(files: Sequence[str], screen: output.DataConsole) -> None:
 
 def _show_problem(group: ProblemGroup) -> None:
     problem = group.first
-    about_all = problem.row is None and problem.column is None
-    found = (
-        ""
-        if problem.value is None
-        else f"{problem.value}; "
-        if about_all
-        else f"found {problem.value!r}; "
-    )
-    place = problem.place()
+    place, found = problem.place(), ""
     if len(group.problems) > 1:
         column = "" if problem.column is None else f", column {problem.column!r}"
         place = f"{group.file}, {group.where}{column}"
         found = "" if group.found is None else f"found {group.found}; "
+    elif problem.value is not None:
+        about_all = problem.row is None and problem.column is None
+        found = f"{problem.value}; " if about_all else f"found {problem.value!r}; "
     output.say(f"{place}: {found}expected {problem.expected}.", indent=2)
     output.say(f"What to do: {problem.remedy}", indent=4)

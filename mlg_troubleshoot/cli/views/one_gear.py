@@ -163,13 +163,13 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
             f" {screen.unit}."
         )
     if a.rigging is not None:
-        screen.sentence(rigging_sentence(a.rigging))
+        screen.print(rigging_sentence(a.rigging))
     if a.budget is not None:
         shares = ", ".join(
             f"{name} {screen.length(u)} {screen.unit} ({percent(share)})"
             for name, u, share in a.budget.lines
         )
-        screen.sentence(
+        screen.print(
             Sentence.of(
                 "Standard uncertainty, with shares: {}. Model: {}.", shares, a.budget.model_source
             )
