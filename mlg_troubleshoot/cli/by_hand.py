@@ -87,7 +87,7 @@ def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, t
             )
         column = headers.column_named(name, joints)
         if column in values:
-            raise UsageError(f"{flag}{column} is given twice", "Give each column once.")
+            raise UsageError(f"{flag or 'amend '}gives {column} twice", "Give each column once.")
         values[column] = pair, text
     return values
 

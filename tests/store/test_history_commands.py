@@ -201,7 +201,7 @@ def test_an_amended_value_is_that_of_its_column(
         (["tail=N7"], "mlg history move"),
         (["outcom=FAILED"], "not a column"),
         (["landings"], "is not COLUMN=VALUE"),
-        (["outcome=FAILED", "outcome=RETRACTED"], "given twice"),
+        (["outcome=FAILED", "outcome=RETRACTED"], "outcome twice"),
         (["landings=400"], "says that already"),
     ],
 )
