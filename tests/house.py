@@ -60,13 +60,13 @@ WAYS = {
 # writes it down again.
 BUDGETS: dict[str, int] = {
     "(top)": 9679,
-    "cli": 29147,
+    "cli": 28569,
     "decision": 32509,
     "diagnosis": 35621,
     "gear": 11306,
     "geometry": 5881,
     "indices": 5102,
-    "life": 18100,
+    "life": 18228,
     "misfit": 18550,
     "notebook": 2355,
     "paper": 6762,
@@ -76,7 +76,7 @@ BUDGETS: dict[str, int] = {
     "store": 7925,
     "surveying": 5285,
     "wear": 7893,
-    "workflows": 14623,
+    "workflows": 14497,
 }
 _NO_CODE = {
     tokenize.COMMENT,

@@ -261,9 +261,9 @@ def word(data: str | None, style: str = "") -> Text:
     return Text("?" if data is None else visible(data, one_line=True), style=style)
 
 
-def say(message: str, indent: int = 0) -> None:
+def say(message: str, indent: int = 0, *, is_result: bool = False) -> None:
     """Write a message to stderr, on a terminal folded between words; one that cannot be written
-    changes no result.
+    changes nothing unless it is a result.
     """
     lines = [visible(line) for line in message.split("\n")]
     if sys.stderr.isatty():
@@ -273,7 +273,7 @@ def say(message: str, indent: int = 0) -> None:
             break_on_hyphens=False,
         ).wrap
         lines = [part for line in lines for part in fold(line) or [""]]
-    with suppress(OSError):
+    with suppress(*(() if is_result else (OSError,))):
         print("\n".join(" " * indent + line for line in lines), file=sys.stderr, flush=True)
 
 

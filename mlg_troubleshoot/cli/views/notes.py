@@ -29,7 +29,7 @@ def show_problems(problems: Sequence[Problem]) -> None:
     if not problems:
         return
     noun = "problem" if len(problems) == 1 else "problems"
-    output.say(f"{len(problems)} {noun} in the input:")
+    output.say(f"{len(problems)} {noun} in the input:", is_result=True)
     groups = grouped(problems)
     shown = groups[:_LINES_OF_PROBLEMS]
     for group in shown:
