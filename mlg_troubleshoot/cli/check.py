@@ -59,6 +59,7 @@ class CheckOutputs(options.Shown):
         typer.Option(
             "--format",
             metavar="html|pdf",
+            parser=options.report_format,
             help="Report format, may repeat; default html and pdf. HTML is the accessible form.",
         ),
     ] = None

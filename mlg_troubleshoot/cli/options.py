@@ -30,6 +30,14 @@ class ReportFormat(StrEnum):
     PDF = "pdf"
 
 
+def report_format(text: str) -> ReportFormat:
+    try:
+        return ReportFormat(text)
+    except ValueError:
+        remedy = "Give html or pdf; the HTML report is the accessible form."
+        raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
+
+
 def one_of(kind: type[_Word], text: str, flag: str) -> _Word:
     """Judge a word that must be one of a few."""
     try:

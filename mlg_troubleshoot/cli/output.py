@@ -36,6 +36,7 @@ WIDEST = 120
 _PLAIN = "mlg.plain"
 # Between the cells of a table in a template.
 _CELL = "│"
+_MARK = re.compile(r"[<>]\d*$")
 # Room that the last column of a table gets before other columns are left out for it, and rows that
 # are printed where all of them are listed elsewhere.
 _LEAST = 27
@@ -202,7 +203,8 @@ def print_table(
     others: str = "",
     folded: str = "",
 ) -> None:
-    """Print a table without rules; a heading that ends with ``>`` aligns its column to the right.
+    """Print a table without rules; a heading may end with ``>``, which aligns its column to the
+    right, or ``<``, and its greatest width.
 
     With `spare` a column that says nothing is left out, and on a narrow screen those of `spare`,
     the first first; then only the last column, or the one that is named, is folded. Of many rows
@@ -210,7 +212,7 @@ def print_table(
     """
     shown = rows[:_LINES] if others else rows
     cells = [[word(each) if isinstance(each, str) else each for each in row] for row in shown]
-    kept = {heading.removesuffix(">"): place for place, heading in enumerate(headings)}
+    kept = {_MARK.sub("", heading): place for place, heading in enumerate(headings)}
     last = folded or [*kept][-1]
     wide = {
         name: max(*map(cell_len, name.split("\n")), 1, *(row[place].cell_len for row in cells))
@@ -227,9 +229,11 @@ def print_table(
     gap = 2 if sum(wide[name] + 2 for name in kept) - 2 <= screen.width else 1
     table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
     for name, place in kept.items():
+        mark = headings[place].removeprefix(name)
         table.add_column(
             name,
-            justify="right" if headings[place].endswith(">") else "left",
+            justify="right" if mark.startswith(">") else "left",
+            max_width=int(mark[1:]) if mark[1:] else None,
             overflow="fold",
             no_wrap=spare is not None and name != last,
         )

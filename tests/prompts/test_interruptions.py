@@ -16,7 +16,9 @@ from pathlib import Path
 
 import pytest
 
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.life.state import state_now
 from mlg_troubleshoot.store import Store
 from tests.cli.conftest import mlg
 
@@ -178,8 +180,11 @@ def test_a_second_visit_loses_no_answer_at_any_question(
         child.sendline(text)
     child.expect_exact("Enter ends > ")
     child.close(force=True)
-    found = lives(Store(trial.store))["N1", "LH"].inspections[-1].inspection
-    assert [str(found.entered[n]) for n in (3, 4, 5)] == ["4 thou", "6thou", "5 thou"]
+    visits = lives(Store(trial.store))["N1", "LH"].visits
+    found = state_now(visits, load_gear())
+    assert found is not None
+    assert [str(found.inspection.entered[n]) for n in (3, 4, 5)] == ["4 thou", "6thou", "5 thou"]
+    assert sorted(visit.inspection.restored_joints for visit in visits) == [(), (), (3, 5)]
 
 
 if __name__ == "__main__":
