@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri, pdtrc
+from scipy.special import ndtri
 
 from mlg_troubleshoot.arrays import Array, Mask, numbered
 from mlg_troubleshoot.decision.columns import LANDINGS
@@ -25,7 +25,6 @@ from mlg_troubleshoot.diagnosis.wear import (
     steps_of,
     visits,
 )
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -118,7 +117,7 @@ def data_condition(table: DiagnosisTable, gear: Gear) -> tuple[tuple[DataConditi
             for rows, (kind, said) in zip(each, _ASIDE.items(), strict=True)
             if rows.any()
         ),
-        *_selected(table, gear),
+        *_selected(table),
         *_falls(table),
     )
     return found, aside
@@ -176,12 +175,10 @@ def _copies(table: DiagnosisTable) -> Mask:
         before[rows[1:]] = values[rows[:-1]]
     # The least value may stand for all that are smaller.
     read = (values > np.min(values[values > 0.0], initial=np.inf)) & np.isfinite(before)
-    count = read.sum(axis=1)
-    same = (values == before).all(axis=1) & (count >= LEAST_ALIKE)
+    same = (values == before).all(axis=1) & (read.sum(axis=1) >= LEAST_ALIKE)
     others = read & ~same[:, None]
-    usual = np.sum(others & (values == before)) / max(others.sum(), 1)
-    by_chance = float(np.sum(usual ** count[count > 0]))
-    return np.asarray(same & (pdtrc(same.sum() - 1, by_chance) < BY_CHANCE))
+    alike = float(np.sum(others & (values == before)) / max(int(others.sum()), 1))
+    return _beyond_chance(same, alike, read)
 
 
 def _identical(table: DiagnosisTable) -> Mask:
@@ -189,44 +186,46 @@ def _identical(table: DiagnosisTable) -> Mask:
     allows of the values of the other rows.
     """
     values = read_in(table)
-    count = np.isfinite(values).sum(axis=1)
+    read = np.isfinite(values)
     first = np.nanmax(values, axis=1, initial=0.0)
-    same = ~np.any(values != first[:, None], axis=1, where=np.isfinite(values))
-    same &= (first > 0.0) & (count >= LEAST_ALIKE)
+    same = ~np.any(values != first[:, None], axis=1, where=read)
+    same &= (first > 0.0) & (read.sum(axis=1) >= LEAST_ALIKE)
     others = values[~same]
     often = np.unique(others[np.isfinite(others)], return_counts=True)[1]
-    alike = np.sum(often**2) / max(int(often.sum()) ** 2, 1)
-    return np.asarray(same & (len(values) * alike ** np.maximum(count - 1.0, 0.0) < BY_CHANCE))
+    alike = float(np.sum(often**2) / max(int(often.sum()) ** 2, 1))
+    return _beyond_chance(same, alike, read[:, 1:])
+
+
+def _beyond_chance(same: Mask, alike: float, read: Mask) -> Mask:
+    """Rows of which all values that were read are the same, if two are alike by such a chance."""
+    return np.asarray(same & (len(same) * alike ** read.sum(axis=1) < BY_CHANCE))
 
 
 def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
     """Values on a step of twice their standard uncertainty or more: half a step is as large."""
     used = table.take(rows)
-    steps = steps_of(used, read_in(used))
-    for step in np.unique(steps[steps >= 2.0 * np.median(used.gauge_u_in)]).tolist():
-        share = float(np.mean(steps == step))
-        # What rounding takes away depends on the values where the step is larger than twice their
-        # standard deviation, that of the rounding taken out (Sheppard's corrections).
-        spread = np.nanvar(used.clearance_in[steps == step]) - step**2 / 12.0
-        yield DataCondition(
-            "rounded",
-            f"clearances, to {step:.4g} in{_whose(used, steps == step)}",
-            share,
-            f"each is known to ± {0.5 * step:.4g} in only; small effects of joints are not seen",
-            "the value as the gauge shows it, to 0.0005 in",
-            bool(share > _MANY_CUT and step**2 > 4.0 * spread),
-        )
-    known = used.plunger_gauge_u_in
-    least = 2.0 * (DEFAULT_PLUNGER_U_IN if known is None else np.nanmedian(known))
-    steps = steps_of(used, used.readings_in)
-    for step in np.unique(steps[steps >= least]).tolist():
-        yield DataCondition(
-            "rounded",
-            f"plunger readings, to {step:.4g} in{_whose(used, steps == step)}",
-            float(np.mean(steps == step)),
-            f"each is known to ± {0.5 * step:.4g} in only",
-            "the plunger to 0.001 in",
-        )
+    declared = used.plunger_gauge_u_in
+    u = DEFAULT_PLUNGER_U_IN if declared is None else np.nanmedian(declared)
+    for what, values, gauge_u, record in (
+        ("clearances", read_in(used), np.median(used.gauge_u_in), "the clearance to 0.0005 in"),
+        ("plunger readings", used.readings_in, u, "the plunger to 0.001 in"),
+    ):
+        steps = steps_of(used, values)
+        for step in np.unique(steps[steps >= 2.0 * gauge_u]).tolist():
+            on = steps == step
+            share = float(np.mean(on))
+            # What rounding takes away depends on the values where the step is larger than twice
+            # their standard deviation, that of the rounding taken out (Sheppard's corrections).
+            spread = np.nanvar(values[on]) - step**2 / 12.0
+            cut = what == "clearances" and share > _MANY_CUT and step**2 > 4.0 * spread
+            yield DataCondition(
+                "rounded",
+                f"{what}, to {step:.4g} in{_whose(used, on)}",
+                share,
+                f"each is known to ± {0.5 * step:.4g} in only: smaller effects are not seen",
+                record,
+                bool(cut),
+            )
 
 
 def _whose(table: DiagnosisTable, rows: Mask) -> str:
@@ -342,13 +341,13 @@ def _fewer_as_worn(table: DiagnosisTable, rows: Mask) -> bool:
     return bool(spearmanr(landings[known], blanks, alternative="less").pvalue < BY_CHANCE)
 
 
-def _selected(table: DiagnosisTable, gear: Gear) -> Iterator[DataCondition]:
-    """Whether the plunger was read depends on the displacement that is predicted."""
+def _selected(table: DiagnosisTable) -> Iterator[DataCondition]:
+    """Whether the plunger was read depends on how worn the gear is."""
     read = np.isfinite(table.readings_in).any(axis=1)
-    over = worst_case(gear.model, np.nan_to_num(table.clearance_in)).over_in
-    use = np.isfinite(table.clearance_in).any(axis=1) & np.isfinite(over)
-    one = over[use & read]
-    other = over[use & ~read]
+    known = np.isfinite(table.clearance_in)
+    worn = np.nan_to_num(table.clearance_in).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    one = worn[known.any(axis=1) & read]
+    other = worn[known.any(axis=1) & ~read]
     if min(len(one), len(other)) < 2 * LEAST_ROWS:
         return
     from scipy.stats import mannwhitneyu

@@ -36,7 +36,6 @@ from mlg_troubleshoot.diagnosis.noise import (
     Rows,
     estimate_repeatability,
     measured_uncertainty,
-    robust_scale,
 )
 from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -47,7 +46,6 @@ from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import EffectColumns
-from mlg_troubleshoot.misfit.covariance import FAR
 from mlg_troubleshoot.misfit.explanation import Key
 from mlg_troubleshoot.misfit.fitting import shrunk
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
@@ -61,15 +59,13 @@ _MOST_TIMES = 20
 _MANY_FAULTS = 0.15
 # Measured over predicted displacement: further from 1 than this, or negative, is not a misfit. [1]
 _MOST_RATIO = 4.0
-# Mean square left by all-joint effects, over that left by one scale or by a constant, from which
-# they explain. Ten factors take 5 % off by chance. [1]
-_CLEARLY_LESS = 0.7
 # Above this ratio readings against the prediction are not an error of the sign, which gives -0.9 to
 # -1.1 (20 simulated tables with one cause or none), nor of a unit: that the clearances tell of them
 # beyond chance is enough. [1]
 _SIGN_SLIP = -0.75
-# And where one scale leaves more than this of the variance, which a slip of the unit does not (of
-# 60 tables with one cause, S = 10 and 25, seeds 8,700,000 and on, at most 0.25 in 57). [1]
+# Else: where one scale leaves more than this of the variance, a slip of the sign or the unit is not
+# what is wrong (of 60 tables with one cause, S = 10 and 25, seeds 8,700,000 and on, at most 0.25 in
+# 57). [1]
 _NO_SCALE = 0.3
 
 
@@ -556,9 +552,8 @@ def _comparable(measured_in: Array, predicted_in: Array, contribution_in: Array)
     ratio = float(np.median(measured_in[large] / np.maximum(predicted_in[large], 1e-9)))
     if 1.0 / _MOST_RATIO < ratio < _MOST_RATIO or not np.any(predicted_in > 0.0):
         return
-    if contribution_in.any() and _explained_by_clearances(
-        measured_in, predicted_in, contribution_in, _SIGN_SLIP < ratio < 0.0
-    ):
+    no_slip = _SIGN_SLIP < ratio < 0.0
+    if _explained_by_clearances(measured_in, predicted_in, contribution_in, no_slip):
         return
     check = (
         "Check the unit and the convention of the clearances, and that the gauge moves with the"
@@ -578,32 +573,22 @@ def _comparable(measured_in: Array, predicted_in: Array, contribution_in: Array)
 def _explained_by_clearances(
     measured_in: Array, predicted_in: Array, contribution_in: Array, no_sign_slip: bool
 ) -> bool:
-    """Tell whether factors of −1 to 1, joint by joint, explain readings that no one scale of the
-    prediction does.
-
-    Nor one scale with one joint that was written in millimetres. What is not an entry error is
-    reported only beyond chance.
+    """Tell whether factors of −1 to 1, joint by joint, explain readings beyond chance that no one
+    scale of the prediction does, nor one with a joint that was written in millimetres; where there
+    is no slip of the sign, that a constant does not.
     """
     from scipy.optimize import lsq_linear
 
-    near = np.ones(len(measured_in), bool)
-    for _ in range(4):
-        factors = lsq_linear(contribution_in[near], measured_in[near], (-1.0, 1.0)).x
-        left = measured_in - contribution_in @ factors
-        about_zero = robust_scale(np.hstack([left, -left]))
-        near = np.abs(left) <= FAR * max(about_zero, 1e-9)
+    factors = lsq_linear(contribution_in, measured_in, (-1.0, 1.0)).x
     in_mm = predicted_in[:, None] - (1.0 - 1.0 / MM_PER_IN) * contribution_in
-    simple = np.column_stack([predicted_in, in_mm])[near]
-    measured = measured_in[near]
-    one = measured[:, None] - simple * (measured @ simple / np.sum(simple**2, axis=0))
-    unexplained = np.mean(left[near] ** 2)
-    constant = np.var(measured)
-    alone = constant if no_sign_slip else min(np.mean(one**2, axis=0).min(), constant)
-    beyond_chance = chdtri(contribution_in.shape[1], BY_CHANCE)
-    surely = len(measured) * np.log(alone / unexplained) > beyond_chance
-    if no_sign_slip:
-        return bool(surely)
-    return bool(unexplained < _CLEARLY_LESS * alone or (surely and alone > _NO_SCALE * constant))
+    simple = np.column_stack([predicted_in, in_mm])
+    one = measured_in[:, None] - simple * (measured_in @ simple / np.sum(simple**2, axis=0))
+    constant = np.var(measured_in)
+    alone = constant if no_sign_slip else np.mean(one**2, axis=0).min()
+    left = np.mean((measured_in - contribution_in @ factors) ** 2)
+    surely = len(one) * np.log(min(alone, constant) / left)
+    beyond_chance = surely > chdtri(contribution_in.shape[1], BY_CHANCE)
+    return bool(beyond_chance and alone > _NO_SCALE * constant)
 
 
 def _unsaid(table: DiagnosisTable) -> tuple[str, ...]:

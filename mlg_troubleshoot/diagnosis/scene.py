@@ -39,14 +39,13 @@ def build_scene(
     filled_in, shared_in = (
         np.sqrt(np.sum((slopes * u) ** 2, axis=1)) for u in (worn.u_row_in, worn.u_gear_in)
     )
-    fleet_in = slopes * worn.u_fleet_in
     rows = Rows(
         scene.over_in,
         table.tails,
         table.gears,
         filled_in,
         shared_in,
-        np.hstack([fleet_in, np.sum(fleet_in, axis=1, keepdims=True) * worn.together]),
+        slopes * worn.u_fleet_in,
         np.nan_to_num(read - scene.over_in),
         *small_trends(table),
     )

@@ -59,10 +59,6 @@ _ON_STEP = 0.02
 # How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the
 # others: the share of its variance that is the gear's. [1]
 OWN_GEAR = GEARS_APART**2 / (JOINTS_APART**2 + GEARS_APART**2 + ROWS_APART**2)
-# Standard deviations, supposed: how much further that may follow one read joint, and of exponents
-# of wear. [1]
-FOLLOWS = 0.2
-BENT = FOLLOWS / 2
 
 
 @dataclass(frozen=True)
@@ -94,15 +90,12 @@ class LikelyClearances:
     u_row_in, u_gear_in, u_fleet_in : ndarray, shape (n, n_joints)
         Standard uncertainty of what was not read: of each row, common to a gear's rows, common to
         all rows. [in]
-    together : ndarray, shape (n, k)
-        Further changes of `u_fleet_in`, of all joints that nobody read alike. [1]
     """
 
     likely_in: Array
     u_row_in: Array
     u_gear_in: Array
     u_fleet_in: Array
-    together: Array
 
 
 def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
@@ -132,7 +125,6 @@ def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
     spread = np.where(known, 0.0, np.sqrt(history.scatter_in2))
     shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))
     common = np.zeros_like(readings)
-    together = np.empty((len(readings), 0))
     seen = np.isfinite(readings).any(axis=0)
     if seen.any() and not seen.all():
         lines = np.polyfit(kilo, history.expected_in[:, seen], 1 if np.ptp(kilo) > 0.0 else 0)
@@ -150,12 +142,7 @@ def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
         )
         likely[:, ~seen], common[:, ~seen] = worn, JOINTS_APART * worn
         shared[:, ~seen], spread[:, ~seen] = GEARS_APART * worn, rows_apart * worn
-        bent = BENT * np.log(np.maximum(kilo, 0.1 * np.mean(kilo)) + _TIGHT_IN)[:, None]
-        together = (
-            np.hstack([FOLLOWS * further, bent - np.mean(bent), BENT * np.mean(worn) / line])
-            / JOINTS_APART
-        )
-    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, together)
+    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common)
 
 
 def gears_of(table: DiagnosisTable) -> Places:

@@ -366,24 +366,12 @@ class _Study:
             spare = max(spare - len(chosen) / len(own), 1.0 / len(own))
             scale = self.scale(own * at.unit, spare)
 
-    def settled(self, start: Array) -> _Point:
-        """Search; where that ends with a discrepancy, also from what explains most without one,
-        which may be the bend of a large change.
-        """
-        at = self.search(start)
-        if at.likeliest.context:
-            found = at.follows.posterior
-            plain = next(e for e in found.likeliest if e.members and not e.context)
-            again = self.search(self.fit(at, self.chosen(found.names_of(plain))))
-            at = at if again.likeliest.context else again
-        return at
-
     def diagnosis(self) -> SimulationDiagnosis:
         """Say what is wrong, what may be, what that gains, and how residuals look."""
         run = self.run
         names = run.names
         start = self.fit(self.point(run.nominal, self.first_scale(run.nominal)), [])
-        at = self.settled(start)
+        at = self.search(start)
         follows = at.follows
         verdict = follows.verdict
         causes = self.causes(at)

@@ -91,24 +91,6 @@ def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(
     assert column == pytest.approx(slope, abs=0.03 * np.max(np.abs(slope)))
 
 
-def test_a_convention_slip_is_expected_where_the_clearances_look_twice_as_worn(gear: Gear) -> None:
-    plain = fleet(gear.model)
-    own = plain.factors["tail_no"] == "N103"
-    twice = replace(plain, clearance_in=plain.clearance_in * np.where(own, 2.0, 1.0)[:, None])
-    half = replace(plain, readings_in=plain.readings_in * np.where(own, 0.5, 1.0)[:, None])
-    written, read = (
-        next(
-            candidate.rarity
-            for candidate in BY_NAME["convention_slip"].candidates(
-                scene_of(gear.model, table, gear.discrepancies)
-            )
-            if candidate.target == "tail N103" and "days" not in candidate.setting
-        )
-        for table in (twice, half)
-    )
-    assert written > read + 4.0
-
-
 def test_a_gear_that_was_never_read_hides_no_convention_slip(gear: Gear) -> None:
     plain = fleet(gear.model)
     own = plain.factors["tail_no"] == "N103"

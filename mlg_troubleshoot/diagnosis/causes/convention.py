@@ -10,15 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask, numbered
-from mlg_troubleshoot.decision.columns import LANDINGS
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, levels
 from mlg_troubleshoot.diagnosis.causes.reading import change_date
-from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import gears_of, landings_of, likely_clearances
+from mlg_troubleshoot.diagnosis.wear import likely_clearances
 from mlg_troubleshoot.gear.adjustment import Adjustment
-from mlg_troubleshoot.misfit.beliefs import Beliefs
 
 # Rows from which a group can show a convention of its own.
 _LEAST_ROWS = 6
@@ -74,9 +71,7 @@ class ConventionSlip(Cause):
                 found.append(Candidate(self, target, setting | stretch, rarity=rarity))
         offered = len({candidate.target for candidate in found})
         for candidate in found:
-            rarity = candidate.rarity + float(np.log(offered / len(groups)))
-            rarity += _odds_of_wear(scene.table, candidate.setting)
-            yield replace(candidate, rarity=rarity)
+            yield replace(candidate, rarity=candidate.rarity + float(np.log(offered / len(groups))))
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Take the group's clearances as they were meant, and what wear makes expect of all rows
@@ -117,42 +112,6 @@ def _stretches(
                 },
                 -float(np.log(0.5 * len(rows) * (len(rows) + 1))),
             )
-
-
-def _odds_of_wear(table: DiagnosisTable, setting: Any) -> float:
-    """Logarithm of how many times likelier the clearances themselves are if they were written so:
-    their joints look twice, or half, as worn as their landings make expect of the fleet.
-    """
-    apart = _log_wear(table)
-    known = np.isfinite(apart)
-    rows = _rows_of(table, setting)[known]
-    if not rows.any():
-        return 0.0
-    apart = apart[known]
-    gears = numbered(gears_of(table)[known])
-    mean = np.bincount(gears, apart) / np.bincount(gears)
-    within = np.sum((apart - mean[gears]) ** 2) / max(len(apart) - len(mean), 1)
-    share = np.bincount(gears[rows]) / rows.sum()
-    variance = robust_scale(mean) ** 2 * np.sum(share**2) + within / rows.sum()
-    variance += Beliefs().exact ** 2
-    slip = np.log(setting["written_factor"])
-    off = np.mean(apart[rows]) - np.median(apart)
-    return float(slip * (off - 0.5 * slip) / variance)
-
-
-def _log_wear(table: DiagnosisTable) -> Array:
-    """Logarithm of the clearances of each row over what its landings make expect of the fleet; NaN
-    without clearances, shape (n,). [1]
-    """
-    read = np.nan_to_num(table.clearance_in)
-    known = np.isfinite(table.clearance_in)
-    usual = read.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    worn = read.sum(axis=1) / np.maximum(known @ usual, np.finfo(float).tiny)
-    some = worn > 0.0
-    kilo = landings_of(table.numbers(LANDINGS.variable), gears_of(table))[0]
-    line = np.polyfit(kilo[some], worn[some], 1 if np.ptp(kilo[some]) > 0.0 else 0)
-    expected = np.maximum(np.polyval(line, kilo), worn[some].min())
-    return np.asarray(np.log(np.where(some, worn, np.nan) / expected))
 
 
 def _rows_of(table: DiagnosisTable, setting: Any) -> Mask:

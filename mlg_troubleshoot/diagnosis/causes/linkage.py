@@ -16,16 +16,15 @@ from mlg_troubleshoot.diagnosis.causes.base import (
     filled,
     share_never_read,
 )
-from mlg_troubleshoot.diagnosis.wear import BENT
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
 # Temperature at which lengths are as drawn (ISO 1), and usual pressure of aircraft hydraulics
 # (MIL-H-5440).
 REFERENCE_TEMPERATURE_C = 20
 REFERENCE_PRESSURE_PSI = 3000
-# Exponents with which parts wear with landings: nodes of a Gauss-Hermite quadrature over the
-# normal logarithm of what is believed of joints that nobody read.
-_WEAR_EXPONENTS = tuple(np.exp(BENT * np.sqrt(3) * np.arange(-1, 2)).round(2).tolist())
+# Exponents with which parts wear with landings: nodes of a Gauss-Hermite quadrature over a normal
+# logarithm of standard deviation a tenth.
+_WEAR_EXPONENTS = tuple(np.exp(np.sqrt(3) / 10 * np.arange(-1, 2)).round(2).tolist())
 
 
 class OutOfPlaneTilt(Cause):
