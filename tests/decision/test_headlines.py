@@ -240,12 +240,6 @@ def test_no_two_sentences_of_one_screen_contradict_each_other(
         assert Listed.of(a).is_fine <= (a.tone is GREEN)
 
 
-def test_a_gear_that_is_opened_again_is_told_the_same(gear: Gear, table: IndexTable) -> None:
-    rows = drawn_states(500, 61)
-    first, again = (assess(rows, gear, table) for _ in range(2))
-    assert [a.next_action for a in first] == [a.next_action for a in again]
-
-
 @pytest.mark.parametrize("n", [200, pytest.param(2000, marks=pytest.mark.slow)])
 def test_instructions_are_short_and_single(gear: Gear, table: IndexTable, n: int) -> None:
     for a in judged(gear, table, n):

@@ -110,24 +110,6 @@ def test_no_gain_is_claimed_where_nothing_is_named(nothing: Diagnosis) -> None:
     assert (nothing.verdict, nothing.gain, nothing.terms) == ("NONE", None, ())
 
 
-def test_the_same_table_gives_the_same_diagnosis(
-    gear: Gear, table: DiagnosisTable, found: Diagnosis
-) -> None:
-    again = diagnose(gear.model, table, gear.discrepancies)
-    for part in ("verdict", "causes", "gain", "probabilities"):
-        assert repr(getattr(again, part)) == repr(getattr(found, part))
-
-
-def test_the_order_of_the_rows_does_not_matter_to_the_name(
-    gear: Gear, table: DiagnosisTable
-) -> None:
-    turned = table.take(np.arange(len(table))[::-1])
-    found = diagnose(gear.model, turned, gear.discrepancies)
-    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [
-        ("gauge_bias", "gauge G-2")
-    ]
-
-
 def test_a_cause_whose_column_is_missing_is_not_testable(gear: Gear, plain: DiagnosisTable) -> None:
     bare = fleet(
         gear.model,

@@ -195,18 +195,6 @@ def test_a_few_readings_far_out_do_not_move_the_value() -> None:
     assert found.causes[0].value == pytest.approx(0.3, abs=0.05)
 
 
-def test_the_interval_of_an_offset_is_as_wide_as_the_scatter_between_groups_makes_it() -> None:
-    rng = np.random.default_rng(14)
-    groups = np.arange(120) % 12
-    read = (6.0 + rng.standard_normal(12))[groups] + 0.1 * rng.standard_normal(120)
-    suspects = [Suspect("offset", 0.0, 0.1)]
-    found = diagnose_simulation(
-        lambda p: np.full((120, 1), p["offset"]), read, suspects, groups=groups
-    )
-    low, high = found.causes[0].interval
-    assert high - low > 2.0 / np.sqrt(12.0)
-
-
 def test_a_curve_that_no_suspect_has_is_not_lent_to_the_one_most_like_it() -> None:
     rng = np.random.default_rng(16)
     x = np.linspace(-1.0, 1.0, 90)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
@@ -18,6 +17,8 @@ from mlg_troubleshoot.life.wear_paths import placed_in_time, stretches
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.cli.conftest import mlg, row
+
+from .places import table
 
 Visit = tuple[str, float | None, Mapping[int, float]]
 
@@ -142,11 +143,7 @@ def keep(folder: Path, visits: Sequence[Visit]) -> None:
         )
         for day, landings, clearance in visits
     ]
-    with (folder / "table.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    mlg("check", folder / "table.csv", "--keep")
+    mlg("check", table(folder, *rows), "--keep")
 
 
 def fleet() -> dict[str, Any]:
