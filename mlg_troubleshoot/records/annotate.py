@@ -12,7 +12,7 @@ from functools import partial
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
-from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile
+from zipfile import ZIP_DEFLATED, ZipFile
 
 from openpyxl import Workbook, load_workbook
 from openpyxl.cell import Cell, MergedCell
@@ -32,6 +32,7 @@ from mlg_troubleshoot.records.model import ReadResult, SheetLayout
 from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.template import BOLD, HEADER_FILL
 from mlg_troubleshoot.records.xlsx import XlsxFile, XlsxSheet
+from mlg_troubleshoot.records.zipguard import PARSER_ERRORS
 from mlg_troubleshoot.units import LengthUnit
 
 _BAD_FILL = "FFFFB3B3"
@@ -92,17 +93,7 @@ def annotate_workbook(
             widths = {sheet.name: sheet.width() for sheet in judged.sheets}
             _annotate(book, label, result, verdicts, over_limit, widths)
             ExcelWriter(book, package).save()
-    except (
-        FileRefusedError,
-        BadZipFile,
-        KeyError,
-        ValueError,
-        TypeError,
-        AttributeError,
-        IndexError,
-        SyntaxError,
-        OSError,
-    ) as error:
+    except (FileRefusedError, *PARSER_ERRORS) as error:
         raise OutputError(
             f"{source} cannot be copied ({type(error).__name__}): a part of it is not understood",
             "Open it in a spreadsheet program, save it again as .xlsx, and annotate the copy.",

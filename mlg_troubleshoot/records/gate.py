@@ -54,21 +54,10 @@ def judge_row(
         options.decimal_comma,
     )
     columns = Columns(Header(1, tuple(values), (1,)), table, by_hand=True)
-    problems += [
-        Problem(
-            "column_unknown",
-            None,
-            None,
-            None,
-            p.header,
-            None,
-            p.header,
-            "a column of the inspection table",
-            "",
-        )
-        for p in columns.placed
-        if p.field is None and not p.refused
-    ]
+    for p in columns.placed:
+        if p.field is None and not p.refused:
+            expected = "a column of the inspection table"
+            table.tell("column_unknown", p.header, expected, "", p.place)
     reader = RowReader(columns.placed, table)
     rows = [reader.read(Row(1, [typed(value) for value in values.values()]))]
     reader.settle_dates(rows)

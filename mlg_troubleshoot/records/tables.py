@@ -404,10 +404,13 @@ class _Table:
         """
         silent = replace(self._table, report=lambda _problem: None)
         reader = RowReader(self._columns.placed, silent)
-        others = self._alarms(self._out.rows)
+        worst: dict[str, float] = {}
+        for row in self._out.rows:
+            for what, value in self._alarms(row):
+                worst[what] = max(value, worst.get(what, 0.0))
         for number, name, cells in self._aside:
-            found = self._alarms([reader.read(Row(number, [*cells]))])
-            alarms = [what for what, value in found.items() if value > others.get(what, 0.0)]
+            found = self._alarms(reader.read(Row(number, [*cells])))
+            alarms = [what for what, value in found if value > worst.get(what, 0.0)]
             texts = [*filter(None, map(show, cells))]
             if _JOINT_SAID.search(" ".join(texts)) and any(map(_FRACTION.search, texts)):
                 alarms.append("a joint and a number in words")
@@ -421,36 +424,28 @@ class _Table:
                 )
                 self._out.rows.append(self._reader.faulty(number, cells, why))
 
-    def _alarms(self, rows: Sequence[Inspection | InvalidRow]) -> dict[str, float]:
-        """What rows hold beyond a limit or what no reading can be, each with its largest value.
-        [in]
-        """
+    def _alarms(self, row: Inspection | InvalidRow) -> Iterator[tuple[str, float]]:
+        """What a row holds beyond a limit or what no reading can be, each with its value. [in]"""
         options = self._table.options
         lowest = min(options.limit_in.values(), default=math.inf)
-        of_readings = {self._texts[index] for index in self._evidence}
-        worst: dict[str, float] = {}
-        for row in rows:
-            found = {}
-            known = row
-            if isinstance(row, InvalidRow):
-                found = {
-                    f"an unclear {header}": 1.0 for header in row.correct if header in of_readings
-                }
-                known = row.understood or row
-            if isinstance(known, Inspection):
-                # Without its convention a reading was taken as the smallest radial value.
-                factor = 1.0 if known.convention else ClearanceConvention.TOTAL_PLAY.per_radial
-                for joint, value in known.clearance_in.items():
-                    if factor * value > options.limit_in.get(joint, lowest) + ROUNDING_IN:
-                        found[f"clearance of joint {joint or 'any'} over its limit"] = value
-                far = max(map(abs, known.readings_in), default=0.0)
-                if far > options.margin_in + ROUNDING_IN:
-                    found["a plunger reading beyond the margin"] = far
-                if known.outcome is Outcome.FAILED:
-                    found["FAILED"] = 1.0
-            for what, value in found.items():
-                worst[what] = max(value, worst.get(what, 0.0))
-        return worst
+        known = row.understood if isinstance(row, InvalidRow) else row
+        if isinstance(row, InvalidRow):
+            of_readings = {self._texts[index] for index in self._evidence}
+            yield from (
+                (f"an unclear {each}", 1.0) for each in of_readings.intersection(row.correct)
+            )
+        if known is None:
+            return
+        # Without its convention a reading was taken as the smallest radial value.
+        factor = 1.0 if known.convention else ClearanceConvention.TOTAL_PLAY.per_radial
+        for joint, value in known.clearance_in.items():
+            if factor * value > options.limit_in.get(joint, lowest) + ROUNDING_IN:
+                yield f"clearance of joint {joint or 'any'} over its limit", value
+        far = max(map(abs, known.readings_in), default=0.0)
+        if far > options.margin_in + ROUNDING_IN:
+            yield "a plunger reading beyond the margin", far
+        if known.outcome is Outcome.FAILED:
+            yield "FAILED", 1.0
 
     def finish(self) -> None:
         """Read what could be read only with all rows at hand."""

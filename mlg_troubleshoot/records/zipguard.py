@@ -27,22 +27,11 @@ _BEFORE_ROOT = re.compile(
 # part.
 MAX_OPEN_BYTES = 2_000_000
 MAX_ITEMS = 1 << 20
-# What zipfile raises: NotImplementedError for compression that it lacks, RuntimeError for encrypted
-# members.
-_ZIP_ERRORS = (
-    zipfile.BadZipFile,
-    zlib.error,
-    EOFError,
-    OSError,
-    NotImplementedError,
-    ValueError,
-    RuntimeError,
-)
-# What openpyxl, xlrd and the parser of XML raise on damaged bytes: a part or an attribute that is
-# missing, a wrong kind of element or value, a place outside the texts or the bytes, XML that is not
-# well-formed (a SyntaxError, with lxml or without), a text in no known encoding, arithmetic on
-# wrong lengths, their own checks.
-_PARSER_ERRORS = (
+# What zipfile, openpyxl, xlrd and the parser of XML raise on damaged bytes: a part or an attribute
+# that is missing, a wrong kind of element or value, a place outside the texts or the bytes, XML
+# that is not well-formed (a SyntaxError, with lxml or without), a text in no known encoding,
+# arithmetic on wrong lengths, unknown compression or encryption, their own checks.
+PARSER_ERRORS = (
     ArithmeticError,
     AssertionError,
     AttributeError,
@@ -56,6 +45,8 @@ _PARSER_ERRORS = (
     TypeError,
     ValueError,
     struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
 )
 
 
@@ -68,7 +59,7 @@ def damage(what: str) -> Iterator[None]:
     """Turn what a foreign parser raises into a refusal: the one place where that happens."""
     try:
         yield
-    except _PARSER_ERRORS:
+    except PARSER_ERRORS:
         raise damaged(what) from None
 
 
@@ -76,11 +67,9 @@ class GuardedZip:
     """A packed workbook, checked before anything in it is parsed."""
 
     def __init__(self, data: bytes) -> None:
-        try:
+        with damage("its list of parts cannot be read"):
             self._zip = zipfile.ZipFile(io.BytesIO(data))
             members = self._zip.infolist()
-        except _ZIP_ERRORS:
-            raise damaged("its list of parts cannot be read") from None
         if len(members) > MAX_MEMBERS:
             raise too_large(f"{len(members)} parts in one workbook")
         self._members: dict[str, zipfile.ZipInfo] = {}
@@ -131,15 +120,12 @@ class GuardedZip:
     def chunks(self, name: str) -> Iterator[bytes]:
         member = self._member(name)
         total = 0
-        try:
-            with self._zip.open(member) as part:
-                while piece := part.read(_CHUNK):
-                    total += len(piece)
-                    if total > MAX_EXPANDED_BYTES:
-                        raise too_large(f"{name} unpacks to more than it claims")
-                    yield piece
-        except _ZIP_ERRORS:
-            raise damaged(f"{name} cannot be unpacked") from None
+        with damage(f"{name} cannot be unpacked"), self._zip.open(member) as part:
+            while piece := part.read(_CHUNK):
+                total += len(piece)
+                if total > MAX_EXPANDED_BYTES:
+                    raise too_large(f"{name} unpacks to more than it claims")
+                yield piece
 
 
 class Stream:
