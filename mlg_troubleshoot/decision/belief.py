@@ -510,7 +510,7 @@ def _drawn(even: Array, weights: Array) -> Places:
     """One place of each row, by its weights."""
     steps = np.cumsum(weights, axis=1)
     at = even * steps[:, -1]
-    return np.asarray((steps < at[:, None]).sum(axis=1).clip(max=weights.shape[1] - 1))
+    return np.asarray(np.argmax(steps >= at[:, None], axis=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
