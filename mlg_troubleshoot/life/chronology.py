@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from math import hypot, inf
 
-from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.life.state import GearVisit
 
 # More records than this are not listed in one sentence. [1]
 _MOST_NAMED = 6
@@ -21,27 +21,31 @@ _CLEARLY = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Date (ISO 8601, empty if not known) and landings of one inspection or repair, with what was
-    read, if it is an inspection, or the joints that were restored.
+    """Date (ISO 8601, empty if not known) and landings of one inspection or repair.
+
+    joints: those that were restored, none where the rigging was set right; None of an inspection.
+    visit: who states it; of a repair that an inspection states it is the inspection.
     """
 
     day: str
     landings: float | None
-    inspection: Inspection | None = field(default=None, repr=False)
-    restored: frozenset[int] = frozenset()
+    joints: frozenset[int] | None = None
+    visit: GearVisit | None = field(default=None, repr=False)
+    is_alone: bool = False
 
     @classmethod
-    def of(cls, inspection: Inspection) -> Moment:
-        day = inspection.inspection_date
-        return cls("" if day is None else day.isoformat(), inspection.gear_landings, inspection)
+    def of(cls, visit: GearVisit) -> Moment:
+        """An inspection."""
+        day = "" if visit.at is None else visit.at.isoformat()
+        return cls(day, visit.inspection.gear_landings, None, visit)
 
     @property
     def read(self) -> Mapping[int, tuple[float, float]]:
         """Radial clearance of each joint that was read, and its standard uncertainty. [in]"""
-        if self.inspection is None:
+        if self.visit is None or self.joints is not None:
             return {}
-        found = self.inspection.clearance_in
-        return {joint: (found[joint], self.inspection.gauge_u_of(joint)) for joint in found}
+        row = self.visit.inspection
+        return {n: (value, row.gauge_u_of(n)) for n, value in row.clearance_in.items()}
 
 
 def in_order(moments: Sequence[Moment]) -> list[int]:
@@ -104,7 +108,7 @@ def _restored(
     wider.
     """
     days = moments[before[-1]].day, moments[after[0]].day
-    recorded = (m.restored for m in moments if days[0] <= m.day <= days[1])
+    recorded = (m.joints for m in moments if m.joints and days[0] <= m.day <= days[1])
     restored = frozenset[int]().union(*recorded)
     last = {joint: reading for i in before for joint, reading in moments[i].read.items()}
     first = {joint: reading for i in after[::-1] for joint, reading in moments[i].read.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import date, datetime
 from functools import cached_property, lru_cache
 from operator import itemgetter
@@ -36,89 +36,20 @@ _TICK_S = 1e-6
 
 # Who judges is not part of what a record says, but decides whether it can be read.
 @lru_cache(_UNPACKED)
-def _inspection_of(record: Record, _judge: Judge | None) -> Inspection:
-    return inspection_from(record)
-
-
-@dataclass(frozen=True, slots=True)
-class KeptInspection:
-    """An inspection as it stands after corrections, unpacked when it is asked for.
-
-    first: as it was entered, which decides what was typed before it.
+def _unpacked(record: Record, _judge: Judge | None) -> tuple[Inspection, Mapping[str, str]]:
+    """The inspection of a record, and what else it says: what it supersedes, or where and when it
+    was entered before it was moved.
     """
-
-    record: Record
-    first: Record
-
-    @property
-    def inspection(self) -> Inspection:
-        return _inspection_of(self.record, self.record.judge)
-
-    @property
-    def moment(self) -> Moment:
-        return Moment.of(self.inspection)
-
-    def visit(self, place: float) -> GearVisit:
-        row = self.inspection
-        return GearVisit(row, place, row.source.file is None, self.record.digest)
+    body = record.body
+    return inspection_from(record, body), {n: v for n, v in body.items() if n != "inspection"}
 
 
-@dataclass(frozen=True, slots=True)
-class Repair:
-    """Joints that were restored on a day (ISO 8601, empty if not known), or none where the rigging
-    was set right, and the record that states it.
-    """
-
-    record: Record
-    day: str
-    joints: frozenset[int]
-    landings: float | None = None
-
-    @classmethod
-    def of(cls, record: Record) -> Repair:
-        """A repair that was recorded by itself."""
-        joints = frozenset(record.body.get("joints", ()))
-        return cls(record, record.day, joints, record.body.get("landings"))
-
-    @classmethod
-    def stated(cls, kept: KeptInspection) -> list[Repair]:
-        """What an inspection states of repairs."""
-        row = kept.inspection
-        day = "" if row.repair_date is None else _day_of(row.repair_date).isoformat()
-        rerigged = row.rigging_checked is RiggingCheck.CORRECTED
-        done = [frozenset(row.restored_joints)] * bool(row.restored_joints)
-        done += [frozenset()] * rerigged
-        return [cls(kept.record, day, joints) for joints in done if day]
-
-    @property
-    def moment(self) -> Moment:
-        return Moment(self.day, self.landings, restored=self.joints)
-
-    @property
-    def first(self) -> Record:
-        return self.record
-
-    def visit(self, place: float) -> GearVisit:
-        """The visit of a repair that was recorded by itself."""
-        record = self.record
-        at = record.body.get("at")
-        day = date.fromisoformat(self.day) if self.day else None
-        row = Inspection(
-            record.record_id or record.digest[:LEAST_OF_A_HASH],
-            record.tail_no,
-            Side(record.side),
-            ClearanceConvention.RADIAL,
-            {},
-            inspection_date=day,
-            gear_landings=self.landings,
-            restored_joints=tuple(sorted(self.joints)),
-            rigging_checked=None if self.joints else RiggingCheck.CORRECTED,
-            repair_date=datetime.fromisoformat(at) if at else day,
-        )
-        return GearVisit(row, place, "stated_by" not in record.body, record.digest)
+def inspection_of(record: Record) -> Inspection:
+    return _unpacked(record, record.judge)[0]
 
 
-Event = KeptInspection | Repair
+def more_of(record: Record) -> Mapping[str, str]:
+    return _unpacked(record, record.judge)[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,9 +84,9 @@ class GearLife:
 
     key: GearKey
     records: tuple[Record, ...]
-    places: Mapping[str, float]
-    events: tuple[Event, ...]
+    events: tuple[Moment, ...]
     warnings: tuple[str, ...]
+    voided: tuple[Record, ...] = ()
     overhauls: Mapping[int, frozenset[int]] = field(default_factory=dict)
     judged: Mapping[str, TodaysVerdict] = field(default_factory=dict)
     state: GearState | None = None
@@ -169,39 +100,23 @@ class GearLife:
     def notes(self) -> tuple[str, ...]:
         """What is to be known of its history: from where its landings begin anew."""
         return tuple(
-            f"Landings begin anew on {self.events[place].moment.day}: taken as an overhaul that"
+            f"Landings begin anew on {self.events[place].day}: taken as an overhaul that"
             f" restored {joint_list(sorted(joints))}. Landings before it are negative here."
             for place, joints in self.overhauls.items()
         )
 
     @cached_property
-    def inspections(self) -> tuple[KeptInspection, ...]:
-        return tuple(event for event in self.events if isinstance(event, KeptInspection))
-
-    @cached_property
-    def repairs(self) -> tuple[Repair, ...]:
-        """Restorations of joints and re-riggings."""
-        return tuple(event for event in self.events if isinstance(event, Repair))
-
-    @cached_property
-    def voided(self) -> list[Record]:
-        """Inspections that no longer count, as they were entered."""
-        one = first_keys(self.records)
-        standing = {one[each.first.key] for each in self.inspections}
-        return [
-            r
-            for r in self.records
-            if r.kind is RecordKind.INSPECTION and one[r.key] not in standing
-        ]
+    def inspections(self) -> tuple[GearVisit, ...]:
+        return tuple(at.visit for at in self.events if at.visit and at.joints is None)
 
     @property
-    def latest(self) -> KeptInspection | None:
-        return self.inspections[-1] if self.inspections else None
+    def repairs(self) -> tuple[Moment, ...]:
+        """Restorations of joints and re-riggings."""
+        return tuple(at for at in self.events if at.joints is not None)
 
-    def _place(self, first: Record) -> float:
-        """When something was entered first; what was moved here, at its former gear."""
-        entered = first.body.get("entered")
-        return self.places[first.digest] if entered is None else _clock(entered)
+    @property
+    def latest(self) -> GearVisit | None:
+        return self.inspections[-1] if self.inspections else None
 
     @cached_property
     def visits(self) -> tuple[GearVisit, ...]:
@@ -209,17 +124,13 @@ class GearLife:
         time.
         """
         return tuple(
-            event.visit(self._place(event.first))
-            for event in self.events
-            if isinstance(event, KeptInspection) or event.record.kind in _WORK
+            at.visit for at in self.events if at.visit and (at.joints is None or at.is_alone)
         )
 
 
-def lives(
-    store: Store, tail: str | None = None, side: str | None = None
-) -> dict[GearKey, GearLife]:
-    """Every gear's life, or those of one aircraft."""
-    return _lives(store.all() if tail is None else store.of_gear(tail, side))
+def lives(store: Store) -> dict[GearKey, GearLife]:
+    """Every gear's life."""
+    return _lives(store.all())
 
 
 def lives_of(store: Store, keys: Collection[GearKey]) -> dict[GearKey, GearLife]:
@@ -253,7 +164,7 @@ def as_spelt(tails: Iterable[str], store: Store) -> dict[str, str]:
 def life_of(store: Store, tail: str, side: str) -> GearLife:
     """One gear's life; a gear without records is a usage error that names near spellings."""
     side = Side.parse(side).value
-    life = lives(store, tail, side).get((tail, side))
+    life = lives_of(store, [(tail, side)]).get((tail, side))
     if life is None:
         near = [f"{t} {s}" for t, s in store.gears() if plain_tail(t) == plain_tail(tail)]
         raise UsageError(
@@ -262,9 +173,6 @@ def life_of(store: Store, tail: str, side: str) -> GearLife:
             if near
             else "See which gears are kept: mlg history",
         )
-    for kept in life.inspections:
-        # What stands there and cannot be read is named before anything is added to it.
-        _ = kept.inspection
     return life
 
 
@@ -278,11 +186,9 @@ def find(store: Store, record_id: str) -> Record:
     """Find the record that a command names: by its id, or by the first letters of its hash where an
     id is not one.
     """
-    live = [
-        record
-        for life in lives(store).values()
-        for record in dict.fromkeys(event.record for event in life.events)
-    ]
+    keys = {(record.tail_no, record.side) for record in store.named(record_id)}
+    gears = lives_of(store, keys).values()
+    live = [visit.kept for life in gears for visit in life.visits]
     inspections = (RecordKind.INSPECTION, RecordKind.CORRECTION)
     found = [r for r in live if r.record_id == record_id and r.kind in inspections]
     if not found and len(record_id) >= LEAST_OF_A_HASH:
@@ -311,52 +217,86 @@ def is_readable(record: Record) -> bool:
 
 
 def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
-    kept: dict[str, KeptInspection] = {}
-    others: dict[str, Record] = {}
     places = _by_clock(_readable_or_not_void(records))
-    records = [*places]
-    one = first_keys(records)
-    # The visit that each version of it is of.
-    roots: dict[str, str] = {}
-    for record in records:
+    one = first_keys(places)
+    # The visit that each version of it is of, and that version of each which stands.
+    roots: dict[str, Record] = {}
+    kept: dict[Record, Record] = {}
+    others: dict[str, Record] = {}
+    for record in places:
         own = one[record.key]
         if record.kind is RecordKind.INSPECTION:
-            roots[own] = own
-            kept.setdefault(own, KeptInspection(record, record))
+            kept.setdefault(roots.setdefault(own, record), record)
         elif record.kind is RecordKind.CORRECTION:
-            wrong = one.get(record.body["supersedes"], "")
-            root = roots[own] = roots.get(wrong, wrong)
-            if root in kept:
-                kept[root] = replace(kept[root], record=record)
+            root = roots.get(one.get(more_of(record)["supersedes"], ""))
+            if root is not None:
+                roots[own] = root
+                kept |= {root: record} if root in kept else {}
         elif record.kind is RecordKind.VOID:
             gone = one.get(record.body["voids"], "")
-            kept.pop(roots.get(gone, gone), None)
+            kept.pop(roots.get(gone, record), None)
             others.pop(gone, None)
         elif record.kind is not RecordKind.ASSESSMENT:
             others.setdefault(own, record)
-    stated = [repair for each in kept.values() for repair in Repair.stated(each)]
+    moments: list[Moment] = []
+    for root, record in kept.items():
+        row = inspection_of(record)
+        entered = more_of(root).get("entered")
+        place = places[root] if entered is None else float(entered)
+        visit = GearVisit(row, place, row.source.file is None, record)
+        moments += [
+            *_stated(visit),
+            Moment.of(visit),
+        ]
     # A repair that an inspection states is that of the same day which was recorded by itself; one
     # that came with an inspection falls with it.
-    known = {(repair.day, repair.joints) for repair in stated}
-    sound = {each.record.record_id for each in kept.values() if not each.inspection.is_repaired}
-    alone = (Repair.of(r) for r in others.values() if r.kind in _WORK)
-    repairs = [
-        r
-        for r in alone
-        if (r.day, r.joints) not in known and r.record.body.get("stated_by") not in sound
+    known = {(at.day, at.joints) for at in moments}
+    sound = {r.record_id for r in kept.values() if not inspection_of(r).is_repaired}
+    alone = (_alone(r, places[r]) for r in others.values() if r.kind in _WORK)
+    moments += [
+        at
+        for at in alone
+        if (at.day, at.joints) not in known
+        if at.visit and at.visit.kept.body.get("stated_by") not in sound
     ]
-    events: list[Event] = [*stated, *repairs, *kept.values()]
-    events.sort(key=lambda event: places[event.first])
-    moments = [event.moment for event in events]
-    order = in_order(moments)
-    return GearLife(
-        key,
-        tuple(records),
-        {record.digest: at for record, at in places.items()},
-        tuple(events[place] for place in order),
-        _disagreements(key, events, moments),
-        overhauls([moments[place] for place in order]),
+    moments.sort(key=lambda at: at.visit.place if at.visit else 0.0)
+    events = tuple(moments[place] for place in in_order(moments))
+    void = (r for own, r in roots.items() if own == one[r.key] and r not in kept)
+    warnings = _disagreements(key, moments)
+    return GearLife(key, tuple(places), events, warnings, tuple(void), overhauls(events))
+
+
+def _stated(visit: GearVisit) -> list[Moment]:
+    """What an inspection states of repairs."""
+    row = visit.inspection
+    done = [frozenset(row.restored_joints)] * bool(row.restored_joints)
+    done += [frozenset()] * (row.rigging_checked is RiggingCheck.CORRECTED)
+    if row.repair_date is None:
+        return []
+    day = row.repair_date.isoformat()[:10]
+    return [Moment(day, None, joints, visit) for joints in done]
+
+
+def _alone(record: Record, place: float) -> Moment:
+    """A repair that was recorded by itself."""
+    body = record.body
+    joints = frozenset(body.get("joints", ()))
+    landings = body.get("landings")
+    day = date.fromisoformat(record.day) if record.day else None
+    row = Inspection(
+        record.record_id or record.digest[:LEAST_OF_A_HASH],
+        record.tail_no,
+        Side(record.side),
+        ClearanceConvention.RADIAL,
+        {},
+        inspection_date=day,
+        gear_landings=landings,
+        restored_joints=tuple(sorted(joints)),
+        rigging_checked=None if joints else RiggingCheck.CORRECTED,
+        repair_date=datetime.fromisoformat(body["at"]) if "at" in body else day,
     )
+    visit = GearVisit(row, place, "stated_by" not in body, record)
+    return Moment(record.day, landings, joints, visit, is_alone=True)
 
 
 def first_keys(records: Iterable[Record]) -> dict[str, str]:
@@ -398,18 +338,13 @@ def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:
     return kept[::-1]
 
 
-def _day_of(at: date) -> date:
-    return at.date() if isinstance(at, datetime) else at
-
-
-def _disagreements(
-    key: GearKey, events: Sequence[Event], moments: Sequence[Moment]
-) -> tuple[str, ...]:
+def _disagreements(key: GearKey, moments: Sequence[Moment]) -> tuple[str, ...]:
     """Name the records whose dates and landings disagree, each with how to correct it."""
+    visits = [at.visit for at in moments if at.visit]
 
     def name(place: int) -> str:
-        record = events[place].record
-        what = f"{record.kind} " if record.kind in _WORK else ""
+        record = visits[place].kept
+        what = f"{record.kind} " if moments[place].is_alone else ""
         return f"{what}{record.record_id}, ".lstrip(", ") + record.digest[:10]
 
     by_sentence: dict[str, list[int]] = {}
@@ -417,9 +352,9 @@ def _disagreements(
         by_sentence.setdefault(sentence, []).append(place)
     warnings = []
     for sentence, places in by_sentence.items():
-        record = events[places[0]].record.digest[:10] if len(places) == 1 else "RECORD"
+        record = visits[places[0]].kept.digest[:10] if len(places) == 1 else "RECORD"
         remedy = f"mlg history void {record} --why TEXT"
-        if any(events[place].record.kind in _WORK for place in places):
+        if any(moments[place].is_alone for place in places):
             remedy += ", then mlg history repair"
         else:
             remedy = f"mlg history amend {record} COLUMN=VALUE, or {remedy}"

@@ -175,9 +175,9 @@ def _due_date(life: GearLife, ahead: Forecast) -> str | None:
     its inspections.
     """
     last = life.latest
-    if last is None or not last.record.day or ahead.next_inspection_landings is None:
+    if last is None or last.at is None or ahead.next_inspection_landings is None:
         return None
-    latest = date.fromisoformat(last.record.day).toordinal()
+    latest = last.at.toordinal()
     days = 0.0
     if not ahead.due_now:
         eras = [np.array(era) for era in placed_in_time(life) if era]

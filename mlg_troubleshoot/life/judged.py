@@ -30,10 +30,12 @@ def judge_lives(
             found[place, _NOW] = now
         if not every:
             continue
-        inspected = {kept.record.digest for kept in life.inspections}
-        for state in states(known, gear):
-            if state.visit.digest in inspected:
-                found[place, state.visit.digest] = state
+        inspected = {visit.kept.digest for visit in life.inspections}
+        found |= {
+            (place, digest): state
+            for state in states(known, gear)
+            if (digest := state.visit.kept.digest) in inspected
+        }
     said = dict(zip(found, _judged([*found.values()], gear, table), strict=True))
     return [
         replace(

@@ -78,7 +78,7 @@ class FleetLine:
         line = cls(*life.key, *counts, life.warnings)
         if life.latest is None:
             return line
-        lines = log_of(life, asked.gear)
+        lines = log_of(life, asked.gear, () if asked.joint is None else (asked.joint,))
         urgent = urgency_of(life, lines, asked.gear)
         failed = [e.date or "no date" for e in lines if e.counts and e.kind == "FAILED"]
         line = replace(
@@ -98,8 +98,8 @@ class FleetLine:
         kept, found = life.latest, life.now
         line = replace(
             line,
-            record_id=kept.record.record_id,
-            inspection_date=kept.record.day or None,
+            record_id=kept.inspection.record_id,
+            inspection_date=None if kept.at is None else kept.at.isoformat(),
             gear_landings=kept.inspection.gear_landings,
         )
         if found is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from itertools import groupby
@@ -11,8 +11,8 @@ from typing import Any
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.life.folding import GearLife, first_keys
-from mlg_troubleshoot.store import Record, RecordKind, inspection_from
+from mlg_troubleshoot.life.folding import GearLife, first_keys, inspection_of, more_of
+from mlg_troubleshoot.store import Record, RecordKind
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
 _RERIGGED = "rigging corrected"
@@ -124,9 +124,9 @@ def _newest(lines: Iterable[LogLine]) -> dict[str | int, str]:
     return found
 
 
-def log_of(life: GearLife, gear: Gear) -> list[LogLine]:
+def log_of(life: GearLife, gear: Gear, joints: Collection[int] | None = None) -> list[LogLine]:
     """Every fact of a gear, and what was corrected or voided, in the order of time; what has no
-    day stands where it was entered.
+    day stands where it was entered. `joints`: without readings of others.
     """
     versions: dict[str, Inspection] = {}
     one = first_keys(life.records)
@@ -135,20 +135,19 @@ def log_of(life: GearLife, gear: Gear) -> list[LogLine]:
     for record in life.records:
         if one[record.key] != record.key:
             continue
-        body = record.body
         about: dict[str, Any] = {
-            "gear_landings": body.get("landings"),
             "record_id": record.record_id or None,
             "hash": record.digest,
             "counts": record.key not in void,
         }
         if record.kind in _VISITS:
-            row = versions[record.key] = inspection_from(record)
+            row = versions[record.key] = inspection_of(record)
             about["gear_landings"] = row.gear_landings
-            old = one.get(body.get("supersedes", ""), "")
-            found = visit_lines(row, gear, versions.get(old))
+            old = one.get(more_of(record).get("supersedes", ""), "")
+            found = visit_lines(row, gear, versions.get(old), joints)
             found += _verdict(life, record)
         else:
+            about["gear_landings"] = record.body.get("landings")
             found = _other_lines(record)
         lines += [replace(line, **about) for line in found]
     return _in_time(_without_corrected(lines))
@@ -226,9 +225,14 @@ def _other_lines(record: Record) -> list[LogLine]:
     return []
 
 
-def visit_lines(row: Inspection, gear: Gear, before: Inspection | None = None) -> list[LogLine]:
+def visit_lines(
+    row: Inspection,
+    gear: Gear,
+    before: Inspection | None = None,
+    joints: Collection[int] | None = None,
+) -> list[LogLine]:
     """The facts of a visit; with the version of it that stood before, what this one adds, and what
-    it corrects.
+    it corrects. `joints`: without readings of others.
     """
     old = before or replace(
         row,
@@ -239,7 +243,11 @@ def visit_lines(row: Inspection, gear: Gear, before: Inspection | None = None) -
         rigging_checked=None,
     )
     restored = tuple(n for n in row.restored_joints if n not in old.restored_joints)
-    fresh = [n for n in row.clearance_in if row.clearance_in[n] != old.clearance_in.get(n)]
+    fresh = [
+        n
+        for n in (row.clearance_in if joints is None else row.clearance_in.keys() & joints)
+        if row.clearance_in[n] != old.clearance_in.get(n)
+    ]
     since = [n for n in fresh if n in row.restored_joints]
     found = [*_corrected(row, old)] if before else []
     after = [*_readings(row, gear, since)]

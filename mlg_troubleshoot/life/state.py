@@ -25,6 +25,7 @@ from mlg_troubleshoot.decision.inspection import (
     surely_later,
 )
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
+from mlg_troubleshoot.store import Record
 from mlg_troubleshoot.units import Length, Sentence
 
 GearKey = tuple[str, str]
@@ -40,15 +41,21 @@ class GearVisit:
     """Facts that were taken together: a row of a table, an entry at the prompts, or a repair that
     was recorded by itself.
 
-    place: its place in the log; infinite until it is kept. [1]
+    place: when it was entered; infinite until it is kept. [s]
     typed: whether it was typed; rows of a table are in no order.
-    digest: the hash of its record; empty until it is kept.
+    record: as it stands, once it is kept.
     """
 
     inspection: Inspection
     place: float = inf
     typed: bool = False
-    digest: str = ""
+    record: Record | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def kept(self) -> Record:
+        if self.record is None:
+            raise TypeError(f"{self.inspection.record_id} is not kept")
+        return self.record
 
     @property
     def at(self) -> date | None:
@@ -135,7 +142,15 @@ def _is_later(one: _Event, other: _Event) -> bool:
 
 
 def _newest(events: Sequence[_Event]) -> list[_Event]:
-    return [e for e in events if not any(_is_later(other, e) for other in events)]
+    # Most are replaced by one of the last day; each is compared with each only of the others.
+    days = [(e.at, n) for n, e in enumerate(events) if e.at.__class__ is date]
+    last = events[max(days)[1]] if days else None
+    return [
+        e
+        for e in events
+        if not (last and surely_later(last.at, e.at))
+        if not any(_is_later(other, e) for other in events)
+    ]
 
 
 def states(visits: Sequence[GearVisit], gear: Gear) -> list[GearState]:

@@ -9,7 +9,8 @@ from operator import itemgetter
 
 import numpy as np
 
-from mlg_troubleshoot.life.folding import GearLife, KeptInspection, Repair
+from mlg_troubleshoot.life.chronology import Moment
+from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.wear import WearPath
 
@@ -43,13 +44,11 @@ def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]
     for place, event in enumerate(life.events):
         if place in life.overhauls:
             _begin_anew(found, life.overhauls[place], landings)
-        if isinstance(event, KeptInspection):
-            read = event.inspection
-            landings = landings if read.gear_landings is None else read.gear_landings
-            for joint, clearance in read.clearance_in.items():
+        if event.joints is None:
+            landings = landings if event.landings is None else event.landings
+            for joint, reading in event.read.items():
                 if joint in found:
-                    reading = (read.gear_landings, clearance, read.gauge_u_of(joint))
-                    found[joint][-1].readings.append(reading)
+                    found[joint][-1].readings.append((event.landings, *reading))
         else:
             at = _landings_of(event, life)
             for joint in found.keys() & event.joints:
@@ -100,14 +99,12 @@ def placed_in_time(life: GearLife) -> list[list[tuple[int, float]]]:
     for place, event in enumerate(life.events):
         if place in life.overhauls:
             found.append([])
-        if isinstance(event, KeptInspection):
-            at = event.inspection.gear_landings
-            if event.record.day and at is not None:
-                found[-1].append((date.fromisoformat(event.record.day).toordinal(), at))
+        if event.joints is None and event.day and event.landings is not None:
+            found[-1].append((date.fromisoformat(event.day).toordinal(), event.landings))
     return found
 
 
-def _landings_of(repair: Repair, life: GearLife) -> float | None:
+def _landings_of(repair: Moment, life: GearLife) -> float | None:
     """Landings at a repair: as recorded, else between the inspections about it, by their days."""
     if repair.landings is not None:
         return float(repair.landings)

@@ -19,6 +19,7 @@ from mlg_troubleshoot.decision.inspection import (
 )
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.life.chronology import Moment, contradictions
+from mlg_troubleshoot.life.state import GearVisit
 from mlg_troubleshoot.records.cells import column_letters, quote
 from mlg_troubleshoot.records.model import SheetLayout
 from mlg_troubleshoot.units import SLIPS
@@ -207,7 +208,7 @@ def order_warnings(rows: Rows, layouts: Sequence[SheetLayout]) -> dict[int, str]
     moments: dict[int, Moment] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection):
-            moments[place] = Moment.of(row)
+            moments[place] = Moment.of(GearVisit(row))
             gears.setdefault((row.tail_no, row.side), []).append(place)
     found: dict[int, str] = {}
     for (tail, side), places in gears.items():

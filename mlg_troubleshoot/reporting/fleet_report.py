@@ -51,8 +51,8 @@ def fleet_document(
         places.append(GearInPicture(life.name, line.verdict, share, due))
         cases = [
             None if said is None else said.predicted_displacement_in
-            for kept in life.inspections
-            for said in (life.judged.get(kept.record.digest),)
+            for visit in life.inspections
+            for said in (life.judged.get(visit.kept.digest),)
         ]
         lines.append((line, cases, f"{safe_stem('life', *line.key)}.html"))
     context = {

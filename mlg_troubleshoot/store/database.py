@@ -12,6 +12,7 @@ import getpass
 import hashlib
 import json
 import os
+import re
 import signal
 import threading
 import zlib
@@ -21,7 +22,6 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from enum import StrEnum
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from sys import intern
 from typing import TYPE_CHECKING, Any
@@ -596,58 +596,42 @@ class Store:
     def add(
         self, records: Iterable[Record], judge: Callable[[Record, Record], bool] | None = None
     ) -> Added:
-        """Add records in one transaction; those that stand there already are left out.
+        """Add records in one transaction; those that stand there already are left out, and of those
+        that say the same the last one stands.
 
-        ``records`` are gone through twice. ``judge`` is asked about a known identity, with the
-        record kept and the new one: False refuses the whole call.
+        ``judge`` is asked about a known identity, with the record kept and the new one: False
+        refuses the whole call.
         """
-        waiting: set[bytes] = set()
-        last: dict[bytes, Record] = {}
-        total = 0
-        for record in records:
-            total += 1
-            identity = record.identity_hash
-            if identity in waiting:
-                last[identity] = record
-            waiting.add(identity)
-        added = 0
-        others: list[Record] = []
+        each = [*records]
+        distinct = {record.identity_hash: record for record in each}
         with self.transaction(writing=True) as connection:
             seq, before = self._head(connection)
             stamp = _stamp()
-            each = iter(records)
-            while block := list(islice(each, _AT_ONCE)):
-                distinct = {}
-                for record in block:
-                    identity = record.identity_hash
-                    if identity in waiting:
-                        waiting.remove(identity)
-                        distinct[identity] = last.pop(identity, record)
-                known = self._known(connection, list(distinct))
-                others += [
-                    r
-                    for identity, r in known.items()
-                    if judge is not None and not judge(r, distinct[identity])
-                ]
-                rows = []
-                for record in (r for i, r in distinct.items() if i not in known and not others):
-                    seq += 1
-                    row = {
-                        "seq": seq,
-                        "kind": record.kind.value,
-                        **{name: getattr(record, name) for name in _TEXTS[1:]},
-                        "identity": record.identity_hash,
-                        "body": record.packed,
-                        **stamp,
-                    }
-                    row["hash"] = before = _chained(before, row)
-                    rows.append(row)
-                if rows:
-                    connection.execute(_records.insert(), rows)
-                added += len(rows)
+            known = self._known(connection, [*distinct])
+            others = [
+                r
+                for identity, r in known.items()
+                if judge is not None and not judge(r, distinct[identity])
+            ]
             if others:
                 raise kept_otherwise(others)
-        return Added(added, total - added)
+            rows: list[dict[str, Any]] = []
+            for identity, record in distinct.items():
+                if identity in known:
+                    continue
+                row = {
+                    "seq": seq + len(rows) + 1,
+                    "kind": record.kind.value,
+                    **{name: getattr(record, name) for name in _TEXTS[1:]},
+                    "identity": identity,
+                    "body": record.packed,
+                    **stamp,
+                }
+                row["hash"] = before = _chained(before, row)
+                rows.append(row)
+            if rows:
+                connection.execute(_records.insert(), rows)
+        return Added(len(rows), len(each) - len(rows))
 
     def known(self, identities: Sequence[bytes]) -> dict[bytes, Record]:
         """Records that stand here under these identities."""
@@ -683,6 +667,18 @@ class Store:
             where.append(_records.c.side == side)
         with self.transaction(writing=False) as connection:
             return [self._record(row) for row in self._rows(connection, *where)]
+
+    def named(self, name: str) -> list[Record]:
+        """Records with this id, or whose hash begins so."""
+        # What a terminal may hand on, and no database holds.
+        name = name.encode(errors="replace").decode()
+        ends = [(name + end * 64)[:64].lower() for end in "0f"]
+        where = _records.c.record_id == name
+        if re.fullmatch("[0-9a-f]{64}", ends[0]):
+            low, high = map(bytes.fromhex, ends)
+            where |= _records.c.hash.between(low, high)
+        with self.transaction(writing=False) as connection:
+            return [self._record(row) for row in self._rows(connection, where)]
 
     def of_aircraft(self, tails: Collection[str]) -> list[Record]:
         """All records of some aircraft, each in the order of the chain."""

@@ -87,11 +87,12 @@ _READ: dict[str, Callable[[Any], Any]] = {
 }
 
 
-def inspection_from(record: Record) -> Inspection:
-    body = record.body["inspection"]
+def inspection_from(record: Record, body: Any = None) -> Inspection:
+    """The inspection that a record holds; `body`: its content, where it is unpacked already."""
+    content = (record.body if body is None else body)["inspection"]
     read = {
         name: _READ[name](value) if name in _READ else value
-        for name, value in body.items()
+        for name, value in content.items()
         if name not in RETIRED
     }
     other = {name: read.pop(name) for name in [*read] if name not in _NAMES}

@@ -391,10 +391,11 @@ def _judge(
         found = replace(found, notes=(*found.notes, *other_visits_count(counting)))
     blocks = [slice(start, start + AT_ONCE) for start in range(0, total, AT_ONCE)]
     # As they were read, and what else counts of each gear: packed they take a tenth of the memory.
-    pickled = (pickle.dumps((rows[at], counting[at])) for at in blocks)
+    stand = [state and (state.inspection, state.older) for state in counting]
+    pickled = (pickle.dumps((rows[at], stand[at])) for at in blocks)
     waiting = [zlib.compress(block, 1) for block in pickled]
     rows.clear()
-    del counting
+    del counting, stand
     if total > AT_ONCE:
         # What the rows took is given back before they are judged, not when the collector next runs.
         gc.collect()
@@ -451,19 +452,14 @@ def _made(
     block: bytes,
 ) -> tuple[int, list[Any]]:
     """Judge a block of rows; how many they are, and what is made of them."""
-    rows, counting = pickle.loads(zlib.decompress(block))
-    judged = judge(
-        [
-            row if state is None else state.inspection
-            for row, state in zip(rows, counting, strict=True)
-        ]
-    )
+    rows, stand = pickle.loads(zlib.decompress(block))
+    judged = judge([each[0] if each else row for row, each in zip(rows, stand, strict=True)])
     # What is shown and kept of a visit is what was found at it.
     own = [
-        replace(each, inspection=row, older=state.older)
-        if isinstance(each, Assessment) and state is not None
+        replace(each, inspection=row, older=state[1])
+        if isinstance(each, Assessment) and state
         else each
-        for each, row, state in zip(judged, rows, counting, strict=True)
+        for each, row, state in zip(judged, rows, stand, strict=True)
     ]
     return len(rows), [make(own) for make in makers]
 

@@ -5,9 +5,8 @@ the chain.
 from __future__ import annotations
 
 import os
-import re
 import stat
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime
 from functools import partial
@@ -19,6 +18,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import (
     LEAST_OF_A_HASH,
     GearLife,
+    as_spelt,
     find,
     is_readable,
     life_of,
@@ -170,7 +170,7 @@ def show_lives(
     from mlg_troubleshoot.life.judged import judge_lives
 
     keys = store.gears()
-    tail, meant = _as_kept(keys, key_of(tail, "LH" if side is None else side))
+    tail, meant = key_of(store, tail, "LH" if side is None else side)
     wanted = [key for key in keys if key == (tail, meant if side else key[1])]
     if not wanted:
         life_of(store, tail, meant)
@@ -218,23 +218,12 @@ def write_pages(
     return written + [write(each, formats=("html",)) for each in documents]
 
 
-def key_of(tail: str, side: str) -> GearKey:
-    """Judge which gear is meant as a table would: a tail number, and a side in any spelling."""
-    row = admit({**_ANY_ROW, "tail_no": tail, "side": side}, ReadOptions())
-    return row.tail_no, row.side.value
-
-
-def _as_kept(keys: Collection[GearKey], asked: GearKey) -> GearKey:
-    """A gear as it stands in the store, whatever capitals, blanks and dashes its tail was typed
-    with.
+def key_of(store: Store, tail: str, side: str) -> GearKey:
+    """Judge which gear is meant as a table would: a tail number as the store spells it, and a side
+    in any spelling.
     """
-    tails = {tail for tail, _side in keys}
-    alike = [tail for tail in tails if _spelling(tail) == _spelling(asked[0])]
-    return (alike[0], asked[1]) if asked[0] not in tails and len(alike) == 1 else asked
-
-
-def _spelling(tail: str) -> str:
-    return re.sub(r"[\s-]", "", tail).upper()
+    row = admit({**_ANY_ROW, "tail_no": tail, "side": side}, ReadOptions())
+    return as_spelt([row.tail_no], store)[row.tail_no], row.side.value
 
 
 def repair(
@@ -246,7 +235,7 @@ def repair(
     landings: float | str | None = None,
 ) -> Record:
     """Record that joints were restored."""
-    key = _as_kept(store.gears(), key_of(*gear))
+    key = key_of(store, *gear)
     given = {"inspection_date": day, "gear_landings": landings, "work_order": work_order}
     flags = {
         "inspection_date": "--date",
@@ -279,14 +268,14 @@ def void(store: Store, record_id: str, why: str) -> Record:
 def move_record(store: Store, record_id: str, gear: GearKey, why: str) -> Record:
     """Move an inspection to the gear that it is of."""
     judge_text("--why", why, "State why it is moved.")
-    return move(store, find(store, record_id), key_of(*gear), why)
+    return move(store, find(store, record_id), key_of(store, *gear), why)
 
 
 def _unreadable(store: Store, digest: str) -> Record | None:
     """The record of which the hash begins so, if its content cannot be read."""
     if len(digest) < LEAST_OF_A_HASH:
         return None
-    found = [record for record in store.all() if record.digest.startswith(digest.lower())]
+    found = [r for r in store.named(digest) if r.record_id != digest]
     return found[0] if len(found) == 1 and not is_readable(found[0]) else None
 
 

@@ -75,23 +75,30 @@ class _KnownContents:
         # What a table without ids said of a gear on a day.
         self._unnamed: dict[tuple[str, ...], list[Record]] = {}
         self._stand: list[Record] = []
-        self._void: list[Record] = []
+        self._void: dict[tuple[object, ...], list[Record]] = {}
         gears = [key for key in store.gears() if key[0] in tails]
         for life in lives_of(store, gears).values():
-            self._void += life.voided
-            for each in life.inspections:
-                self.add(each.record, each.first)
-                self._stand.append(each.record)
+            for void in life.voided:
+                self._void.setdefault(void.content[:4], []).append(void)
+            standing = [each.kept for each in life.inspections]
+            self._stand += standing
+            for record in standing:
+                self.add(record)
+            # A table that comes back may have the day that was corrected.
+            by_name = {record.record_id: record for record in standing}
+            for record in life.records:
+                name = record.record_id
+                if record.kind is RecordKind.INSPECTION and name in by_name:
+                    self._by_id.setdefault((name, *life.key, record.day), by_name[name])
 
-    def add(self, record: Record, first: Record | None = None) -> None:
+    def add(self, record: Record) -> None:
         self._contents.setdefault(content_of(record), []).append(record)
         self._without_day.setdefault(content_of(record, with_day=False), []).append(record)
         whose = record.record_id, record.tail_no, record.side
         self._undated.pop(whose, None)
         if not record.day:
             self._undated[whose] = record
-        for day in {record.day, (first or record).day}:
-            self._by_id[*whose, day] = record
+        self._by_id[*whose, record.day] = record
         if is_made_for_row(record.record_id):
             self._unnamed.setdefault((*whose[1:], record.day), []).append(record)
 
@@ -123,7 +130,7 @@ class _KnownContents:
         """A record to add; None if it was voided, which it stays. Under the id of a void one it is
         another.
         """
-        named = [each for each in self._void if each.content[:4] == record.content[:4]]
+        named = self._void.get(record.content[:4], [])
         if any(same_inspection(each, record) for each in named):
             return None
         return replace(record, identity=()) if named else record
@@ -299,11 +306,10 @@ def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
             f"{wrong.record_id} is of {' '.join(gear)} already", "Give another tail or side."
         )
     own = lives_of(store, [(wrong.tail_no, wrong.side)])[wrong.tail_no, wrong.side]
-    first = next(each.first for each in own.inspections if each.record.digest == wrong.digest)
-    entered = first.body.get("entered", first.recorded_at)
+    entered = next(each.place for each in own.inspections if each.kept.digest == wrong.digest)
     row = replace(inspection_from(wrong), tail_no=gear[0], side=Side(gear[1]))
     there = lives_of(store, [gear]).get(gear)
-    if there and any(each.record.record_id == row.record_id for each in there.inspections):
+    if there and any(v.inspection.record_id == row.record_id for v in there.inspections):
         row = under_a_free_id(row, store)
     moved = inspection_record(row, moved_from=wrong.key, entered=entered)
     # Moved back it is no record that stands there already and was moved away.

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.workflows.check import next_step
+from mlg_troubleshoot.workflows.check import check
 from mlg_troubleshoot.workflows.index_tables import load_index_table
 from tests.cli.conftest import FAILURE, mlg
+from tests.decision.conftest import inspected
 
 
 @pytest.fixture
@@ -54,7 +55,7 @@ def test_from_python_a_table_that_is_computed_is_warned_of_once(gear: Path) -> N
         table = load_index_table(loaded)
     assert table.gear.geometry_sha256 == loaded.geometry_sha256
     with warnings.catch_warnings(action="error"):
-        next_step(load_gear(gear), {1: 0.001})
+        check(inspected({1: 0.001}), load_gear(gear))
 
 
 @pytest.mark.parametrize("command", [("check", *HAND), ("study", "--write-table", "--force")])

@@ -12,7 +12,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.life.folding import lives, lives_of
 from mlg_troubleshoot.life.forecast import (
     TEACHERS,
     fit_fleet,
@@ -161,8 +161,8 @@ def test_another_margin_has_another_forecast(tmp_path: Path) -> None:
 
 def test_unpacked_contents_are_judged_by_the_gate_of_their_own_store(tmp_path: Path) -> None:
     store = fleet_of(tmp_path)
-    [life] = lives(store, TAILS[0]).values()
+    [life] = lives_of(store, [(TAILS[0], "LH")]).values()
     assert life.inspections[0].inspection.tail_no == TAILS[0]
     strict = Store(store.place, judge=lambda _record, _body: "it is wrong")
     with pytest.raises(StoreError, match="it is wrong"):
-        lives(strict, TAILS[0])
+        lives_of(strict, [(TAILS[0], "LH")])

@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.chronology import Moment, contradictions, overhauls
 from mlg_troubleshoot.life.folding import GearLife, life_of
+from mlg_troubleshoot.life.state import GearVisit
 from mlg_troubleshoot.life.wear_paths import placed_in_time, stretches
 from mlg_troubleshoot.store import Store
-from mlg_troubleshoot.units import ClearanceConvention
 from tests.cli.conftest import mlg, row
+from tests.decision.conftest import inspected
 
 from .places import table
 
@@ -38,15 +38,13 @@ LIFE = (FIRST, LAST, ANEW, NEWEST)
 def moments(visits: Sequence[Visit]) -> list[Moment]:
     return [
         Moment.of(
-            Inspection(
-                record_id=day,
-                tail_no="N1",
-                side=Side.LH,
-                convention=ClearanceConvention.RADIAL,
-                clearance_in=read,
-                inspection_date=date.fromisoformat(day),
-                gear_landings=landings,
-                gauge_u_in=0.0003,
+            GearVisit(
+                inspected(
+                    read,
+                    inspection_date=date.fromisoformat(day),
+                    gear_landings=landings,
+                    gauge_u_in=0.0003,
+                )
             )
         )
         for day, landings, read in visits
@@ -110,7 +108,7 @@ def test_one_mistyped_number_begins_nothing(visits: Sequence[Visit]) -> None:
 
 
 def test_joints_that_were_recorded_as_restored_in_between_need_no_reading() -> None:
-    work = Moment("2024-09-01", None, restored=frozenset({1, 2, 3}))
+    work = Moment("2024-09-01", None, joints=frozenset({1, 2, 3}))
     visits = [FIRST, LAST, read(ANEW, all_joints(0.0050))]
     assert overhauls([*moments(visits), work]) == {2: frozenset({1, 2, 3})}
 

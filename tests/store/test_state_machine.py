@@ -153,7 +153,15 @@ def counting(entries: Sequence[Entry]) -> dict[str, Known]:
 
 
 def truth(visits: Mapping[str, Known]) -> dict[str, Any]:
-    """What stands of one gear."""
+    """What stands of one gear. A repair that was recorded by itself and that an inspection states
+    with the same day is one repair.
+    """
+    stated = [(k.drawn.repaired, k.drawn.restored) for n, k in visits.items() if n[0] != "W"]
+    visits = {
+        name: known
+        for name, known in visits.items()
+        if name[0] != "W" or (known.drawn.repaired, known.drawn.restored) not in stated
+    }
     read: dict[int, list[Told]] = {}
     plunger, failed, retracted, repairs = [], [], [], []
     for name, known in visits.items():

@@ -16,11 +16,11 @@ from mlg_troubleshoot.decision.columns import (
     RESTORED_JOINTS,
     RIGGING_CHECKED,
 )
-from mlg_troubleshoot.decision.inspection import Inspection, Side, plain_tail
+from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.plan import Action, Step
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.life.folding import as_spelt, lives_of
 from mlg_troubleshoot.life.logbook import shortened, visit_lines
 from mlg_troubleshoot.life.state import GearState, state_now
 from mlg_troubleshoot.store import Record, Store
@@ -78,15 +78,12 @@ def find_visit(
     """What is kept of a gear, under whichever spelling of its tail number."""
     if store.is_new:
         return None
-    kept = [t for t, s in store.gears() if s == side and plain_tail(t) == plain_tail(tail)]
-    if not kept:
+    key = (as_spelt([tail], store)[tail], side.value)
+    life = lives_of(store, [key]).get(key)
+    state = None if life is None else state_now(life.visits, gear)
+    if life is None or state is None or not life.inspections:
         return None
-    key = (tail if tail in kept else kept[0], side.value)
-    life = lives(store, *key)[key]
-    state = state_now(life.visits, gear)
-    if state is None or not life.inspections:
-        return None
-    newest = max(life.inspections, key=lambda each: life.places[each.record.digest])
+    newest = max(life.inspections, key=lambda each: each.place)
     last = {
         joint: f"{entered} on {visit.at}" if visit.at else str(entered)
         for visit in life.visits
@@ -98,7 +95,7 @@ def find_visit(
         lines = [*shortened(visit_lines(newest.inspection, gear))]
         undoes = ", ".join(said_in(line.text, row.unit_entered) for line in lines[:_MOST_NAMED])
         undoes += " …" * (len(lines) > _MOST_NAMED)
-    return Visit(newest.record, row, judge(state), last, undoes)
+    return Visit(newest.kept, row, judge(state), last, undoes)
 
 
 def continued(known: Visit, row: Inspection, entry: Entry) -> Inspection:
