@@ -113,14 +113,12 @@ class Form(Header):
         for column, visit in visits.items():
             found = Row(row, [], visit=visit)
             for line, p in zip(self.lines, columns.placed, strict=True):
-                own, shared = (
-                    line.cells[i] if i < len(line.cells) else None
-                    for i in (column, self.value_column)
-                )
+                cells = dict(enumerate(line.cells))
+                own, shared = cells.get(column), cells.get(self.value_column)
                 is_measured = p.field is None or p.field.column in _MEASURED
                 # Above the readings a line may say it once for all columns.
                 is_own = is_measured and line.row >= self.measured_from
-                is_read = any(i < len(line.cells) and line.cells[i] is not None for i in visits)
+                is_read = any(cells.get(i) is not None for i in visits)
                 if is_own and not is_read and shared is not None and line.column is not CLEARANCE:
                     # So may one that no column of readings fills; next to a reading stands a limit.
                     is_own = line.column is PLUNGER_DISPLACEMENT

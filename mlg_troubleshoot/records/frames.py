@@ -92,11 +92,6 @@ def clearances_alone(source: Frame, joints: Joints) -> pd.DataFrame:
     return frame.iloc[:, kept].assign(record_id=rows, tail_no=rows, side="LH")
 
 
-def source_label(source: object) -> str:
-    """What a table is called: its path, or that it is a frame."""
-    return FRAME if is_frame(source) else str(source)
-
-
 def label_of(labels: Sequence[object], row: int | None) -> object:
     """The label of a row that is numbered as in a file; None for the header."""
     return None if row is None or row < _FIRST_ROW else labels[row - _FIRST_ROW]

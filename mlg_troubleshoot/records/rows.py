@@ -103,7 +103,8 @@ _MISSING_CONVENTION = (
 _FIELDS = frozenset(each.name for each in fields(Inspection))
 
 
-_DIGIT = re.compile(r"\d")
+# What no word of an outcome, a convention or a unit is.
+_CODE = re.compile(r"(?=..)\S*\d\S*")
 _A_DAY = timedelta(days=1)
 _MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
 
@@ -500,9 +501,8 @@ class RowReader:
         stated = found.convention
         for placed in self._unread_words:
             cell = self._cells[placed.index]
-            # No word has a digit, but a sentence may; a single one may be an answer.
-            is_word = isinstance(cell, str) and cell[1:] and " " not in cell
-            if cell is None or (is_word and _DIGIT.search(cell)):
+            # A sentence may have a digit; a single one may be an answer.
+            if cell is None or (isinstance(cell, str) and _CODE.fullmatch(cell)):
                 continue
             failed, said, unit = _spoken(placed.header, cell)
             if failed and found.values.get(OUTCOME) is not Outcome.FAILED:
