@@ -70,7 +70,7 @@ BUDGETS: dict[str, int] = {
     "misfit": 18457,
     "notebook": 2355,
     "paper": 6762,
-    "records": 45541,
+    "records": 45493,
     "reporting": 28089,
     "schemas": 771,
     "store": 7972,
