@@ -36,7 +36,7 @@ _FREQUENCIES = 2.0 * np.pi * np.arange(_CELLS // 2 + 1) / (_CELLS * _CELL_IN)
 
 # Shares of its limit that a joint may be worn to: centres of cells. [1]
 SHARES = np.asarray((np.arange(50) + 0.5) * 0.04, np.float64)
-_WORN = SHARES > 1.0
+_WORN = np.asarray(SHARES > 1.0, float)
 
 # Errors of a reading by which it is averaged, with their weights (Gauss–Hermite). [1]
 _ERRORS, _GAUSS = np.polynomial.hermite_e.hermegauss(5)
@@ -51,7 +51,7 @@ _NEGLIGIBLE = 1e-4
 
 def _wear() -> Array:
     levels = np.geomspace(*PRIORS.levels, 6)[:, None]
-    usual = np.exp(-SHARES / levels) * ~_WORN
+    usual = np.exp(-SHARES / levels) * (1.0 - _WORN)
     usual /= usual.sum(axis=1, keepdims=True)
     chance = np.geomspace(*PRIORS.worn_out, 6)[:, None]
     alike = (1.0 - chance) * usual + chance * _WORN / _WORN.sum()
@@ -125,12 +125,12 @@ class _Joints:
     excess_in2: Array
 
     @classmethod
-    def of(cls, table: Array, chance: Array, share: Array, reach_in: Array) -> _Joints:
-        """Joints from their cells by wear (2, joints, wear, cells), and the chance of each wear
-        (levels, joints, wear).
+    def of(cls, table: Array, chance: Array, share: Array, reach_in: Array, over: Array) -> _Joints:
+        """Joints from their cells by wear (2, joints, wear, cells), the chance of each wear
+        (levels, joints, wear), and the chance that each is worn.
         """
         cells = np.einsum("kjs,pjsc->pkjc", chance, table)
-        worn = np.einsum("kjs,pjsc->pkjc", chance * (share > 1.0), table)
+        worn = np.einsum("kjs,pjsc->pkjc", chance * over, table)
         of_pins = np.array([0.5, PRIORS.cosine[0] ** 2 + PRIORS.cosine[1] ** 2])[:, None, None]
         share2 = np.sum(chance * share**2, axis=2)
         excess = cells @ _AT**2 - of_pins * share2 * reach_in**2
@@ -148,7 +148,7 @@ def _prior(gear: Gear) -> tuple[Array, _Joints]:
     at, shift = reach[:, None] * SHARES, bend[:, None] * SHARES**2
     table = np.array([_moved(at, shift, held=held) for held in (False, True)])
     chance = np.repeat(WEAR[:, None], len(reach), axis=1)
-    return table, _Joints.of(table, chance, SHARES, reach)
+    return table, _Joints.of(table, chance, SHARES, reach, _WORN)
 
 
 @lru_cache(maxsize=1024)
@@ -168,6 +168,7 @@ def _read_exactly(cases: Cases) -> tuple[Mask, _Joints]:
         (cases.clearance_in[at] / limits)[:, None]
         + (cases.gauge_u_in[at] / limits)[:, None] * _ERRORS
     )
+    over = tabled_normal_cdf((cases.clearance_in[at] - limits) / cases.gauge_u_in[at])
     reach, bend = (each[at[1]] for each in _reach(cases.gear))
     parts = []
     for some in np.array_split(np.arange(len(share)), max(len(share) // 512, 1)):
@@ -175,7 +176,7 @@ def _read_exactly(cases: Cases) -> tuple[Mask, _Joints]:
         places = reach[some, None] * of, bend[some, None] * of**2
         table = np.array([_moved(*places, held=held) for held in (False, True)])
         chance = np.broadcast_to(_WEIGHTS, (1, *of.shape))
-        parts.append(_Joints.of(table, chance, of, reach[some]))
+        parts.append(_Joints.of(table, chance, of, reach[some], over[some, None]))
     joined = (
         np.concatenate([getattr(part, name) for part in parts], axis=2)
         for name in ("cells", "worn", "transforms", "excess_in2")
@@ -263,7 +264,7 @@ class Belief:
         chance = chance / chance.sum(axis=1, keepdims=True)
         table = _prior(self.gear)[0][:, [j]]
         reach = _reach(self.gear)[0][[j]]
-        return chance, _Joints.of(table, chance[:, None], SHARES, reach)
+        return chance, _Joints.of(table, chance[:, None], SHARES, reach, _WORN)
 
     @cached_property
     def _contexts(self) -> tuple[Places, Places]:
@@ -386,7 +387,7 @@ class Belief:
         cause = np.repeat([0, 1], [STATES, _OTHERS])
         moved, worn, stands, held = self._backwards(cause)
         moved = moved[:STATES]
-        level = rng.choice(len(WEAR), _OTHERS, p=_normal(self._rigging_levels))
+        level = _drawn(rng.random(_OTHERS), self._rigging_levels[None])
         rigging = rng.random((_OTHERS, worn.shape[1])) < self._left_worn[level]
         mean, spread = PRIORS.cosine
         loaded = mean + spread * rng.standard_normal(moved.shape)
@@ -499,11 +500,6 @@ def _both_senses(likelihood: Array) -> Array:
     """
     mirrored = np.roll(likelihood[::-1], 1)
     return np.array([likelihood, 0.5 * (likelihood + mirrored)])
-
-
-def _normal(weights: Array) -> Array:
-    total = float(weights.sum())
-    return weights / total if total > 0.0 else np.full(len(weights), 1.0 / len(weights))
 
 
 def _drawn(even: Array, weights: Array) -> Places:

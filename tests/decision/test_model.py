@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -76,6 +78,7 @@ def drawn_pins(rng: np.random.Generator, joints: int, held: Array, sign: Array) 
     return np.where(held[:, None], loaded, free)
 
 
+@lru_cache(maxsize=1)
 def usual_chances(gear: Gear) -> tuple[Array, float]:
     """How often a gear of which nothing is known leaves its margin, with free and with held pins;
     how rarely work on it leaves every worn joint. [1]
@@ -179,3 +182,75 @@ def test_belief_is_what_plain_draws_of_the_model_say(
     assert found.causes == pytest.approx(truth.causes, abs=0.02 + error)
     assert found.worn == pytest.approx(truth.worn, abs=0.02 + error)
     assert found.second == pytest.approx(truth.second, abs=0.02 + error)
+
+
+def drawn_gears(gear: Gear, n: int, seed: int) -> list[tuple[dict[int, float], float, int, Array]]:
+    """Failed gears of the model: readings of some joints within their limits, the plunger's, the
+    cause, and which joints are worn.
+    """
+    rng = np.random.default_rng(seed)
+    often, overlooked = usual_chances(gear)
+    response = responses(gear)[0]
+    second = np.diag(response.curvature).reshape(-1, 2).sum(axis=1) / 4.0 * gear.limits_in**2
+    total = 400 * n
+    share = drawn_shares(rng, gear, {}, total)
+    held = rng.random(total) < PRIORS.loaded
+    cosines = drawn_pins(rng, 10, held, rng.choice([-1.0, 1.0], total))
+    x = (response.amplification * gear.limits_in * share * cosines).sum(axis=1)
+    x += np.where(held, 0.0, share**2 @ second) + PRIORS.linkage_u_in * rng.standard_normal(total)
+    often = np.where(held, often[1], often[0])
+    out = np.abs(x) > MARGIN_IN
+    left = PRIORS.overlooked ** (share > 1.0).sum(axis=1) / overlooked
+    weights = np.array(
+        [
+            out / often,
+            left / PRIORS.joints_for_one_misrigged,
+            ~out / (1.0 - often) / PRIORS.joints_for_one_elsewhere,
+        ]
+    )
+    chosen = rng.choice(3 * total, 3 * n, p=weights.ravel() / weights.sum(), replace=False)
+    found = []
+    for cause, place in zip(*np.divmod(chosen, total), strict=True):
+        joints = rng.permutation(10)[: rng.choice([0, 2, 5])]
+        if (share[place, joints] > 0.9).any():
+            continue
+        at = x[place]
+        if cause == 1:
+            width = PRIORS.offset * MARGIN_IN
+            at = rng.choice([-1.0, 1.0]) * rng.uniform(MARGIN_IN, width)
+        clearance = share[place, joints] * gear.limits_in[joints]
+        seen = np.abs(clearance + GAUGE_U_IN * rng.standard_normal(len(joints)))
+        read = {int(j) + 1: float(each) for j, each in zip(joints, seen, strict=True)}
+        y = float(at + PLUNGER_U_IN * rng.standard_normal())
+        found.append((read, y, int(cause), share[place] > 1.0))
+    return found[:n]
+
+
+@pytest.mark.slow
+def test_two_hundred_drawn_gears_are_believed_as_plain_draws_say(gear: Gear) -> None:
+    beyond = []
+    for read, y, _cause, _worn in drawn_gears(gear, 200, 5):
+        sets = some_sets(believed(gear, read, y, np.zeros((1, 10), bool)).worn)
+        truth, found = simulated(gear, read, y, sets, 200_000, 9), believed(gear, read, y, sets)
+        error = 0.02 + 3.0 / np.sqrt(truth.effective)
+        apart = [
+            np.abs(found.causes - truth.causes).max(),
+            np.abs(found.worn - truth.worn).max(),
+            np.abs(found.second - truth.second).max() * (truth.causes[0] > 0.05),
+        ]
+        beyond += [(read, y, apart)] if max(apart) > error else []
+    assert beyond == []
+
+
+@pytest.mark.slow
+def test_what_is_stated_happens_as_often(gear: Gear) -> None:
+    stated, happened = [], []
+    for read, y, cause, worn in drawn_gears(gear, 1500, 6):
+        found = believed(gear, read, y, np.zeros((1, 10), bool))
+        stated += [*found.causes, *found.worn]
+        happened += [*(np.arange(3) == cause), *worn]
+    chance, came = np.array(stated), np.array(happened, float)
+    for low, high in pairwise((0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0)):
+        some = (chance >= low) & (chance < high)
+        spread = np.sqrt(np.sum(chance[some] * (1.0 - chance[some])))
+        assert abs(came[some].sum() - chance[some].sum()) <= 3.5 * spread + 0.01 * some.sum()
