@@ -449,7 +449,8 @@ class Belief:
         middle = _CELLS // 2
         for j in range(joints - 1, -1, -1):
             some = np.flatnonzero(cells[:, j].max(axis=0) > 1e-12)
-            most = int(np.abs(some - middle).max())
+            # The window of the farthest cells closes one cell before it meets itself.
+            most = min(int(np.abs(some - middle).max()), middle - 1)
             round_about = np.concatenate(
                 [sums[:, j, -most:], sums[:, j], sums[:, j, :most]], axis=1
             )
