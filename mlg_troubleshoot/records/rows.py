@@ -557,8 +557,8 @@ class RowReader:
         # What is asked about may have either point.
         comma = self._table.decimal_comma or (isinstance(cell, str) and "," in cell)
         value, unit = written_number(cell, decimal_comma=comma)
-        usual = list(LengthUnit) if is_sure else [LengthUnit.INCH, LengthUnit.MILLIMETRE]
-        size = min(abs(each.to_inches(value)) for each in ([unit] if unit else usual))
+        smallest = unit or (LengthUnit.THOU if is_sure else LengthUnit.MILLIMETRE)
+        size = abs(smallest.to_inches(value))
         return 0.0 < size <= self._options.plunger_hard_max_in and (
             is_sure or unit is not None or (is_named and value % 1.0 > 0.0)
         )
