@@ -66,7 +66,7 @@ BUDGETS: dict[str, int] = {
     "gear": 11306,
     "geometry": 5881,
     "indices": 5102,
-    "life": 18176,
+    "life": 18171,
     "misfit": 18457,
     "notebook": 2355,
     "paper": 6762,

@@ -189,8 +189,7 @@ def find(store: Store, record_id: str) -> Record:
     keys = {(record.tail_no, record.side) for record in store.named(record_id)}
     gears = lives_of(store, keys).values()
     live = [visit.kept for life in gears for visit in life.visits]
-    inspections = (RecordKind.INSPECTION, RecordKind.CORRECTION)
-    found = [r for r in live if r.record_id == record_id and r.kind in inspections]
+    found = [r for r in live if r.record_id == record_id and r.kind not in _WORK]
     if not found and len(record_id) >= LEAST_OF_A_HASH:
         found = [r for r in live if r.digest.startswith(record_id.lower())]
     if len(found) == 1:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from datetime import date, datetime, timedelta
 from itertools import groupby
 from math import inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mlg_troubleshoot.decision.inspection import (
     Fact,
@@ -25,8 +25,10 @@ from mlg_troubleshoot.decision.inspection import (
     surely_later,
 )
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.store import Record
 from mlg_troubleshoot.units import Length, Sentence
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.store import Record
 
 GearKey = tuple[str, str]
 _DAY = timedelta(days=1)
