@@ -656,9 +656,9 @@ class Store:
                 return []
             found = [(row.tail_no, row.side) for row in connection.execute(pairs)]
         if any(type(text) is not str for key in found for text in key):
-            # Reading the records names the one that is damaged.
-            self.all()
-        return sorted(found)
+            # Reading the records names the one that is damaged; an index may be alone.
+            found = [(record.tail_no, record.side) for record in self.all()]
+        return sorted({*found})
 
     def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:
         """All records of a gear, or of both gears of an aircraft, in the order of the chain."""
