@@ -168,7 +168,9 @@ def _read_exactly(cases: Cases) -> tuple[Mask, _Joints]:
         (cases.clearance_in[at] / limits)[:, None]
         + (cases.gauge_u_in[at] / limits)[:, None] * _ERRORS
     )
-    over = tabled_normal_cdf((cases.clearance_in[at] - limits) / cases.gauge_u_in[at])
+    over = tabled_normal_cdf(
+        (cases.clearance_in[at] - limits) / np.maximum(cases.gauge_u_in[at], 1e-9)
+    )
     reach, bend = (each[at[1]] for each in _reach(cases.gear))
     parts = []
     for some in np.array_split(np.arange(len(share)), max(len(share) // 512, 1)):
