@@ -413,15 +413,13 @@ class Belief:
         gone = transforms[:, restored].prod(axis=1)
         stay = self._noise[pins, levels] * transforms[:, ~restored].prod(axis=1)
         reach = _reach(self.gear)[0] * self.gear.new_parts_in / self.gear.limits_in
-        new = [
-            _moved(reach[restored], np.zeros(restored.sum()), held=held) for held in (False, True)
-        ]
+        new = [_moved(reach[restored], 0.0 * reach[restored], held=held) for held in (False, True)]
         fresh = _transform(np.array(new)).prod(axis=1)[pins]
         weight = _density(np.conj(gone) * _transform(self._seen_at[0][pins])) * _density(stay)
         weight *= self._factors[0][pins, levels][:, None]
         inside = _density(np.conj(fresh) * _transform(_share_within(self.margin_in)))
-        out = 1.0 - inside
-        return float(np.clip(np.sum(weight * out) / max(float(weight.sum()), 1e-300), 0.0, 1.0))
+        within = np.sum(weight * inside) / max(float(weight.sum()), 1e-300)
+        return max(1.0 - float(within), 0.0)
 
     def chance_of_any(self, joints: Sequence[int]) -> float:
         """Chance that any of some joints, by their places, is worn, whatever the cause. [1]"""
