@@ -241,17 +241,6 @@ def in_a_terminal(*arguments, columns=80):
 
 
 @needs_posix
-def test_problems_stand_in_a_table_on_a_terminal(mixed):
-    lines = [line.rstrip() for line in in_a_terminal("check", mixed, columns=120).splitlines()]
-    heading = next(
-        n for n, line in enumerate(lines) if line.split()[:3] == ["cell", "column", "found"]
-    )
-    in_table = [line.split()[:3] for line in lines[heading + 1 : heading + 4]]
-    assert ["C4", "side", "both"] in in_table
-    assert ["G4", "clearance_3_in", "n/a?"] in in_table
-
-
-@needs_posix
 def test_quiet_shows_no_progress(tmp_path):
     rows = [sound(f"R{n}", clearance_3_in=0.001 + n * 1e-6) for n in range(600)]
     (tmp_path / "t.csv").write_text(as_csv(HEADER, *rows))
