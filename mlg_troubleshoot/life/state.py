@@ -327,8 +327,10 @@ class _AsOf:
         changed = self._readings()
         plunger = self._plunger()
         outcome = self._outcome()
-        if plunger is not None and (readings := self._repeated(plunger)) != row.readings_in:
+        readings = () if plunger is None else self._repeated(plunger)
+        if readings != row.readings_in:
             changed["readings_in"] = readings
+        if plunger is not None and "readings_in" in changed:
             changed["plunger_gauge_u_in"] = plunger.visit.inspection.plunger_gauge_u_in
         if row.rigging_checked is None and self._is_rigging_checked():
             changed["rigging_checked"] = RiggingCheck.YES
@@ -441,7 +443,8 @@ class _AsOf:
             e for e in newest if e not in replaced and (self._is_beyond(e) or self._counts_for(e))
         ]
         untried = [e for e in replaced if self._is_beyond(e) and not self._is_settled(e)]
-        event = max(standing or untried, key=lambda e: e.value, default=own)
+        mine = next((e for e in newest if self._is_own(e)), None)
+        event = max(standing or untried, key=lambda e: e.value, default=mine)
         if event is None or self._is_own(event):
             return event
         readings = event.visit.inspection.readings_in
@@ -498,7 +501,7 @@ class _AsOf:
             when = "" if event.at is None else f" on {event.at.isoformat()}"
             self._said.append(f"{fact.record} states that this gear failed{when}: {then}.")
             return event
-        tried = [e for e in _newest(self._retracted) if self._counts_for(e)]
+        tried = _newest([e for e in self._retracted if self._counts_for(e)])
         if not tried or (row.outcome is Outcome.RETRACTED and not self._now):
             return None if row.outcome is Outcome.FAILED else own
         self._older.append(tried[-1].fact(FactKind.RETRACTED))

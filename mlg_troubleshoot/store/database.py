@@ -615,23 +615,23 @@ class Store:
             ]
             if others:
                 raise kept_otherwise(others)
-            rows: list[dict[str, Any]] = []
-            for identity, record in distinct.items():
-                if identity in known:
-                    continue
-                row = {
-                    "seq": seq + len(rows) + 1,
-                    "kind": record.kind.value,
-                    **{name: getattr(record, name) for name in _TEXTS[1:]},
-                    "identity": identity,
-                    "body": record.packed,
-                    **stamp,
-                }
-                row["hash"] = before = _chained(before, row)
-                rows.append(row)
-            if rows:
+            new = [both for both in distinct.items() if both[0] not in known]
+            for first in range(0, len(new), _AT_ONCE):
+                rows = []
+                for identity, record in new[first : first + _AT_ONCE]:
+                    seq += 1
+                    row = {
+                        "seq": seq,
+                        "kind": record.kind.value,
+                        **{name: getattr(record, name) for name in _TEXTS[1:]},
+                        "identity": identity,
+                        "body": record.packed,
+                        **stamp,
+                    }
+                    row["hash"] = before = _chained(before, row)
+                    rows.append(row)
                 connection.execute(_records.insert(), rows)
-        return Added(len(rows), len(each) - len(rows))
+        return Added(len(new), len(each) - len(new))
 
     def known(self, identities: Sequence[bytes]) -> dict[bytes, Record]:
         """Records that stand here under these identities."""

@@ -189,7 +189,7 @@ def truth(visits: Mapping[str, Known]) -> dict[str, Any]:
         not any(r.is_later(f) and any(t.is_later(r) for t in retracted) for r in repairs)
         for f in failed
     )
-    is_good = any(all(t.is_later(r) for r in repairs) for t in _newest(retracted))
+    is_good = any(all(t.is_later(r) for r in repairs) for t in retracted)
     found["outcome"] = "FAILED" if is_open else "RETRACTED" if is_good else None
     return found
 
@@ -422,7 +422,7 @@ def _with_blanks(visits: Sequence[GearVisit], side: str) -> list[GearVisit]:
 
 
 @pytest.mark.parametrize(
-    ("runs", "steps"), [(25, 10), pytest.param(400, 20, marks=pytest.mark.slow)]
+    ("runs", "steps"), [(25, 10), pytest.param(120, 20, marks=pytest.mark.slow)]
 )
 def test_whatever_happens_to_two_stores_the_truth_stands(runs: int, steps: int) -> None:
     run_state_machine_as_test(
