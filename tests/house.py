@@ -61,7 +61,7 @@ WAYS = {
 BUDGETS: dict[str, int] = {
     "(top)": 9679,
     "cli": 28616,
-    "decision": 32495,
+    "decision": 32498,
     "diagnosis": 34917,
     "gear": 11306,
     "geometry": 5881,

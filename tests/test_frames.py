@@ -6,12 +6,13 @@ import copy
 import pickle
 import random
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from io import BytesIO
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import joblib
 import jsonschema
 import numpy as np
 import pandas as pd
@@ -239,7 +240,8 @@ def same_again(given: Any) -> Any:
 @pytest.mark.slow
 def test_results_travel_to_two_processes_and_back() -> None:
     given = [result(name) for name in RESULTS]
-    assert joblib.Parallel(2)(joblib.delayed(same_again)(each) for each in given) == given
+    with ProcessPoolExecutor(2, get_context("spawn")) as two:
+        assert list(two.map(same_again, given)) == given
 
 
 @pytest.mark.parametrize("name", RESULTS)

@@ -426,7 +426,7 @@ class Belief:
         each, worn = self.worn[list(joints)], self.states.worn[:, list(joints)]
         # Drawn is only how often several are.
         several = self.states.causes.sum(axis=0) @ (worn.sum(axis=1) - worn.any(axis=1))
-        return float(max(each.sum() - several, each.max()))
+        return max(float(each.sum() - several), float(each.max()))
 
     def _backwards(self, cause: Places) -> tuple[Array, Mask, Array, Mask]:
         """Draw failures of some causes: what each joint moves and whether it is worn, given where
