@@ -18,7 +18,7 @@ WHAT_A_USER_SETS = (
     "tests/cli/test_views.py::test_the_screen_follows_columns_and_is_80_wide_without",
     "tests/cli/test_streams.py::test_without_a_terminal_neither_colour_nor_progress_bar_is_written",
     "tests/cli/test_exit_codes.py::test_an_interrupt_exits_130",
-    "tests/cli/test_inputs_are_kept.py::test_an_output_respects_the_umask_and_the_mode_of_the_old_file[old]",
+    "tests/test_outputs.py::test_a_new_file_has_what_the_umask_leaves[18-420]",
 )
 pytestmark = [
     pytest.mark.slow,
