@@ -574,8 +574,8 @@ def _explained_by_clearances(
     measured_in: Array, predicted_in: Array, contribution_in: Array, no_sign_slip: bool
 ) -> bool:
     """Tell whether factors of −1 to 1, joint by joint, explain readings beyond chance that no one
-    scale of the prediction does, nor one with a joint that was written in millimetres; where there
-    is no slip of the sign, that a constant does not.
+    scale of the prediction does, nor one with a joint that was written in millimetres; where no
+    sign is wrong, that a constant does not.
     """
     from scipy.optimize import lsq_linear
 

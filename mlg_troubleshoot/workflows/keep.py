@@ -312,7 +312,7 @@ def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
     if there and any(v.inspection.record_id == row.record_id for v in there.inspections):
         row = under_a_free_id(row, store)
     moved = inspection_record(row, moved_from=wrong.key, entered=entered)
-    # Moved back it is no record that stands there already and was moved away.
+    # Moved back it differs from the record that was moved away from there.
     moved = replace(moved, identity=())
     gone = [voids(each, why, moved_to=gear) for each in with_its_repairs(store, wrong)]
     store.add([*gone, moved])
