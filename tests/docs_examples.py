@@ -212,12 +212,9 @@ def refreshed(text: str, folder: Path) -> str:
 
 
 def pictures() -> dict[str, str]:
-    """Draw the pictures of the README: the linkage of the published failure, and what its plunger
-    does.
-    """
+    """Draw the picture of the README: the linkage of the published failure."""
     from mlg_troubleshoot import ClearanceConvention, Inspection, Side, check, load_gear
     from mlg_troubleshoot.reporting.formats import Lengths
-    from mlg_troubleshoot.reporting.inspection_figures import plunger_curve
     from mlg_troubleshoot.reporting.schematic import joint_key, schematic
 
     gear = load_gear()
@@ -235,11 +232,6 @@ def pictures() -> dict[str, str]:
             f"{gear.name}, linkage {gear.reference.name} at mid-position: {gear.provenance}."
             f" Arrows: worst-case clearances of the published failure, {drawn.exaggeration} times"
             " larger than life.",
-        ),
-        "plunger.svg": standing_alone(
-            [str(plunger_curve(gear, found, width=620.0))],
-            "Plunger over the release stroke, nominal and with the clearances of the published"
-            " failure.",
         ),
     }
 

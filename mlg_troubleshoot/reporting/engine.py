@@ -54,14 +54,9 @@ def serve(requests: BinaryIO, answers: BinaryIO, fonts: Mapping[str, bytes]) -> 
             # address.
             book.load_html(html, base_url=_HERE)
             stream = io.BytesIO()
-            if job["kind"] == "png":
-                book.write_to_png_stream(stream, int(2 * job["width"]))
-                pdf = stream.getvalue()
-                boxes = False
-            else:
-                book.write_to_pdf_stream(stream)
-                about = job["sections"], job["title"], job["created"], job["keywords"]
-                pdf, boxes = finished(stream.getvalue(), *about)
+            book.write_to_pdf_stream(stream)
+            about = job["sections"], job["title"], job["created"], job["keywords"]
+            pdf, boxes = finished(stream.getvalue(), *about)
         except (plutoprint.Error, PyPdfError, OSError, ValueError) as error:
             answer = {"error": str(error) or type(error).__name__, "length": 0}
             pdf = b""

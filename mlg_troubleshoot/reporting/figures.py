@@ -1,7 +1,7 @@
 """Figures as inline SVG: flat colours, and text or shape wherever a colour says something.
 
 A :class:`Canvas` escapes what it is given and carries a title and a description for readers who
-cannot see it; a :class:`Plot` puts axes, series and a legend on it. A unit of a canvas is about 1
+cannot see it; a :class:`Plot` puts axes and series on it. A unit of a canvas is about 1
 px on a screen and 0.25 mm on paper; its text is 11 units.
 """
 
@@ -29,12 +29,11 @@ ACCENT = "#0b4f8a"
 TEXT_SIZE = 11
 # Average width of a character of the report's font, per unit of its size.
 _CHARACTER = 0.62
-# Size of the numbers of an axis and of the words of a legend. [px]
+# Size of the numbers of an axis. [px]
 _TICK_SIZE = 9.5
 
 Anchor = Literal["start", "middle", "end"]
-Marker = Literal["circle", "square", "diamond", "triangle", "cross", "ring"]
-Style = Literal["solid", "mid", "open"]
+Marker = Literal["circle", "square", "diamond", "triangle", "ring"]
 Place = tuple[float, float]
 
 
@@ -142,15 +141,8 @@ class Canvas:
         bold: bool = False,
         colour: str = INK,
         anchor: Anchor = "start",
-        halo: bool = False,
     ) -> None:
-        """Write a text with its baseline at y; a halo keeps it readable across lines. [canvas
-        units]
-        """
-        if halo:
-            width = text_width(text, size)
-            left = {"start": x, "middle": x - width / 2, "end": x - width}[anchor]
-            self.rectangle(left - 1.5, y - 0.8 * size, width + 3, size * 1.02, fill=PAPER)
+        """Write a text with its baseline at y. [canvas units]"""
         self.add(
             "text",
             text,
@@ -192,9 +184,6 @@ class Canvas:
                 base = y + 0.8 * size
                 corners = [(x, top), (right, base), (left, base)]
                 self.polyline(corners, fill=colour, colour=colour, width=1.0, closed=True)
-            case "cross":
-                self.line(left, top, right, bottom, colour=colour, width=2.0)
-                self.line(left, bottom, right, top, colour=colour, width=2.0)
 
     def svg(self, css_class: str = "figure") -> Markup:
         title = visible(self.title)
@@ -353,69 +342,3 @@ class Plot:
                 self.canvas.polyline(
                     corners, colour=series.colour, width=series.width, dash=series.dash
                 )
-
-    def draw_legend(
-        self,
-        series: Sequence[Series],
-        x: float,
-        y: float,
-        markers: Sequence[tuple[Marker, str]] = (),
-    ) -> None:
-        """Draw the legend on one line, from its left end. [canvas units]"""
-        for one in series:
-            self.canvas.line(
-                x,
-                y,
-                x + 24,
-                y,
-                colour=one.colour,
-                width=one.width,
-                dash=one.dash,
-            )
-            self.canvas.text(x + 28, y + 3.5, one.label, size=_TICK_SIZE)
-            x += 40 + text_width(one.label, _TICK_SIZE)
-        for shape, label in markers:
-            self.canvas.marker(shape, x + 6, y, 4.5)
-            self.canvas.text(x + 15, y + 3.5, label, size=_TICK_SIZE)
-            x += 27 + text_width(label, _TICK_SIZE)
-
-
-@dataclass(frozen=True, slots=True)
-class Bar:
-    """A bar and the ends of its interval, in the data's unit; black, grey or outlined as its
-    caption explains.
-    """
-
-    value: float | None
-    low: float | None = None
-    high: float | None = None
-    style: Style = "mid"
-
-
-def draw_bar(
-    canvas: Canvas, bar: Bar, x: float, y: float, height: float, per_value: float
-) -> float:
-    if bar.value is None:
-        return x
-    length = max(bar.value * per_value, 0.8)
-    fill, edge, dash = {
-        "solid": (INK, INK, None),
-        "mid": (RULE, SOFT, None),
-        "open": (PAPER, SOFT, "3 2"),
-    }[bar.style]
-    canvas.rectangle(x, y, length, height, fill=fill, colour=edge, dash=dash)
-    end = x + length
-    if bar.low is not None and bar.high is not None:
-        low = x + bar.low * per_value
-        high = x + bar.high * per_value
-        middle = y + height / 2
-        inside = PAPER if bar.style == "solid" else INK
-        start = max(low, x)
-        top = middle - 2.5
-        bottom = middle + 2.5
-        canvas.line(start, middle, min(high, end), middle, colour=inside, width=1.2)
-        canvas.line(end, middle, max(high, end), middle, width=1.2)
-        canvas.line(start, top, start, bottom, colour=inside, width=1.2)
-        canvas.line(high, top, high, bottom, width=1.2)
-        end = max(end, high)
-    return end

@@ -1,8 +1,7 @@
-"""Figures of a fleet and of one gear's life: how bad, how long still, and how each joint wears."""
+"""The figure of one gear's life: how each joint wears."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,12 +12,10 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.figures import (
     ACCENT,
-    INK,
     PALE,
     SOFT,
     Axis,
     Canvas,
-    Marker,
     Plot,
     Series,
 )
@@ -29,73 +26,10 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
     from mlg_troubleshoot.life.wear_paths import Stretch
 
-# The colours and shapes of the signs of the verdicts in templates/signs.html.j2.
 _RED = "#a3131a"
-_MARKS: dict[str, tuple[Marker, str]] = {
-    "OUTSIDE_MARGIN": ("square", _RED),
-    "INCONCLUSIVE": ("diamond", "#8a4b00"),
-    "INCOMPLETE": ("triangle", "#0b4f8a"),
-    "WITHIN_MARGIN": ("ring", "#1d6b2a"),
-}
-_WIDE = 940
-_WORST_SHOWN = 4
+_LEGEND = "● reading  ■ over its limit  ▲ restored  - - limit  ··· forecast, median; grey: 90 %"
 _PANEL_WIDE = 350
 _PANEL_HIGH = 132
-
-
-@dataclass(frozen=True, slots=True)
-class GearInPicture:
-    """One gear of a fleet in its picture.
-
-    case: worst case as a multiple of the margin, None where the linkage does not close. [1]
-    due: landings to the next inspection, None where they are not known. [landings]
-    """
-
-    name: str
-    verdict: str | None
-    case: float | None
-    due: float | None = None
-
-
-def fleet_picture(places: Sequence[GearInPicture]) -> Markup:
-    """Draw each gear's worst case against its margin and, where any is known, its landings left."""
-    if not places:
-        return Markup("")
-    due = [place.due for place in places if place.due is not None]
-    order = Axis("gears in the order of the table", 0.5, len(places) + 0.5)
-    cases = [min(p.case or _WORST_SHOWN, _WORST_SHOWN) * 100.0 for p in places]
-    high = max(*cases, 110.0) * 1.08
-    canvas = Canvas(
-        _WIDE,
-        350 if due else 200,
-        "Worst case of each gear against its margin",
-        f"{sum(case > 100.0 for case in cases)} of {len(places)} gears are beyond their margin.",
-    )
-    top = Plot(canvas, order, Axis("worst case, % of margin", 0.0, high), top=22, right=18)
-    top.area = (*top.area[:3], 160.0)
-    top.draw_axes(min(6, len(places)))
-    top.draw(Series("", (order.low, order.high), (100.0, 100.0), "5 3", _RED))
-    for number, (place, case) in enumerate(zip(places, cases, strict=True), 1):
-        shape, colour = _MARKS.get(place.verdict or "", ("cross", INK))
-        canvas.marker(shape, *top.at(number, case), 3.4, colour=colour)
-    x = 60.0
-    for verdict, (shape, colour) in _MARKS.items():
-        canvas.marker(shape, x, 10, 4.5, colour=colour)
-        canvas.text(x + 9, 13.5, verdict.replace("_", " ").lower(), size=9.5)
-        x += 125
-    if due:
-        axis = Axis("due in, landings", 0.0, max(*due, 1.0) * 1.08)
-        left = Plot(canvas, order, axis, top=214, right=18)
-        left.draw_axes(min(6, len(places)))
-        for number, place in enumerate(places, 1):
-            if place.due is not None:
-                x, y = left.at(number, place.due)
-                start, _, end, base = left.area
-                wide = min(0.7 * (end - start) / len(places), 14.0)
-                top_y = min(y, base - 2.0)
-                tall = max(base - y, 2.0)
-                canvas.rectangle(x - wide / 2, top_y, wide, tall, fill=ACCENT)
-    return canvas.svg()
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,18 +93,7 @@ def wear_figure(life: GearLife, ahead: Forecast, gear: Gear, lengths: Lengths) -
     )
     for place, number in enumerate(wear.between):
         _panel(canvas, place, gear, number, wear, lengths)
-    base = rows * _PANEL_HIGH + 10
-    shown = [
-        Series("limit", (), (), "5 3", _RED),
-        Series("forecast, median", (), (), "2 2", ACCENT),
-    ]
-    legend = Plot(canvas, Axis("", 0, 1), Axis("", 0, 1))
-    legend.draw_legend(
-        shown,
-        50,
-        base,
-        [("circle", "reading"), ("square", "over its limit"), ("triangle", "restored")],
-    )
+    canvas.text(52, canvas.height - 4, _LEGEND, size=9.5)
     return canvas.svg()
 
 

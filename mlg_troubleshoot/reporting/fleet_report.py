@@ -18,7 +18,7 @@ from mlg_troubleshoot.life.landings_left import (
 from mlg_troubleshoot.life.logbook import as_found_as_left, log_of, shortened
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.life.urgency import repair_sentence
-from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture, wear_figure
+from mlg_troubleshoot.reporting.fleet_figures import wear_figure
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.life_json import life_as_json
@@ -41,14 +41,9 @@ def fleet_document(
     lengths = Lengths(unit)
     by_key = {life.key: life for life in lives}
     gears = fleet_lines(every, forecasts)
-    places = []
     lines = []
     for line in gears:
         life = by_key[line.key]
-        worst = line.predicted_displacement_in
-        share = worst / line.margin_in if worst is not None and line.margin_in else None
-        due = line.next_inspection_landings
-        places.append(GearInPicture(life.name, line.verdict, share, due))
         cases = [
             None if said is None else said.predicted_displacement_in
             for visit in life.inspections
@@ -58,7 +53,6 @@ def fleet_document(
     context = {
         **head("Fleet", "Fleet", gear, provenance, lengths),
         "lines_of": lines,
-        "picture": fleet_picture(places),
         "work": work_sentence(gears),
         "notes": [warning for line in every for warning in line.warnings],
     }

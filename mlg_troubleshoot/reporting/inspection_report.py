@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import Outcome, RowSource, Side
 from mlg_troubleshoot.decision.plan import Step
 from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear, listed
@@ -23,10 +23,9 @@ from mlg_troubleshoot.decision.sentences import (
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.reporting import inspection_figures as drawn
-from mlg_troubleshoot.reporting.fleet_figures import GearInPicture, fleet_picture
 from mlg_troubleshoot.reporting.formats import Lengths, short
 from mlg_troubleshoot.reporting.html import Document, render
+from mlg_troubleshoot.reporting.inspection_figures import margin_gauge
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
 from mlg_troubleshoot.reporting.provenance import Facts, ReportProvenance, head, provenance_of
 from mlg_troubleshoot.reporting.publish import safe_stem
@@ -120,15 +119,14 @@ def _inspection(
         "carried": in_front,
         "carried_in_full": carried if carried != in_front else [],
         "front_warnings": front,
-        "gauge": drawn.margin_gauge(a, lengths),
+        "gauge": margin_gauge(a, lengths),
         "drawing": schematic(gear, a),
         "legend": [(joint_mark("", state), words) for state, words in JOINT_STATES.items()],
         "wrong": chance_wrong_sentence(a),
         "no_repair": no_repair_set(a),
         "rigging": None if a.rigging is None else lengths.said(rigging_sentence(a.rigging)),
         "areas": partial(_areas, gear),
-        "rows": _joints(gear, a, lengths),
-        "curve": drawn.plunger_curve(gear, a, lengths),
+        "rows": _joints(gear, a),
         "cases": _sequence(gear, a, lengths),
     }
 
@@ -139,27 +137,13 @@ def _place(
     return source.file, source.sheet, absent if source.row is None else str(source.row)
 
 
-def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]:
-    """The ranked joints, each with its mark and its bar."""
-    gauge_u = a.inspection.gauge_u_of
-
-    def bar_end(finding: JointFinding) -> float:
-        if finding.contribution_in is None:
-            return drawn.bar_stand_in(finding)
-        return (
-            finding.contribution_in + 2.0 * gauge_u(finding.joint) * finding.plunger_amplification
-        )
-
-    longest = max([1e-6, *(bar_end(f) for f in a.joints)])
-    return [
-        {
-            "f": f,
-            "state": joint_state(gear.joint(f.joint), f.clearance_in),
-            "mark": joint_mark(str(f.joint), joint_state(gear.joint(f.joint), f.clearance_in)),
-            "bar": drawn.contribution_bar(f, longest, gauge_u(f.joint), lengths),
-        }
-        for f in a.ranked
-    ]
+def _joints(gear: Gear, a: Assessment) -> list[dict[str, Any]]:
+    """The ranked joints, each with its mark."""
+    rows = []
+    for f in a.ranked:
+        state = joint_state(gear.joint(f.joint), f.clearance_in)
+        rows.append({"f": f, "state": state, "mark": joint_mark(str(f.joint), state)})
+    return rows
 
 
 def _areas(gear: Gear, step: Step) -> str:
@@ -227,21 +211,11 @@ def batch_document(
         "latest": linked(latest),
         "earlier": linked(earlier),
         "rejected": [j for j in judgements if isinstance(j, Rejected)],
-        "picture": fleet_picture([_place_of(j) for j, _links in linked(latest)]),
         "problems": problems,
         "notes": notes,
     }
     stem = safe_stem("batch", *(Path(name).name for name in provenance.input_sha256))
     return Document("batch.html.j2", context, stem, landscape=True, script="table.js")
-
-
-def _place_of(a: Assessment) -> GearInPicture:
-    inspection = a.inspection
-    worst_in = a.deciding_in
-    name = f"{inspection.tail_no} {inspection.side}"
-    return GearInPicture(
-        name, a.verdict.value, None if worst_in is None else worst_in / a.margin_in
-    )
 
 
 def _limit_as_read(

@@ -66,11 +66,9 @@ class PdfEngine:
             )
         return self._process
 
-    def convert(
-        self, html: str, page: str, created: datetime, kind: str = "pdf", width: float = 0.0
-    ) -> tuple[bytes, bool]:
-        """Make one PDF, or a PNG of some width [px]; also tell whether a PDF shows the box that
-        stands for a character that no font has.
+    def convert(self, html: str, page: str, created: datetime) -> tuple[bytes, bool]:
+        """Make one PDF; also tell whether it shows the box that stands for a character that no font
+        has.
         """
         body = html.encode("utf-8")
         dated = created.astimezone(UTC).strftime("D:%Y%m%d%H%M%SZ")
@@ -80,7 +78,7 @@ class PdfEngine:
             "created": dated,
             "keywords": _found(_KEYWORDS, html),
         }
-        job = {"length": len(body), "page": page, "kind": kind, "width": width, **about}
+        job = {"length": len(body), "page": page, **about}
         process = self.start()
         if process.stdin is None or process.stdout is None:
             raise PdfError("the PDF engine has no pipes")

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from contextlib import closing
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
 from markupsafe import Markup, escape
 
 from mlg_troubleshoot.errors import OutputError
-from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.reporting.html import font_faces
-from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
+from mlg_troubleshoot.outputs import write_text
 
 _FONT = "DejaVu Sans, Verdana, sans-serif"
 # Between two drawings of one picture. [px]
 _GAP = 12
-_FORMATS = (".svg", ".png", ".pdf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +59,12 @@ class Picture:
         return f"Picture({self.title!r}, {self.width:.0f} × {self.height:.0f})"
 
     def save(self, file: str | Path) -> Path:
-        """Write the picture as the name of the file ends.
+        """Write the picture as SVG.
 
         Parameters
         ----------
         file : str or Path
-            A name that ends in .svg, .png or .pdf.
+            A name that ends in .svg.
 
         Returns
         -------
@@ -82,31 +77,13 @@ class Picture:
             If it cannot be written, or the name ends otherwise.
         """
         path = Path(file)
-        kind = path.suffix.lower()
-        if kind not in _FORMATS:
+        if path.suffix.lower() != ".svg":
             raise OutputError(
                 f"a picture cannot be written as {path.name!r}",
-                f"Give a name that ends in {', '.join(_FORMATS)}.",
+                "Give a name that ends in .svg; a browser prints it.",
             )
-        write_bytes(path, self.svg.encode() if kind == ".svg" else self._drawn(kind[1:]))
+        write_text(path, self.svg)
         return path
-
-    def _drawn(self, kind: str) -> bytes:
-        page = (
-            f'<!doctype html><html lang="en"><title>{escape(self.title)}</title><style>'
-            f"{font_faces()} @page {{ size: {self.width:g}px {self.height:g}px; margin: 0 }} "
-            f"body {{ margin: 0; font-family: {_FONT} }}"
-            "body > svg { display: block; width: 100%; height: auto }</style>"
-            f"<body>{self.svg}</body></html>"
-        )
-        try:
-            with closing(PdfEngine()) as engine:
-                moment = datetime.fromtimestamp(0, UTC)
-                return engine.convert(page, "A4", moment, kind, self.width)[0]
-        except PdfError as error:
-            raise OutputError(
-                f"the picture cannot be drawn: {error}", "Write it as .svg instead."
-            ) from error
 
 
 def _attribute(drawing: str, name: str) -> str:

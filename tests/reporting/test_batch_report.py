@@ -89,9 +89,7 @@ def test_every_gear_has_one_line_what_was_measured_beyond_its_margin_and_the_wor
     assert records(summary[0]) == ["little", "worn", "published", "sound"]
 
 
-@pytest.mark.parametrize(
-    "words", ["2 of 4 gears are beyond their margin", "LEFT", "cell C7", "2 columns unread."]
-)
+@pytest.mark.parametrize("words", ["LEFT", "cell C7", "2 columns unread."])
 def test_the_summary_says_what_is_wrong_with_gears_and_input(
     words: str, summary: tuple[str, bytes]
 ) -> None:

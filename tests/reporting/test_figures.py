@@ -13,19 +13,16 @@ from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.figures import (
     Axis,
-    Bar,
     Canvas,
     Plot,
     Series,
-    draw_bar,
     nice_ticks,
     text_width,
 )
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import environment
-from mlg_troubleshoot.reporting.inspection_figures import margin_gauge, plunger_curve
+from mlg_troubleshoot.reporting.inspection_figures import margin_gauge
 from mlg_troubleshoot.reporting.schematic import joint_key, schematic
-from mlg_troubleshoot.units import LengthUnit
 
 from .conftest import FAILURE, SOUND, WORN, Judge
 
@@ -55,14 +52,6 @@ def test_text_in_a_figure_is_escaped_and_what_would_reorder_it_is_shown_as_its_c
     assert "<script>" not in canvas.svg()
     assert not {"\u202e", "\u202d"} & set(canvas.svg())
     assert "N1‹U+202D›2" in canvas.svg()
-
-
-def test_bars_are_as_long_as_their_values_and_a_missing_one_draws_none() -> None:
-    canvas = Canvas(100, 40, "t")
-    draw_bar(canvas, Bar(None), 10, 0, 8, 20.0)
-    assert rectangles(canvas.svg()) == []
-    ends = [draw_bar(canvas, Bar(value), 10, 0, 8, 20.0) for value in (1.0, 3.0)]
-    assert ends == [30.0, 70.0]
 
 
 def test_a_gap_in_a_series_breaks_its_line() -> None:
@@ -168,44 +157,6 @@ def test_no_label_of_the_schematic_lies_outside_it(gear: Gear, judge: Judge) -> 
         for x, y in re.findall(r'<text x="([-\d.]+)" y="([-\d.]+)"', str(svg)):
             assert 0 <= float(x) <= width
             assert 0 <= float(y) <= height
-
-
-def curves(svg: str) -> list[list[tuple[float, float]]]:
-    """Points of the lines of a plot."""
-    return [
-        [(float(x), float(y)) for x, y in (pair.split(",") for pair in points.split())]
-        for points in re.findall(r'<polyline points="([^"]*)"', svg)
-    ]
-
-
-def test_the_plunger_is_drawn_as_its_displacement_from_nominal(gear: Gear, judge: Judge) -> None:
-    judged = judge(FAILURE)
-    svg = str(plunger_curve(gear, judged))
-    over, under = curves(svg)
-    zero = next(
-        float(y) for y in re.findall(r'<line x1="[\d.]+" y1="([\d.]+)"[^>]*stroke-width="1.2"', svg)
-    )
-    assert judged.over_travel_in is not None
-    assert judged.under_travel_in is not None
-    assert (zero - over[-1][1]) / (zero - under[-1][1]) == pytest.approx(
-        judged.over_travel_in / judged.under_travel_in, rel=0.02
-    )
-
-
-def triangles(svg: str) -> int:
-    return len(re.findall(r"<polygon points=\"(?:[-\d.]+,[-\d.]+ ?){3}\"", svg))
-
-
-def test_what_was_measured_stands_in_the_plunger_s_figure(gear: Gear, judge: Judge) -> None:
-    without = str(plunger_curve(gear, judge(FAILURE)))
-    both = judge(FAILURE, plunger_down_lock_in=0.02, readings_in=(0.041,))
-    assert (triangles(without), triangles(str(plunger_curve(gear, both)))) == (0, 3)
-
-
-def test_a_figure_in_thou_says_so(gear: Gear, judge: Judge) -> None:
-    svg = str(plunger_curve(gear, judge(FAILURE), Lengths(LengthUnit.THOU)))
-    assert "displacement from nominal, thou" in svg
-    assert ">+47.2</text>" in svg
 
 
 def test_markers_of_joints_do_not_overlap(gear: Gear, judge: Judge) -> None:
