@@ -90,24 +90,17 @@ UNIT_SPELLINGS: dict[str, LengthUnit] = {
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """A slip of entry by a factor, and what makes a value that many times too large or too
-    small.
-    """
+    """A slip of entry by a factor, and what makes a value that many times too small."""
 
     factor: float
-    too_large: str
     too_small: str
 
 
 # The one table of slips: suggested wherever they would explain a value, never applied.
 SLIPS: dict[str, Slip] = {
-    "unit": Slip(MM_PER_IN, "millimetres read as inches", "inches read as millimetres"),
-    "point": Slip(10.0, "a misplaced decimal point", "a misplaced decimal point"),
-    "convention": Slip(
-        2.0,
-        "a diametral clearance or total play read as radial",
-        "a radial clearance read as diametral or total play",
-    ),
+    "unit": Slip(MM_PER_IN, "inches read as millimetres"),
+    "point": Slip(10.0, "a misplaced decimal point"),
+    "convention": Slip(2.0, "a radial clearance read as diametral or total play"),
 }
 
 

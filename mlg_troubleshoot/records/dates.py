@@ -39,9 +39,12 @@ _MONTH = (
     r"|nov(?:ember)?|dec(?:ember)?"
 )
 _WORDED_DAY = re.compile(
-    rf"(?:(?P<day>\d{{1,2}})[\s.\-/]*(?P<month>{_MONTH})|(?P<first>{_MONTH})[\s.\-/]*(?P<second>\d{{1,2}}),?\s)"
+    rf"(?:(?<!\w)(?P<day>\d{{1,2}})[\s.\-/]*(?P<month>{_MONTH})|(?P<first>{_MONTH})[\s.\-/]*(?P<second>\d{{1,2}}),?\s)"
     r"[\s.,\-/]*(?P<year>\d{4}|\d{2})",
     re.IGNORECASE | re.ASCII,
+)
+_MONTH_ALONE = re.compile(
+    rf"\b(?:{_MONTH})\b(?:[\s.\-/']*\d{{2,4}}\b)?|\b\d{{4}}-\d{{2}}\b", re.IGNORECASE | re.ASCII
 )
 _CLOCK = r"(?:[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d+)?)?(?:Z|[+\-]\d{2}:?\d{2})?)?"
 _ISO_DAY = re.compile(rf"(\d{{4}}-\d{{2}}-\d{{2}}){_CLOCK}|((?:19|20)\d{{6}})", re.ASCII)
@@ -63,8 +66,9 @@ def written_day(text: str) -> date | None:
 
 
 def find_day(text: str) -> str:
-    """The part of a text that is a day; empty without one."""
-    found = next(filter(None, (p.search(text) for p in (_ISO_DAY, _WORDED_DAY, _NUMBERS))), None)
+    """The part of a text that is a day, or only a month; empty without one."""
+    patterns = _ISO_DAY, _WORDED_DAY, _NUMBERS, _MONTH_ALONE
+    found = next(filter(None, (p.search(text) for p in patterns)), None)
     return found[0] if found is not None else ""
 
 

@@ -100,7 +100,11 @@ class Folder:
         elif there == cell and joint is not None:
             again = f"joint {joint} is given twice with the same reading (row {number})"
             row.warnings.append(again)
-        elif there != cell and p.field is not None:
+        elif there != cell and (p.field is None or p.field.column.carried):
+            # What is only carried of several rows travels together.
+            texts = dict.fromkeys((*show(there).split("; "), show(cell)))
+            row.cells[slot] = "; ".join(texts)
+        elif there != cell:
             code = "record_contradicts"
             expected = f"{show(there)}, as in cell {other}"
             remedy = "All rows of one record must agree. Correct one of them, or the record id."

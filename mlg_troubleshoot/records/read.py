@@ -24,7 +24,6 @@ from mlg_troubleshoot.records.row_consistency import (
     one_aircraft,
     order_warnings,
     settle_duplicates,
-    slips,
 )
 from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.tables import Collected, read_form, read_table
@@ -405,10 +404,10 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     rows = out.rows
     problems = out.problems
     alike = one_aircraft(rows)
-    problems += settle_duplicates(rows, out.layouts, out.invalid_content)
+    problems += settle_duplicates(rows, out.layouts)
     repeated = copies(rows)
     backwards = order_warnings(rows, out.layouts)
-    for place, said in (*repeated.items(), *slips(rows).items(), *backwards.items()):
+    for place, said in (*repeated.items(), *backwards.items()):
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, said))
     files = {file.name: i for i, (file, _) in reversed([*enumerate(results)])}
     sheets = dict.fromkeys((layout.file, layout.sheet) for layout in out.layouts)

@@ -1,20 +1,17 @@
-"""Rows compared with each other: record ids and clearances that stand twice, slips that would
-explain a jump, tails that look alike, and the order of time.
+"""Rows compared with each other: record ids and clearances that stand twice, tails that look
+alike, and the order of time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
-from statistics import median
 
 from mlg_troubleshoot.decision.columns import DATE, LANDINGS, RECORD_ID, Column
 from mlg_troubleshoot.decision.inspection import (
     Inspection,
     InvalidRow,
     RowSource,
-    Side,
     plain_tail,
 )
 from mlg_troubleshoot.errors import Problem
@@ -22,13 +19,10 @@ from mlg_troubleshoot.life.chronology import Moment, contradictions
 from mlg_troubleshoot.life.state import GearVisit
 from mlg_troubleshoot.records.cells import column_letters, quote
 from mlg_troubleshoot.records.model import SheetLayout
-from mlg_troubleshoot.units import SLIPS
 
 
 def settle_duplicates(
-    rows: list[Inspection | InvalidRow],
-    layouts: Sequence[SheetLayout],
-    invalid_content: Mapping[RowSource, int],
+    rows: list[Inspection | InvalidRow], layouts: Sequence[SheetLayout]
 ) -> list[Problem]:
     """Warn of rows that are the same inspection again, and refuse rows that share an id and
     differ.
@@ -42,13 +36,8 @@ def settle_duplicates(
         if len(places) == 1:
             continue
         found = [rows[place] for place in places]
-        bare = [
-            invalid_content.get(row.source)
-            if isinstance(row, InvalidRow)
-            else replace(row, source=RowSource(), warnings=(), entered={})
-            for row in found
-        ]
-        is_same = all(b is not None and b == bare[0] for b in bare)
+        said = [_content(row) for row in found]
+        is_same = all(each == said[0] for each in said)
         for place, row in list(zip(places, found, strict=True))[is_same:]:
             if is_same:
                 note = f"the same inspection as {where(found[0].source)}"
@@ -82,6 +71,14 @@ def settle_duplicates(
     return problems
 
 
+def _content(row: Inspection | InvalidRow) -> tuple[object, ...]:
+    """What a row says, without its place."""
+    known, correct = (row.understood, row.correct) if isinstance(row, InvalidRow) else (row, ())
+    if known is not None:
+        known = replace(known, source=RowSource(), warnings=(), entered={})
+    return row.tail_no, row.side, correct, known
+
+
 def where(source: RowSource) -> str:
     sheet = f" of sheet {source.sheet!r}" if source.sheet is not None else ""
     return f"row {source.row}{sheet} of {source.file or 'the input'}"
@@ -101,22 +98,7 @@ def cell_of(
     return wanted.name, None
 
 
-# Rows of a gear before and after that a row is compared with: enough for a median, few enough to
-# follow the wear.
-_NEIGHBOURS = 3
-_FEWEST = 2
-# Readings of one joint agree at least within the default uncertainty of their difference, rounded
-# up; those that differ by so many times as much are unusual. Both assumed. [in, 1]
-_FIT_IN = 0.0008
-_CLEARLY_OFF = 3
-_SCALES: tuple[tuple[float, str], ...] = tuple(
-    (factor, f"{words} (factor {slip.factor:g})")
-    for slip in SLIPS.values()
-    for factor, words in ((slip.factor, slip.too_large), (1.0 / slip.factor, slip.too_small))
-)
-
 Rows = Sequence[Inspection | InvalidRow]
-Clearances = Mapping[int, float]
 
 
 # So many different clearances are not read again exactly: a reading agrees with the one before to
@@ -141,39 +123,6 @@ def copies(rows: Rows) -> dict[int, str]:
         if before.inspection_date == row.inspection_date:
             said = "the same inspection, entered twice?"
         found[place] = f"all clearances are those of {where(before.source)}: {said}"
-    return found
-
-
-def slips(rows: Rows) -> dict[int, str]:
-    """Suggest slips for rows, by their place, that do not fit the other inspections of the gear."""
-    gears: dict[tuple[str, Side], list[int]] = {}
-    for place, row in enumerate(rows):
-        if isinstance(row, Inspection) and row.clearance_in:
-            gears.setdefault((row.tail_no, row.side), []).append(place)
-    usual: dict[tuple[str, Side], Clearances] = {}
-    found: dict[int, str] = {}
-    for gear, places in gears.items():
-        if len(places) <= _FEWEST:
-            continue
-        seen = [row for row in (rows[p] for p in places) if isinstance(row, Inspection)]
-        clearances = [row.clearance_in for row in seen]
-        for at, place in enumerate(places):
-            near = [
-                *clearances[max(0, at - _NEIGHBOURS) : at],
-                *clearances[at + 1 : at + 1 + _NEIGHBOURS],
-            ]
-            if _fits(clearances[at], near):
-                continue
-            expected = _medians(near)
-            other = (gear[0], Side.RH if gear[1] is Side.LH else Side.LH)
-            if other not in usual:
-                others = [rows[p] for p in gears.get(other, ())][: 2 * _NEIGHBOURS + 1]
-                usual[other] = _medians(
-                    [r.clearance_in for r in others if isinstance(r, Inspection)]
-                )
-            slip = _slip(clearances[at], expected, usual[other], other[1])
-            if slip:
-                found[place] = slip
     return found
 
 
@@ -226,78 +175,3 @@ def order_warnings(rows: Rows, layouts: Sequence[SheetLayout]) -> dict[int, str]
                 " landings or the date."
             )
     return found
-
-
-def _fits(own: Clearances, near: Sequence[Clearances]) -> bool:
-    """Tell quickly that a row is like one of its neighbours."""
-    return any(
-        all(
-            abs(value - them.get(joint, value)) <= _tolerance(value) for joint, value in own.items()
-        )
-        for them in near
-    )
-
-
-def _tolerance(value_in: float) -> float:
-    return max(_FIT_IN, 0.15 * value_in)
-
-
-def _medians(near: Sequence[Clearances]) -> Clearances:
-    values: dict[int, list[float]] = {}
-    for them in near:
-        for joint, value in them.items():
-            values.setdefault(joint, []).append(value)
-    return {joint: median(found) for joint, found in values.items() if len(found) >= _FEWEST}
-
-
-def _slip(own: Clearances, usual: Clearances, other: Clearances, other_side: Side) -> str:
-    common = [joint for joint in own if joint in usual]
-    off = [
-        joint
-        for joint in common
-        if abs(own[joint] - usual[joint]) > _CLEARLY_OFF * _tolerance(usual[joint])
-    ]
-    if not off:
-        return ""
-    for first, second in pairwise(sorted(common)):
-        if (
-            off == [first, second]
-            and _near(own[first], usual[second])
-            and _near(own[second], usual[first])
-        ):
-            return (
-                f"joints {first} and {second} do not fit this gear's other inspections, but would"
-                " if they were swapped: were the two readings exchanged?"
-            )
-    if len(common) >= 3 and all(
-        joint in other and _near(own[joint], other[joint]) for joint in common
-    ):
-        return (
-            f"the clearances fit the {other_side} gear of this aircraft, not this one: is the side"
-            " right?"
-        )
-    return _scale(own, usual, common, off)
-
-
-def _near(value_in: float, expected_in: float) -> bool:
-    return abs(value_in - expected_in) <= _tolerance(expected_in)
-
-
-def _scale(own: Clearances, usual: Clearances, common: list[int], off: list[int]) -> str:
-    measurable = [joint for joint in common if usual[joint] > _FIT_IN]
-
-    def fits(factor: float, joint: int) -> bool:
-        return abs(own[joint] / factor - usual[joint]) <= 0.15 * usual[joint]
-
-    for factor, meaning in _SCALES:
-        said = f"this gear's other inspections: {meaning}?"
-        if len(measurable) >= 3 and all(fits(factor, joint) for joint in measurable):
-            return f"all clearances of this row are {_times(factor)} {said}"
-        alone = len(off) == 1 and off[0] in measurable and factor not in (2.0, 0.5)
-        if alone and fits(factor, off[0]):
-            return f"joint {off[0]} is {_times(factor)} {said}"
-    return ""
-
-
-def _times(factor: float) -> str:
-    return f"{factor:g} times" if factor >= 1 else f"one part in {1 / factor:g} of"

@@ -127,7 +127,8 @@ def _spoken(
     unit that it is.
     """
     text = cell if isinstance(cell, str) else ""
-    failed = says_failed(text) or answers_outcome(header, cell)
+    # The rows of a long table are carried together.
+    failed = any(map(says_failed, text.split("; "))) or answers_outcome(header, cell)
     return failed, convention_word(text), UNIT_SPELLINGS.get(plain_text(text).lower())
 
 
@@ -200,8 +201,7 @@ class _Found:
 class RowReader:
     """Reads the rows of one table, each bad cell reported once.
 
-    is_several: True if the readings of several visits stand next to each other. invalid_content: a
-    hash of the cells of each row that cannot be judged, to recognize a repeated row.
+    is_several: True if the readings of several visits stand next to each other.
     """
 
     def __init__(
@@ -240,7 +240,6 @@ class RowReader:
         self._worded: set[int] = set()
         self._add(placed)
         self.not_measured: Counter[str] = Counter()
-        self.invalid_content: dict[RowSource, int] = {}
         self._without_unit: set[str | None] = set()
         self._row = Row(0, [])
         self._suffix = ""
@@ -307,7 +306,6 @@ class RowReader:
             named = [*row.bad, *(self._placed[index].header for index in bad)]
             named += [c.name for c in IDENTITY if c not in self._at and identity[c.name] is None]
             named += [CONVENTION.name] if -1 in self._bad else []
-            self.invalid_content[source] = hash(tuple(self._cells))
             return InvalidRow(
                 **identity,
                 correct=tuple(dict.fromkeys(named)),
@@ -414,7 +412,7 @@ class RowReader:
             try:
                 self._days_of_visits[text] = self._read_day(text)
             except CellFaultError as fault:
-                self._table.tell_fault(fault, text, CellPlace(None, DATE.name))
+                self._table.tell_fault(fault, text, CellPlace(self._row.number, DATE.name))
         return self._days_of_visits[text]
 
     def _one_value(self, index: int, column: Column, cell: Cell) -> Any:

@@ -20,7 +20,7 @@ from mlg_troubleshoot.decision.columns import (
     SIDE,
     TAIL_NO,
 )
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import ROUNDING_IN
 from mlg_troubleshoot.records.cells import Cells, Filled, column_letters, quote, show
@@ -45,8 +45,7 @@ _GEARS = frozenset(("gear", "mlg", "main gear", "landing gear", "leg", "hand", "
 class Collected:
     """What the sheets of one file gave.
 
-    invalid_content: a hash of the cells of each row that cannot be judged, to recognize a repeated
-    row. unread: those of the notes that say what was not read.
+    unread: those of the notes that say what was not read.
     """
 
     rows: list[Inspection | InvalidRow] = field(default_factory=list)
@@ -55,17 +54,13 @@ class Collected:
     unread: list[str] = field(default_factory=list)
     unread_sheets: list[str] = field(default_factory=list)
     layouts: list[SheetLayout] = field(default_factory=list)
-    invalid_content: dict[RowSource, int] = field(default_factory=dict)
 
     def join(self, part: Collected, place: str) -> None:
         """Take what a sheet or a file gave; its notes say the place."""
         for own in fields(self):
-            if own.name == "invalid_content":
-                self.invalid_content |= part.invalid_content
-            else:
-                said = place if own.name in ("notes", "unread") else ""
-                kept: list[Any] = getattr(self, own.name)
-                kept += [said + each if said else each for each in getattr(part, own.name)]
+            said = place if own.name in ("notes", "unread") else ""
+            kept: list[Any] = getattr(self, own.name)
+            kept += [said + each if said else each for each in getattr(part, own.name)]
 
     def tell(self, problem: Problem) -> None:
         """Take a problem; a table that has far too many of them is refused, with the first."""
@@ -140,7 +135,6 @@ def read_form(
     is_several = len(visits) > 1
     reader = RowReader(columns.placed, table, is_several=is_several)
     out.rows += map(reader.read, form.upright(columns, visits))
-    out.invalid_content = reader.invalid_content
     dates = reader.settle_dates(out.rows)
     out.notes += filter(None, (*columns.notes(), dates, form.note(visits)))
     kind = "visits" if is_several else "form"
@@ -454,7 +448,6 @@ class _Table:
             found += map(self._reader.read, self._folder.rows.values())
             found.sort(key=lambda row: row.source.row or 0)
         self._dates = self._reader.settle_dates(found)
-        self._out.invalid_content = self._reader.invalid_content
         if self._aside:
             self._judge_aside()
 

@@ -76,6 +76,16 @@ def test_rows_of_a_record_that_contradict_each_other_are_an_error(read, table):
     assert isinstance(result.rows[0], InvalidRow)
 
 
+@pytest.mark.parametrize("header", ["remarks", "Bushing seen"])
+def test_what_is_only_carried_of_the_rows_of_a_record_is_carried_of_each(read, table, header):
+    said = ("bushing 4 cracked", "greased", "bushing 4 cracked")
+    rows = [("R1", "N1", "LH", "RADIAL", 3 + n, 0.013, text) for n, text in enumerate(said)]
+    (row,) = read(table((*HEADER, header), rows)).rows
+    assert row.carried == {header: "bushing 4 cracked; greased"}
+    rows[1] = (*rows[1][:6], "stuck")
+    assert isinstance(read(table((*HEADER, header), rows)).rows[0], InvalidRow)
+
+
 def test_what_a_record_says_only_once_holds_for_all_its_rows(read, table):
     rows = [("R1", "N1", "LH", "RADIAL", 3, 0.013), ("R1", None, None, None, 5, 0.007)]
     result = read(table(HEADER, rows))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import openpyxl
@@ -15,6 +16,7 @@ from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions, ReadResult, read_many
+from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.check import check
 from tests.cli.conftest import mlg
 from tests.records.drawn_sheets import KINDS, drawn
@@ -151,6 +153,22 @@ def test_days_and_sides_of_a_visit_are_its_own() -> None:
     found = read_many([workbook(rows)], OPTIONS)
     days = [str(row.inspection_date) for row in found.rows if isinstance(row, Inspection)]
     assert days == ["2025-01-15", "2026-01-15"]
+
+
+@pytest.mark.parametrize("months", [("Jan", "Feb"), ("January 2026", "March 2026")])
+def test_months_above_readings_are_visits_without_a_day(months: tuple[str, str]) -> None:
+    who = ["N1", "LH", "RADIAL"]
+    long = [["tail", "side", "convention", "joint", *months], [*who, 3, 0.001, 0.002]]
+    wide = [["tail", "side", "convention", *(f"J3 {each}" for each in months)]]
+    wide.append([*who, 0.001, 0.002])
+    form = [["Tail", "N1"], ["Side", "LH"], ["Convention", "RADIAL"], ["Item", *months]]
+    form += [["J3", 0.001, 0.002], ["J5", 0.001, 0.002]]
+    for lines in (long, wide, form):
+        found = read_many([workbook(lines)], replace(OPTIONS, unit=LengthUnit.INCH))
+        assert [row.clearance_in[3] for row in found.inspections] == [0.001, 0.002]
+        assert {(p.code, p.value) for p in found.problems} == {
+            ("date_invalid", each.lower()) for each in months
+        }
 
 
 def test_sides_in_the_headings_of_a_table_with_sides_are_refused() -> None:
