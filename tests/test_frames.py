@@ -333,12 +333,12 @@ def test_residuals_against_an_unknown_column_name_the_columns() -> None:
 
 
 def test_a_store_gives_what_it_keeps_as_tables(tmp_path: Path) -> None:
-    from mlg_troubleshoot.workflows.keep import keep
+    from mlg_troubleshoot.workflows.keep import keep, told_by
 
     store = mlg.Store(tmp_path / "store.sqlite")
     options = mlg.CheckOptions(advice=False)
     checked = mlg.check_files([DATA / "fleet_batch.csv"], options)
-    keep(checked, store)
+    keep(told_by(checked.judgements), store)
     kept = store.inspections()
     assert set(kept["record_id"]) == set(checked.to_frame()["record_id"])
     gears = checked.to_frame()[["tail_no", "side"]].drop_duplicates()

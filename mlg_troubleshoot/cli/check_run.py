@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from mlg_troubleshoot.cli import by_hand, options, output
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
-from mlg_troubleshoot.decision.inspection import Inspection, RowSource, Side
+from mlg_troubleshoot.decision.inspection import RowSource, Side
 from mlg_troubleshoot.decision.ranking import Listed, listed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.decision.assessment import Judgement
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.json_form import CheckText
+    from mlg_troubleshoot.workflows.keep import Told
 
 # Inspections that --report writes at most: HTML and PDF of one take 0.1 s, and their judgements
 # stand in memory until then. [1]
@@ -44,7 +45,7 @@ class _Gathered:
 
     lines: list[Listed] = field(default_factory=list)
     held: list[Judgement] = field(default_factory=list)
-    entries: list[Inspection] = field(default_factory=list)
+    entries: list[Told] = field(default_factory=list)
     annotated: dict[RowSource, task.Annotated] = field(default_factory=dict)
     text: CheckText | None = None
 
@@ -149,7 +150,7 @@ class Run:
         if wanted.annotate is not None and result.read is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
         # A report states what was kept.
-        self._keep(result, judged=found.entries)
+        self._keep(result, found.entries)
         if wanted.report is not None:
             self.write_reports(result, wanted.report, unit)
         if not (wanted.keep or wanted.quiet) and sys.stderr.isatty():
@@ -188,9 +189,9 @@ class Run:
         if wanted.annotate is not None:
             outputs.append(task.BlockOutput(task.annotated, found.annotated.update))
         if self._place is not None:
-            from mlg_troubleshoot.workflows.keep import inspections_of
+            from mlg_troubleshoot.workflows.keep import told_by
 
-            outputs.append(task.BlockOutput(inspections_of, found.entries.extend))
+            outputs.append(task.BlockOutput(told_by, found.entries.extend))
         if total == 1 or wanted.report is not None:
             outputs.append(task.BlockOutput(tuple, found.held.extend))
         return outputs
@@ -286,15 +287,16 @@ class Run:
             )
         return output.say_written(written, quiet=self._wanted.quiet)
 
-    def _keep(self, result: task.CheckResult, judged: Sequence[Inspection] | None = None) -> None:
+    def _keep(self, result: task.CheckResult, told: Sequence[Told] | None = None) -> None:
         """Add what was found to the store, if that is asked for."""
         if self._place is None or not self._wanted.keep:
             return
-        from mlg_troubleshoot.workflows.keep import keep
+        from mlg_troubleshoot.workflows.keep import keep, told_by
 
         with stages(quiet=self._wanted.quiet) as bar:
             progress = partial(bar, "Keeping")
-            added = keep(result, self._place, progress, judged, amend=self._wanted.amend)
+            inspections = told_by(result.judgements) if told is None else told
+            added = keep(inspections, self._place, progress, amend=self._wanted.amend)
         if not self._wanted.quiet:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""

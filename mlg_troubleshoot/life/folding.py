@@ -250,13 +250,13 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     # A repair that an inspection states is that of the same day which was recorded by itself; one
     # that came with an inspection falls with it.
     known = {(at.day, at.joints) for at in moments}
-    sound = {r.record_id for r in kept.values() if not inspection_of(r).is_repaired}
+    repaired = {None, *(r.record_id for r in kept.values() if inspection_of(r).is_repaired)}
     alone = (_alone(r, places[r]) for r in others.values() if r.kind in _WORK)
     moments += [
         at
         for at in alone
         if (at.day, at.joints) not in known
-        if at.visit and at.visit.kept.body.get("stated_by") not in sound
+        if at.visit and at.visit.kept.body.get("stated_by") in repaired
     ]
     moments.sort(key=lambda at: at.visit.place if at.visit else 0.0)
     events = tuple(moments[place] for place in in_order(moments))

@@ -19,7 +19,6 @@ from mlg_troubleshoot.store.inspections import (
     content_of,
     inspection_from,
     inspection_record,
-    same_inspection,
 )
 
 __all__ = [
@@ -40,5 +39,4 @@ __all__ = [
     "inspection_record",
     "login",
     "packed",
-    "same_inspection",
 ]

@@ -196,7 +196,7 @@ class Record:
             self.day,
             self.packed.hex(),
         )
-        text = _canonical([self.kind.value, *what])
+        text = canonical([self.kind.value, *what])
         return hashlib.sha256(text.encode()).digest()
 
 
@@ -222,14 +222,14 @@ class Broken:
 
 
 # Made once; whatever another program may have put into a column also has a form.
-_canonical = json.JSONEncoder(
+canonical = json.JSONEncoder(
     ensure_ascii=True, allow_nan=False, sort_keys=True, separators=(",", ":"), default=repr
 ).encode
 
 
 def packed(body: Mapping[str, Any]) -> bytes:
     """Compress the content of a record; one that could not be read again is refused."""
-    text = _canonical(body).encode()
+    text = canonical(body).encode()
     if len(text) > MOST_BYTES:
         raise StoreError(
             f"a record of {len(text)} bytes cannot be kept, at most {MOST_BYTES}",
@@ -253,7 +253,7 @@ def _chained(before: bytes, row: Mapping[str, Any]) -> bytes:
     since = [row[name] for name in _SINCE_2]
     texts += since if any(since) else []
     return hashlib.sha256(
-        before + _canonical(texts).encode() + row["identity"] + row["body"]
+        before + canonical(texts).encode() + row["identity"] + row["body"]
     ).digest()
 
 
@@ -593,13 +593,9 @@ class Store:
         at = "" if misfit.row is None else f" at record {misfit.row.seq}"
         return StoreError(f"store {self.place}: the chain does not fit{at}: {misfit.why}", _VERIFY)
 
-    def add(
-        self, records: Iterable[Record], judge: Callable[[Record, Record], bool] | None = None
-    ) -> Added:
+    def add(self, records: Iterable[Record]) -> Added:
         """Add records in one transaction; those that stand there already are left out, and of those
-        that say the same the last one stands.
-
-        ``judge`` is asked about a known identity, with the record kept and the new one: False
+        that say the same the last one stands. An inspection that stands there with other content
         refuses the whole call.
         """
         each = [*records]
@@ -611,7 +607,7 @@ class Store:
             others = [
                 r
                 for identity, r in known.items()
-                if judge is not None and not judge(r, distinct[identity])
+                if r.kind is RecordKind.INSPECTION and r.packed != distinct[identity].packed
             ]
             if others:
                 raise kept_otherwise(others)
@@ -767,7 +763,7 @@ class Store:
                     columns = {name: getattr(row, name) for name in ("seq", *_TEXTS)}
                     columns |= {n: text for n in _SINCE_2 if (text := getattr(row, n))}
                     exact = {name: bytes(getattr(row, name)).hex() for name in _BYTES}
-                    yield _canonical({**columns, **exact, "content": content}) + "\n"
+                    yield canonical({**columns, **exact, "content": content}) + "\n"
             except _MisfitError as misfit:
                 raise self._broken(misfit) from None
         for first in wrong.values():

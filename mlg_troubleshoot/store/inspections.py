@@ -11,7 +11,7 @@ from typing import Any
 
 from mlg_troubleshoot.decision.columns import COLUMNS, Holds
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, RowSource
-from mlg_troubleshoot.store.database import Record, RecordKind, packed
+from mlg_troubleshoot.store.database import Record, RecordKind, canonical, packed
 from mlg_troubleshoot.units import LengthUnit
 
 # What says where and how an inspection was entered, not what was found.
@@ -99,15 +99,9 @@ def inspection_from(record: Record, body: Any = None) -> Inspection:
     return Inspection(**{"clearance_in": {}, "other_columns": other, **read})
 
 
-def content_of(record: Record, *, with_day: bool = True) -> bytes:
-    """Hash of what was found at which gear and, unless it is left out, on which day; wherever it
-    was entered and whatever it is called.
+def content_of(said: Mapping[str, Any], *left_out: str) -> bytes:
+    """Hash of what an inspection says was found at which gear, and of what else is not left out;
+    wherever it was entered and whatever it is called.
     """
-    left_out = {*NOT_CONTENT, *(() if with_day else ("inspection_date",))}
-    found = record.body.get("inspection", record.body)
-    return sha256(packed({n: v for n, v in found.items() if n not in left_out})).digest()
-
-
-def same_inspection(one: Record, two: Record) -> bool:
-    """Whether two records say that the same was found."""
-    return content_of(one) == content_of(two)
+    found = {n: v for n, v in said.items() if n not in NOT_CONTENT and n not in left_out}
+    return sha256(canonical(found).encode()).digest()

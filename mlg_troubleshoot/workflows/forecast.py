@@ -12,7 +12,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from mlg_troubleshoot.workflows.history import Lives, show_fleet
-from mlg_troubleshoot.workflows.keep import keep
+from mlg_troubleshoot.workflows.keep import keep, told_by
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.records.read import Source
@@ -45,5 +45,5 @@ def forecast(
     checked = check_files([inspections], options)
     with TemporaryDirectory() as folder:
         store = Store(Path(folder) / "inspections.sqlite")
-        keep(checked, store)
+        keep(told_by(checked.judgements), store)
         return show_fleet(store, known, ahead=True, problems=checked.problems)

@@ -34,7 +34,7 @@ from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.store import Added, Broken, Record, RecordKind, Store, StoreError, packed
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.index_tables import load_index_table
-from mlg_troubleshoot.workflows.keep import move, voids, with_its_repairs
+from mlg_troubleshoot.workflows.keep import move, voids
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
@@ -259,10 +259,9 @@ def void(store: Store, record_id: str, why: str) -> Record:
     """Void a record: it stays in the chain but does not count."""
     judge_text("--why", why, "State why the record does not count.")
     wrong = _unreadable(store, record_id) or find(store, record_id)
-    beside = with_its_repairs(store, wrong) if is_readable(wrong) else [wrong]
-    records = [voids(each, why) for each in beside]
-    store.add(records)
-    return records[0]
+    record = voids(wrong, why)
+    store.add([record])
+    return record
 
 
 def move_record(store: Store, record_id: str, gear: GearKey, why: str) -> Record:

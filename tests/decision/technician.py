@@ -23,7 +23,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
-from mlg_troubleshoot.workflows.keep import keep
+from mlg_troubleshoot.workflows.keep import keep, told_by
 from tests.benchmarks.worn_gears import GROUPS, LIMIT_IN, displacement, worst
 from tests.hidden_effect.simulator.linkage import load
 
@@ -293,7 +293,7 @@ class Hangar:
         (folder / "kept.sqlite").unlink(missing_ok=True)
         self.store = Store(folder / "kept.sqlite")
         options = CheckOptions(advice=False)
-        keep(check_files([folder / "row.csv"], options), self.store)
+        keep(told_by(check_files([folder / "row.csv"], options).judgements), self.store)
         return self
 
     def judged(self, gears: Sequence[Gear], folder: Path) -> list[dict[str, Any]]:

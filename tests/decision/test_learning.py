@@ -17,7 +17,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.looking_back import expected_of
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
-from mlg_troubleshoot.workflows.keep import keep
+from mlg_troubleshoot.workflows.keep import keep, told_by
 from tests.decision.conftest import every_joint, inspected
 from tests.decision.technician import Hangar, World
 
@@ -94,7 +94,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     rows += [f"R{k},N{k % 10},LH,RADIAL,2026-03-{k + 1:02},0.004" for k in range(11)]
     (folder / "fleet.csv").write_text("\n".join(rows), encoding="utf-8")
     found, options = Store(folder / "kept.sqlite"), CheckOptions()
-    keep(check_files([folder / "fleet.csv"], options), found)
+    keep(told_by(check_files([folder / "fleet.csv"], options).judgements), found)
     return found
 
 
@@ -113,7 +113,7 @@ def test_a_few_gears_are_not_a_fleet(gear: Gear, tmp_path: Path) -> None:
     rows += [f"R{k},N{k},LH,RADIAL,0.004" for k in range(9)]
     (tmp_path / "few.csv").write_text("\n".join(rows), encoding="utf-8")
     few, options = Store(tmp_path / "kept.sqlite"), CheckOptions()
-    keep(check_files([tmp_path / "few.csv"], options), few)
+    keep(told_by(check_files([tmp_path / "few.csv"], options).judgements), few)
     assert expected_of(few, gear) is None
 
 

@@ -21,8 +21,8 @@ from mlg_troubleshoot.store import (
     StoreError,
     inspection_from,
     inspection_record,
-    same_inspection,
 )
+from mlg_troubleshoot.workflows.keep import Told
 
 from . import places
 
@@ -50,7 +50,7 @@ def test_an_inspection_comes_back_as_it_was_kept(store: Store) -> None:
 
 
 def test_the_same_inspection_twice_is_one_in_one_call_too(store: Store) -> None:
-    again = store.add([*places.records(1, 8), *places.records(1, 8)], same_inspection)
+    again = store.add([*places.records(1, 8), *places.records(1, 8)])
     assert (again.new, again.known) == (4, 24)
 
 
@@ -69,22 +69,12 @@ def test_while_one_writes_no_other_begins_to(store: Store) -> None:
         pass
 
 
-def test_the_same_inspection_from_another_file_is_the_same(store: Store) -> None:
-    moved = replace(
-        places.inspection(2), source=places.RowSource("other.xlsx", "Sheet", 9), warnings=("seen",)
-    )
-    assert store.add([inspection_record(moved)], same_inspection).new == 0
-
-
 def test_the_same_identity_with_other_content_is_refused_and_nothing_of_the_call_is_kept(
     store: Store,
 ) -> None:
     other = [*places.records(20, 22), inspection_record(places.inspection(3, clearance_in=0.009))]
     with pytest.raises(StoreError, match=r"R3 \(N3 LH 2026-01-04\).*nothing of this was kept"):
-        store.add(
-            other,
-            lambda kept, new: new.kind is not RecordKind.INSPECTION or same_inspection(kept, new),
-        )
+        store.add(other)
     assert len(store.all()) == 10
 
 
@@ -228,7 +218,7 @@ def test_a_store_of_each_schema_version_can_be_read_and_added_to(
     copied.write_bytes(version.read_bytes())
     store = Store(copied)
     assert inspection_from(kept_inspections(store)[0]) == places.inspection(1)
-    assert store.add(places.records(1, 5), lambda kept, new: kept.kind is new.kind).new == 2
+    assert store.add(places.records(1, 5)).new == 2
     assert store.verify() == (8, None)
 
 
@@ -267,6 +257,7 @@ def test_what_was_found_otherwise_is_another_inspection_and_comes_back_so(
     found: dict[str, Any], place: Path
 ) -> None:
     kept, other = places.inspection(2), replace(places.inspection(2), **found)
-    assert not same_inspection(inspection_record(kept), inspection_record(other))
+    one, two = (Told.of(inspection_record(each)) for each in (kept, other))
+    assert one.content != two.content
     Store(place).add([inspection_record(other)])
     assert inspection_from(kept_inspections(Store(place))[0]) == other

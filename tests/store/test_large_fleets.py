@@ -20,9 +20,9 @@ from mlg_troubleshoot.life.forecast import (
 )
 from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
-from mlg_troubleshoot.workflows.check import CheckOptions, check_files, check_inspection
+from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from mlg_troubleshoot.workflows.history import show_fleet, show_lives
-from mlg_troubleshoot.workflows.keep import keep
+from mlg_troubleshoot.workflows.keep import Told, keep, told_by
 
 TAILS = [f"N{n:03d}" for n in range(TEACHERS + 30)]
 
@@ -106,18 +106,18 @@ def test_a_store_kept_in_many_blocks_is_the_one_kept_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     batch = Path(__file__).parents[2] / "inspection_data" / "fleet_batch.csv"
-    result = check_files([batch, batch], CheckOptions())
+    told = told_by(check_files([batch, batch], CheckOptions()).judgements)
     at_once, in_blocks = (Store(tmp_path / f"{name}.sqlite") for name in ("one", "many"))
-    kept = keep(result, at_once)
+    kept = keep(told, at_once)
     monkeypatch.setattr("mlg_troubleshoot.store.database._AT_ONCE", 5)
-    assert keep(result, in_blocks) == kept
+    assert keep(told, in_blocks) == kept
     assert [r.content for r in in_blocks.all()] == [r.content for r in at_once.all()]
 
 
 def test_rows_that_stand_twice_in_a_call_are_kept_once(tmp_path: Path) -> None:
     batch = Path(__file__).parents[2] / "inspection_data" / "fleet_batch.csv"
     store = Store(tmp_path / "store.sqlite")
-    kept = keep(check_files([batch, batch], CheckOptions()), store)
+    kept = keep(told_by(check_files([batch, batch], CheckOptions()).judgements), store)
     stored = [record for record in store.all() if record.kind is RecordKind.INSPECTION]
     assert len(stored) == kept.new == kept.known == len(store.all())
 
@@ -136,11 +136,10 @@ def test_keeping_says_how_far_it_is_also_where_rows_state_repairs(tmp_path: Path
         )
         for n in range(3)
     ]
-    checked = [check_inspection(row, CheckOptions()) for row in rows]
-    result = replace(checked[0], judgements=tuple(each.judgements[0] for each in checked))
+    told = [Told.of(inspection_record(row)) for row in rows]
     said: list[tuple[int, int]] = []
     store = Store(tmp_path / "store.sqlite")
-    keep(result, store, progress=lambda done, total: said.append((done, total)))
+    keep(told, store, progress=lambda done, total: said.append((done, total)))
     assert said == [(1, 3), (2, 3), (3, 3)]
 
 

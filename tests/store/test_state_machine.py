@@ -31,9 +31,9 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import find, lives
 from mlg_troubleshoot.life.state import GearVisit, state_now
-from mlg_troubleshoot.store import RecordKind, Store
+from mlg_troubleshoot.store import RecordKind, Store, inspection_record
 from mlg_troubleshoot.workflows import history
-from mlg_troubleshoot.workflows.check import CheckResult
+from mlg_troubleshoot.workflows import keep as task
 from mlg_troubleshoot.workflows.keep import keep, move, voids
 from tests.decision.conftest import inspected
 
@@ -278,7 +278,8 @@ class TwoStores(RuleBasedStateMachine):
         self.entered[where][entry.place] = entry
 
     def keep(self, where: int, rows: Sequence[Inspection], *, amend: bool | None = None) -> None:
-        keep(CheckResult(gear=GEAR, judgements=()), self.stores[where], judged=rows, amend=amend)
+        told = [task.Told.of(inspection_record(row)) for row in rows]
+        keep(told, self.stores[where], amend=amend)
 
     def counting(self, where: int) -> dict[str, Known]:
         return counting([*self.entered[where].values()])

@@ -6,7 +6,7 @@ import resource
 import signal
 import sys
 
-from mlg_troubleshoot.store import Store, StoreError, same_inspection
+from mlg_troubleshoot.store import Store, StoreError
 
 from . import places
 
@@ -20,12 +20,7 @@ if __name__ == "__main__":
         resource.setrlimit(resource.RLIMIT_FSIZE, (int(most[0]), int(most[0])))
     print("ready", flush=True)
     try:
-        store.add(
-            batch,
-            lambda kept, new: (
-                kept.kind is new.kind and (kept.kind != "inspection" or same_inspection(kept, new))
-            ),
-        )
+        store.add(batch)
     except StoreError as error:
         print(error.message, flush=True)
         sys.exit(5)
