@@ -102,7 +102,7 @@ class Run:
         typed = by_hand.from_flags(self._flags, self.asked, self._place)
         result = task.check_inspection(typed, self.asked, self._place)
         try:
-            self._keep(result)
+            self._keep(result.judgements)
         finally:
             self.publish(result, LengthUnit.INCH)
         return result.exit_code
@@ -150,7 +150,7 @@ class Run:
         if wanted.annotate is not None and result.read is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
         # A report states what was kept.
-        self._keep(result, found.entries)
+        self._keep((), found.entries)
         if wanted.report is not None:
             self.write_reports(result, wanted.report, unit)
         if not (wanted.keep or wanted.quiet) and sys.stderr.isatty():
@@ -287,7 +287,7 @@ class Run:
             )
         return output.say_written(written, quiet=self._wanted.quiet)
 
-    def _keep(self, result: task.CheckResult, told: Sequence[Told] | None = None) -> None:
+    def _keep(self, judgements: Sequence[Judgement], told: Sequence[Told] = ()) -> None:
         """Add what was found to the store, if that is asked for."""
         if self._place is None or not self._wanted.keep:
             return
@@ -295,8 +295,8 @@ class Run:
 
         with stages(quiet=self._wanted.quiet) as bar:
             progress = partial(bar, "Keeping")
-            inspections = told_by(result.judgements) if told is None else told
-            added = keep(inspections, self._place, progress, amend=self._wanted.amend)
+            found = [*told_by(judgements), *told]
+            added = keep(found, self._place, progress, amend=self._wanted.amend)
         if not self._wanted.quiet:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""

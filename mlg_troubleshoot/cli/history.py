@@ -90,14 +90,7 @@ def show(
         return
     with stages(quiet=shown.quiet) as bar:
         ahead = not no_forecast
-        found = history.show_lives(
-            place,
-            known,
-            tail,
-            side,
-            ahead=ahead,
-            progress=bar,
-        )
+        found = history.show_lives(place, known, tail, side, ahead=ahead, progress=bar)
     if shown.as_json and len(found.lives) != 1:
         tail = found.lives[0].key[0]
         raise UsageError(
@@ -176,7 +169,7 @@ def show_gears(
         )
     gears = "1 gear" if len(lines) == 1 else f"{len(lines)} gears"
     console.print(f"{gears}, the most urgent first.")
-    show_warnings(console, found.lines)
+    _show_warnings(console, (said for line in found.lines for said in line.warnings))
     spare = ("landings", "last seen", "failed", worst_in, "verdict", "next action")
     output.print_table(console, headings, rows, spare, "--json lists all of them", folded=why)
     if joint is not None:
@@ -208,10 +201,9 @@ def _count(landings: float | None) -> str:
     return "-" if landings is None else f"{landings:g}"
 
 
-def show_warnings(console: output.DataConsole, found: Iterable[GearLife | FleetLine]) -> None:
-    for each in found:
-        for warning in each.warnings:
-            console.print(output.text(f"Warning: {warning}"))
+def _show_warnings(console: output.DataConsole, warnings: Iterable[str]) -> None:
+    for warning in warnings:
+        console.print(output.text(f"Warning: {warning}"))
 
 
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
@@ -233,7 +225,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
         before = visit
     headings = ("date", "landings>", "hash", "what")
     output.print_table(console, headings, events, ("hash",))
-    show_warnings(console, [life])
+    _show_warnings(console, life.warnings)
     for note in life.notes:
         console.print(note)
     if outlook := outlook_sentence(life, ahead, gear):
