@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Literal, Unpack
+from typing import Literal, Unpack
 
 import numpy as np
 from markupsafe import Markup
@@ -17,14 +17,10 @@ from markupsafe import Markup
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.gear.gear import Gear, JointSpec
 from mlg_troubleshoot.geometry.mechanism import (
-    Crank,
     Dyad,
-    Guided,
     Lever,
     Mechanism,
-    Slider,
     Slot,
-    Towards,
     needs,
 )
 from mlg_troubleshoot.reporting.figures import (
@@ -203,13 +199,12 @@ class _PlaneDrawing:
         }
 
         canvas.text(2, 11, name, size=10.5, bold=True, colour=SOFT)
-        self._links(canvas, at)
+        self._parts(canvas, at)
         for point, place in at.items():
-            if point not in self.cut:
-                if self.mechanism.point(point).fixed:
-                    _ground(canvas, place)
-                if all(joint.point != point for joint in joints):
-                    canvas.marker("circle", place.real, place.imag, 3.0)
+            if self.mechanism.point(point).fixed and point not in self.cut:
+                _polygon(canvas, place, place + (12 + 19j), place + (-12 + 19j), fill=PAPER)
+            if all(joint.point != point for joint in joints):
+                canvas.marker("circle", place.real, place.imag, 3.0)
         markers = _without_overlap({j.number: at[j.point] for j in joints})
         # Those of another plane first: nothing of theirs may cover this one's.
         for joint in sorted(joints, key=self._stands_here):
@@ -230,44 +225,36 @@ class _PlaneDrawing:
     def _stands_here(self, joint: JointSpec) -> bool:
         return self.mechanism.point(joint.point).plane == self.plane
 
-    def _links(self, canvas: Canvas, at: Mapping[str, complex]) -> None:
-        """Draw the rigid parts below, the links above."""
-        self._rigid_parts(canvas, at)
-        for step in self.steps:
+    def _parts(self, canvas: Canvas, at: Mapping[str, complex]) -> None:
+        """Draw rigid parts as plates, links as bars above them; name what moves the linkage and
+        what it moves.
+        """
+        plates: list[set[str]] = []
+        for step in sorted(self.steps, key=lambda step: not isinstance(step, (Lever, Slot))):
             place = at[step.joint]
-            match step:
-                case Dyad():
-                    (_actuator if step.driven else _bar)(canvas, at[step.upstream], place)
-                    if not self._rigid(step.joint, step.downstream):
-                        _bar(canvas, place, at[step.downstream])
-                case Crank():
-                    _bar(canvas, at[step.pivot], place)
-                case Slider():
-                    _plunger(canvas, place, step.axis)
-                    _bar(canvas, at[step.upstream], place)
-                case Guided():
-                    _guides(canvas, step, at)
-
-    def _rigid_parts(self, canvas: Canvas, at: Mapping[str, complex]) -> None:
-        """Draw levers as plates, and the slot in its lever."""
-        for step in self.steps:
             if isinstance(step, (Lever, Slot)):
-                first = step.follows if isinstance(step, Lever) else step.pin
-                corners = at[first], at[step.pivot], at[step.joint]
-                _polygon(canvas, *corners, fill=PALE, colour=RULE, width=7.0)
-                _polygon(canvas, *corners, fill=PALE, colour=PALE, width=4.0)
-        for step in self.steps:
-            if isinstance(step, Slot):
-                pin = at[step.pin]
-                along = _unit(pin - at[step.pivot])
-                _tube(canvas, pin - 13 * along, pin + 9 * along, 25, PAPER, cap="round")
-
-    def _rigid(self, joint: str, pivot: str) -> bool:
-        """Tell whether two points are already drawn as an edge of a rigid part."""
-        return any(
-            isinstance(s, Lever) and s.pivot == pivot and joint in (s.follows, s.joint)
-            for s in self.steps
-        )
+                plates.append({step.joint, *needs(step)})
+                _polygon(
+                    canvas,
+                    place,
+                    *map(at.__getitem__, needs(step)),
+                    fill=PALE,
+                    colour=RULE,
+                    width=3,
+                )
+                continue
+            for name in needs(step):
+                # Two points of a plate need no bar.
+                if not any({step.joint, name} <= plate for plate in plates):
+                    _line(canvas, place, at[name], width=6, cap="round")
+                    _line(canvas, place, at[name], width=3, cap="round", colour=PAPER)
+        named = dict.fromkeys(self.cut, "actuator") | {self.mechanism.output.joint: "output"}
+        for point, name in named.items():
+            if point in at:
+                left = at[point].real < canvas.width / 2
+                x = at[point].real + (-14 if left else 14)
+                end: Anchor = "end" if left else "start"
+                canvas.text(x, at[point].imag + 4, name, size=9, colour=SOFT, anchor=end)
 
 
 def _without_overlap(markers: Mapping[int, complex]) -> dict[int, complex]:
@@ -301,82 +288,6 @@ def _polygon(canvas: Canvas, *corners: complex, fill: str, **stroke: Unpack[Stro
     canvas.polyline([(p.real, p.imag) for p in corners], fill=fill, closed=True, **stroke)
 
 
-def _tube(
-    canvas: Canvas, start: complex, end: complex, width: float, fill: str, cap: str | None = None
-) -> None:
-    """A thick line with an outline."""
-    _line(canvas, start, end, width=width, cap=cap)
-    _line(canvas, start, end, width=width - 3, cap=cap, colour=fill)
-
-
-def _bar(canvas: Canvas, start: complex, end: complex) -> None:
-    _tube(canvas, start, end, 7, PAPER, cap="round")
-
-
-def _actuator(canvas: Canvas, far: complex, joint: complex) -> None:
-    """A cylinder towards its anchor, broken off, and its rod."""
-    along = _unit(far - joint)
-    neck = joint + 0.42 * (far - joint)
-    _line(canvas, joint, neck, width=5)
-    _tube(canvas, neck, far, 15, PALE)
-    across = (3 - 10j) * along
-    for break_at in (far - 3 * along, far + 3 * along):
-        _line(canvas, break_at - across, break_at + across)
-    left = neck.real < canvas.width / 2
-    _named(canvas, neck + complex(-12 if left else 12, 16), "actuator", "end" if left else "start")
-
-
-def _plunger(canvas: Canvas, joint: complex, axis: float) -> None:
-    """The plunger beyond its pin, entering the valve."""
-    along = cmath.rect(1.0, -axis)
-    tip = joint + 30 * along
-    end = joint + 52 * along
-    _line(canvas, joint, tip, width=6)
-    _tube(canvas, tip, end, 24, PALE)
-    _named(canvas, (tip + end) / 2 - (18 + 7j), "plunger", "end")
-
-
-def _guides(canvas: Canvas, step: Guided, at: Mapping[str, complex]) -> None:
-    """The lines that a joint slides on, broken where they keep a direction, and its link."""
-    place = at[step.joint]
-    lines: list[tuple[str, Towards | None]] = [step.line, (step.upstream, step.across)]
-    for start, to in lines:
-        if isinstance(to, float):
-            along = cmath.rect(45.0, -to)
-            _line(canvas, place - along, place + along, width=3)
-            if start == step.upstream:
-                _line(canvas, at[start], place)
-        else:
-            (_bar if to is None else _line)(canvas, at[start], place if to is None else at[to])
-
-
-def _named(canvas: Canvas, place: complex, name: str, anchor: Anchor) -> None:
-    canvas.text(
-        place.real,
-        place.imag,
-        name,
-        size=9,
-        bold=True,
-        colour=SOFT,
-        anchor=anchor,
-    )
-
-
-def _ground(canvas: Canvas, place: complex) -> None:
-    _polygon(
-        canvas,
-        place,
-        place + (12 + 19j),
-        place + (-12 + 19j),
-        fill=PAPER,
-        width=1.4,
-    )
-    for k in range(-2, 3):
-        above = place + complex(5 * k + 1, 19)
-        below = place + complex(5 * k - 3, 24)
-        _line(canvas, above, below)
-
-
 def joint_state(joint: JointSpec, clearance_in: float | None) -> JointState:
     if clearance_in is None:
         return "missing"
@@ -384,30 +295,24 @@ def joint_state(joint: JointSpec, clearance_in: float | None) -> JointState:
 
 
 def _mark(canvas: Canvas, at: complex, text: str, state: str, faded: bool = False) -> None:
-    x = at.real
-    y = at.imag
-    size = _MARKER
     missing = state == "missing"
-    pale = state == "missing" or faded
+    pale = missing or faded
     colour = SOFT if pale else INK
     if state == "over":
-        canvas.rectangle(
-            x - size,
-            y - size,
-            2 * size,
-            2 * size,
-            fill=colour,
-            colour=PAPER,
-        )
-        colour = PAPER
+        canvas.marker("square", at.real, at.imag, _MARKER, colour=colour)
     else:
-        outline: dict[str, Any] = {
-            "stroke": colour,
-            "stroke_width": 1.3 if pale else 2.2,
-            "stroke_dasharray": "3 2.2" if missing else None,
-        }
-        canvas.add("circle", cx=x, cy=y, r=size, fill=PAPER, **outline)
-    canvas.text(x, y + 4, text, bold=not missing, colour=colour, anchor="middle")
+        canvas.add(
+            "circle",
+            cx=at.real,
+            cy=at.imag,
+            r=_MARKER,
+            fill=PAPER,
+            stroke=colour,
+            stroke_width=1.3 if pale else 2.2,
+            stroke_dasharray="3 2.2" if missing else None,
+        )
+    ink = PAPER if state == "over" else colour
+    canvas.text(at.real, at.imag + 4, text, bold=not missing, colour=ink, anchor="middle")
 
 
 def joint_mark(text: str, state: JointState) -> Markup:

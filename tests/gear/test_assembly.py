@@ -316,7 +316,7 @@ def test_a_linkage_whose_guide_moves_is_not_surveyed(tmp_path: Path) -> None:
 def test_a_gear_with_guides_that_move_is_drawn_with_them(tmp_path: Path) -> None:
     drawn = gear_of(changed(**YOKE), tmp_path).plot().svg
     still = gear_of(changed(**ACTUATOR), tmp_path).plot().svg
-    assert drawn.count("<line") > 0 and "plunger" not in drawn and "plunger" in still
+    assert drawn.count("<line") > 0 and "actuator" not in drawn and "actuator" in still
 
 
 @pytest.mark.parametrize("ends", [["A", "B"], ["B", "A"]])
