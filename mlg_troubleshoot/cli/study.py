@@ -34,8 +34,8 @@ class StudyFlags:
     design: Annotated[
         str,
         typer.Option(
-            metavar="tensor|sampled|lhs|lhs+ccd|ccd",
-            help="tensor = exact; sampled = Sobol points; the others are the paper's.",
+            metavar="tensor|lhs|lhs+ccd|ccd",
+            help="tensor = exact; the others are the paper's.",
         ),
     ] = "tensor"
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0

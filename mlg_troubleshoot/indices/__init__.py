@@ -5,6 +5,5 @@ __all__ = [
     "estimators",
     "index_table",
     "inputs",
-    "sampled",
     "tensor",
 ]

@@ -93,23 +93,6 @@ def student_half(scatter: Array, count: int) -> Array:
     return half
 
 
-def without_numbers(
-    design: str,
-    seed: int,
-    n: int,
-    evaluations: int,
-    note: str = "",
-    *,
-    failed: int = 0,
-    mean: float = np.nan,
-    variance: float = np.nan,
-) -> Indices:
-    """Return indices that are not defined, because samples failed or nothing varies."""
-    none = np.full(n, np.nan), np.full(n, np.nan)
-    note = failed_note(failed, evaluations) if failed else note
-    return Indices.around(design, seed, none, none, mean, variance, evaluations, failed, note)
-
-
 def failed_note(failed: int, evaluations: int) -> str:
     return (
         f"{failed} of {evaluations} samples do not close, so the variance over the whole range is"

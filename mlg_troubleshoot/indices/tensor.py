@@ -48,9 +48,9 @@ class TensorIndices:
         return float(_variance(partial, self.weights) / self.variance)
 
 
-def has_tensor(n: int) -> bool:
-    """Whether a tensor of so many variables has no more points than it may."""
-    return bool(_ORDER**n <= _MOST_POINTS)
+def order_for(n: int) -> int:
+    """Gauss points per variable: two where a tensor of three has too many points."""
+    return _ORDER if _ORDER**n <= _MOST_POINTS else 2
 
 
 def tensor_indices(
@@ -72,7 +72,7 @@ def tensor_indices(
     if m**n > _MOST_POINTS:
         raise UsageError(
             f"a tensor of {m} points in {n} variables has {m**n} points, more than {_MOST_POINTS}",
-            "Use a smaller order or another design.",
+            "Use fewer joints or one of the paper's designs.",
         )
     values = np.empty(m**n)
     for start in range(0, m**n, _ROWS):

@@ -13,7 +13,6 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.indices.amplification import Amplification, amplification
 from mlg_troubleshoot.indices.estimators import (
     GroupIndices,
@@ -21,7 +20,6 @@ from mlg_troubleshoot.indices.estimators import (
     failed_note,
     group_indices,
     student_half,
-    without_numbers,
 )
 from mlg_troubleshoot.indices.index_table import (
     IndexTable,
@@ -30,9 +28,8 @@ from mlg_troubleshoot.indices.index_table import (
     rank_ranges,
     ranks,
 )
-from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs, worst_directions, worst_sense
-from mlg_troubleshoot.indices.sampled import sampled_indices
-from mlg_troubleshoot.indices.tensor import CORNERS, TensorIndices, has_tensor, tensor_indices
+from mlg_troubleshoot.indices.inputs import worst_directions
+from mlg_troubleshoot.indices.tensor import CORNERS, TensorIndices, order_for, tensor_indices
 from mlg_troubleshoot.outputs import SCHEMA_VERSION
 from mlg_troubleshoot.paper.replicated import (
     ITERATIONS,
@@ -47,20 +44,12 @@ from mlg_troubleshoot.results import Result
 
 
 class StudyDesign(StrEnum):
-    """How the points are chosen; a gear with too many joints for a tensor is sampled."""
+    """How the points are chosen: by the exact tensor, or as the paper has it."""
 
     TENSOR = "tensor"
-    SAMPLED = "sampled"
     LHS = "lhs"
     LHS_CCD = "lhs+ccd"
     CCD = "ccd"
-
-
-class Directions(StrEnum):
-    WORST = "worst"
-    OVER = "over"
-    UNDER = "under"
-    FIXED = "fixed"
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -73,14 +62,8 @@ class StudyOptions(Result):
         How the points are chosen.
     seed : int
         Seed of all random draws.
-    distribution : str
-        Distribution of the clearances.
     limits_in : ndarray, shape (n_joints,), or None
         Limits in place of the gear's. [in]
-    directions : Directions
-        Directions of the virtual links.
-    fixed_rad : ndarray, shape (n_joints,), or None
-        Directions set by a load, with ``fixed``. [rad]
     n1, n2, iterations : int or None
         Size of a paper design in place of the paper's.
     executor : Executor or None
@@ -90,10 +73,7 @@ class StudyOptions(Result):
 
     design: StudyDesign = StudyDesign.TENSOR
     seed: int = 0
-    distribution: str = "uniform"
     limits_in: Array | None = None
-    directions: Directions = Directions.WORST
-    fixed_rad: Array | None = None
     n1: int | None = None
     n2: int | None = None
     iterations: int | None = None
@@ -102,12 +82,7 @@ class StudyOptions(Result):
     @property
     def is_standard(self) -> bool:
         """True if the result is the table that goes with a gear."""
-        return (
-            self.design in (StudyDesign.TENSOR, StudyDesign.SAMPLED)
-            and self.distribution == "uniform"
-            and self.limits_in is None
-            and self.directions is Directions.WORST
-        )
+        return self.design is StudyDesign.TENSOR and self.limits_in is None
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -162,54 +137,39 @@ def run_study(
     """Study the reference of a gear by the chosen design, and the other linkages of its ensemble by
     the tensor.
     """
-    limits = gear.limits_in if options.limits_in is None else options.limits_in
-    inputs = Inputs(limits, options.distribution)
-    if len(inputs.limits_in) != len(gear.joints):
+    limits = np.asarray(gear.limits_in if options.limits_in is None else options.limits_in, float)
+    if limits.shape != gear.limits_in.shape or not (np.isfinite(limits) & (limits > 0.0)).all():
         raise UsageError(
-            f"{len(inputs.limits_in)} limits for {len(gear.joints)} joints",
-            "Give one per joint.",
+            f"limits {limits.tolist()} in of {len(gear.joints)} joints",
+            "Give one positive length per joint.",
         )
-    if options.design in (StudyDesign.TENSOR, StudyDesign.SAMPLED):
-        run = _on_linkage(gear, inputs, options, 0)
+    if options.design is StudyDesign.TENSOR:
+        run = _on_linkage(gear, limits, options, 0)
     else:
-        run = _paper(gear, inputs, options, progress)
+        run = _paper(gear, limits, options, progress)
     found = [run.indices]
-    others = replace(options, design=StudyDesign.TENSOR)
     for k in range(1, len(gear.ensemble)):
-        found.append(_on_linkage(gear, inputs, others, k).indices)
+        found.append(_on_linkage(gear, limits, options, k).indices)
         progress("ensemble", k, len(gear.ensemble) - 1)
     growth = amplification(gear)
-    table = _table(gear, inputs, options, found, growth)
+    table = _table(gear, limits, options, found, growth)
     return StudyResult(table, run.indices, run.plain, run.groups, growth)
 
 
-def _response(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDirections:
-    if options.directions is Directions.FIXED:
-        if options.fixed_rad is None or len(options.fixed_rad) != len(inputs.limits_in):
-            raise UsageError("directions fixed by load", "Give one direction per joint.")
-        return HeldDirections(model, np.asarray(options.fixed_rad, float))
-    if options.directions is Directions.WORST:
-        return worst_directions(model, inputs.limits_in)
-    return worst_sense(
-        model, inputs.limits_in, 1.0 if options.directions is Directions.OVER else -1.0
-    )
-
-
-def _on_linkage(gear: Gear, inputs: Inputs, options: StudyOptions, k: int) -> _Run:
+def _on_linkage(gear: Gear, limits: Array, options: StudyOptions, k: int) -> _Run:
     """Indices of linkage k of the ensemble; the first is the reference."""
-    cube = inputs.on_unit_cube(_response(gear.ensemble_models[k], inputs, options))
-    n = len(inputs.limits_in)
-    if options.design is StudyDesign.SAMPLED or not has_tensor(n):
-        seeds = np.random.SeedSequence(options.seed, spawn_key=(k,))
-        return _Run(sampled_indices(cube, n, np.random.default_rng(seeds), options.seed))
-    corners = tensor_indices(cube, np.ones(n), nodes=CORNERS)
+    response = worst_directions(gear.ensemble_models[k], limits)
+    corners = tensor_indices(response, limits, nodes=CORNERS)
     if corners.failed:
         # Gauss points lie inside the range, and a linkage opens at its corners first.
         design = f"{corners.evaluations} corners of the range"
-        count = corners.evaluations
-        return _Run(without_numbers(design, options.seed, n, count, failed=corners.failed))
-    tensor = tensor_indices(cube, np.ones(n))
-    coarse = None if k else tensor_indices(cube, np.ones(n), order=2)
+        none = np.full(len(limits), np.nan), np.full(len(limits), np.nan)
+        counts = corners.evaluations, corners.failed
+        note = failed_note(corners.failed, corners.evaluations)
+        return _Run(Indices.around(design, options.seed, none, none, np.nan, np.nan, *counts, note))
+    order = order_for(len(limits))
+    tensor = tensor_indices(response, limits, order=order)
+    coarse = None if k or order < 3 else tensor_indices(response, limits, order=2)
     return _Run(_of_tensor(tensor, coarse, options.seed), groups=group_indices(gear, tensor.closed))
 
 
@@ -230,14 +190,14 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
     )
 
 
-def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, progress: StageProgress) -> _Run:
+def _paper(gear: Gear, limits: Array, options: StudyOptions, progress: StageProgress) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
-    response = _response(gear.model, inputs, options)
-    n = len(inputs.limits_in)
+    response = worst_directions(gear.model, limits)
+    n = len(limits)
     design = _sized(PAPER_DESIGNS[str(options.design)], n, options)
     iterations = ITERATIONS if options.iterations is None else options.iterations
     found = replicated_first_order(
-        inputs.on_unit_cube(response),
+        lambda unit: response(unit * limits),
         n,
         design,
         options.seed,
@@ -249,7 +209,7 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, progress: StagePro
     failed = found.failed
     note = f"first order corrected for the bias (1 - S)/{design.n1}"
     if options.design is StudyDesign.LHS:
-        study = TotalOrderStudy(response, inputs, options.seed, design.n1, design.n2, iterations)
+        study = TotalOrderStudy(response, limits, options.seed, design.n1, design.n2, iterations)
         totals = total_order(study, options.executor, partial(progress, "total order"))
         total = totals.total_order
         spread = student_half(totals.scatter, iterations)
@@ -290,7 +250,7 @@ def _sized(paper: PaperDesign, n: int, options: StudyOptions) -> PaperDesign:
 
 def _table(
     gear: Gear,
-    inputs: Inputs,
+    limits: Array,
     options: StudyOptions,
     found: Sequence[Indices],
     growth: Amplification,
@@ -304,7 +264,7 @@ def _table(
     joints = tuple(
         JointIndices(
             joint=joint.number,
-            limit_in=float(inputs.limits_in[i]),
+            limit_in=float(limits[i]),
             first_order=float(reference.first_order[i]),
             first_order_interval=_pair(reference.first_order_interval[i]),
             total_order=float(reference.total_order[i]),

@@ -19,7 +19,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Wholes, count_failed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.geometry.kernel import numba_is_installed
-from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs
+from mlg_troubleshoot.indices.inputs import HeldDirections
 from mlg_troubleshoot.paper.replicated import middle_of_level, replicated_levels
 from mlg_troubleshoot.parallel import map_blocks
 
@@ -58,7 +58,7 @@ class TotalOrderStudy:
     """
 
     response: HeldDirections
-    inputs: Inputs
+    limits_in: Array
     seed: int
     n1: int = 100
     n2: int = 1000
@@ -74,7 +74,7 @@ class TotalOrderStudy:
 
     @property
     def n(self) -> int:
-        return len(self.inputs.limits_in)
+        return len(self.limits_in)
 
     @property
     def evaluations(self) -> int:
@@ -116,7 +116,7 @@ def compute_block(study: TotalOrderStudy, block: StudyBlock) -> BlockSums:
     failed = 0
     wide = np.empty((n, n1, n1))
     for level in range(block.start, block.stop):
-        clearance = study.inputs.at(middle_of_level(levels[:, level, :], n2))
+        clearance = middle_of_level(levels[:, level, :], n2) * study.limits_in
         base = response(clearance)
         total += float(base.sum())
         squares += float((base * base).sum())

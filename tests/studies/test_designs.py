@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.indices.estimators import student_half
 from mlg_troubleshoot.paper.replicated import (
     central_composite,
     first_order_design,
@@ -62,3 +63,11 @@ def test_every_replicate_holds_all_composite_points() -> None:
     rows = first_order_design(10, 3, 862, ccd, np.random.default_rng(0))
     assert rows.points.shape == (3, 1000, 10)
     assert np.array_equal(rows.points[2, 862:], ccd)
+
+
+@pytest.mark.parametrize(("count", "quantile"), [(2, 12.7062), (5, 2.7764), (10, 2.2622)])
+def test_a_mean_has_as_many_degrees_of_freedom_as_values_but_one(
+    count: int, quantile: float
+) -> None:
+    # Table of Student's distribution, 97.5 %.
+    assert student_half(np.ones(1), count) == pytest.approx(quantile / np.sqrt(count), rel=1e-4)

@@ -1,35 +1,16 @@
-"""Distributions, groups, statements."""
+"""Groups, statements."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.estimators import group_indices
-from mlg_troubleshoot.indices.inputs import DISTRIBUTIONS, HeldDirections, Inputs
+from mlg_troubleshoot.indices.inputs import HeldDirections
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.statements import ClaimOutcome, Statement, check_statements
-
-
-@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
-def test_every_distribution_stays_between_zero_and_the_limit(distribution: str) -> None:
-    inputs = Inputs(np.array([0.0075]), distribution)
-    assert inputs.at(np.array([[0.0], [1.0]])).ravel() == pytest.approx([0.0, 0.0075])
-
-
-def test_a_rising_distribution_has_its_mean_at_two_thirds() -> None:
-    unit = (np.arange(100_000)[:, None] + 0.5) / 100_000
-    assert Inputs(np.array([1.0]), "rising").at(unit).mean() == pytest.approx(2.0 / 3.0, abs=1e-5)
-
-
-def test_an_unknown_distribution_and_a_limit_of_zero_are_refused() -> None:
-    with pytest.raises(UsageError):
-        Inputs(np.array([0.01]), "normal")
-    with pytest.raises(UsageError):
-        Inputs(np.array([0.0]))
 
 
 def test_the_groups_are_the_links_of_the_linkage(gear: Gear) -> None:

@@ -10,23 +10,16 @@ import pytest
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
-from mlg_troubleshoot.paper.study import Directions, StudyDesign, StudyOptions, run_study
+from mlg_troubleshoot.paper.study import StudyDesign, StudyOptions, run_study
 
 
-def test_the_sampled_study_agrees_with_the_shipped_table_on_every_joint(
-    gear: Gear, table: IndexTable
-) -> None:
-    found = run_study(gear, StudyOptions(design=StudyDesign.SAMPLED))
-    assert found.table.first_order == pytest.approx(table.first_order, abs=1e-3)
-    assert found.table.total_order == pytest.approx(table.total_order, abs=1e-3)
-
-
-def test_a_gear_with_too_many_joints_for_a_tensor_is_sampled(
-    gear: Gear, monkeypatch: pytest.MonkeyPatch
+def test_a_gear_with_too_many_joints_for_three_gauss_points_takes_two(
+    gear: Gear, table: IndexTable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("mlg_troubleshoot.indices.tensor._MOST_POINTS", 3**9)
-    found = run_study(replace(gear, ensemble=gear.ensemble[:1]), StudyOptions())
-    assert "Sobol points" in found.table.design
+    found = run_study(replace(gear, ensemble=gear.ensemble[:1]), StudyOptions()).table
+    assert found.design == "tensor of 2 Gauss points per joint"
+    assert found.first_order == pytest.approx(table.first_order, abs=2e-5)
 
 
 def test_a_seed_gives_the_same_table_again(gear: Gear) -> None:
@@ -38,17 +31,12 @@ def test_a_seed_gives_the_same_table_again(gear: Gear) -> None:
     assert not np.array_equal(table(3).first_order, table(0).first_order)
 
 
-def test_under_travel_has_indices_of_its_own(gear: Gear, table: IndexTable) -> None:
-    found = run_study(gear, StudyOptions(directions=Directions.UNDER))
-    assert found.table.first_order == pytest.approx(table.first_order, abs=0.02)
-    assert not np.allclose(found.table.first_order, table.first_order, atol=1e-4)
-
-
-def test_directions_fixed_by_a_load_need_one_for_each_joint(gear: Gear) -> None:
-    with pytest.raises(UsageError):
-        run_study(gear, StudyOptions(directions=Directions.FIXED, fixed_rad=np.zeros(3)))
-    found = run_study(gear, StudyOptions(directions=Directions.FIXED, fixed_rad=np.zeros(10)))
-    assert found.table.first_order.sum() == pytest.approx(1.0, abs=0.01)
+@pytest.mark.parametrize("limits", [np.zeros(10), np.full(3, 0.01), np.full(10, np.nan)])
+def test_limits_that_are_not_one_positive_length_per_joint_are_refused(
+    gear: Gear, limits: np.ndarray
+) -> None:
+    with pytest.raises(UsageError, match="of 10 joints"):
+        run_study(gear, StudyOptions(limits_in=limits))
 
 
 def test_the_papers_design_reports_plain_and_corrected_indices(gear: Gear) -> None:

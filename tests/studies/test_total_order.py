@@ -8,27 +8,27 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs
+from mlg_troubleshoot.indices.inputs import HeldDirections
 from mlg_troubleshoot.indices.tensor import TensorIndices
 from mlg_troubleshoot.paper.total_order import TotalOrderStudy, compute_block, total_order
 
 
 @pytest.fixture
 def study(gear: Gear, response: HeldDirections) -> TotalOrderStudy:
-    return TotalOrderStudy(response, Inputs(gear.limits_in), 5, 8, 120, 2)
+    return TotalOrderStudy(response, gear.limits_in, 5, 8, 120, 2)
 
 
 def test_the_papers_study_has_a_thousand_million_solutions(
     gear: Gear, response: HeldDirections
 ) -> None:
-    paper = TotalOrderStudy(response, Inputs(gear.limits_in), 0)
+    paper = TotalOrderStudy(response, gear.limits_in, 0)
     assert paper.evaluations == 10 * 100 * 1000 * (100 * 10 + 1)
 
 
 def test_total_order_indices_are_the_exact_ones(
     gear: Gear, response: HeldDirections, exact: TensorIndices
 ) -> None:
-    study = TotalOrderStudy(response, Inputs(gear.limits_in), 0, 20, 300, 3)
+    study = TotalOrderStudy(response, gear.limits_in, 0, 20, 300, 3)
     found = total_order(study)
     assert found.total_order == pytest.approx(exact.total_order, abs=0.01)
     assert found.evaluations == study.evaluations
@@ -42,7 +42,7 @@ def test_an_executor_gives_the_same_bits(study: TotalOrderStudy) -> None:
 
 
 def test_solutions_that_do_not_close_are_counted(response: HeldDirections) -> None:
-    wide = Inputs(np.full(10, 0.08))
+    wide = np.full(10, 0.08)
     found = total_order(TotalOrderStudy(response, wide, 0, 10, 60, 1))
     assert found.failed > 0
     assert np.any(np.isnan(found.total_order))
