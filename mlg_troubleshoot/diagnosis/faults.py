@@ -9,20 +9,19 @@ fleet: rows that stand out together are an effect and stay.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp
 
-from mlg_troubleshoot.arrays import Array, Mask, Places, log_sum
+from mlg_troubleshoot.arrays import Array, Mask, log_sum
 from mlg_troubleshoot.diagnosis.causes.base import Scene
 from mlg_troubleshoot.diagnosis.noise import FREEDOM, robust_scale, student
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import fleet_history, inspection_of
+from mlg_troubleshoot.diagnosis.wear import fleet_history
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.gear.model import LinkageModel
@@ -44,10 +43,7 @@ _FACTORS = tuple(
     for kind, slip in (("mm_as_in", SLIPS["unit"]), ("factor_10", SLIPS["point"]))
     for factor in (1 / slip.factor, slip.factor)
 )
-_TOO_LARGE = tuple((kind, factor) for kind, factor in _FACTORS if factor < 1)
 _KINDS = 4
-# Computing only: rows of which all errors are weighed together.
-_AT_ONCE = 64
 # A new joint is as tight as this share of its readings; shares of rows in which the worst joint was
 # restored between its reading and that of the plunger, each as likely (of a scale: evenly in its
 # logarithm); rounds to fit level and scatter. [1]
@@ -102,77 +98,12 @@ class DataFault:
         )
 
 
-@dataclass(frozen=True)
-class _Usual:
-    """Clearances to expect in each row by the wear of its gear, and their standard deviation, (n,
-    n_joints). [in]
-    """
-
-    expected: Array
-    spread: Array
-
-
-@dataclass(frozen=True)
-class _Errors:
-    """The entry errors that a row may hold, none first, as what undoes them.
-
-    kind, shape (n_errors,): kind of the error; empty for none.
-    order, shape (n_errors, n_cells): cell that each value belongs to; clearances and readings stand
-        in a row.
-    factor, shape (n_errors, n_cells): of these values, NaN where they mean nothing. [1]
-    changed, shape (n_errors, n_cells): 1 where an error made another value of one.
-    value, shape (n_errors, n_joints): place in `values` of the clearance of each joint.
-    values, shape (n_values, 3): every clearance that some error makes of a joint: joint, the joint
-        that it is read of, and factor.
-    """
-
-    kind: NDArray[np.str_]
-    order: Places
-    factor: Array
-    changed: Array
-    value: Places
-    values: Array
-
-    @classmethod
-    def of(cls, n_joints: int, n_readings: int) -> _Errors:
-        """The errors in a row of so many joints and readings."""
-        cells = np.arange(n_joints + n_readings)
-        alone = list(cells[:, None])
-        joints = cells[:n_joints]
-        readings = cells[n_joints:]
-        repeated = [readings] if n_readings > 1 else []
-        # A gear may be worn less than any other: then all its clearances are small.
-        scaled = [(places, *error) for places in (*alone, *repeated) for error in _FACTORS]
-        too_large = [joints] if n_joints > 1 else []
-        scaled += [(places, *error) for places in too_large for error in _TOO_LARGE]
-        scaled += [(places, "implausible", np.nan) for places in (*alone, *repeated)]
-        pairs = list(combinations(joints.tolist(), 2))
-        kind = ["", *(kind for _places, kind, _factor in scaled), *["swapped_joints"] * len(pairs)]
-        factor = np.ones((len(kind), len(cells)))
-        order = np.tile(cells, (len(kind), 1))
-        for error, (places, _kind, by) in enumerate(scaled, 1):
-            factor[error, places] = by
-        for error, (a, b) in enumerate(pairs, 1 + len(scaled)):
-            order[error, [a, b]] = b, a
-        changed = (factor != 1.0).astype(float)
-        made = np.stack(np.broadcast_arrays(joints, order[:, joints], factor[:, joints]), axis=2)
-        made = np.nan_to_num(made, nan=np.inf)
-        values, value = np.unique(made.reshape(-1, 3), axis=0, return_inverse=True)
-        values[np.isinf(values)] = np.nan
-        return cls(np.array(kind), order, factor, changed, value.reshape(-1, n_joints), values)
-
-
 def _off(clearance: Array, expected: Array) -> Array:
     """How far clearances lie off what is usual; by their logarithm if they are less. [in]"""
     apart = clearance - expected
     size = expected + _LEAST_SPREAD_IN
     less = size * np.log((clearance + _LEAST_SPREAD_IN) / size)
     return np.where(apart < 0.0, less, apart)
-
-
-def _normal(off: Array, spread: Array | float) -> Array:
-    """Log-density of a normal distribution. [1]"""
-    return np.asarray(-0.5 * (off / spread) ** 2 - np.log(spread * np.sqrt(2.0 * np.pi)))
 
 
 @dataclass(frozen=True)
@@ -185,8 +116,8 @@ class _Screen:
         The linkage that the rows are of.
     table : DiagnosisTable
         The rows.
-    usual : _Usual
-        Clearances to expect.
+    expected, spread : ndarray, shape (n, n_joints)
+        Clearances to expect by the wear of each gear, and their standard deviation. [in]
     rest : ndarray, shape (n,)
         Misfit beyond what is explained. [in]
     explained : ndarray, shape (n,)
@@ -195,35 +126,66 @@ class _Screen:
         Scatter of the misfits. [in]
     repeat_in : float
         Scatter between the readings of a row. [in]
-    inspection : ndarray, shape (n,)
-        Number of the inspection that a row is of.
     """
 
     model: LinkageModel
     table: DiagnosisTable
-    usual: _Usual
+    expected: Array
+    spread: Array
     rest: Array
     explained: Array
     scale_in: float
     repeat_in: float
-    inspection: Places
 
-    @cached_property
-    def errors(self) -> _Errors:
-        """What may be wrong in a row."""
-        return _Errors.of(self.table.clearance_in.shape[1], self.table.readings_in.shape[1])
+    def written(self, place: int) -> Array:
+        """Cells of a row as they are written, clearances first, shape (n_cells,). [in]"""
+        return np.append(self.table.clearance_in[place], self.table.readings_in[place])
 
-    def written(self, places: Places) -> Array:
-        """Cells of rows as they are written, shape (n_places, n_cells)."""
-        return np.column_stack([self.table.clearance_in[places], self.table.readings_in[places]])
+    def entries(self, place: int) -> tuple[list[str], Array, Array]:
+        """What may have been meant in a row, as written first: the kind of each entry error, the
+        cells without it, shape (n_errors, n_cells) [in], and the log-density of what it made of
+        them, with how often it occurs. [1]
+        """
+        cells = self.written(place)
+        joints, readings = np.split(np.arange(len(cells)), [self.expected.shape[1]])
+        read = np.isfinite(cells)
+        size = read & np.append(cells[joints] > 0.0, read[readings])
+        # A value that means nothing is large: a small one is what a restored joint has.
+        large = size & np.append(cells[joints] > self.expected[place], read[readings])
+        together = [group for group in (readings, joints) if len(group) > 1]
+        errors = [("", cells, 0.0)]
+        for group in (*np.arange(len(cells))[:, None], *together):
+            least = min(len(group), 2)
+            for kind, factor in _FACTORS:
+                # A gear may be worn less than any other: then all its clearances are small.
+                possible = group is not joints or factor < 1.0
+                if possible and size[group].sum() >= least:
+                    meant = cells.copy()
+                    meant[group] *= factor
+                    errors.append((kind, meant, size[group].sum() * min(np.log(factor), 0.0)))
+            if group is not joints and large[group].sum() >= least:
+                meant = cells.copy()
+                meant[group] = np.nan
+                anything = _ANYTHING - np.log(abs(np.nanmean(cells[group])) + _LEAST_SPREAD_IN)
+                anything += self.repeats(cells[group])
+                errors.append(("implausible", meant, anything))
+        for pair in combinations(joints[read[joints]], 2):
+            meant = cells.copy()
+            meant[[*pair]] = cells[[*pair[::-1]]]
+            errors.append(("swapped_joints", meant, 0.0))
+        kinds = [kind for kind, _meant, _made in errors]
+        often = {kind: _WRONG / _KINDS / count for kind, count in Counter(kinds).items()}
+        often[""] = 1.0 - _WRONG
+        made = [made + np.log(often[kind]) for kind, _meant, made in errors]
+        return kinds, np.array([meant for _kind, meant, _made in errors]), np.array(made)
 
     def misfit_of(self, place: int, cells: Array) -> Array:
         """Misfit beyond what is explained, if the cells of a row were meant so. [in]"""
-        joints = self.usual.expected.shape[1]
+        joints = self.expected.shape[1]
         rows = self.table.take(np.full(len(cells), place))
         rows = replace(rows, readings_in=cells[:, joints:])
         clearance = cells[:, :joints]
-        clearance = np.where(np.isfinite(clearance), clearance, self.usual.expected[place])
+        clearance = np.where(np.isfinite(clearance), clearance, self.expected[place])
         over = worst_of_sense(self.model, clearance)[0]
         return np.asarray(rows.measured_in - over - self.explained[place])
 
@@ -243,86 +205,48 @@ class _Screen:
         density = log_sum((density + np.log(weight[kept] / weight.sum())).T)
         return np.where(np.isfinite(misfit), density, -np.inf)
 
-    def wear(self, places: Places, written: Array) -> Array:
-        """Log-density of clearances by the wear of their gears, shape (n_places, n_errors). [1]"""
-        joint, source, factor = self.errors.values.T
-        joint = joint.astype(np.intp)
-        clearance = written[:, source.astype(np.intp)] * factor
-        spread = self.usual.spread[places][:, joint]
-        expected = self.usual.expected[places][:, joint]
+    def wear(self, place: int, clearance: Array) -> Array:
+        """Log-density of clearances by the wear of their gear, (n_errors, n_joints): (n_errors,).
+        [1]
+        """
         known = np.isfinite(clearance)
+        expected = self.expected[place]
+        spread = self.spread[place]
         clearance = np.where(known, clearance, expected)
-        wear = _normal(_off(clearance, expected), spread)
-        for row, place in enumerate(places):
-            others = self.inspection == self.inspection[place]
-            again = self.table.clearance_in[others & (self.table.row != self.table.row[place])]
-            # Two rows do not hold the same slip: what both read of a joint that still moves is so.
-            off = clearance[row] - np.where(again < _WORN_OUT_IN, again, np.inf)[:, joint]
-            same = np.where(np.isfinite(off), _normal(off, _LEAST_SPREAD_IN), -np.inf)
-            wear[row] = log_sum(np.vstack([wear[row], same])) - np.log1p(len(again))
+        wear = -0.5 * (_off(clearance, expected) / spread) ** 2
         # One of the joints may be worn out, as rarely as there is an entry error of one kind.
-        rare = np.log(_WRONG / _KINDS / self.usual.expected.shape[1] / _WORN_OUT_IN)
+        rare = np.log(_WRONG / _KINDS / len(spread) / _WORN_OUT_IN * spread * np.sqrt(2.0 * np.pi))
         wear = np.logaddexp(wear, np.where(clearance < _WORN_OUT_IN, rare, -np.inf))
         # A row that lies off the wear of its gear altogether says little of two of its joints.
-        apart = np.where(known, -2.0 * (wear + np.log(spread * np.sqrt(2.0 * np.pi))), 0.0)
-        apart, size, counted = (
-            each[:, self.errors.value].sum(axis=-1)
-            for each in (apart, np.where(known, np.log(spread), 0.0), known)
-        )
+        apart = np.sum(-2.0 * wear, axis=1, where=known)
+        counted = known.sum(axis=1)
         together = 0.5 * (FREEDOM + counted)
         found = gammaln(together) - together * np.log1p(np.maximum(apart, 0.0) / FREEDOM)
-        return np.asarray(found - 0.5 * counted * np.log(FREEDOM * np.pi) - size)
+        found -= np.sum(np.broadcast_to(np.log(spread), known.shape), axis=1, where=known)
+        return np.asarray(found - 0.5 * counted * np.log(FREEDOM * np.pi))
 
     def repeats(self, readings: Array) -> Array:
         """Log-density of the differences between the readings of a row. [1]"""
         return np.asarray(student(np.diff(np.sort(readings)), self.repeat_in).sum(axis=-1))
 
-    def made(self, places: Places, cells: Array) -> Array:
-        """Log-density of the errors that made what is written in rows, and how often they occur;
-        none where there is nothing that can be so wrong. [1]
-        """
-        errors = self.errors
-        written = np.isfinite(cells)
-        clearance, readings = np.split(cells, [self.usual.expected.shape[1]], axis=1)
-        size = np.hstack([clearance > 0.0, np.isfinite(readings)])
-        # A value that means nothing is large: a small one is what a restored joint has.
-        large = (clearance > 0.0) & (clearance > self.usual.expected[places])
-        nothing = np.hstack([large, np.isfinite(readings)])
-        lost = errors.kind == "implausible"
-        changed = errors.changed
-        count = np.where(lost, nothing @ changed.T, size @ changed.T)
-        moved = (errors.order != errors.order[0]).astype(float)
-        can = (count >= np.minimum(changed.sum(axis=1), 2.0)) & (written @ moved.T == moved.sum(1))
-        smaller = size @ np.nan_to_num(np.minimum(np.log(errors.factor), 0.0)).T
-        mean = np.abs(np.nan_to_num(cells) @ changed.T) / np.maximum(count, 1.0)
-        anything = _ANYTHING - np.log(mean + _LEAST_SPREAD_IN)
-        anything += (changed.sum(axis=1) > 1.0) * self.repeats(readings)[:, None]
-        often = np.maximum(can @ (errors.kind[:, None] == errors.kind).astype(float), 1.0)
-        prior = np.log(np.where(errors.kind == "", 1.0 - _WRONG, _WRONG / _KINDS / often))
-        return np.where(can, prior + np.where(lost, anything, smaller), -np.inf)
-
-    def best(self, places: Places) -> Iterator[tuple[int, str, Array]]:
-        """The likeliest entry error of each of some rows if one is likely, and the cells as they
-        were meant.
-        """
-        written = self.written(places)
-        meant = written[:, self.errors.order] * self.errors.factor
-        readings = meant[..., self.usual.expected.shape[1] :]
-        found = self.made(places, written) + self.repeats(readings)
-        found += self.wear(places, written)
-        read = np.asarray(np.isfinite(readings).any(axis=-1))
-        for place, likely, cells, known in zip(places.tolist(), found, meant, read, strict=True):
-            as_written = likely[0] + self.near(place, self.rest[[place]])[0]
-            # The misfit need only be known of what may be likelier with the best one that there is.
-            bound = likely - np.where(known, np.log(self.scale_in), 0.0)
-            kept = 1 + np.flatnonzero(bound[1:] > as_written + np.log(_WRONG))
-            if not len(kept):
-                continue
-            near = self.near(place, self.misfit_of(place, cells[kept]))
-            weighed = likely[kept] + np.where(known[kept], near, 0.0)
-            if logsumexp(weighed) - as_written >= Beliefs().odds:
-                best = kept[np.argmax(weighed)]
-                yield place, str(self.errors.kind[best]), cells[best]
+    def best(self, place: int) -> tuple[str, Array] | None:
+        """The likeliest entry error of a row if one is likely, and the cells as they were meant."""
+        kinds, meant, likely = self.entries(place)
+        clearances, readings = np.split(meant, [self.expected.shape[1]], axis=1)
+        likely = likely + self.repeats(readings) + self.wear(place, clearances)
+        known = np.asarray(np.isfinite(readings).any(axis=1))
+        as_written = likely[0] + self.near(place, self.rest[[place]])[0]
+        # The misfit need only be known of what may be likelier with the best one that there is.
+        bound = likely - np.where(known, np.log(self.scale_in), 0.0)
+        kept = 1 + np.flatnonzero(bound[1:] > as_written + np.log(_WRONG))
+        if not len(kept):
+            return None
+        near = self.near(place, self.misfit_of(place, meant[kept]))
+        weighed = likely[kept] + np.where(known[kept], near, 0.0)
+        if logsumexp(weighed) - as_written < Beliefs().odds:
+            return None
+        best = kept[np.argmax(weighed)]
+        return kinds[best], meant[best]
 
     def faults(self, place: int, kind: str, cells: Array) -> Iterator[DataFault]:
         """The cells of a row that are not as they were meant."""
@@ -331,8 +255,7 @@ class _Screen:
             f"plunger_displacement{f'_{k}' if k > 1 else ''}_in"
             for k in range(1, 1 + self.table.readings_in.shape[1])
         ]
-        written = self.written(np.array([place]))[0]
-        values = zip(columns, written.tolist(), cells.tolist(), strict=True)
+        values = zip(columns, self.written(place).tolist(), cells.tolist(), strict=True)
         for column, value, right in values:
             if np.isfinite(value) and value != right:
                 suggested = f"{right:.4g}" if np.isfinite(right) else None
@@ -347,12 +270,11 @@ def screen_faults(
     clearance = table.clearance_in.copy()
     readings = table.readings_in.copy()
     faults: list[DataFault] = []
-    places = np.flatnonzero(suspects)
-    for some in np.array_split(places, 1 + len(places) // _AT_ONCE):
-        for place, kind, cells in screen.best(some):
-            faults += screen.faults(place, kind, cells)
-            clearance[place] = cells[: clearance.shape[1]]
-            readings[place] = cells[clearance.shape[1] :]
+    for place in np.flatnonzero(suspects).tolist():
+        best = screen.best(place)
+        if best is not None:
+            faults += screen.faults(place, *best)
+            clearance[place], readings[place] = np.split(best[1], [clearance.shape[1]])
     usable = np.asarray(np.isfinite(readings).any(axis=1))
     repaired = replace(table, clearance_in=clearance, readings_in=readings)
     return repaired, tuple(faults), usable
@@ -434,25 +356,24 @@ def _suspects(
     """The screen of a table without what its suspect rows say of wear; rows that an entry error may
     make likelier by more than it is rare.
     """
-    usual = _usual(table, np.ones(len(table), bool))
-    clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, usual.expected)
+    expected, spread = _usual(table, np.ones(len(table), bool))
+    clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, expected)
     misfit = table.measured_in - worst_of_sense(model, clearance)[0]
     named = np.zeros(len(table)) if explained is None else explained
     rest = misfit - named
     scale = _scale(rest)
     apart = np.diff(np.sort(table.readings_in)).ravel()
     repeat = _scale(np.append(apart, -apart))
-    screen = _Screen(model, table, usual, rest, named, scale, repeat, inspection_of(table))
     # An entry error is in one cell or in two, or in so many that any two of them show it.
-    lost = np.sort(-student(_off(table.clearance_in, usual.expected) / usual.spread, 1.0))[
-        :, -2:
-    ].sum(axis=1)
+    off = -student(_off(table.clearance_in, expected) / spread, 1.0)
+    lost = np.sort(off)[:, -2:].sum(axis=1)
     middle = np.median(rest[np.isfinite(rest)]) if np.isfinite(rest).any() else 0.0
     lost -= student((rest - middle) / scale, 1.0)
-    lost -= student(np.diff(np.sort(table.readings_in)) / screen.repeat_in, 1.0).sum(axis=1)
+    lost -= student(np.diff(np.sort(table.readings_in)) / repeat, 1.0).sum(axis=1)
     suspects = (lost > np.log(_KINDS / _WRONG)) | ~np.isfinite(rest)
     suspects &= np.isfinite(table.readings_in).any(axis=1)
-    return replace(screen, usual=_usual(table, ~suspects)), np.asarray(suspects)
+    usual = _usual(table, ~suspects)
+    return _Screen(model, table, *usual, rest, named, scale, repeat), np.asarray(suspects)
 
 
 def _scale(values: Array) -> float:
@@ -461,11 +382,11 @@ def _scale(values: Array) -> float:
     return max(robust_scale(known) if len(known) else 0.0, _LEAST_SPREAD_IN)
 
 
-def _usual(table: DiagnosisTable, trusted: Mask) -> _Usual:
-    """Expect each row's clearances from what the trusted rows say about the wear of its gear and of
-    the fleet.
+def _usual(table: DiagnosisTable, trusted: Mask) -> tuple[Array, Array]:
+    """Clearances to expect in each row from what the trusted rows say about the wear of its gear
+    and of the fleet, and their standard deviation. [in]
     """
     known = replace(table, clearance_in=np.where(trusted[:, None], table.clearance_in, np.nan))
     history = fleet_history(known)[0]
     variance = history.unsure_in2 + history.scatter_in2 + history.reading_in2
-    return _Usual(history.expected_in, np.sqrt(variance + _LEAST_SPREAD_IN**2))
+    return history.expected_in, np.sqrt(variance + _LEAST_SPREAD_IN**2)

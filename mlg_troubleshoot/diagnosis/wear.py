@@ -197,16 +197,6 @@ def landings_of(landings: Array, gears: Places) -> tuple[Array, Mask]:
     return np.where(known, landings, mean[gears]) / 1000.0, known
 
 
-def inspection_of(table: DiagnosisTable) -> Places:
-    """Number of the inspection of each row: of one gear at one number of landings and on one day,
-    so far as known, shape (n,).
-    """
-    known = {"gear_landings", "day"} & set(table.quantities)
-    parts = [np.nan_to_num(table.quantities[name], nan=-1.0) for name in sorted(known)]
-    whole = np.column_stack([gears_of(table), *parts])
-    return np.unique(whole, axis=0, return_inverse=True)[1].ravel()
-
-
 def read_in(table: DiagnosisTable) -> Array:
     """Clearances, NaN where only an end was read. [in]"""
     return np.where(False if table.below is None else table.below, np.nan, table.clearance_in)

@@ -110,21 +110,6 @@ def test_two_swapped_joints_are_found_together(gear: Gear, sound: DiagnosisTable
     ]
 
 
-def test_what_is_found_in_a_row_does_not_depend_on_the_rows_weighed_with_it(
-    gear: Gear, sound: DiagnosisTable, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    clearances = sound.clearance_in.copy()
-    clearances[10, 2] *= 25.4
-    clearances[90, 4] *= 10.0
-    readings = sound.readings_in.copy()
-    readings[110, 1] *= 25.4
-    wrong = swapped(replace(sound, clearance_in=clearances, readings_in=readings))
-    together = screen_faults(gear.model, wrong)[1]
-    monkeypatch.setattr("mlg_troubleshoot.diagnosis.faults._AT_ONCE", 1)
-    assert screen_faults(gear.model, wrong)[1] == together
-    assert {fault.place for fault in together} == {10, ROW, 90, 110}
-
-
 def test_a_slip_is_named_with_its_row_and_repaired_in_the_analysis_only(
     gear: Gear, sound: DiagnosisTable
 ) -> None:
