@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 
 from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.boundary import Boundary
+from mlg_troubleshoot.cli.gone import refuse_gone
 from mlg_troubleshoot.errors import ExitCode, UsageError
 
 # In the order of the help; each stands in the module of its name, as `app`.
@@ -59,6 +60,7 @@ class CommandGroup(TyperGroup):
     def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
         given = list(sys.argv[1:] if args is None else args)
         with Boundary():
+            refuse_gone(given)
             given = _understood(given)
             self.shows_all = _ALL in given
             given = ["--help" if each == _ALL else each for each in given]
