@@ -62,7 +62,6 @@ def fleet(
     """
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.life.unrecorded_work import suggestions
     from mlg_troubleshoot.reporting.life_json import fleet_as_json
     from mlg_troubleshoot.workflows.history import show_fleet
 
@@ -82,9 +81,9 @@ def fleet(
             progress=bar,
         )
         found = everything.chosen(changed=since is not None and not failed, failed=failed)
-    compared = () if shown.quiet else [line.key for line in found.lines]
-    for line in suggestions(compared, found.forecasts):
-        output.say(f"Note: {line}")
+    for line in found.lines:
+        if line.suggestion and not shown.quiet:
+            output.say(f"Note: {line.suggestion}")
     if shown.as_json:
         output.write_json(fleet_as_json(found.lines, found.forecasts, within))
     elif found.lines:

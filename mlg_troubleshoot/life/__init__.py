@@ -12,7 +12,6 @@ __all__ = [
     "logbook",
     "looking_back",
     "state",
-    "unrecorded_work",
     "urgency",
     "wear_paths",
 ]

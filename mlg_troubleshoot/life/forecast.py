@@ -56,9 +56,6 @@ class Forecast:
     limit_joint: the joint that most often is the first at its limit.
     due_now: why nothing remains, in words; empty where something may.
     due_date: the day of the next inspection, None where it is not known.
-    departures: how far the last reading of each joint lies from what its readings before promised,
-    of joints read twice since they were restored, the last time at the last inspection. [standard
-    deviations]
     """
 
     joints: Mapping[int, Quantiles] = field(default_factory=dict)
@@ -69,7 +66,6 @@ class Forecast:
     next_inspection_landings: float | None = None
     due_now: str = ""
     due_date: str | None = None
-    departures: Mapping[int, float] = field(default_factory=dict)
 
 
 def _quantiles(samples: Array) -> list[Quantiles]:
@@ -137,12 +133,12 @@ def forecast(
         life
         for life in lives
         if life.key in forecasts
-        and not life.warnings
+        and not (life.warnings or forecasts[life.key].due_now)
         and life.inspections[-1].inspection.gear_landings is not None
     ]
     if model is not None:
         parts = [known[at : at + _GEARS_AT_ONCE] for at in range(0, len(known), _GEARS_AT_ONCE)]
-        look = partial(_forecast_part, so_far=forecasts, model=model, gear=gear)
+        look = partial(_forecast_part, model=model, gear=gear)
         # NumPy lets others work meanwhile.
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             for ahead in pool.map(look, parts):
@@ -195,32 +191,23 @@ def _over_limit(clearance_in: Mapping[int, float], gear: Gear) -> dict[int, floa
 
 
 def _forecast_part(
-    part: Sequence[GearLife], so_far: Mapping[GearKey, Forecast], model: WearModel, gear: Gear
+    part: Sequence[GearLife], model: WearModel, gear: Gear
 ) -> dict[GearKey, Forecast]:
     numbers = gear.joint_numbers
     ahead = gear.horizon.value * _AHEAD
-    fitted, begun = _asked_about(part, model, gear)
-    apart = _departures(part, fitted, gear)
-    found = {
-        life.key: replace(so_far[life.key], departures=of_life)
-        for life, of_life in zip(part, apart, strict=True)
-    }
-    going_on = [life for life in part if not found[life.key].due_now]
-    if not going_on:
-        return found
     read = np.array(
         [
             [any(n in kept.inspection.clearance_in for kept in life.inspections) for n in numbers]
-            for life in going_on
+            for life in part
         ]
     )
-    wear = _wear_ahead(going_on, begun, fitted, gear)
+    wear = _wear_ahead(part, model, gear)
     # A joint that was never read counts as it does in the prediction: not at all.
     wear[~read] = 0.0
     asked = wear[:, :, _ASKED]
     displacement = _worst_case_of(wear, asked, gear)
     bands = np.quantile(asked, [0.05, 0.5, 0.95], axis=3)
-    margins = [life.inspections[-1].inspection.margin_in for life in going_on]
+    margins = [life.inspections[-1].inspection.margin_in for life in part]
     to_limit = first_passage(ahead, wear, gear.limits_in)
     to_any = to_limit.min(axis=1)
     to_margin = first_passage(
@@ -229,7 +216,8 @@ def _forecast_part(
     due = Samples(np.minimum(to_any, to_margin)).quantile(gear.accepted_chance.value)
     of_joints, of_any, of_margin = map(_quantiles, (to_limit, to_any, to_margin))
     first = to_limit.argmin(axis=1)
-    for g, life in enumerate(going_on):
+    found = {}
+    for g, life in enumerate(part):
         known = [(j, number) for j, number in enumerate(numbers) if read[g, j]]
         passed = first[g, np.isfinite(to_any[g])]
         found[life.key] = Forecast(
@@ -239,62 +227,26 @@ def _forecast_part(
             numbers[int(np.bincount(passed).argmax())] if len(passed) else None,
             of_margin[g],
             float(due[g]) if np.isfinite(due[g]) else None,
-            departures=found[life.key].departures,
         )
     return found
 
 
-def _asked_about(
-    part: Sequence[GearLife], model: WearModel, gear: Gear
-) -> tuple[WearModel, dict[GearKey, list[float]]]:
-    """The model asked about the joints of some gears, and the landings at which the current path of
-    each began.
-    """
-    paths: list[WearPath] = []
-    begun: dict[GearKey, list[float]] = {}
-    for life in part:
-        of_joints = wear_paths(life, gear.joint_numbers).values()
-        paths += [path for own, _begun in of_joints for path in own]
-        begun[life.key] = [since for _own, since in of_joints]
-    return model.of(paths), begun
-
-
-def _departures(
-    lives: Sequence[GearLife], fitted: WearModel, gear: Gear
-) -> list[Mapping[int, float]]:
-    units = {
-        (life.key, number): unit
-        for life in lives
-        for number in gear.joint_numbers
-        if number in life.inspections[-1].inspection.clearance_in
-        and fitted.paths[unit := unit_of(life.key, number)][-1].n_readings > 1
-    }
-    scores = dict(zip(units, fitted.scores([*units.values()]).tolist(), strict=True))
-    return [
-        {n: scores[life.key, n] for n in gear.joint_numbers if (life.key, n) in scores}
-        for life in lives
-    ]
-
-
-def _wear_ahead(
-    lives: Sequence[GearLife],
-    begun: Mapping[GearKey, Sequence[float]],
-    fitted: WearModel,
-    gear: Gear,
-) -> Array:
+def _wear_ahead(lives: Sequence[GearLife], model: WearModel, gear: Gear) -> Array:
     """Simulated clearances (gears, joints, ahead, samples). [in]
 
     Each gear from the model's seed: its forecast is the same whoever else is asked for.
     """
     ahead = gear.horizon.value * _AHEAD
-    usage = [
-        np.maximum((life.inspections[-1].inspection.gear_landings or 0.0) + ahead - since, 0.0)
-        for life in lives
-        for since in begun[life.key]
-    ]
+    paths: list[WearPath] = []
+    usage = []
+    for life in lives:
+        now = (life.inspections[-1].inspection.gear_landings or 0.0) + ahead
+        for own, begun in wear_paths(life, gear.joint_numbers).values():
+            paths += own
+            usage.append(np.maximum(now - begun, 0.0))
     units = [unit_of(life.key, number) for life in lives for number in gear.joint_numbers]
     joints = len(gear.joint_numbers)
-    found = fitted.forecast(units, usage, reading=False, together=joints).samples
+    found = model.of(paths).forecast(units, usage, reading=False, together=joints).samples
     np.maximum(found, 0.0, out=found)
     return found.reshape(len(lives), joints, *found.shape[1:])
 

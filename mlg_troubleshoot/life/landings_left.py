@@ -16,6 +16,7 @@ from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import Forecast, Quantiles
 from mlg_troubleshoot.life.logbook import log_of
 from mlg_troubleshoot.life.state import GearKey
+from mlg_troubleshoot.life.unrecorded_work import suggestion
 from mlg_troubleshoot.life.urgency import OVER_LIMIT, changes_since, repair_sentence, urgency_of
 
 
@@ -69,6 +70,7 @@ class FleetLine:
     why: str = ""
     failed: tuple[str, ...] = ()
     repair: str = ""
+    suggestion: str = ""
     changed: tuple[str, ...] = ()
     readings: tuple[Reading, ...] = ()
 
@@ -88,6 +90,7 @@ class FleetLine:
             why=urgent.why,
             failed=tuple(day for day in failed if day >= asked.since),
             repair=repair_sentence(lines),
+            suggestion=suggestion(life, asked.gear),
             changed=changes_since(life, lines, asked.since) if asked.since else (),
             readings=tuple(
                 Reading(e.date, e.gear_landings, e.value_in or 0.0)

@@ -5,19 +5,15 @@ Level x and drift b of a path run over a clock c = usage^q:
 
     x(c + d) = x(c) + b d + s W(d)         Wiener increments
     b(c + d) = b(c) + v W(d)               integrated Wiener: the drift itself wanders
-    x(c + d) = x(c) + Gamma(d / s², b s²)  gamma increments: mean b d, variance b² s² d
 
 Paths begin at x ~ N(start, start_sd²) with b = unit's drift + N(0, (1 - kept) drift_sd²), and the
 unit's drift is N(drift, kept drift_sd²), so that a restored part keeps a share of its own pace. A
-reading is x + N(0, r²). Wiener and integrated Wiener are filtered exactly (Kalman); gamma
-increments by their mean and their variance, which is what is expected of it from the readings so
-far: s² d E[b²] = s² d (mean² + variance of the drift).
+reading is x + N(0, r²). Both are filtered exactly (Kalman).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -34,11 +30,8 @@ _LEAST_VARIANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Draws:
-    """Parameters, each of shape (draws, 1), in the units of ``Scale``; ``gamma`` says that
-    increments are gamma.
-    """
+    """Parameters, each of shape (draws, 1), in the units of ``Scale``."""
 
-    gamma: Mask
     start: Array
     start_sd: Array
     drift: Array
@@ -55,18 +48,13 @@ class Draws:
 
 @dataclass(frozen=True, slots=True)
 class FilterState:
-    """Mean and covariance of level and drift at the last step, arrays (draws, units); and what the
-    readings before it promised of its own: mean, variance and drift.
-    """
+    """Mean and covariance of level and drift at the last step, arrays (draws, units)."""
 
     level: Array
     drift: Array
     level_var: Array
     both_cov: Array
     drift_var: Array
-    promised: Array
-    promised_var: Array
-    promised_drift: Array
 
     def take(self, units: Places) -> FilterState:
         return FilterState(*(getattr(self, name)[:, units] for name in self.__dataclass_fields__))
@@ -107,15 +95,12 @@ class _Covariances:
         self.bb = np.where(restored, self._uu + self._own, self.bb)
         self._bu = np.where(restored, self._uu, self._bu)
 
-    def run(self, d: Array, drift: Array | None, *, own: bool) -> None:
-        """Let the clock run by d; a drift is that of gamma increments, the own drift may be asked
-        for.
-        """
+    def run(self, d: Array, *, own: bool) -> None:
+        """Let the clock run by d; the own drift may be asked for."""
         by_drift = d * self.bb
         self.xx = self.xx + d * (2.0 * self.xb + by_drift)
         if self._jumps:
-            s2 = self._draws.increment_sd**2 * d
-            self.xx += s2 if drift is None else s2 * (drift * drift + self.bb)
+            self.xx += self._draws.increment_sd**2 * d
         self.xb = self.xb + by_drift
         if self._wanders:
             w2 = self._draws.wander_sd**2 * d
@@ -144,31 +129,26 @@ class _Covariances:
 
 
 def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Array, FilterState]:
-    """Filter the readings of every unit with draws that are all gamma or none; return log
-    likelihood (draws, units), zero where it is not asked for, and the state at the end.
+    """Filter the readings of every unit; return log likelihood (draws, units), zero where it is
+    not asked for, and the state at the end.
 
     Mean of level x, drift b and the unit's own drift u.
     """
-    is_gamma = bool(draws.gamma.any())
-    # Covariances depend on what was read with gamma increments only: otherwise once for all units
-    # that were read at the same usages, as the joints of one gear are.
-    first, owner = (None, None) if is_gamma else steps.alike
-
-    def alike(of_units: Any) -> Any:
-        return of_units if first is None else of_units[..., first]
+    # Covariances do not depend on what was read: once for all units that were read at the same
+    # usages, as the joints of one gear are.
+    first, owner = steps.alike
 
     def each(of_alike: Array) -> Array:
-        return of_alike if owner is None else of_alike.take(owner, axis=-1)
+        return of_alike.take(owner, axis=-1)
 
-    seens, usages, known_r2 = map(alike, (steps.seen, steps.usage, steps.known_r2))
+    seens, usages, known_r2 = (of[..., first] for of in (steps.seen, steps.usage, steps.known_r2))
     estimated = np.isnan(known_r2)
     shape = (len(draws.start), steps.seen.shape[1])
-    x = promised = np.broadcast_to(draws.start, shape)
-    b = u = promised_drift = np.broadcast_to(draws.drift, shape)
+    x = np.broadcast_to(draws.start, shape)
+    b = u = np.broadcast_to(draws.drift, shape)
     total = np.zeros(shape)
     covariances = _Covariances(draws, seens.shape[1])
-    s = covariances.xx
-    before = np.zeros_like(s)
+    before = np.zeros_like(covariances.xx)
     again = steps.begins & (np.cumsum(steps.begins, axis=0) > 1)
     # After that the own drift decides nothing.
     last = int(np.flatnonzero(again.any(axis=1)).max(initial=-1))
@@ -177,13 +157,12 @@ def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Arra
         if begins.any():
             x = np.where(begins, draws.start, x)
             b = np.where(begins, u, b)
-            before = np.where(alike(begins), 0.0, before)
-            covariances.restore(alike(begins))
+            before = np.where(begins[first], 0.0, before)
+            covariances.restore(begins[first])
         d = now - before
         before = now
-        promised_drift = b
-        covariances.run(d, b if is_gamma else None, own=i < last)
-        x = promised = x + b * each(d)
+        covariances.run(d, own=i < last)
+        x = x + b * each(d)
         reading = known_r2[i]
         if estimated[i].any():
             reading = np.where(estimated[i], draws.reading_sd**2, reading)
@@ -197,5 +176,5 @@ def follow(steps: Steps, draws: Draws, *, likelihood: bool = True) -> tuple[Arra
         b = b + each(to_b) * off
         if to_u is not None:
             u = u + each(to_u) * off
-    xx, xb, bb, s = map(each, (covariances.xx, covariances.xb, covariances.bb, s))
-    return total, FilterState(x, b, xx, xb, bb, promised, s, promised_drift)
+    xx, xb, bb = map(each, (covariances.xx, covariances.xb, covariances.bb))
+    return total, FilterState(x, b, xx, xb, bb)

@@ -33,8 +33,6 @@ _DOUBT = 0.25
 _TO_LIMIT = np.concatenate([[0], np.geomspace(1 / 50, 40, 44)])
 # The clock of a simulated path never stops. [1]
 _SLOWEST = 0.1
-# Least drift of gamma increments, as a share of the fleet's typical one. [1]
-_LEAST_DRIFT = 1e-3
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -50,20 +48,15 @@ class Samples(Result):
     samples: Array
 
     def quantile(self, probability: ArrayLike) -> Array:
-        """Quantiles of the samples, at a probability or several, shape (p,). [1]
+        """Quantiles of the samples, each the nearest one, at a probability or several, shape (p,).
+        [1]
 
         Returns, shape (..., p): infinite, never NaN, where a quantile lies among samples that never
         happen. [as asked]
         """
         ordered = np.sort(self.samples, axis=-1)
-        at = np.asarray(probability, float) * (ordered.shape[-1] - 1)
-        below = np.floor(at)
-        low = ordered[..., below.astype(int)]
-        high = ordered[..., np.ceil(at).astype(int)]
-        share = at - below
-        is_low = (share == 0.0) | (low == high)
-        with np.errstate(invalid="ignore"):
-            return np.where(is_low, low, low + share * (high - low))
+        at = np.rint(np.asarray(probability) * (ordered.shape[-1] - 1)).astype(int)
+        return np.asarray(ordered[..., at])
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -124,7 +117,8 @@ class WearModel(Result):
             raise UsageError("a usage to forecast is negative or not finite", "Give usages from 0.")
         wanted = np.atleast_1d(asked)
         wanted = np.broadcast_to(wanted, (len(units), wanted.shape[-1]))
-        repeats = self.simulated // sum(len(draws.start) for draws, _state in self._followed)
+        draws, state = self._followed
+        repeats = self.simulated // len(draws.start)
         rng = _Streams(self.seed)
         parts = []
         for chosen in self._chunks(len(units), together or 1):
@@ -133,51 +127,18 @@ class WearModel(Result):
             names = [units[i] for i in chosen]
             order = np.argsort(wanted[chosen], axis=1)
             ascending = np.take_along_axis(wanted[chosen], order, axis=1) / self.scale.usage
-            last = self._last(names)
-            known = self._known_reading(names)
-            places = self._places(names)
-            ends = [
-                _Ends.drawn(draws, state.take(places), repeats, rng)
-                for draws, state in self._followed
-            ]
-            # The draws of all kinds behind each other, without a copy for each.
-            samples = np.empty((*ascending.shape, sum(end.level[:, 0].size for end in ends)))
-            each = np.arange(len(names))
-            first = 0
-            for end in ends:
-                own = slice(first, first + end.level[:, 0].size)
-                first = own.stop
-                followed = end.follow(ascending, last, known, rng, reading=reading)
-                for at, path in zip(order.T, followed, strict=True):
-                    samples[each, at, own] = path.swapaxes(0, 1).reshape(len(names), -1)
+            end = _Ends.drawn(draws, state.take(self._places(names)), repeats, rng)
+            samples = np.empty((*ascending.shape, end.level[:, 0].size))
+            last, known = self._last(names), self._known_reading(names)
+            followed = end.follow(ascending, last, known, rng, reading=reading)
+            for at, path in zip(order.T, followed, strict=True):
+                samples[np.arange(len(names)), at] = path.swapaxes(0, 1).reshape(len(names), -1)
             samples *= self.scale.value
             samples += self.scale.start
             parts.append(samples)
         if isinstance(unit, str):
             return Samples(parts[0][0])
         return Samples(parts[0] if len(parts) == 1 else np.concatenate(parts))
-
-    def scores(self, units: Sequence[str]) -> Array:
-        """How far the last reading of each unit lies from what those before it promised, of units
-        read twice since their restoration, shape (n,). [standard deviations]
-        """
-        places = self._places(units)
-        paths = [self.paths[unit][-1] for unit in units]
-        usage = np.array([np.asarray(path.usage)[-2:] for path in paths])
-        before, last = usage.reshape(-1, 2).T / self.scale.usage
-        value = np.array([np.asarray(path.value)[-1] for path in paths])
-        promised = []
-        variance = []
-        for draws, state in self._followed:
-            beyond = clock(last, draws.power) - clock(np.maximum(before, 1.0), draws.power)
-            doubt = _DOUBT * state.promised_drift[:, places] * np.maximum(beyond, 0.0)
-            promised.append(state.promised[:, places])
-            variance.append(state.promised_var[:, places] + doubt**2)
-        mean = np.concatenate(promised)
-        total = np.concatenate(variance).mean(axis=0) + mean.var(axis=0)
-        apart = (value - self.scale.start) / self.scale.value - mean.mean(axis=0)
-        scores: Array = np.sign(self.scale.value) * apart / np.sqrt(total)
-        return scores
 
     def usage_to_limit(self, unit: str | Sequence[str], limit: ArrayLike) -> Samples:
         """Forecast the usage at which the wear itself of one unit or n, not a reading of it,
@@ -226,21 +187,14 @@ class WearModel(Result):
         return np.array([places.get(unit, len(places)) for unit in units], int)
 
     @cached_property
-    def _followed(self) -> list[tuple[Draws, FilterState]]:
-        """What was read of each unit says so much of it, and at the end of a new one, by draws
-        with gamma increments and by others.
-        """
+    def _followed(self) -> tuple[Draws, FilterState]:
+        """What was read of each unit says so much of it, and at the end of a new one, by draw."""
         steps = lay_out([*self.paths.values(), (WearPath("", (), ()),)], self.scale)
-        every = self.draws
+        draws = self.draws
         if self.simulated <= _PATHS_OF_MANY:
             # Draws stand kind by kind: every second one keeps their shares.
-            every = every.take(np.arange(0, _DRAWS, 2))
-        kinds = [every.take(every.gamma[:, 0] == is_gamma) for is_gamma in (False, True)]
-        return [
-            (draws, follow(steps, draws, likelihood=False)[1])
-            for draws in kinds
-            if len(draws.start)
-        ]
+            draws = draws.take(np.arange(0, _DRAWS, 2))
+        return draws, follow(steps, draws, likelihood=False)[1]
 
 
 class _Streams:
@@ -250,27 +204,12 @@ class _Streams:
 
     def __init__(self, seed: int, groups: int = 1) -> None:
         self._groups = groups
-        self._seed = np.random.SeedSequence(seed)
-        # One for all, until what the groups ask for differs.
-        self._streams = [np.random.default_rng(self._seed)]
+        self._stream = np.random.default_rng(seed)
 
     def normal(self, count: int, shape: tuple[int, int, int]) -> Array:
         draws, units, repeats = shape
-        of_group = (count, draws, units // self._groups, repeats)
-        found = [stream.standard_normal(of_group) for stream in self._streams]
-        return np.concatenate(found * (self._groups // len(found)), axis=2)
-
-    def gamma(self, shape: Array) -> Array:
-        if len(self._streams) < self._groups:
-            # Several times as fast as a deep copy.
-            state = self._streams[0].bit_generator.state
-            self._streams = [np.random.default_rng(self._seed) for _ in range(self._groups)]
-            for stream in self._streams:
-                stream.bit_generator.state = state
-        shapes = np.split(shape, self._groups, axis=1)
-        pairs = zip(self._streams, shapes, strict=True)
-        parts = [stream.standard_gamma(part) for stream, part in pairs]
-        return np.concatenate(parts, axis=1)
+        found = self._stream.standard_normal((count, draws, units // self._groups, repeats))
+        return np.tile(found, (self._groups, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,13 +236,7 @@ class _Ends:
         rest = np.sqrt(np.maximum(drift_var - (cov / sd) ** 2, 0.0))
         pace = np.maximum(1.0 + _DOUBT * three, _SLOWEST)
         drift = drift + cov / sd * one + rest * two
-        # What wears by gamma increments never goes back.
-        return cls(
-            draws,
-            level + sd * one,
-            np.maximum(drift, _LEAST_DRIFT) if draws.gamma.any() else drift,
-            pace,
-        )
+        return cls(draws, level + sd * one, drift, pace)
 
     def _column(self, name: str) -> Array:
         return np.asarray(getattr(self.draws, name))[:, :, None]
@@ -333,17 +266,12 @@ class _Ends:
                 now = now + self.pace * beyond
             d = now - before
             before = now
-            if self.draws.gamma.any():
-                shape = np.broadcast_to(np.maximum(d, 0.0) / s**2, x.shape)
-                increment = b * s**2 * rng.gamma(shape)
-                x = x + np.where(d > 0.0, increment, b * d)
-            else:
-                span = np.abs(d)
-                turn = v * np.sqrt(span)
-                one, two = rng.normal(2, x.shape)
-                sway = np.sqrt((turn * turn * span / 12.0 + s * s) * span)
-                x = x + b * d + 0.5 * turn * span * one + sway * two
-                b = b + turn * one
+            span = np.abs(d)
+            turn = v * np.sqrt(span)
+            one, two = rng.normal(2, x.shape)
+            sway = np.sqrt((turn * turn * span / 12.0 + s * s) * span)
+            x = x + b * d + 0.5 * turn * span * one + sway * two
+            b = b + turn * one
             yield x + sd * rng.normal(1, x.shape)[0] if reading else x
 
 
@@ -387,9 +315,9 @@ def fit_wear(
 ) -> WearModel:
     """Learn how a population of units wears, from readings of some of them.
 
-    Each unit has a drift from the population's; increments are correlated along a path (Wiener,
-    integrated Wiener or gamma) in proportion to usage or to a power of it, all averaged in the
-    measure of their evidence; readings have errors, at least of the resolution that they show; a
+    Each unit has a drift from the population's; increments are correlated along a path (Wiener or
+    integrated Wiener) in proportion to usage or to a power of it, all averaged in the measure of
+    their evidence; readings have errors, at least of the resolution that they show; a
     restoration starts a new path of the same unit. See ``filtering`` for the equations and
     ``posterior`` for the priors.
 

@@ -29,7 +29,7 @@ _PRIOR = {
     # Pace of the population, and how far units differ from it. [rise per usage; its logarithm]
     "drift": (1, 1),
     "drift_sd": (np.log(0.25), 1),
-    # Wiener or gamma increments over the whole usage, and wandering of the drift. [log rise]
+    # Wiener increments over the whole usage, and wandering of the drift. [log rise]
     "increment_sd": (np.log(0.15), 1.2),
     "wander_sd": (np.log(0.5), 1.2),
     # Error of a reading. [log rise]
@@ -39,7 +39,7 @@ _PRIOR = {
     # Share of its pace that a restored unit keeps. [log odds]
     "kept": (1, 1.5),
 }
-_KINDS = ("wiener", "integrated", "gamma")
+_KINDS = ("wiener", "integrated")
 # Importance samples of each kind of increments, and the degrees of freedom of the Student
 # distribution that they are drawn from: wider tails than the posterior's. [1]
 _SAMPLES = 800
@@ -65,7 +65,6 @@ class Member:
             return np.exp(np.clip(column[name], -15.0, 8.0)) if name in column else none
 
         return Draws(
-            gamma=np.full((len(theta), 1), self.kind == "gamma"),
             start=column["start"],
             start_sd=positive("start_sd"),
             drift=column["drift"],

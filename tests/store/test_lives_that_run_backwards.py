@@ -17,10 +17,10 @@ import pytest
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import life_of, lives
-from mlg_troubleshoot.life.forecast import Forecast, fit_fleet, forecast
+from mlg_troubleshoot.life.forecast import fit_fleet, forecast
 from mlg_troubleshoot.life.judged import judge_lives
 from mlg_troubleshoot.life.landings_left import Asked, FleetLine
-from mlg_troubleshoot.life.unrecorded_work import suggestions
+from mlg_troubleshoot.life.unrecorded_work import suggestion
 from mlg_troubleshoot.life.wear_paths import wear_paths
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
 from mlg_troubleshoot.store import Store, inspection_record
@@ -397,14 +397,25 @@ def test_landings_are_left_to_the_margin_that_the_last_inspection_states(tmp_pat
 # Last inspections that do not fit the wear of their gear.
 
 
-@pytest.mark.parametrize(("deviations", "told"), [(3.0, 0), (5.0, 1)])
-def test_a_reading_five_standard_deviations_tighter_is_taken_for_a_restoration_and_three_are_not(
-    deviations: float, told: int
+@pytest.mark.parametrize(("reads", "told"), [(0.0033, False), (0.0031, True), (0.0090, False)])
+def test_a_reading_four_standard_deviations_tighter_is_taken_for_a_restoration(
+    reads: float, told: bool
 ) -> None:
-    key = ("A", "LH")
-    found = suggestions([key], {key: Forecast(departures={3: -deviations, 4: deviations})})
-    assert len([words for words in found if "#3 read much tighter" in words]) == told
-    assert "#4" not in " ".join(found)
+    # Readings to 0.0005 in: their difference to 0.0007 in.
+    seen = [inspection(n, f"2024-0{n}-01", 100.0 * n) for n in (1, 2)]
+    add(
+        [
+            [
+                replace(row, clearance_in={3: value})
+                for row, value in zip(seen, (0.006, reads), strict=True)
+            ]
+        ]
+    )
+    found = suggestion(life_of(Store(), "N507", "LH"), load_gear())
+    assert ("#3 read much tighter" in found) is told
+    if told:
+        restored([3], "2024-01-20", "100")
+        assert suggestion(life_of(Store(), "N507", "LH"), load_gear()) == ""
 
 
 # A gear that is outside its margin or has a joint over its limit is due now.
