@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import PurePath
 
@@ -103,10 +103,6 @@ class Problem:
     value: str | None
     expected: str
     remedy: str
-
-    def as_dict(self) -> dict[str, str | int | None]:
-        """Return the problem as plain values, in the order of the JSON contract."""
-        return asdict(self)
 
     def place(self) -> str:
         """Return where it is, in words: file, sheet, cell or row, column."""

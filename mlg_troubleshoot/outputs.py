@@ -85,18 +85,13 @@ def write_text(path: str | Path, text: str) -> None:
 
 def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[Field]]) -> None:
     """Write a table as CSV in UTF-8, in which no text can become a formula."""
-    write_text(path, csv_text(header, rows))
-
-
-def csv_text(header: Sequence[str], rows: Iterable[Sequence[Field]]) -> str:
-    """Return a table as CSV in which no text can become a formula, whatever separator a program
-    takes it to have.
-    """
-    return csv_lines((header, *rows))
+    write_text(path, csv_lines((header, *rows)))
 
 
 def csv_lines(rows: Iterable[Sequence[Field]]) -> str:
-    """Return rows of such a table."""
+    """Return rows as CSV in which no text can become a formula, whatever separator a program takes
+    it to have.
+    """
     lines = [[_quoted(harmless(value)) for value in row] for row in rows]
     return "".join(",".join(line) + "\n" for line in lines)
 

@@ -4,8 +4,10 @@ it.
 
 from __future__ import annotations
 
+import re
 import unicodedata
 
+_MEASURE = re.compile(r"(?<=\d) (?=(?:%|in|thou|mm|min)(?!\w))")
 _LINE_ENDS = "\t\n\r"
 # Joiners belong to the writing of Persian and Indic names; every other format character is shown as
 # a code.
@@ -31,3 +33,8 @@ def visible(text: str, *, one_line: bool = False) -> str:
         )
         for c in text
     )
+
+
+def unbroken(text: str, glue: str = "\u00a0") -> str:
+    """Put a character that no line breaks at between a number and its unit."""
+    return _MEASURE.sub(glue, text)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.outputs import (
     claim_outputs,
-    csv_text,
+    csv_lines,
     harmless,
     write_bytes,
     write_csv,
@@ -103,14 +103,14 @@ def fields(text: str, separator: str) -> list[str]:
     "text", ["=1+1", "+1", "-1", "@SUM(A1)", " =1", "\t=1", '"=1', "＝1", "＠SUM(A1)"]
 )
 def test_no_text_becomes_a_formula(text: str) -> None:
-    _, field = fields(csv_text(["a"], [[text]]), ",")
+    _, field = fields(csv_lines([["a"], [text]]), ",")
     assert field.strip().startswith("'")
 
 
 @pytest.mark.parametrize("separator", [";", "\t", "|", ';"', "; ", "\r\n", "|\f"])
 @pytest.mark.parametrize("sign", SIGNS)
 def test_no_text_splits_into_a_formula_whatever_the_separator(separator: str, sign: str) -> None:
-    text = csv_text(["a", "b"], [["R2", f"x{separator}{sign}HYPERLINK(1)"]])
+    text = csv_lines([["a", "b"], ["R2", f"x{separator}{sign}HYPERLINK(1)"]])
     for read_with in SEPARATORS:
         for field in fields(text, read_with):
             assert not field.strip(' \f"').startswith(tuple(SIGNS))
@@ -129,7 +129,7 @@ def test_no_text_splits_into_a_formula_whatever_the_separator(separator: str, si
 def test_no_field_starts_with_a_formula_sign_whichever_separator_it_is_read_with(
     rows: list[list[str | float]],
 ) -> None:
-    text = csv_text(["id"], [["R1", *row] for row in rows])
+    text = csv_lines([["id"], *(["R1", *row] for row in rows)])
     for separator in SEPARATORS:
         for field in fields(text, separator):
             assert field == "-0.5" or not field.strip(' \u00a0\f"').startswith(tuple(SIGNS))
@@ -142,11 +142,11 @@ def test_what_was_made_harmless_is_not_changed_again(text: str) -> None:
 
 def test_a_text_without_a_formula_is_read_back_as_it_was() -> None:
     text = 'N123; LH | a-b, "c" = 1\n2'
-    assert fields(csv_text(["a"], [[text]]), ",") == ["a", text]
+    assert fields(csv_lines([["a"], [text]]), ",") == ["a", text]
 
 
 def test_a_negative_number_stays_a_number() -> None:
-    assert csv_text(["a"], [[-0.5]]) == "a\n-0.5\n"
+    assert csv_lines([["a"], [-0.5]]) == "a\n-0.5\n"
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import signal
 import sys
@@ -17,6 +18,8 @@ def main() -> None:
     from mlg_troubleshoot.cli.output import prepare_streams
 
     gc.set_threshold(_NEW_OBJECTS)
+    # On its way out Python looks through all that is left: half a second that somebody waits.
+    atexit.register(gc.freeze)
     # What is half written goes as it does with Ctrl-C: the exit code is that of a shell.
     signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(128 + number))
     prepare_streams()

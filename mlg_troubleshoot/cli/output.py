@@ -25,7 +25,7 @@ from rich.text import Text
 
 from mlg_troubleshoot.errors import ExitCode, OutputError
 from mlg_troubleshoot.units import LengthUnit, said_in
-from mlg_troubleshoot.visible import visible
+from mlg_troubleshoot.visible import unbroken, visible
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.reporting.publish import WrittenReport
@@ -34,6 +34,8 @@ _WIDTH_ELSEWHERE = 80
 WIDE = 100
 WIDEST = 120
 _PLAIN = "mlg.plain"
+# Between a number and its unit until the lines are folded: rich breaks them at any space.
+_GLUE = "\ue000"
 # Between the cells of a table in a template.
 _CELL = "│"
 _MARK = re.compile(r"[<>]\d*$")
@@ -149,7 +151,7 @@ class DataConsole(Console):
         any case here.
         """
         for text, style, control in super().render(renderable, options):
-            yield Segment(text if control else visible(text), style, control)
+            yield Segment(text if control else visible(text.replace(_GLUE, " ")), style, control)
 
 
 def is_plain() -> bool:
@@ -255,7 +257,7 @@ def page(name: str, unit: LengthUnit = LengthUnit.INCH, **values: object) -> lis
 
 def text(data: str, style: str = "") -> Text:
     """Return data as a text for the console, made visible before it is measured."""
-    return Text(visible(data), style=style)
+    return Text(unbroken(visible(data), _GLUE), style=style)
 
 
 def word(data: str | None, style: str = "") -> Text:
@@ -276,7 +278,8 @@ def say(message: str, indent: int = 0, *, is_result: bool = False) -> None:
             break_long_words=False,
             break_on_hyphens=False,
         ).wrap
-        lines = [part for line in lines for part in fold(line) or [""]]
+        lines = [part for line in lines for part in fold(unbroken(line)) or [""]]
+        lines = [line.replace("\u00a0", " ") for line in lines]
     with suppress(*(() if is_result else (OSError,))):
         print("\n".join(" " * indent + line for line in lines), file=sys.stderr, flush=True)
 

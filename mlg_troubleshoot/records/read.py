@@ -50,6 +50,8 @@ _PACKED: tuple[tuple[str, bytes, str], ...] = (
 )
 _SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods", ".numbers"))
 
+# How the verdicts of `mlg check --csv` begin.
+_OWN = b"record_id,tail_no,side,inspection_date,gear_landings,verdict,"
 _ZIP_MAGICS = (b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")
 _HTML = (b"<!doctype html", b"<html", b"<table", b"<head", b"<body")
 _OLE_MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
@@ -134,7 +136,7 @@ def expand(source: Source) -> list[Source]:
     path = Path(source)
     try:
         if path.is_dir():
-            found = [p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES]
+            found = [p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES and not _is_own(p)]
         elif any(c in str(source) for c in "*?[") and not path.exists():
             pattern = str(path.relative_to(path.anchor))
             found = [p for p in Path(path.anchor).glob(pattern) if p.is_file()]
@@ -145,6 +147,14 @@ def expand(source: Source) -> list[Source]:
         return [source]
     # Spreadsheet programs lay lock files next to an open workbook.
     return [*sorted(p for p in found if not p.name.startswith(("~$", ".")))] or [source]
+
+
+def _is_own(path: Path) -> bool:
+    """Tell whether a file is a list of verdicts that mlg wrote: nothing in it was measured."""
+    try:
+        return path.suffix.lower() == ".csv" and load_bytes(path).startswith(_OWN)
+    except FileRefusedError:
+        return False
 
 
 def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:

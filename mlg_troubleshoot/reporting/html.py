@@ -21,7 +21,7 @@ from markupsafe import Markup
 from mlg_troubleshoot.errors import OutputError, grouped
 from mlg_troubleshoot.reporting import formats
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
-from mlg_troubleshoot.visible import visible
+from mlg_troubleshoot.visible import unbroken, visible
 
 FONT_FILES = {"normal": "fonts/DejaVuSans.ttf", "bold": "fonts/DejaVuSans-Bold.ttf"}
 _LONGEST_WORD = 64
@@ -113,7 +113,7 @@ def _readable(value: Any) -> Any:
     return (
         value
         if isinstance(value, Markup) or not isinstance(value, str)
-        else breakable(visible(value))
+        else breakable(unbroken(visible(value)))
     )
 
 

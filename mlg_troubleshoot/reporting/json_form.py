@@ -123,7 +123,7 @@ def _head(gear: Gear) -> dict[str, Any]:
 
 
 def _tail(problems: Sequence[Problem], warnings: Sequence[str]) -> dict[str, Any]:
-    return {"problems": [problem.as_dict() for problem in problems], "warnings": list(warnings)}
+    return {"problems": list(problems), "warnings": list(warnings)}
 
 
 def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import os
 import re
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,24 @@ def test_one_gear_takes_twenty_lines_with_verdict_and_next_last(
     assert len(lines) <= 20
     (title,) = (place for place, line in enumerate(lines) if line.startswith("N1 LH  ["))
     assert any(line.startswith("NEXT") for line in lines[title:])
+
+
+@pytest.mark.parametrize("wide", [40, 60, 72, 79, 80, 81, 90, 100])
+def test_a_number_is_never_parted_from_its_unit(
+    wide: int, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(wide))
+    for gear in SAID.values():
+        result = task.check_inspection(gear, task.CheckOptions(), None)
+        one_gear.show(result.judgements[0], result.gear, console(), detail=True)
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    parted = [
+        (before, after)
+        for before, after in pairwise(lines)
+        if re.search(r"\d$", before) and re.match(r"(%|in|thou|min)\b", after)
+    ]
+    assert parted == []
+    assert any(" %" in line for line in lines)
 
 
 def test_the_help_is_one_screen_and_says_where_to_start() -> None:

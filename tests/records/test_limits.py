@@ -9,6 +9,7 @@ import random
 import subprocess
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 import openpyxl
@@ -161,7 +162,7 @@ def test_such_a_character_in_a_workbook_leaves_json_and_annotated_copy_whole(
     source.write_bytes(xlsx(change=change))
     result = read_many([source], ReadOptions())
     json.dumps(
-        [str(result.rows), *(p.as_dict() for p in result.problems)], ensure_ascii=False
+        [str(result.rows), *(asdict(p) for p in result.problems)], ensure_ascii=False
     ).encode("utf-8")
     annotate_workbook(source, out, result, {row.source: {"verdict": "X"} for row in result.rows})
     assert openpyxl.load_workbook(out).worksheets[0]["B1"].value == "tail_no"

@@ -7,6 +7,7 @@ import io
 import pytest
 
 from mlg_troubleshoot.records import ReadOptions, read_many
+from tests.cli.conftest import mlg
 from tests.records.reading import read_inspections
 
 HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in\n"
@@ -27,6 +28,12 @@ def test_a_folder_stands_for_the_tables_in_it(folder):
     result = read_many([folder], ReadOptions())
     assert [row.record_id for row in result.rows] == ["A1", "B1", "B2"]
     assert [file.kind for file in result.files] == ["csv", "csv", "unreadable"]
+
+
+def test_a_list_of_verdicts_in_a_folder_is_not_read_as_a_table(folder):
+    assert mlg("check", folder / "a.csv", "--csv", folder / "out.csv").code == 1
+    (folder / "out.csv").rename(folder / "verdicts of May.csv")
+    assert len(read_many([folder], ReadOptions()).rows) == 3
 
 
 def test_a_file_that_cannot_be_read_is_a_problem_and_the_others_still_work(folder):

@@ -7,6 +7,7 @@ import sys
 from rich.padding import Padding
 
 from mlg_troubleshoot.cli.output import console, word
+from mlg_troubleshoot.cli.output import text as data_text
 
 _WIDEST = 80
 
@@ -23,7 +24,7 @@ class Terminal:
         width = min(self._console.width, _WIDEST)
         for each in text.split("\n"):
             indent = len(each) - len(each.lstrip())
-            shown = Padding(word(each.strip(), style), (0, 0, 0, indent), expand=False)
+            shown = Padding(data_text(each.strip(), style), (0, 0, 0, indent), expand=False)
             self._console.print(shown, width=width)
 
     def ask(self, prompt: str) -> str:

@@ -42,7 +42,7 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
     title = word(f"{row.tail_no or 'tail ?'} {row.side or 'side ?'}  ", "bold")
     is_judged = isinstance(judgement, Assessment)
     said = screen.said(judgement.headline) if is_judged else judgement.title
-    title.append(f"[{MARKS[judgement.verdict]}] {said}", TONES[judgement.tone])
+    title.append_text(text(f"[{MARKS[judgement.verdict]}] {said}", TONES[judgement.tone]))
     origin = word(f"{row.record_id or 'record ?'}: {gear.provenance}. {_DISCLAIMER}", "dim")
     body = [origin, title, *_body(judgement, screen, detail=detail)]
     notes = [text(f"* {screen.said(note)}") for note in judgement.warnings]
