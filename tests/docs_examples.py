@@ -120,7 +120,8 @@ def names_table(module: str) -> str:
     the package has not.
     """
     door = importlib.import_module(module)
-    lines = ["| name | is |", "|---|---|"]
+    users = {} if "." in module else by_name(USERS_OF_NAMES)
+    lines = ["| name | is | for |", "|---|---|---|"] if users else ["| name | is |", "|---|---|"]
     for name in sorted(door.__all__, key=str.lower):
         thing = getattr(door, name)
         above = getattr(importlib.import_module("mlg_troubleshoot"), name, None)
@@ -131,7 +132,7 @@ def names_table(module: str) -> str:
         call = name
         if inspect.isfunction(thing):
             call = f"{name}({', '.join(inspect.signature(thing).parameters)})"
-        lines.append(f"| `{call}` | {text} |")
+        lines.append(f"| `{call}` | {text} |" + (f" {users[name]} |" if users else ""))
     return "\n".join(lines) + "\n"
 
 
@@ -162,19 +163,73 @@ def commands_table() -> str:
     return "\n".join(lines) + "\n"
 
 
+# Who uses each option and how often: by its name, or by command and name where commands differ.
+USERS = {
+    "administrator": {
+        "seldom": "--store; history verify --report",
+        "weekly": "--expect; --quiet",
+    },
+    "analyst": {
+        "seldom": "--approve; --causes; --design; --figure; --seed; --size; --workers"
+        "; --write-table; diagnose --why; study --csv",
+        "weekly": "--extension; --json; --write-extension",
+    },
+    "fleet engineer": {
+        "seldom": "--columns; --dates; --decimal-comma; --format; --gear; --no-forecast; --why"
+        "; fleet --joint",
+        "weekly": "--amend; --annotate; --csv; --failed; --force; --keep; --map; --sheet; --since"
+        "; --within",
+    },
+    "technician": {
+        "daily": "--detail; --report; --show; --side; --tail",
+        "weekly": "--convention; --date; --joint; --landings; --set; --unit; --work-order",
+    },
+}
+# The same for the names of the package.
+USERS_OF_NAMES = {
+    "analyst": {
+        "daily": "check; diagnose; load_gear; predict; read_inspections",
+        "weekly": "Assessment; CheckOptions; CheckResult; ClearanceConvention; DiagnoseOptions"
+        "; DiagnoseResult; Gear; Inspection; Outcome; Picture; Side; TroubleshootError; Verdict"
+        "; WorstCase; check_files; diagnose_files; diagnose_simulation; load_model_extension"
+        "; SimulationDiagnosis; Suspect; write_extension",
+        "seldom": "Cause; IndexTable; load_index_table; run_study; shipped_gears; StudyFindings"
+        "; StudyOptions",
+    },
+    "fleet engineer": {
+        "weekly": "forecast; Lives; Problem; Store; write_reports",
+        "seldom": "LengthUnit; parse_length; schema; survey; SurveyResult",
+    },
+}
+
+
+def by_name(users: dict[str, dict[str, str]]) -> dict[str, str]:
+    """Who uses each thing and how often, by its name."""
+    return {
+        name: f"{who}, {often}"
+        for who, rows in users.items()
+        for often, names in rows.items()
+        for name in names.split("; ")
+    }
+
+
 def options_table() -> str:
-    """Each option with the commands that have it."""
-    found: dict[tuple[str, str], list[str]] = {}
+    """Each option with the commands that have it, and who uses it how often."""
+    users = by_name(USERS)
+    found: dict[tuple[str, str, str], list[str]] = {}
     for path, command in all_commands():
         for option in command.params:
             if option.param_type_name == "option" and "--help" not in option.opts:
                 names = [max(o, key=len) for o in (option.opts, option.secondary_opts) if o]
                 words = f"{'/'.join(names)} {option.metavar or ''}".strip().replace("|", "\\|")
+                user = users.get(f"{path} {names[0]}") or users[names[0]]
                 variable = f" Else `{option.envvar}`." if option.envvar else ""
-                found.setdefault((words, f"{option.help}{variable}"), []).append(path)
-    lines = ["| option | does | of |", "|---|---|---|"]
+                key = words, f"{option.help}{variable}", user
+                found.setdefault(key, []).append(path)
+    lines = ["| option | does | of | for |", "|---|---|---|---|"]
     lines += [
-        f"| `{words}` | {does} | {', '.join(of)} |" for (words, does), of in sorted(found.items())
+        f"| `{words}` | {does} | {', '.join(of)} | {user} |"
+        for (words, does, user), of in sorted(found.items())
     ]
     return "\n".join(lines) + "\n"
 

@@ -249,18 +249,17 @@ def table() -> str:
 
 
 def ways() -> str:
-    """The files that a cell and a diagnosis pass, each with what is done there."""
+    """The files that a cell and a diagnosis pass; each file says what is done there."""
     found = []
     for title, steps in WAYS.items():
         lines = [
-            f"{n}. `{file}` `{name}`. {first_line(defined(file, name))}".rstrip()
-            for n, (file, name) in enumerate(steps, 1)
+            f"{n}. `{file}` `{defined(file, name).name}`" for n, (file, name) in enumerate(steps, 1)
         ]
         found.append("\n".join([f"**{title}**", "", *lines]))
     return "\n\n".join(found)
 
 
-def defined(file: str, name: str) -> ast.AST:
+def defined(file: str, name: str) -> ast.ClassDef | ast.FunctionDef:
     """The function or class of that name; `StopIteration` if the file has none."""
     return next(
         node

@@ -13,6 +13,7 @@ from urllib.parse import unquote
 import pytest
 from pytest_examples import CodeExample, EvalExample, find_examples
 
+import mlg_troubleshoot
 from mlg_troubleshoot.decision.columns import COLUMNS, Column
 from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
 from tests import docs_examples, numbers_page
@@ -183,6 +184,19 @@ def test_every_option_that_a_page_names_exists(page: Path) -> None:
     known = {option for p in params for option in (*p.opts, *p.secondary_opts)}
     named = set(re.findall(r"(?<![\w-])--[a-z][\w-]+", page.read_text(encoding="utf-8")))
     assert named - known - OF_OTHERS - {"--version", "--help", "--help-all"} == set()
+
+
+def test_every_option_and_public_name_has_its_user_and_no_other_one() -> None:
+    options = [
+        (path, max(option.opts, key=len))
+        for path, command in docs_examples.all_commands()
+        for option in command.params
+        if option.param_type_name == "option" and "--help" not in option.opts
+    ]
+    users = set(docs_examples.by_name(docs_examples.USERS))
+    assert {name for path, name in options if not {name, f"{path} {name}"} & users} == set()
+    assert users - {name for path, name in options for name in (name, f"{path} {name}")} == set()
+    assert set(docs_examples.by_name(docs_examples.USERS_OF_NAMES)) == set(mlg_troubleshoot.__all__)
 
 
 def test_the_python_version_is_that_of_the_project() -> None:
