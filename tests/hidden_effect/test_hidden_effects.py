@@ -1,7 +1,8 @@
 """An effect is hidden in a fleet by the independent simulator; the diagnosis must find it from the
 table alone.
 
-These are smoke tests, one fleet of each case; rates are measured by ceiling.py and the calibration.
+These are smoke tests, one fleet of each case; rates are measured by test_rates.py and the
+calibration.
 The seed of each case is 40,000 plus its place in the list. No seed was chosen for its outcome. What
 was hidden is compared after the diagnosis, which reads the CSV file that the simulator wrote.
 """

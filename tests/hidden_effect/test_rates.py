@@ -1,0 +1,84 @@
+"""The promise as a rate: effects are hidden in fleets that nobody has seen, and what is named is
+counted against one who knows the form of the effect and all noise (``ceiling.oracle``).
+
+The seeds are those of the day on which the tests run; MLG_TEST_DAY=YYYY-MM-DD draws the fleets of
+another day again. The bounds leave each count one chance in ten thousand to fall outside by luck.
+"""
+
+from __future__ import annotations
+
+import os
+from datetime import date
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import binom, norm
+
+from tests.hidden_effect import ceiling, simulator, study
+
+pytestmark = pytest.mark.slow
+
+EACH, STRENGTH = 2, 15.0
+BY_LUCK = 1e-4
+# Of what the oracle is sure of, the share that a program is to name which knows neither the noise
+# nor the size of the effect; and how often a name may be wrong and a set without the true cause.
+OF_THE_ORACLE, WRONG, LEFT_OUT = 0.90, 0.01, 0.03
+
+
+def first_seed() -> int:
+    day = date.fromisoformat(os.environ.get("MLG_TEST_DAY") or date.today().isoformat())
+    return 1000 * day.toordinal()
+
+
+@cache
+def hidden() -> tuple[tuple[study.Task, study.Record], ...]:
+    """Some fleets for each cause of the list, diagnosed blind."""
+    drawn = [
+        {
+            "group": f"single:{STRENGTH:g}",
+            "seed": first_seed() + k,
+            "arguments": {"kind": "single", "strength": STRENGTH, "cause": cause},
+        }
+        for k, cause in enumerate(EACH * list(simulator.CATALOGUE))
+    ]
+    return tuple((task, study.run(task)) for task in drawn)
+
+
+def test_what_is_named_right_comes_near_to_what_the_oracle_is_sure_of() -> None:
+    sure = np.array([ceiling.oracle(task)["sure"] for task, _record in hidden()], float)
+    right = sum(record["right"] for _task, record in hidden())
+    expected = OF_THE_ORACLE * sure
+    spread = np.sqrt(np.sum(expected * (1.0 - expected)))
+    least = expected.sum() + norm.ppf(BY_LUCK) * spread
+    assert right >= least, [
+        (task["seed"], record["cause"], record["named"])
+        for task, record in hidden()
+        if not record["right"]
+    ]
+
+
+def test_no_more_names_are_wrong_than_is_promised() -> None:
+    wrong = [(task["seed"], record["named"]) for task, record in hidden() if record["wrong"]]
+    assert len(wrong) <= binom.ppf(1.0 - BY_LUCK, len(hidden()), WRONG), wrong
+
+
+def test_the_true_cause_is_named_or_in_the_set() -> None:
+    lost = [(task["seed"], record["cause"]) for task, record in hidden() if not record["in_set"]]
+    assert len(lost) <= binom.ppf(1.0 - BY_LUCK, len(hidden()), LEFT_OUT), lost
+
+
+def test_an_alarm_is_rare_where_nothing_is_wrong() -> None:
+    drawn = [
+        {
+            "group": f"null:{null}",
+            "seed": first_seed() + 500 + k,
+            "arguments": {"kind": "null", "null": null},
+        }
+        for k, null in enumerate(simulator.NULLS)
+    ]
+    found = [
+        study.run(task | {"arguments": task["arguments"] | {"kind": "null"}}) for task in drawn
+    ]
+    alarms = [(r["seed"], r["named"]) for r in found if r["verdict"] != "NONE"]
+    assert len(alarms) <= binom.ppf(1.0 - BY_LUCK, len(found), 0.05), alarms
