@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -101,11 +102,12 @@ class Run:
             return self._ask().exit_code
         typed = by_hand.from_flags(self._flags, self.asked, self._place)
         result = task.check_inspection(typed, self.asked, self._place)
+        against: list[str] = []
         try:
-            self._keep(result.judgements)
+            against = self._keep(result.judgements)
         finally:
             self.publish(result, LengthUnit.INCH)
-        return result.exit_code
+        return task.exit_code_of(listed(result.judgements), against)
 
     def _check_files(self) -> int:
         # The side of a FILE is that of a table without a column of sides.
@@ -150,14 +152,14 @@ class Run:
         if wanted.annotate is not None and result.read is not None:
             self._annotate(result.read, found.annotated, wanted.annotate)
         # A report states what was kept.
-        self._keep((), found.entries)
+        against = self._keep((), found.entries)
         if wanted.report is not None:
             self.write_reports(result, wanted.report, unit)
         if not (wanted.keep or wanted.quiet) and sys.stderr.isatty():
             output.say("Not kept: --keep adds these inspections to the records.")
         if result.problems and not wanted.as_json and not found.lines:
             output.say("No row could be judged.")
-        return task.exit_code_of(found.lines, result.unread_files)
+        return task.exit_code_of(found.lines, (*result.unread_files, *against))
 
     def _outputs(
         self, found: _Gathered, files: ExitStack, read: task.CheckResult, total: int
@@ -287,10 +289,12 @@ class Run:
             )
         return output.say_written(written, quiet=self._wanted.quiet)
 
-    def _keep(self, judgements: Sequence[Judgement], told: Sequence[Told] = ()) -> None:
-        """Add what was found to the store, if that is asked for."""
+    def _keep(self, judgements: Sequence[Judgement], told: Sequence[Told] = ()) -> list[str]:
+        """Add what was found to the store, if that is asked for; return the gears that need
+        attention with all of their records.
+        """
         if self._place is None or not self._wanted.keep:
-            return
+            return []
         from mlg_troubleshoot.workflows.keep import keep, told_by
 
         with stages(quiet=self._wanted.quiet) as bar:
@@ -301,5 +305,8 @@ class Run:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""
             output.say(f"{added.new} {noun} kept in {self._place.place}{known}.")
-        for warning in added.warnings:
+        seen = Counter((each.record.tail_no, each.record.side) for each in found)
+        against = task.attention_of_kept(seen, self._place, load_gear(self.asked.gear))
+        for warning in (*added.warnings, *against):
             output.say(f"Warning: {warning}")
+        return against

@@ -234,7 +234,7 @@ def _is_line(line: _Line, at: int, options: ReadOptions) -> bool:
         is_known
         or is_named
         or any(
-            _is_fraction(cell) or may_be_outcome(cell) or says_failed(show(cell))
+            _is_fraction(cell) or may_be_outcome(cell, asked=False) or says_failed(show(cell))
             for cell in line.cells[at + 1 :]
             if cell is not None
         )

@@ -133,6 +133,11 @@ _PLUNGER = re.compile(
     r"plu?ng|\bplg|\brv\b|reversing|(?:over|under)[ -]?travel|mid[ -]?pos|spool|piston|kolben"
     r"|st(?:ö|oe)(?:ß|ss)el"
 )
+_OUTCOME_HEADER = re.compile(
+    r"result|status|\bstate\b|condition|outcome|retract|swing|gear[ _]up|\btest|functional|\bpass"
+    r"|\bp/f\b|fail|fault|defect|complain|squawk|\bsnag|discrepan|serviceable|\bu/s\b|airworthy"
+    r"|\bok\b|ergebnis|zustand"
+)
 _MARGIN = re.compile(r"margin|marge|spielraum|\ballow|\bpermi(?:tted|ssible)\b|\btolerance\b")
 # Words of readings, and of numbers that are given next to readings.
 _READING_WORDS = _words(
@@ -148,7 +153,8 @@ _FILLERS = _words("of at the for in")
 _OTHER_MATTER = _words(
     "remark remarks comment comments note notes photo photos picture date by initials sign"
     " signature stamp part serial sn pn status ok condition technician inspector gauge name"
-    " description location access signed greased lubricated cleaned"
+    " description location access signed greased lubricated cleaned humidity hours hrs time"
+    " temperature temp oat torque pressure weight cost price"
 )
 
 
@@ -294,10 +300,12 @@ def suspect(header: str, joints: Joints) -> tuple[str | None, bool]:
     ), sure
 
 
-def may_ask_outcome(header: str) -> bool:
-    """Whether a yes under an unread header may say that the gear failed or retracted."""
+def asks_outcome(header: str) -> bool | None:
+    """Whether an unread header asks what the gear did; None if it asks for something else."""
     said = {*_TOKEN.findall(tidy(header).replace("_", " "))}
-    return not said & (_OTHER_MATTER - {"status", "ok", "condition"})
+    if said & (_OTHER_MATTER - {"status", "ok", "condition"}):
+        return None
+    return _OUTCOME_HEADER.search(tidy(header)) is not None and not said & _JOINT_WORDS
 
 
 def _aliased(plain: str, units: _Units) -> Recognition | None:

@@ -56,7 +56,7 @@ from mlg_troubleshoot.records.cells import (
     writable,
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings
-from mlg_troubleshoot.records.headers import UNKNOWN, Field, Recognition, may_ask_outcome, suspect
+from mlg_troubleshoot.records.headers import UNKNOWN, Field, Recognition, asks_outcome, suspect
 from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand
 from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.unit_fit import (
@@ -117,6 +117,11 @@ def is_made_for_row(record_id: str) -> bool:
 # A clearance of which only an end was found; a no-go gauge did not enter, a go gauge did.
 _END = re.compile(r"(?:(?P<below><=?|≤|no[ -]?go)|(?:>=?|≥|go))\s*(?=[\d.,])", re.IGNORECASE)
 _NO_END = "Measure with a gauge that reaches further, or leave it blank if it was not measured."
+
+
+def _is_code(cell: Filled) -> bool:
+    """Whether a cell is one word with a digit; a sentence may have one, a single one may answer."""
+    return isinstance(cell, str) and _CODE.fullmatch(cell) is not None
 
 
 @lru_cache(4096)
@@ -233,9 +238,9 @@ class RowReader:
         ]
         self._blankable = [index for index, known in good if known.column.blank_by_word]
         self._unread: dict[int, str] = {}
-        # What is only carried, and may still say that the gear failed or how it was read.
-        self._unread_words: list[PlacedField] = []
-        self._suspects: list[tuple[PlacedField, str | None, bool]] = []
+        # What is only carried, and may still say that the gear failed or how it was read; with the
+        # column of readings that each may be and whether any number may be one.
+        self._unread_words: list[tuple[PlacedField, str | None, bool]] = []
         # What a number format adds counts where a unit does.
         self._worded: set[int] = set()
         self._add(placed)
@@ -269,7 +274,10 @@ class RowReader:
             ):
                 self._worded.add(p.index)
             if (column is None or column.carried) and not (p.refused or p.is_settled):
-                self._unread_words.append(p)
+                nearest, is_sure = suspect(p.header, self._options.joints)
+                # A column without a header may only number the rows if it is the first one.
+                is_sure = is_sure or (not p.header and p.index > 0)
+                self._unread_words.append((p, nearest, is_sure))
             if column is not None or p.refused:
                 continue
             name = p.header or f"column {column_letters(p.index)}"
@@ -277,10 +285,6 @@ class RowReader:
                 name = f"{name} (again)"
             taken.add(name)
             self._unread[p.index] = name
-            if not p.is_settled:
-                nearest, is_sure = suspect(p.header, self._options.joints)
-                # A column without a header may only number the rows if it is the first one.
-                self._suspects.append((p, nearest, is_sure or (not p.header and p.index > 0)))
 
     def read(self, row: Row) -> Inspection | InvalidRow:
         """Read one row; every bad cell is reported once."""
@@ -290,9 +294,10 @@ class RowReader:
         self._read_others(found)
         self._carry(found)
         asked = self._unit_questions(found)
-        if self._suspects:
-            asked += self.ask_about(self._cells, outcome=found.values.get(OUTCOME))
-        asked += row.questions
+        units = {entered.unit for entered in found.entered.values()}
+        outcome = found.values.get(OUTCOME)
+        asked += self.ask_about(self._cells, outcome=outcome, is_in_thou=units == {LengthUnit.THOU})
+        asked += [each for each in row.questions if each not in asked]
         source = RowSource(self._table.file, self._table.sheet, row.number)
         for index, fault in sorted(self._faults, key=itemgetter(0)):
             if isinstance(fault, AmbiguousDateError):
@@ -489,23 +494,20 @@ class RowReader:
         self._faults = []
 
     def _carry(self, found: _Found) -> None:
-        """Carry what is not read; stop a row in which it says that the gear failed, or that the
-        clearances were read in another way or another unit.
+        """Carry what is not read; stop a row in which it says that the clearances were read in
+        another way or another unit.
         """
         for index, name in self._unread.items():
             if self._cells[index] is not None:
                 found.carried[name] = writable(show(self._cells[index]))
         units = {entered.unit for entered in found.entered.values()}
         stated = found.convention
-        for placed in self._unread_words:
+        for placed, *_ in self._unread_words:
             cell = self._cells[placed.index]
-            # A sentence may have a digit; a single one may be an answer.
-            if cell is None or (isinstance(cell, str) and _CODE.fullmatch(cell)):
+            if cell is None or _is_code(cell):
                 continue
-            failed, said, unit = _spoken(placed.header, cell)
-            if failed and found.values.get(OUTCOME) is not Outcome.FAILED:
-                column = OUTCOME
-            elif said is not None and (stated is None or said.per_radial != stated.per_radial):
+            _failed, said, unit = _spoken(placed.header, cell)
+            if said is not None and (stated is None or said.per_radial != stated.per_radial):
                 column = CONVENTION
             elif unit is not None and units and unit not in units:
                 column = UNIT
@@ -521,24 +523,30 @@ class RowReader:
             self._bad.add(placed.index)
 
     def ask_about(
-        self, cells: Cells, *, of_joint: bool = False, outcome: Outcome | None = None
+        self,
+        cells: Cells,
+        *,
+        of_joint: bool = False,
+        outcome: Outcome | None = None,
+        is_in_thou: bool = False,
     ) -> list[str]:
-        """Ask about what stands in columns that are not read: numbers that may be readings, next
-        to a joint any fraction, and answers where no outcome is known.
+        """Ask about what stands in columns that are not read: numbers that may be readings, and
+        words that say that the gear failed or may say what it did.
         """
         asked = []
-        for placed, nearest, is_sure in self._suspects:
+        for placed, nearest, is_sure in self._unread_words:
             cell = cells[placed.index]
             if cell is None:
                 continue
             header = placed.header or column_letters(placed.index)
-            is_named = bool(nearest) or of_joint
-            if (nearest is not None or of_joint) and self._may_be_length(
-                cell, is_sure=is_sure, is_named=is_named
-            ):
+            is_unread = placed.field is None and (nearest is not None or of_joint)
+            # Under a header that names nothing only a number that may decide is asked about.
+            is_named = nearest or is_sure or of_joint
+            smallest = 0.0 if is_named else min(self._options.limit_in.values(), default=0.0)
+            if is_unread and self._may_be_length(cell, smallest, is_sure=is_sure or is_in_thou):
                 target = nearest or CLEARANCE.name
                 meant = f'a reading, pass --map "{header}={target}" (a length with its unit)'
-            elif outcome is None and may_be_outcome(cell) and may_ask_outcome(header):
+            elif self._may_say_outcome(placed, cell, outcome):
                 meant = f'what the gear did, pass --map "{header}={OUTCOME.name}"'
             else:
                 continue
@@ -548,18 +556,32 @@ class RowReader:
             )
         return asked
 
-    def _may_be_length(self, cell: Filled, *, is_sure: bool, is_named: bool) -> bool:
-        """Whether a cell holds a length of a usual size: any number, a fraction, or only one with
-        its unit.
+    def _may_say_outcome(self, placed: PlacedField, cell: Filled, outcome: Outcome | None) -> bool:
+        """Whether an unread cell says that the gear failed or, where no outcome is known, may say
+        what it did.
+        """
+        if outcome is Outcome.FAILED:
+            return False
+        if not _is_code(cell) and _spoken(placed.header, cell)[0]:
+            return True
+        is_open = outcome is None and placed.field is None
+        return is_open and may_be_outcome(cell, asked=asks_outcome(placed.header))
+
+    def _may_be_length(self, cell: Filled, above_in: float, *, is_sure: bool) -> bool:
+        """Whether a cell holds a length of a usual size: any number, or only a fraction or one
+        with its unit.
         """
         # What is asked about may have either point.
         comma = self._table.decimal_comma or (isinstance(cell, str) and "," in cell)
         value, unit = written_number(cell, decimal_comma=comma)
-        smallest = unit or (LengthUnit.THOU if is_sure else LengthUnit.MILLIMETRE)
-        size = abs(smallest.to_inches(value))
-        return 0.0 < size <= self._options.plunger_hard_max_in and (
-            is_sure or unit is not None or (is_named and value % 1.0 > 0.0)
-        )
+        if unit is not None:
+            units = [unit]
+        elif is_sure:
+            units = [*LengthUnit]
+        else:
+            units = [LengthUnit.INCH, LengthUnit.MILLIMETRE] if value % 1.0 > 0.0 else []
+        most = self._options.plunger_hard_max_in
+        return any(above_in < abs(each.to_inches(value)) <= most for each in units)
 
     def _made_id(self, side: Side | None) -> str:
         # Sheets of both sides may hold the same row.

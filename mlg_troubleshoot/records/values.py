@@ -397,11 +397,19 @@ def says_failed(text: str) -> bool:
     return _OUTCOME_WORDS.get(words) is Outcome.FAILED or _TELLS_FAILURE.search(words) is not None
 
 
-def may_be_outcome(cell: Filled) -> bool:
-    """Whether a cell answers a question that is not known, or doubts its own answer."""
+def may_be_outcome(cell: Filled, *, asked: bool | None) -> bool:
+    """Whether a cell may say what the gear did: whatever is not plainly good where its header asks
+    for that, else an answer to a question that is not known or one that doubts itself; nothing
+    where the header asks for something else.
+    """
     text = show(cell)
-    is_doubted = "?" in text and in_words(text) in _OUTCOME_WORDS
-    return is_doubted or (not text.strip().isdigit() and _yes_no(cell) is not None)
+    found = _OUTCOME_WORDS.get(in_words(text))
+    is_doubted = "?" in text and found is not None
+    if asked:
+        good = found is Outcome.RETRACTED or text.strip().casefold() in NOT_MEASURED
+        return is_doubted or not good
+    is_answer = not text.strip().isdigit() and _yes_no(cell) is not None
+    return asked is not None and (is_doubted or is_answer)
 
 
 def answers_outcome(header: str, cell: Filled) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import pickle
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -467,6 +468,24 @@ def _made(
 def _set_aside(count: int) -> str:
     rows = "1 row" if count == 1 else f"{count} rows"
     return f"{rows} without a reading or an outcome: nothing to judge, set aside and not kept"
+
+
+def attention_of_kept(seen: Counter[GearKey], store: Store, gear: Gear) -> list[str]:
+    """Say which of some gears need attention with all that is kept of them, where more is kept
+    than the visits that were just seen.
+    """
+    from mlg_troubleshoot.life.folding import as_spelt, lives_of
+    from mlg_troubleshoot.life.judged import judge_lives
+
+    tails = as_spelt((tail for tail, _side in seen), store)
+    kept_as = {(tails[tail], side): count for (tail, side), count in seen.items()}
+    lives = lives_of(store, kept_as).items()
+    more = [life for key, life in lives if len(life.visits) > kept_as[key]]
+    return [
+        f"{life.name}: with all that is kept of it: {life.now.in_brief}"
+        for life in judge_lives(more, gear, load_index_table(gear))
+        if life.now is not None and not life.now.is_fine
+    ]
 
 
 def _kept_visits(

@@ -25,7 +25,7 @@ def test_a_failure_next_to_a_stated_retraction_is_not_overlooked(
 ) -> None:
     found = mlg("check", table(row(**TIGHT, outcome="RETRACTED", **{header: cell})), "--json")
     assert found.code != 0
-    assert found.one["verdict"] == "INVALID"
+    assert found.one["verdict"] == "INCOMPLETE"
 
 
 @pytest.mark.parametrize(

@@ -121,12 +121,6 @@ def test_a_length_of_the_plunger_that_no_column_names_is_in_doubt(tmp_path, gear
     assert isinstance(one(tmp_path, gear, **{"Plunger stroke (in)": "0.045"}), InvalidRow)
 
 
-@pytest.mark.parametrize("header", ["Status", "Finding", "Gear", "remarks"])
-def test_a_failure_in_a_column_that_was_not_understood_stops_the_row(tmp_path, gear, header):
-    (problem,) = read_many([table(tmp_path, **{header: "FAILED"})], ReadOptions.of(gear)).problems
-    assert (problem.code, problem.column) == ("outcome_elsewhere", header)
-
-
 @pytest.mark.parametrize("word", ["diametral", "total play"])
 def test_a_column_that_contradicts_the_convention_stops_the_row(tmp_path, gear, word):
     file = table(tmp_path, Reading=word)

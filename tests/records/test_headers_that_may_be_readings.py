@@ -8,7 +8,7 @@ import openpyxl
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Judgement, Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.decision.inspection import Inspection, Outcome
 from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions, ReadResult, read_many
@@ -28,7 +28,7 @@ AFFIRMED = ("retracted", "Retracted?", "gear_retracted", "retracted (y/n)", "Ret
 # Headers of a column that only travels to the report, whatever is in it.
 CARRIED = (
     *("Result 2026", "Retraction 1", "Result (2nd try)", "status 2", "remarks", "Ergebnis 3"),
-    *("Joint 6 status", "col7", "2"),
+    *("Joint 6 status", "col7", "Finding", "Gear"),
 )
 PLUNGER = (
     *("Plunger reading 1", "Plunger displ.", "RV plunger", "plunger 1st", "plunger pos.", "RV 1"),
@@ -47,6 +47,7 @@ MARGINS = (
 
 
 def judged(headers: list[str], cells: list[str], **declared: object) -> Judgement:
+    cells = [f'"{cell}"' for cell in cells]
     text = ",".join([*ALL, *headers]) + "\n" + ",".join([*GOOD, *cells]) + "\n"
     result = check(Named(text.encode(), "t.csv"), advice=False, **declared)
     (judgement,) = result.judgements
@@ -68,17 +69,61 @@ def test_a_question_is_answered_as_it_was_asked(header: str, answer: str) -> Non
 
 @pytest.mark.parametrize("header", ["Retracts OK?", "no retraction", "hyd failure", "2 failed"])
 @pytest.mark.parametrize("answer", ["yes", "N", "1", "TRUE"])
-def test_an_answer_under_a_question_that_is_not_understood_stops_the_row(
+def test_an_answer_under_a_question_that_is_not_understood_is_asked_about(
     header: str, answer: str
 ) -> None:
-    assert judged([header], [answer]).verdict is Verdict.INVALID
+    assert judged([header], [answer]).verdict is Verdict.INCOMPLETE
 
 
-@pytest.mark.parametrize("word", ["FAILED", "fail", "failed!", "did not retract", "NOT OK"])
+@pytest.mark.parametrize(
+    "word", ["FAILED", "fail", "failed!", "did not retract", "failed last week, repaired"]
+)
 @pytest.mark.parametrize("header", CARRIED)
 def test_a_failure_is_seen_whatever_the_header_is(header: str, word: str) -> None:
-    (row,) = read([*ALL, header], [[*GOOD, word]]).rows
-    assert isinstance(row, InvalidRow)
+    row = judged([header], [word]).row
+    assert isinstance(row, Inspection)
+    assert f'--map "{header}=outcome"' in row.unit_question
+
+
+def test_a_failure_in_a_remark_leaves_what_was_measured_judged() -> None:
+    asked = judged(["plunger_displacement_in", "remarks"], ["0.06", "failed last week"])
+    assert asked.verdict is Verdict.OUTSIDE_MARGIN
+
+
+UNCLEAR = ("F", "x", "0", "3", "intermittent", "hung", "partial", "FAULT", "slow", "OK?")
+
+
+@pytest.mark.parametrize("word", UNCLEAR)
+@pytest.mark.parametrize("header", ["Result", "Status", "Gear swing", "Defect", "P/F", "Result 2"])
+def test_what_is_not_plainly_good_in_a_column_of_results_is_asked_about(
+    header: str, word: str
+) -> None:
+    asked = judged([header], [word])
+    assert asked.verdict is Verdict.INCOMPLETE
+    assert f'--map "{header}=outcome"' in asked.row.unit_question
+
+
+@pytest.mark.parametrize(
+    ("header", "value", "unit"),
+    [
+        *(
+            (header, value, "in")
+            for header in ("VI", "six", "X", "11")
+            for value in ("0.06", "1.5")
+        ),
+        *(("VI", value, "thou") for value in ("60", "60.0")),
+        ("six", "12", "thou"),
+    ],
+)
+def test_a_bare_number_that_could_decide_is_asked_about_under_any_header(
+    header: str, value: str, unit: str
+) -> None:
+    names = [name.replace("_in", f"_{unit}") for name in [*ALL, header]]
+    text = (
+        ",".join(names) + "\n" + ",".join([*GOOD[:4], *["1" if unit == "thou" else "0.001"] * 10])
+    )
+    result = check(Named(f"{text},{value}\n".encode(), "t.csv"), advice=False)
+    assert [each.verdict for each in result.judgements] == [Verdict.INCOMPLETE]
 
 
 @pytest.mark.parametrize("value", ["0.06", "0.06 in", "1.5 mm"])
@@ -175,8 +220,8 @@ def test_a_question_that_is_mapped_is_answered(header: str, value: str, outcome:
         "FAILED - RETRACTED 2nd attempt",
     ],
 )
-def test_further_words_of_failure_stop_a_row(word: str) -> None:
-    assert judged(["status"], [word]).verdict is Verdict.INVALID
+def test_further_words_of_failure_are_asked_about(word: str) -> None:
+    assert judged(["status"], [word]).verdict is Verdict.INCOMPLETE
 
 
 @pytest.mark.parametrize("word", ["RETRACTED?", "OK?", "retracted ?"])

@@ -57,15 +57,21 @@ def on_a_page(gear: Aircraft, folder: Path) -> Iterator[str]:
 
 
 def kept(gear: Aircraft, folder: Path) -> Iterator[str]:
-    """Each visit is a table of its own, and is kept before the next one comes."""
+    """Each visit is a table of its own, and is kept before the next one comes; what is kept of the
+    gear counts at the last one, whatever its day.
+    """
     store = folder / f"{gear.tail}.sqlite"
     codes = [
         mlg("check", written(gear, folder, part), "--keep", "--store", store).code
         for part in range(len(gear.visits))
     ]
-    if not any(codes):
-        yield "kept visit by visit: every exit 0"
-    if store.exists() and f'"{gear.tail}"' not in mlg("fleet", "--json", "--store", store).out:
+    if not codes[-1]:
+        yield "kept visit by visit: exit 0 at the last one"
+    fleet = mlg("fleet", "--json", "--no-forecast", "--store", store).json["gears"]
+    alarms = [
+        line["verdict"] != "WITHIN_MARGIN" or line["failed"] or line["restore"] for line in fleet
+    ]
+    if store.exists() and not any(alarms):
         yield "missing in the fleet"
 
 
@@ -80,7 +86,12 @@ def found_wrong(seed: int, number: int, folder: Path) -> list[str]:
     wrong = []
     against = (gear for gear in drawn(seed, number) if gear.standing)
     for k, gear in enumerate(against):
-        ways = [judged, *[shown, kept] * (k % 10 == 0), *[on_a_page] * (k % 50 == 0)]
+        ways = [
+            judged,
+            *[kept] * (k % 3 == 0),
+            *[shown] * (k % 10 == 0),
+            *[on_a_page] * (k % 50 == 0),
+        ]
         faults = [fault for way in ways for fault in way(gear, folder)]
         if faults:
             wrong.append(f"{gear.tail} {gear.standing}: {faults}\n{table([gear])}")
