@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import io
-import re
 import warnings
 from collections import Counter
 from collections.abc import Mapping
-from functools import partial
-from html import escape
 from pathlib import Path
 from types import MappingProxyType
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -18,7 +15,6 @@ from openpyxl import Workbook, load_workbook
 from openpyxl.cell import Cell, MergedCell
 from openpyxl.comments import Comment
 from openpyxl.styles import Alignment, PatternFill
-from openpyxl.worksheet._reader import FORMULA_TAG, VALUE_TAG
 from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.worksheet import Worksheet
 from openpyxl.writer.excel import ExcelWriter
@@ -31,7 +27,7 @@ from mlg_troubleshoot.records.cells import MAX_ROWS, column_letters, writable
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
 from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.template import BOLD, HEADER_FILL
-from mlg_troubleshoot.records.xlsx import XlsxFile, XlsxSheet
+from mlg_troubleshoot.records.xlsx import XlsxFile
 from mlg_troubleshoot.records.zipguard import PARSER_ERRORS
 from mlg_troubleshoot.units import LengthUnit
 
@@ -98,9 +94,8 @@ def annotate_workbook(
             f"{source} cannot be copied ({type(error).__name__}): a part of it is not understood",
             "Open it in a spreadsheet program, save it again as .xlsx, and annotate the copy.",
         ) from None
-    written = _restore_results(data, buffer.getvalue())
-    write_bytes(out, written)
-    return _not_taken_over(data, written)
+    write_bytes(out, buffer.getvalue())
+    return _not_taken_over(data, buffer.getvalue())
 
 
 def _annotate(
@@ -299,48 +294,3 @@ def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictC
             _put(label, header)
             label.font = BOLD
             _put(sheet.cell(layout.header_row + offset, free + 1), value)
-
-
-_FORMULA = re.compile(
-    r'<c r="([A-Z]{1,3}\d{1,7})"((?: s="\d+")?)(?: t="\w+")?>(<f\b[^>]*(?:/>|>[^<]*</f>))<v'
-    r" ?(?:/>|></v>)</c>"
-)
-
-
-def _restore_results(original: bytes, written: bytes) -> bytes:
-    """Put the last results of formulas back into a copy: openpyxl keeps either them or the
-    formulas.
-    """
-    before = {sheet.name: sheet for sheet in XlsxFile(original).sheets}
-    after = {sheet.part.lower(): sheet.name for sheet in XlsxFile(written).sheets}
-    out = io.BytesIO()
-    with ZipFile(io.BytesIO(written)) as old, ZipFile(out, "w", ZIP_DEFLATED) as new:
-        for member in old.infolist():
-            content = old.read(member)
-            sheet = before.get(after.get(member.filename.lower()))
-            if sheet is not None and b"<f" in content:
-                results = _results(sheet)
-                with_results = partial(_with_result, results=results)
-                content = _FORMULA.sub(with_results, content.decode()).encode()
-            new.writestr(member, content)
-    return out.getvalue()
-
-
-def _results(sheet: XlsxSheet) -> dict[str, tuple[str, str]]:
-    """Return the kind and the text of every last result by its cell, as they stand in the file."""
-    found = {}
-    for row in sheet.elements():
-        for cell in row:
-            kind = cell.get("t", "n")
-            result = cell.findtext(VALUE_TAG)
-            if result and kind != "s" and cell.find(FORMULA_TAG) is not None:
-                found[cell.get("r", "")] = kind, result
-    return found
-
-
-def _with_result(match: re.Match[str], results: dict[str, tuple[str, str]]) -> str:
-    place, style, formula = match.groups()
-    if place not in results:
-        return match[0]
-    kind, result = results[place]
-    return f'<c r="{place}"{style} t="{kind}">{formula}<v>{escape(result, quote=False)}</v></c>'

@@ -123,34 +123,25 @@ _BUILTIN_CODES = {9: "0%", 10: "0.00%", 11: "0.00E+00", 48: "##0.0E+0"}
 _PIECE = re.compile(
     r"""
     "(?P<words>[^"]*)" | \\(?P<character>.) | \[\$(?P<currency>[^\]-]*)[^\]]*\] | [_*].
-    | (?P<bracket>\[[^\]]*\]) | (?P<number>general|@|e[+-]|[0\#?.,%]+) | (?P<end>;) | (?P<bare>.)
+    | \[[^\]]*\] | (?P<number>general|@|e[+-]|[0\#?.,%]+) | (?P<end>;) | (?P<bare>.)
     """,
     re.VERBOSE | re.IGNORECASE | re.DOTALL,
 )
-_CONDITION = re.compile(r"\[[<>=]")
 _NUMBER_PLACE = "\0"
+_END = "\1"
 _UNIT_MARKS = frozenset("\"'°″′”’%‰")
+_PERCENT, _SCIENTIFIC = "%", "E+"
 
 
 @dataclass(frozen=True, slots=True)
 class NumberFormat:
     """What a number format makes of a number.
 
-    Attributes
-    ----------
-    width : int
-        Digits that a format such as ``000`` fills up with zeros.
-    sections : tuple of str
-        Text of each section, with a mark where the number stands; none if the format adds no words
-        to numbers.
+    sections: text of each section, with a mark where the number stands.
     """
 
-    is_date: bool = False
-    width: int = 0
+    kind: OddKind
     sections: tuple[str, ...] = ()
-    has_conditions: bool = False
-    is_percent: bool = False
-    is_scientific: bool = False
 
     @classmethod
     def of(cls, code: str | None, format_id: int = 0) -> NumberFormat | None:
@@ -159,69 +150,52 @@ class NumberFormat:
         """
         code = _BUILTIN_CODES.get(format_id) if code is None else code
         if code is None:
-            return cls(is_date=True) if format_id in _BUILTIN_DATES else None
-        pieces = list(_PIECE.finditer(code))
+            return cls(OddKind.DATE) if format_id in _BUILTIN_DATES else None
+        pieces = [*_PIECE.finditer(code)]
         bare = "".join(piece["bare"] or "" for piece in pieces).lower()
         # y, m, d, h and s without quotes stand only in dates and times.
         is_date = any(letter in bare for letter in "ymdhs") and "general" not in code.lower()
         if is_date or _ELAPSED.search(code):
-            return cls(is_date=True)
-        numbers = "".join(piece["number"] or "" for piece in pieces).lower()
-        if "%" in numbers or "e+" in numbers:
-            return cls(is_percent="%" in numbers, is_scientific="e+" in numbers)
+            return cls(OddKind.DATE)
         if len(code) > 1 and set(code) == {"0"}:
-            return cls(width=len(code))
-        sections, is_worded = _sections(pieces)
-        if not is_worded:
+            return cls(OddKind.PADDED, (code,))
+        numbers = "".join(piece["number"] or "" for piece in pieces).upper()
+        for notation in (_PERCENT, _SCIENTIFIC):
+            if notation in numbers:
+                return cls(OddKind.WORDED, (notation,))
+        text = _PIECE.sub(_literal, code)
+        if not any(c.isalpha() or c in _UNIT_MARKS for c in text):
             return None
-        return cls(sections=sections[:3], has_conditions=_CONDITION.search(code) is not None)
+        sections = [*map(str.strip, text.split(_END))]
+        if len(sections) > 1 and "@" in code.rpartition(";")[2]:
+            sections.pop()
+        return cls(OddKind.WORDED, tuple(sections[:3]))
 
     def cell(self, number: float, *, epoch_1904: bool) -> Cell:
         """Return the cell of a number that is shown so."""
         if not abs(number) < 1e15:
             return number
-        if self.is_date:
+        if self.kind is OddKind.DATE:
             return date_cell(number, epoch_1904=epoch_1904)
-        if self.is_percent or self.is_scientific:
-            text = f"{show_number(100.0 * number)}%" if self.is_percent else f"{number:.2E}"
-            return OddCell(OddKind.WORDED, text, None, number)
-        text = self._worded(number) if self.sections else show_number(number).zfill(self.width)
-        return OddCell(OddKind.WORDED if self.sections else OddKind.PADDED, text, None, number)
-
-    def _worded(self, number: float) -> str:
-        signed = show_number(number)
-        size = show_number(abs(number))
-        if self.has_conditions:
-            # Which section is meant is not guessed: where they differ, no unit is understood.
-            return " or ".join(
-                dict.fromkeys(section.replace(_NUMBER_PLACE, signed) for section in self.sections)
-            )
-        if number < 0 and len(self.sections) > 1:
-            return self.sections[1].replace(_NUMBER_PLACE, size)
-        section = self.sections[-1 if number == 0 and len(self.sections) > 2 else 0]
-        return section.replace(_NUMBER_PLACE, signed)
+        if self.kind is OddKind.PADDED:
+            text = show_number(number).zfill(len(self.sections[0]))
+        elif self.sections == (_PERCENT,):
+            text = f"{show_number(100.0 * number)}%"
+        elif self.sections == (_SCIENTIFIC,):
+            text = f"{number:.2E}"
+        else:
+            # Where the sections differ it is not guessed which is meant: no unit is understood.
+            is_zero = number == 0.0 and len(self.sections) > 2
+            sections = self.sections[2:] if is_zero else self.sections
+            shown = [each.lstrip("-") for each in sections if _NUMBER_PLACE in each] or sections
+            text = " or ".join(dict.fromkeys(shown)).replace(_NUMBER_PLACE, show_number(number))
+        return OddCell(self.kind, text, None, number)
 
 
-def _sections(pieces: list[re.Match[str]]) -> tuple[tuple[str, ...], bool]:
-    """Return the text of each section of a number format; True if one holds letters or signs of
-    units.
-    """
-    sections = [""]
-    words = ""
-    is_of_texts = False
-    for piece in pieces:
-        literal = piece["words"] or piece["character"] or piece["currency"] or piece["bare"] or ""
-        words += literal
-        is_of_texts = not piece["end"] and (is_of_texts or piece["number"] == "@")
-        if piece["end"]:
-            sections.append("")
-        elif piece["number"] and _NUMBER_PLACE not in sections[-1]:
-            sections[-1] += _NUMBER_PLACE
-        sections[-1] += literal
-    if len(sections) > 1 and is_of_texts:
-        sections.pop()
-    has_words = any(c.isalpha() or c in _UNIT_MARKS for c in words)
-    return tuple(map(str.strip, sections)), has_words
+def _literal(piece: re.Match[str]) -> str:
+    """What a piece of a number format shows."""
+    literal = piece["words"] or piece["character"] or piece["currency"] or piece["bare"] or ""
+    return _NUMBER_PLACE if piece["number"] else _END if piece["end"] else literal
 
 
 def date_cell(serial: float, *, epoch_1904: bool) -> OddCell:

@@ -6,7 +6,7 @@ import hashlib
 import os
 import stat
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
@@ -102,15 +102,12 @@ def read_many(
 ) -> ReadResult:
     """Read the inspections of several files, folders and patterns as one batch."""
     given = list(sources)
-    done = 0
-
-    def ticker(rows: int) -> None:
-        nonlocal done
-        done += rows
+    found: list[_Found] = []
+    for item in (item for source in given for item in expand(source)):
+        found.append(_read(item, options))
         if progress is not None:
-            progress(done, None)
-
-    read = _finish([_read(item, options, ticker) for source in given for item in expand(source)])
+            progress(sum(file.rows for file, _ in found), None)
+    read = _finish(found)
     passed_over = [note for source in given if (note := _subfolders_note(source))]
     return replace(read, notes=(*passed_over, *read.notes))
 
@@ -157,7 +154,7 @@ def _is_own(path: Path) -> bool:
         return False
 
 
-def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
+def _read(source: Source, options: ReadOptions) -> _Found:
     label = FRAME
     kind = "frame"
     digest: str | None = None
@@ -168,9 +165,7 @@ def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -
             sheet = FrameSheet(as_frame(source))
             labels = sheet.labels
             rows = sheet.rows()
-            found = read_table(
-                sheet, sheet.header, rows, options, file=FRAME, delimiter=None, tick=ticker
-            )
+            found = read_table(sheet, sheet.header, rows, options, file=FRAME, delimiter=None)
         else:
             kind = "unreadable"
             file = cast("File", source)
@@ -185,7 +180,7 @@ def _read(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -
             if suffix != f".{kind}" and suffix in _SUFFIXES - {".tsv", ".txt"}:
                 found.notes.append(f"the file is of kind {kind}, whatever its name")
             found.notes += book.notes
-            _read_book(book, options, label, ticker, found)
+            _read_book(book, options, label, found)
         if not found.rows and not found.problems:
             raise FileRefusedError("no_rows", "it contains no inspection")
     except FileRefusedError as refusal:
@@ -291,19 +286,12 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     return _Candidate(sheet, peeked, chain(peeked, rows), header, form, is_filled)
 
 
-def _read_book(
-    book: Workbook,
-    options: ReadOptions,
-    label: str,
-    ticker: Callable[[int], None],
-    found: Collected,
-) -> None:
+def _read_book(book: Workbook, options: ReadOptions, label: str, found: Collected) -> None:
     chosen = _choose(book, options, found)
     for candidate in chosen:
         sheet = candidate.sheet
         if candidate.form is not None:
             part = read_form(candidate.form, options, file=label, sheet=sheet.name)
-            ticker(len(part.rows))
         elif candidate.header is not None:
             part = read_table(
                 sheet,
@@ -312,7 +300,6 @@ def _read_book(
                 options,
                 file=label,
                 delimiter=book.delimiter,
-                tick=ticker,
             )
         else:
             raise _no_header(candidate)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain, islice
 from pathlib import PurePath
@@ -35,7 +35,6 @@ from mlg_troubleshoot.units import ClearanceConvention
 
 # So many in one table are one mistake: they would take memory and help nobody.
 MAX_PROBLEMS = 20_000
-_PROGRESS_ROWS = 500
 # Rows by which a column is known that holds sides, whatever its header says.
 _LOOKED_AT = 50
 _GEARS = frozenset(("gear", "mlg", "main gear", "landing gear", "leg", "hand", "l/r"))
@@ -84,7 +83,6 @@ def read_table(
     *,
     file: str | None,
     delimiter: str | None,
-    tick: Callable[[int], None],
 ) -> Collected:
     out = Collected()
     comma = options.decimal_comma or delimiter == ";"
@@ -97,17 +95,12 @@ def read_table(
         header = replace(header, texts=(*header.texts, *blank))
     columns = Columns(header, in_hand)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
-    taken = 0
     titles: list[str] = []
     for number, cells in chain(first, rows):
         if number < header.rows_used[0]:
             titles += [cell for cell in cells if isinstance(cell, str)]
         elif number > header.row:
             table.take(number, cells)
-            taken += 1
-            if taken % _PROGRESS_ROWS == 0:
-                tick(_PROGRESS_ROWS)
-    tick(taken % _PROGRESS_ROWS)
     table.finish()
     used = " and ".join(map(str, header.rows_used))
     placed = f"the header is in row {used}" if header.row > 1 else ""

@@ -455,17 +455,19 @@ def test_a_number_whose_digits_are_lost_is_not_an_identity(read, xlsx, number):
     assert only(read(xlsx(change=change), "t.xlsx")).code == "number_lost_digits"
 
 
-def test_progress_is_told_as_the_rows_are_read(table):
+def test_progress_is_told_file_by_file(table):
     import io
 
     from mlg_troubleshoot.records import ReadOptions, read_many
 
-    text = table(rows=[(f"R{i}", *GOOD[1:]) for i in range(1200)])
+    texts = [table(rows=[(f"R{i}", *GOOD[1:]) for i in range(rows)]) for rows in (2, 3)]
     told: list[int] = []
     read_many(
-        [io.BytesIO(text.encode())], ReadOptions(), progress=lambda done, _: told.append(done)
+        [io.BytesIO(text.encode()) for text in texts],
+        ReadOptions(),
+        progress=lambda done, _: told.append(done),
     )
-    assert told == [500, 1000, 1200]
+    assert told == [2, 5]
 
 
 def test_a_row_repeated_in_a_table_that_lacks_its_convention_is_not_a_contradiction(read, table):

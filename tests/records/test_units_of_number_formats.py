@@ -188,12 +188,12 @@ def test_units_of_formats_are_seen_in_workbooks_of_libreoffice(read, samples: Pa
     assert (good.gear_landings, good.carried) == (1200.0, {"work_order": "12"})
 
 
-def test_a_format_of_two_sections_shows_a_number_below_zero_by_the_second() -> None:
+def test_which_of_two_units_in_sections_is_meant_is_not_guessed() -> None:
     shown = NumberFormat.of('0.0 "in";0.0 "mm"')
     assert shown is not None
     cell = shown.cell(-1.5, epoch_1904=False)
     assert isinstance(cell, OddCell)
-    assert cell.text == "1.5 mm"
+    assert cell.text == "-1.5 in or -1.5 mm"
 
 
 def test_a_number_that_is_shown_with_two_digits_is_read_with_its_zero() -> None:
