@@ -15,11 +15,10 @@ from openpyxl import Workbook, load_workbook
 from openpyxl.cell import Cell, MergedCell
 from openpyxl.comments import Comment
 from openpyxl.styles import Alignment, PatternFill
-from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.worksheet import Worksheet
 from openpyxl.writer.excel import ExcelWriter
 
-from mlg_troubleshoot.decision.columns import CLEARANCE, IDENTITY, RECORD_ID
+from mlg_troubleshoot.decision.columns import CLEARANCE, RECORD_ID
 from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.errors import OutputError, Problem, UsageError
 from mlg_troubleshoot.outputs import write_bytes
@@ -42,8 +41,6 @@ _TEXT_WIDTH = 17
 _NUMBER_WIDTH = 11
 _LONG_WIDTH = 52
 _ON_A_LINE = 58
-# At which the verdicts fit on the width of a landscape page. [%]
-_LANDSCAPE_SCALE = 55
 
 VerdictColumns = Mapping[RowSource, Mapping[str, str | float | None]]
 OverLimit = Mapping[RowSource, Mapping[int, float]]
@@ -86,8 +83,7 @@ def annotate_workbook(
             warnings.simplefilter("ignore")
             macros = Path(out).suffix.lower() == ".xlsm"
             book = load_workbook(io.BytesIO(data), keep_vba=macros, rich_text=True)
-            widths = {sheet.name: sheet.width() for sheet in judged.sheets}
-            _annotate(book, label, result, verdicts, over_limit, widths)
+            _annotate(book, label, result, verdicts, over_limit)
             ExcelWriter(book, package).save()
     except (FileRefusedError, *PARSER_ERRORS) as error:
         raise OutputError(
@@ -104,14 +100,13 @@ def _annotate(
     result: ReadResult,
     verdicts: VerdictColumns,
     over_limit: OverLimit,
-    widths: Mapping[str | None, int],
 ) -> None:
     for layout in result.layouts:
         if layout.file != label or layout.sheet not in book.sheetnames:
             continue
         sheet = book[layout.sheet]
-        # The first column, counted from 1, with nothing in it or to the right of it.
-        free = max(widths[layout.sheet], layout.width) + 1
+        # The first column behind the table, counted from 1.
+        free = layout.width + 1
         for problem in result.problems:
             if problem.file == label and problem.sheet == layout.sheet:
                 _mark(sheet, layout, problem)
@@ -122,7 +117,6 @@ def _annotate(
             _beside_form(sheet, layout, free, own)
         else:
             _behind_table(sheet, layout, free, own)
-            _print_well(sheet, layout, free)
 
 
 # Parts that the library may drop in silence: their folder, and what a user calls them.
@@ -264,27 +258,6 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
                 _fill(written, _VERDICT_FILLS.get(str(value), _UNDECIDED_FILL))
     longest = max(map(len, headers), default=0)
     sheet.row_dimensions[layout.header_row].height = 15.0 * -(-longest // (_NUMBER_WIDTH - 2))
-
-
-def _print_well(sheet: Worksheet, layout: SheetLayout, free: int) -> None:
-    """Put the verdicts on pages of their own behind the readings, where the user has not set up his
-    pages himself.
-    """
-    pages = sheet.sheet_properties.pageSetUpPr
-    if (
-        sheet.print_area
-        or sheet.print_title_rows
-        or sheet.col_breaks.brk
-        or (pages is not None and pages.fitToPage)
-    ):
-        return
-    sheet.page_setup.orientation = "landscape"
-    sheet.page_setup.scale = _LANDSCAPE_SCALE
-    sheet.print_title_rows = f"{layout.header_row}:{layout.header_row}"
-    named = [layout.index_of(column.name) for column in IDENTITY]
-    last = max((index for index in named if index is not None and index < len(named)), default=0)
-    sheet.print_title_cols = f"A:{column_letters(last)}"
-    sheet.col_breaks.append(Break(id=free - 1))
 
 
 def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictColumns) -> None:

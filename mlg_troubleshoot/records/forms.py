@@ -60,6 +60,7 @@ class Form(Header):
     """
 
     lines: Sequence[_Line]
+    width: int
     label_column: int
     value_column: int
     columns: Mapping[int, tuple[Heading, str]]
@@ -181,6 +182,7 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         texts=tuple(line.label for line in lines),
         rows_used=(lines[0].row,),
         lines=lines,
+        width=max(len(cells) for _, cells in rows),
         label_column=at,
         value_column=value_column,
         columns={i: _heading(i, heads) for i in sorted(numbers)},

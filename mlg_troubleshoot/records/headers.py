@@ -413,8 +413,7 @@ def parse_target(name: str, joints: Joints) -> Field | None:
     if field is None:
         raise UsageError(
             f"--map: {name!r} is not a column of the inspection table",
-            "Give a column, or carry to leave it unread."
-            f"{nearest(text, _columns_like(text, joints))}",
+            f"Give a column, or carry to leave it unread.{nearest(text, BY_NAME)}",
         )
     return field
 
@@ -429,21 +428,9 @@ def column_named(name: str, joints: Joints) -> str:
         text = _snake(found.nearest or text)
         raise UsageError(
             f"{name!r} is not a column of the inspection table",
-            f"Give a joint or a column.{nearest(text, [*_SHORT, *_columns_like(text, joints)])}",
+            f"Give a joint or a column.{nearest(text, [*_SHORT, *BY_NAME])}",
         )
     return found.field.name
-
-
-def _columns_like(text: str, joints: Joints) -> list[str]:
-    """Name every column, with the joint and the unit that a text states."""
-    number = re.search(r"\d+", text)
-    unit = re.search(r"(in|thou|mm)$", text)
-    joint = int(number[0]) if number else joints.numbers[0]
-    said = None if unit is None else LengthUnit(unit[1])
-    return [
-        column.header(joint if column.needs_joint else None, said if column.is_length else None)
-        for column in COLUMNS
-    ]
 
 
 def nearest(name: str, names: Collection[str]) -> str:

@@ -27,19 +27,16 @@ class Folder:
         known = {p.read_as: p for p in columns.placed}
         self._record = known.get(RECORD_ID.name)
         self._joint = known.get(JOINT.name)
+        self._readings = [p for p in columns.placed if p.field and p.field.column.needs_joint]
+        own = [*self._readings, self._joint]
+        # What is of the whole inspection.
+        self._shared = [p for p in columns.placed if p not in own]
         # The joint's own columns stay in place but empty; each joint's reading gets a column behind
-        # them. The others are of the whole inspection.
-        self._placed: list[PlacedField] = []
+        # them.
+        self._placed = [
+            replace(p, field=None, refused=True) if p in own else p for p in columns.placed
+        ]
         self._slots: dict[tuple[int, int], int] = {}
-        self._readings: list[PlacedField] = []
-        self._shared: list[PlacedField] = []
-        for p in columns.placed:
-            is_reading = p.field is not None and p.field.column.needs_joint
-            own = self._readings if is_reading else self._shared
-            if p is not self._joint:
-                own.append(p)
-            is_shared = own is self._shared and p is not self._joint
-            self._placed.append(p if is_shared else replace(p, field=None, refused=True))
         for p in self._readings:
             for number in joints.numbers:
                 slot = self._slots[p.index, number] = len(self._placed)

@@ -94,14 +94,12 @@ class SheetFacts:
     come.
 
     hidden_rows: rows with something in them that are hidden or filtered out, counted from 1.
-    hidden_columns: first and last column of each hidden block, counted from 0.
     formulas, struck: number of formula results, and of cells that are struck through, by column,
     counted from 0.
     faulty: rows that cannot be read although the file can, with the reason.
     """
 
     hidden_rows: set[int] = field(default_factory=set)
-    hidden_columns: list[tuple[int, int]] = field(default_factory=list)
     formulas: Counter[int] = field(default_factory=Counter)
     struck: Counter[int] = field(default_factory=Counter)
     faulty: dict[int, FileRefusedError] = field(default_factory=dict)

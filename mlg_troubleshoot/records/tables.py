@@ -96,7 +96,9 @@ def read_table(
     columns = Columns(header, in_hand)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
     titles: list[str] = []
+    width = len(header.texts)
     for number, cells in chain(first, rows):
+        width = max(width, len(cells))
         if number < header.rows_used[0]:
             titles += [cell for cell in cells if isinstance(cell, str)]
         elif number > header.row:
@@ -113,7 +115,7 @@ def read_table(
     kind = "long" if columns.is_long else "wide"
     kind = "visits" if len(columns.visits) > 1 else kind
     readings = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
-    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, len(header.texts), readings))
+    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, width, readings))
     return out
 
 
@@ -134,7 +136,7 @@ def read_form(
     readings = tuple(
         ColumnReading(column, p.header, p.read_as, p.place.row) for p in columns.placed
     )
-    out.layouts.append(SheetLayout(file, sheet, kind, form.row, max(visits) + 1, readings))
+    out.layouts.append(SheetLayout(file, sheet, kind, form.row, form.width, readings))
     return out
 
 
@@ -476,9 +478,6 @@ class _Table:
         both = "1 hidden or filtered row was also read", "{} hidden or filtered rows were also read"
         notes += _counted(hidden, *both)
         width = len(self._columns.placed)
-        for first, last in facts.hidden_columns:
-            ends = dict.fromkeys(column_letters(index) for index in (first, min(last, width - 1)))
-            notes += [f"hidden column {' to '.join(ends)} was also read"] * (first < width)
         for what, found in (
             ("formulas were read by their last calculated values", facts.formulas),
             ("cells that are struck through were also read", facts.struck),

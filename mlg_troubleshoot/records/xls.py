@@ -80,9 +80,6 @@ class _XlsSheet(Sheet):
 
     def _read(self) -> Iterator[NumberedRow]:
         sheet = self._sheet
-        for column, info in sheet.colinfo_map.items():
-            if info.hidden:
-                self.facts.hidden_columns.append((column, column))
         for place in range(sheet.nrows):
             cells = [self._cell(place, column) for column in range(sheet.row_len(place))]
             while cells and cells[-1] is None:

@@ -23,11 +23,9 @@ from openpyxl.utils.cell import column_index_from_string, range_boundaries
 from openpyxl.utils.datetime import CALENDAR_MAC_1904
 from openpyxl.utils.escape import unescape
 from openpyxl.worksheet._reader import (
-    COL_TAG,
     DATA_TAG,
     FORMULA_TAG,
     INLINE_STRING,
-    ROW_TAG,
     VALUE_TAG,
 )
 from openpyxl.xml.constants import SHEET_MAIN_NS
@@ -60,12 +58,14 @@ from mlg_troubleshoot.records.zipguard import (
 )
 from mlg_troubleshoot.units import vanishes
 
-_MERGE = re.compile(rb'<(?:\w+:)?mergeCell\s[^<>]*?ref="([A-Z]{1,3}\d{1,7}:[A-Z]{1,3}\d{1,7})"')
+_MERGE, _SPANNING = (
+    re.compile(rb"""<(?:\w+:)?(?:%s)\s[^<>]*?ref=["']([A-Z0-9:$]+)["']""" % tags)
+    for tags in (b"mergeCell", b"mergeCell|hyperlink")
+)
 _TEXT_TAG, _PHONETIC_TAG, _STRING_TAG = (
     f"{{{SHEET_MAIN_NS}}}{name}" for name in ("t", "rPh", "si")
 )
 _RAISED = "{*}rPr/{*}vertAlign[@val='superscript']"
-_SPANNING = tuple(f"{{{SHEET_MAIN_NS}}}{name}" for name in ("mergeCell", "hyperlink"))
 _EXCEL_ROWS = 1 << 20
 _EXCEL_COLUMNS = 1 << 14
 _TRUE = ("1", "true", "on")
@@ -195,28 +195,38 @@ class XlsxSheet(Sheet):
         """Search the part: they stand behind the last row and are asked for before the first is
         judged.
         """
-        found: list[MergedRange] = []
+        return [*self._ranges(_MERGE)]
+
+    def covered(self) -> int:
+        """Return how many cells its merged cells and links cover."""
+        return sum(
+            (right - left + 1) * (bottom - top + 1)
+            for top, left, bottom, right in self._ranges(_SPANNING)
+        )
+
+    def _ranges(self, of: re.Pattern[bytes]) -> Iterator[MergedRange]:
+        found = 0
         tail = b""
         for chunk in self.book.archive.chunks(self.part):
             piece = tail + chunk
-            for match in _MERGE.finditer(piece):
-                left, top, right, bottom = cast(MergedRange, range_boundaries(match[1].decode()))
-                found.append((top, left - 1, bottom, right - 1))
-            if len(found) > MAX_ITEMS:
-                raise too_large(f"{self.part} holds more than {MAX_ITEMS} merged ranges")
+            for match in of.finditer(piece):
+                found += 1
+                if found > MAX_ITEMS:
+                    raise too_large(f"{self.part} holds more than {MAX_ITEMS} ranges")
+                with damage(f"sheet {self.name!r} cannot be read"):
+                    left, top, right, bottom = range_boundaries(match[1].decode())
+                yield (
+                    top or 1,
+                    (left or 1) - 1,
+                    bottom or _EXCEL_ROWS,
+                    (right or _EXCEL_COLUMNS) - 1,
+                )
             tail = piece[piece.rfind(b"<") :] if piece.rfind(b"<") > piece.rfind(b">") else b""
-        return found
 
     def _read(self) -> Iterator[NumberedRow]:
         with damage(f"sheet {self.name!r} cannot be read"):
             number = 0
             for element in self.elements():
-                is_hidden = element.get("hidden") in _TRUE
-                if element.tag == COL_TAG and is_hidden:
-                    ends = int(element.get("min", "")) - 1, int(element.get("max", "")) - 1
-                    self.facts.hidden_columns.append(ends)
-                if element.tag != ROW_TAG:
-                    continue
                 place = element.get("r") or str(number + 1)
                 number = int(place if place.isdecimal() else place.removesuffix(".0"))
                 cells: list[Cell] = []
@@ -230,7 +240,7 @@ class XlsxSheet(Sheet):
                         raise outside_limits(self.name, index, number)
                     cells.extend([None] * (index + 1 - len(cells)))
                     cells[index] = cell
-                if cells and is_hidden:
+                if cells and element.get("hidden") in _TRUE:
                     self.facts.hidden_rows.add(number)
                 if cells:
                     yield number, cells
@@ -282,27 +292,8 @@ class XlsxSheet(Sheet):
             return OddCell(OddKind.BOOLEAN, "TRUE" if value.strip() in _TRUE else "FALSE")
         return iso_date_cell(value) if kind == "d" else _shown(value)
 
-    def covered(self) -> int:
-        """Return how many cells its merged cells and links cover."""
-        stream = Stream(self.book.archive, self.part)
-        cells = 0
-        with damage(f"sheet {self.name!r} cannot be read"):
-            for _, element in iterparse(stream):
-                if element.tag in _SPANNING:
-                    left, top, right, bottom = range_boundaries(element.get("ref", ""))
-                    wide = (right or _EXCEL_COLUMNS) - (left or 1) + 1
-                    cells += wide * ((bottom or _EXCEL_ROWS) - (top or 1) + 1)
-                if element.tag in (*_SPANNING, ROW_TAG):
-                    element.clear()
-                    stream.end_item()
-        return cells
-
-    def width(self) -> int:
-        """Return the number of columns up to the last with something in it."""
-        return max((len(cells) for _, cells in self.rows()), default=0)
-
     def elements(self) -> Iterator[Element]:
-        """The columns that are described, then the rows, each until the next one is asked for."""
+        """The rows, each until the next one is asked for."""
         stream = Stream(self.book.archive, self.part)
         builder = TreeBuilder()
         parser = XMLParser(target=builder)
@@ -313,9 +304,7 @@ class XlsxSheet(Sheet):
             root: Element | None = builder.close()
             if root is None:
                 continue
-            if data is None:
-                data = root.find(DATA_TAG)
-                yield from root.iter(COL_TAG) if data is not None else ()
+            data = root.find(DATA_TAG) if data is None else data
             if data is not None:
                 is_whole = root[-1] is not data
                 rows = data[:] if is_whole else data[:-1]

@@ -132,26 +132,6 @@ def test_a_joint_over_its_limit_is_marked_with_the_limit(tmp_path, xlsx):
     assert "over the limit of joint 3, 0.0075 in radial" in sheet["E2"].comment.text
 
 
-def test_on_paper_the_verdicts_begin_a_page_with_the_record_beside_them(annotated):
-    sheet = annotated["Inspections"]
-    assert [brk.id for brk in sheet.col_breaks.brk] == [7]
-    assert (sheet.print_title_cols, sheet.print_title_rows) == ("$A:$C", "$1:$1")
-
-
-def test_pages_that_the_user_has_set_up_stay_as_they_are(tmp_path, xlsx):
-    source, out = tmp_path / "in.xlsx", tmp_path / "out.xlsx"
-
-    def set_up(book):
-        book.worksheets[0].print_title_rows = "1:1"
-        book.worksheets[0].page_setup.orientation = "portrait"
-
-    source.write_bytes(xlsx([HEADER, ROWS[0]], set_up))
-    result = read_inspections(source, ReadOptions())
-    annotate_workbook(source, out, result, {r.source: {"verdict": "x"} for r in result.rows})
-    sheet = openpyxl.load_workbook(out)["Inspections"]
-    assert (sheet.page_setup.orientation, len(sheet.col_breaks.brk)) == ("portrait", 0)
-
-
 def test_everything_else_is_as_it_was(annotated, book):
     before, after = openpyxl.load_workbook(book), annotated
     assert before.sheetnames == after.sheetnames
