@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 import stat
@@ -97,11 +98,18 @@ def read_many(
     """Read the inspections of several files, folders and patterns as one batch."""
     given = list(sources)
     found: list[_Found] = []
-    for item in (item for source in given for item in expand(source)):
-        found.append(_read(item, options))
-        if progress is not None:
-            progress(sum(file.rows for file, _ in found), None)
-    read = _finish(found)
+    is_collected = gc.isenabled()
+    # Rows hold no cycles; looking for some takes a fifth of the time.
+    gc.disable()
+    try:
+        for item in (item for source in given for item in expand(source)):
+            found.append(_read(item, options))
+            if progress is not None:
+                progress(sum(file.rows for file, _ in found), None)
+        read = _finish(found)
+    finally:
+        if is_collected:
+            gc.enable()
     passed_over = [note for source in given if (note := _subfolders_note(source))]
     return replace(read, notes=(*passed_over, *read.notes))
 

@@ -105,6 +105,7 @@ _FIELDS = frozenset(each.name for each in fields(Inspection))
 
 # What no word of an outcome, a convention or a unit is.
 _CODE = re.compile(r"(?=..)\S*\d\S*")
+_MONTHS = 12
 _A_DAY = timedelta(days=1)
 _MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
 
@@ -254,11 +255,8 @@ class RowReader:
         # Somewhere it is tomorrow already.
         self._latest = min(date.today(), date.max - _A_DAY) + _A_DAY
         self._days_of_visits: dict[str, date | None] = {"": None}
-        # Which orders fit the dates that are written as numbers, and the dates of rows that wait
-        # for the others.
-        self._date_orders = set(DateOrder)
-        self._typed_days: Counter[bool] = Counter()
-        self._written_days = 0
+        # The dates of the column, and those of rows that wait for the others.
+        self._days: set[Cell] = set()
         self._waiting: dict[RowSource, tuple[AmbiguousDateError, Cell, CellPlace]] = {}
 
     def _add(self, placed: Iterable[PlacedField]) -> None:
@@ -390,7 +388,7 @@ class RowReader:
             if cell is None and column not in IDENTITY:
                 continue
             if column is DATE:
-                self._note_date(cell)
+                self._days.add(cell)
             try:
                 value = value_of(index, column, cell)
             except CellFaultError as fault:
@@ -727,16 +725,6 @@ class RowReader:
     def _read_day(self, cell: Filled) -> date:
         return read_date(cell, self._options.dates, self._latest)
 
-    def _note_date(self, cell: Cell) -> None:
-        """Note which orders of day and month a date leaves to the others of its column."""
-        if isinstance(cell, OddCell) and cell.day is not None:
-            self._typed_days[cell.day.day > 12] += 1
-        if isinstance(cell, str):
-            orders = set(readings(plain_text(cell)) or ())
-            self._written_days += bool(orders)
-            # A year first says nothing of the order of day and month in other cells.
-            self._date_orders &= orders if orders - {DateOrder.YMD} else self._date_orders
-
     def settle_dates(self, rows: list[Inspection | InvalidRow]) -> str:
         """Date the rows whose numbers only the other rows of the column explain; what was
         understood is returned.
@@ -744,19 +732,24 @@ class RowReader:
         Where several orders, or none, fit all dates of the column, the cells are reported and stay
         unread.
         """
-        if self._written_days and self._typed_days[False] and not self._typed_days[True]:
+        texts = [plain_text(cell) for cell in self._days if isinstance(cell, str)]
+        written = [{*found} for text in texts if (found := readings(text))]
+        typed = [cell.day.day for cell in self._days if isinstance(cell, OddCell) and cell.day]
+        if written and typed and max(typed) <= _MONTHS:
             # A program that expects the other order makes dates of those only that fit both.
             return (
-                f"{self._typed_days[False]} dates with a day up to 12 stand among dates that are"
-                " text: day and month may have been swapped when the file was opened. Check them"
+                f"dates whose day is not above {_MONTHS} stand among dates that are text: day and"
+                " month may have been swapped when the file was opened. Check them"
             )
         if not self._waiting:
             return ""
-        if len(self._date_orders) != 1:
+        # A year first says nothing of the order of day and month in other cells.
+        orders = set(DateOrder).intersection(*(each for each in written if each - {DateOrder.YMD}))
+        if len(orders) != 1:
             for waiting in self._waiting.values():
                 self._table.tell_fault(*waiting)
             return ""
-        (order,) = self._date_orders
+        (order,) = orders
         for place, row in enumerate(rows):
             if row.source in self._waiting and isinstance(row, Inspection):
                 fault, *_ = self._waiting[row.source]

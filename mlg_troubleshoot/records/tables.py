@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain, islice
@@ -448,45 +449,32 @@ class _Table:
 
     def notes(self) -> list[str]:
         """Say what stood between the inspections, and how some cells were read."""
-        notes = []
+        facts = self._sheet.facts
+        words = self._reader.not_measured
+        named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
+        more = [f"{len(named) - 5} more"] if len(named) > 5 else []
+        aside = "rows that by their names are not inspections, set aside"
+        counted = {
+            aside: f"{len(named)} ({', '.join([*named[:5], *more])})" if named else "",
+            "repeated header rows skipped": self._repeated,
+            "blank cells that are merged with one above, read as it is": self._filled_in,
+            f"cells with {', '.join(map(repr, [*words][:4]))} read as not measured": words.total(),
+            "hidden or filtered rows that were also read": sum(
+                row > self._header_row for row in facts.hidden_rows
+            ),
+            "formulas were read by their last calculated values": self._by_column(facts.formulas),
+            "cells that are struck through were also read": self._by_column(facts.struck),
+        }
+        notes = [f"{what}: {found}" for what, found in counted.items() if found]
+        self._out.unread += notes[: bool(named)]
         if self._folder is not None:
             notes.append(
                 "long layout: one row is one joint's reading; rows with one record id are one"
                 " inspection"
             )
-        again = "a repeated header row was skipped", "{} repeated header rows were skipped"
-        merged = (
-            "1 blank cell that is merged with one above read as it is",
-            "{} blank cells that are merged with one above read as it is",
-        )
-        notes += [*_counted(self._repeated, *again), *_counted(self._filled_in, *merged)]
-        named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
-        for count in _counted(
-            len(named), "1 row is not an inspection", "{} rows are not inspections"
-        ):
-            shown = ", ".join(named[:5]) + (f" and {len(named) - 5} more" if len(named) > 5 else "")
-            why = "a statistic, a signature, a comment or a rule by its name"
-            notes.append(f"{count}, set aside: {shown} ({why})")
-            self._out.unread.append(notes[-1])
-        notes += [self._dates] * bool(self._dates)
-        words = self._reader.not_measured
-        shown = ", ".join(map(repr, [*words][:4]))
-        for cells in _counted(words.total(), "1 cell", "{} cells"):
-            notes.append(f"{cells} with {shown} read as not measured")
-        facts = self._sheet.facts
-        hidden = sum(row > self._header_row for row in facts.hidden_rows)
-        both = "1 hidden or filtered row was also read", "{} hidden or filtered rows were also read"
-        notes += _counted(hidden, *both)
+        return [*notes, *filter(None, [self._dates])]
+
+    def _by_column(self, counts: Counter[int]) -> str:
         width = len(self._columns.placed)
-        for what, found in (
-            ("formulas were read by their last calculated values", facts.formulas),
-            ("cells that are struck through were also read", facts.struck),
-        ):
-            counts = [f"{column_letters(i)} ({n})" for i, n in sorted(found.items()) if i < width]
-            notes += [f"{what}: column {', '.join(counts)}"] if counts else []
-        return notes
-
-
-def _counted(count: int, one: str, several: str) -> list[str]:
-    """Say how many there are, if there are any."""
-    return [one if count == 1 else several.format(count)] * bool(count)
+        shown = [f"{column_letters(i)} ({n})" for i, n in sorted(counts.items()) if i < width]
+        return f"column {', '.join(shown)}" if shown else ""

@@ -175,7 +175,11 @@ def _text(element: Element) -> str | None:
     """Return the text of a cell, without its pronunciation and the marks of footnotes; None if it
     is blank.
     """
-    runs = (run for run in element if run.tag != _PHONETIC_TAG and run.find(_RAISED) is None)
+    runs = (
+        run
+        for run in element
+        if run.tag != _PHONETIC_TAG and not (len(run) and run.find(_RAISED) is not None)
+    )
     pieces = (t.text or "" for run in runs for t in run.iter(_TEXT_TAG))
     return _shown("".join(pieces))
 

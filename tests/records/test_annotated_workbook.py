@@ -6,7 +6,6 @@ import csv
 import datetime
 import io
 import zipfile
-from dataclasses import replace
 
 import openpyxl
 import pytest
