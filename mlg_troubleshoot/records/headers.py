@@ -411,9 +411,10 @@ def parse_target(name: str, joints: Joints) -> Field | None:
         return None
     field = parse_canonical(text, joints)
     if field is None:
+        names = filter(None, (near_miss(text, joints).nearest, *BY_NAME))
         raise UsageError(
             f"--map: {name!r} is not a column of the inspection table",
-            f"Give a column, or carry to leave it unread.{nearest(text, BY_NAME)}",
+            f"Give a column, or carry to leave it unread.{nearest(text, [*names])}",
         )
     return field
 

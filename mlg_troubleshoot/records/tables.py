@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain, islice
@@ -453,28 +452,27 @@ class _Table:
         words = self._reader.not_measured
         named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
         more = [f"{len(named) - 5} more"] if len(named) > 5 else []
-        aside = "rows that by their names are not inspections, set aside"
-        counted = {
-            aside: f"{len(named)} ({', '.join([*named[:5], *more])})" if named else "",
-            "repeated header rows skipped": self._repeated,
-            "blank cells that are merged with one above, read as it is": self._filled_in,
-            f"cells with {', '.join(map(repr, [*words][:4]))} read as not measured": words.total(),
-            "hidden or filtered rows that were also read": sum(
-                row > self._header_row for row in facts.hidden_rows
-            ),
-            "formulas were read by their last calculated values": self._by_column(facts.formulas),
-            "cells that are struck through were also read": self._by_column(facts.struck),
-        }
-        notes = [f"{what}: {found}" for what, found in counted.items() if found]
+        hidden = sum(row > self._header_row for row in facts.hidden_rows)
+        said = ", ".join(map(repr, [*words][:4]))
+        counted = (
+            (len(named), "row", f"set aside by name: {', '.join([*named[:5], *more])}"),
+            (self._repeated, "repeated header row", "skipped"),
+            (self._filled_in, "blank cell", "merged with one above read as it is"),
+            (words.total(), "cell", f"with {said} read as not measured"),
+            (hidden, "hidden or filtered row", "also read"),
+        )
+        notes = [f"{n} {what}{'s' * (n > 1)} {how}" for n, what, how in counted if n]
         self._out.unread += notes[: bool(named)]
+        for what, cells in (
+            ("formulas were read by their last calculated values", facts.formulas),
+            ("cells that are struck through were also read", facts.struck),
+        ):
+            width = len(self._columns.placed)
+            shown = [f"{column_letters(i)} ({n})" for i, n in sorted(cells.items()) if i < width]
+            notes += [f"{what}: column {', '.join(shown)}"] if shown else []
         if self._folder is not None:
             notes.append(
                 "long layout: one row is one joint's reading; rows with one record id are one"
                 " inspection"
             )
         return [*notes, *filter(None, [self._dates])]
-
-    def _by_column(self, counts: Counter[int]) -> str:
-        width = len(self._columns.placed)
-        shown = [f"{column_letters(i)} ({n})" for i, n in sorted(counts.items()) if i < width]
-        return f"column {', '.join(shown)}" if shown else ""

@@ -72,7 +72,7 @@ def test_a_cell_that_is_merged_over_rows_says_the_same_of_each(merged):
     said = [(row.tail_no, row.side) for row in merged.inspections]
     assert said == [(f"N{n}", side) for n in range(101, 201) for side in ("LH", "RH")]
     assert {str(row.inspection_date) for row in merged.inspections} == {"2026-03-01"}
-    assert any("merged with one above, read as it is: 200" in note for note in merged.notes)
+    assert any("200 blank cells merged with one above" in note for note in merged.notes)
 
 
 def test_a_blank_cell_below_merged_ones_stays_blank(merged):
