@@ -120,8 +120,8 @@ _SINCE_2 = ("recorded_at", "recorded_by", "origin")
 _KINDS = {kind.value: kind for kind in RecordKind}
 _TEXTS = ("kind", "record_id", "tail_no", "side", "day")
 _BYTES = ("identity", "body", "hash")
-_EIGHT_TEXTS = (str,) * (len(_TEXTS) + len(_SINCE_2))
-_THREE_BYTES = (bytes,) * len(_BYTES)
+_NAMES = _records.c.keys()
+_TYPES = [int, *[bytes if name in _BYTES else str for name in _NAMES[1:]]]
 # A body that is too large is not fetched at all.
 _BOUNDED = sql.case(
     (sql.func.length(_records.c.body) <= MOST_BYTES, _records.c.body), else_=None
@@ -400,29 +400,16 @@ class Store:
                 yield connection
                 end()
                 connection.commit()
-        except OSError as error:
-            raise StoreError(
-                f"store {self.place}: {error.strerror}: nothing was kept", Place.REMEDY
-            ) from error
         except UnicodeDecodeError as error:
             raise StoreError(
                 f"store {self.place} holds text that is not UTF-8: nothing was kept", _FOREIGN
             ) from error
-        except SQLAlchemyError as error:
-            said = (
-                str(error.orig if isinstance(error, DBAPIError) else error).strip().splitlines()[0]
-            )
-            foreign = "not a database" in said
+        except (OSError, SQLAlchemyError) as error:
+            why = error.orig if isinstance(error, DBAPIError) else error
+            said = str(why.strerror if isinstance(why, OSError) else why).strip().splitlines()[0]
             raise StoreError(
                 f"store {self.place}: {self._at.masked(said)}: nothing was kept",
-                (
-                    _FOREIGN
-                    if foreign
-                    else (
-                        "Check the place, the permissions and the free space; existing records are"
-                        " unchanged."
-                    )
-                ),
+                _FOREIGN if "not a database" in said else _CHECK,
             ) from error
 
     def _prepare(self, connection: sql.Connection, *, writing: bool) -> None:
@@ -500,20 +487,27 @@ class Store:
         if writing and found == 0:
             connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION_ID}")
 
-    def _rows(self, connection: sql.Connection, *where: Any) -> Iterator[Any]:
+    def _rows(
+        self, connection: sql.Connection, *where: Any, newest: int | None = None
+    ) -> Iterator[Any]:
+        """Rows in the order of the chain, or the newest ones, the last one first."""
         if self._ready:
-            wanted = sql.select(*self._columns).where(*where)
-            found = connection.execute(wanted.order_by(_records.c.seq))
-            for part in found.partitions(_AT_ONCE):
+            order = _records.c.seq if newest is None else _records.c.seq.desc()
+            wanted = sql.select(*self._columns).where(*where).order_by(order).limit(newest)
+            for part in connection.execute(wanted).partitions(_AT_ONCE):
                 yield from part
 
     def _record(self, row: Any) -> Record:
         """A row as a record; a column that cannot be one is named."""
-        seq, kind, record_id, tail_no, side, day, identity, body, digest, at, by, origin = row
-        texts = tuple(map(type, (kind, record_id, tail_no, side, day, at, by, origin)))
-        exact = type(identity), type(body), type(digest)
-        if texts != _EIGHT_TEXTS or exact != _THREE_BYTES or kind not in _KINDS:
-            self._refuse(row)
+        for name, value, kind in zip(_NAMES, row, _TYPES, strict=True):
+            if value.__class__ is not kind or (name == "kind" and value not in _KINDS):
+                found = "too large" if value is None else repr(value)[:60]
+                raise StoreError(
+                    f"store {self.place}: record {row.seq}, column {name!r} cannot be read:"
+                    f" {found}",
+                    _VERIFY,
+                )
+        seq, kind, record_id, tail_no, side, day, _identity, body, digest, at, by, origin = row
         # The records of a gear, and an inspection and its assessment, share what they repeat.
         return Record(
             _KINDS[kind],
@@ -521,31 +515,14 @@ class Store:
             intern(tail_no),
             intern(side),
             intern(day),
-            bytes(body),
+            body,
             seq=seq,
-            digest=bytes(digest).hex(),
+            digest=digest.hex(),
             judge=self.judge,
             recorded_at=at,
             recorded_by=intern(by),
             origin=origin,
         )
-
-    def _refuse(self, row: Any) -> None:
-        """Name a column that cannot be one of a record, if there is one."""
-        columns = row._mapping
-        texts = (*_TEXTS, *_SINCE_2)
-        odd = next((name for name in texts if not isinstance(columns[name], str)), None)
-        odd = odd or next(
-            (name for name in _BYTES if not isinstance(columns[name], bytes | memoryview)), None
-        )
-        if odd is None and row.kind not in _KINDS:
-            odd = "kind"
-        if odd is not None:
-            found = "too large" if columns[odd] is None else repr(columns[odd])[:60]
-            raise StoreError(
-                f"store {self.place}: record {row.seq}, column {odd!r} cannot be read: {found}",
-                _VERIFY,
-            )
 
     def _walk(self, connection: sql.Connection, after: int = 0) -> Iterator[Any]:
         """Rows of the chain from one on, each of which fits the one before; `_MisfitError` where
@@ -629,11 +606,6 @@ class Store:
                 connection.execute(_records.insert(), rows)
         return Added(len(new), len(each) - len(new))
 
-    def known(self, identities: Sequence[bytes]) -> dict[bytes, Record]:
-        """Records that stand here under these identities."""
-        with self.transaction(writing=False) as connection:
-            return self._known(connection, identities)
-
     def _known(
         self, connection: sql.Connection, identities: Sequence[bytes]
     ) -> dict[bytes, Record]:
@@ -656,13 +628,16 @@ class Store:
             found = [(record.tail_no, record.side) for record in self.all()]
         return sorted({*found})
 
-    def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:
-        """All records of a gear, or of both gears of an aircraft, in the order of the chain."""
-        where = [_records.c.tail_no == tail_no]
-        if side:
-            where.append(_records.c.side == side)
+    def records(self, *where: Any, newest: int | None = None) -> list[Record]:
+        """Records in the order of the chain, of which some columns are so; the newest alone."""
         with self.transaction(writing=False) as connection:
-            return [self._record(row) for row in self._rows(connection, *where)]
+            rows = self._rows(connection, *where, newest=newest)
+            return [self._record(row) for row in rows]
+
+    def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:
+        """All records of a gear, or of both gears of an aircraft."""
+        found = self.records(_records.c.tail_no == tail_no)
+        return [record for record in found if side in (None, record.side)]
 
     def named(self, name: str) -> list[Record]:
         """Records with this id, or whose hash begins so."""
@@ -673,35 +648,19 @@ class Store:
         if re.fullmatch("[0-9a-f]{64}", ends[0]):
             low, high = map(bytes.fromhex, ends)
             where |= _records.c.hash.between(low, high)
-        with self.transaction(writing=False) as connection:
-            return [self._record(row) for row in self._rows(connection, where)]
+        return self.records(where)
 
     def of_aircraft(self, tails: Collection[str]) -> list[Record]:
-        """All records of some aircraft, each in the order of the chain."""
-        wanted = sorted(tails)
-        with self.transaction(writing=False) as connection:
-            return [
-                self._record(row)
-                for first in range(0, len(wanted), _AT_ONCE)
-                for row in self._rows(
-                    connection, _records.c.tail_no.in_(wanted[first : first + _AT_ONCE])
-                )
-            ]
+        """All records of some aircraft; of every one where they are many."""
+        few = [_records.c.tail_no.in_(sorted(tails))] if len(tails) <= _AT_ONCE else []
+        return self.records(*few)
 
     def newest(self, kind: RecordKind, most: int) -> list[Record]:
         """The newest records of a kind, the last one first."""
-        with self.transaction(writing=False) as connection:
-            if not self._ready:
-                return []
-            wanted = sql.select(*self._columns).where(_records.c.kind == kind.value)
-            newest = wanted.order_by(_records.c.seq.desc()).limit(most)
-            rows = connection.execute(newest)
-            return [self._record(row) for row in rows]
+        return self.records(_records.c.kind == kind.value, newest=most)
 
     def all(self) -> list[Record]:
-        """All records in the order of the chain."""
-        with self.transaction(writing=False) as connection:
-            return [self._record(row) for row in self._rows(connection)]
+        return self.records()
 
     def verify(self, visit: Callable[[Record], None] | None = None) -> tuple[int, Broken | None]:
         """Walk the chain; return how many records fit and the first one that does not.
@@ -877,6 +836,7 @@ class _MisfitError(Exception):
 
 
 _VERIFY = "Run: mlg history verify"
+_CHECK = "Check the place, the permissions and the free space; existing records are unchanged."
 _FOREIGN = "Give --store the name of a new file, or of one that mlg wrote."
 _EXTRA = "Install the extra: pip install 'mlg-troubleshoot[server]'"
 # Records of one import, and wrong ones among them that wait for a later one to void them. [1]

@@ -313,7 +313,7 @@ def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
     # Moved back it differs from the record that was moved away from there.
     moved = replace(moved, identity=())
     store.add([voids(wrong, why, moved_to=gear), moved])
-    return store.known([moved.identity_hash])[moved.identity_hash]
+    return next(each for each in store.of_gear(*gear)[::-1] if each.packed == moved.packed)
 
 
 def _entered(record: Record) -> Inspection:
