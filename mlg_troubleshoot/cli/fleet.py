@@ -85,7 +85,7 @@ def fleet(
         if line.suggestion and not shown.quiet:
             output.say(f"Note: {line.suggestion}")
     if shown.as_json:
-        output.write_json(fleet_as_json(found.lines, found.forecasts, within))
+        output.write_json(fleet_as_json(found.lines, within))
     elif found.lines:
         history.show_gears(found, shown.unit(), ahead=not no_forecast, within=within, joint=joint)
     elif everything.lines:

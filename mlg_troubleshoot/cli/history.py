@@ -82,7 +82,7 @@ def show(
         with stages(quiet=shown.quiet) as bar:
             everything = history.show_fleet(place, known, ahead=False, whole=False, progress=bar)
         if shown.as_json:
-            output.write_json(life_json.fleet_as_json(everything.lines, {}))
+            output.write_json(life_json.fleet_as_json(everything.lines))
         elif everything.lines:
             show_gears(everything, shown.unit(), ahead=False)
         else:
@@ -99,11 +99,11 @@ def show(
     rows = [kept.inspection for kept in found.lives[0].inspections]
     units = [row.unit_entered for row in rows if row.entered]
     unit = shown.unit(units[-1] if units else LengthUnit.INCH)
-    for life in found.lives:
+    for life, line in zip(found.lives, found.lines, strict=True):
         if shown.as_json:
-            output.write_json(life_json.life_as_json(life, found.forecasts[life.key], known))
+            output.write_json(life_json.life_as_json(life, line.ahead, known))
         else:
-            _show_life(life, found.forecasts[life.key], known, unit)
+            _show_life(life, line.ahead, known, unit)
     write_pages(found, place, shown, unit, fleet=False)
 
 
@@ -138,10 +138,10 @@ def show_gears(
     landings, `joint`: with the readings of that joint.
     """
     from mlg_troubleshoot.cli.views.tables import STYLES, Cell
-    from mlg_troubleshoot.life.landings_left import fleet_lines, parts_within, work_sentence
+    from mlg_troubleshoot.life.landings_left import most_urgent_first, parts_within, work_sentence
 
     console = output.console(unit=unit)
-    lines = fleet_lines(found.lines, found.forecasts)
+    lines = most_urgent_first(found.lines)
     worst_in = f"worst {console.unit}"
     why = "changed" if any(line.changed for line in lines) else "why"
     headings = (
@@ -151,20 +151,20 @@ def show_gears(
     styles = {each.value: style for each, style in STYLES.items()}
     rows: list[list[Cell]] = []
     for line in lines:
-        verdict = line.verdict or "-"
-        worst = line.predicted_displacement_in
+        verdict = line.now.verdict or "-"
+        worst = line.now.predicted_displacement_in
         rows.append(
             [
                 output.word(line.tail_no),
                 line.side,
-                "; ".join(line.changed) or said_in(line.why, console.unit),
+                "; ".join(line.changed) or said_in(line.urgency.why, console.unit),
                 "-" if worst is None else console.length(worst),
                 line.by_when(found.gear),
-                line.inspection_date or "no date",
+                str(line.inspection_date or "no date"),
                 _count(line.gear_landings),
                 output.text(verdict.removesuffix("_MARGIN"), styles.get(verdict, "")),
                 ", ".join(line.failed) or "-",
-                line.next_action or "-",
+                line.now.next_action or "-",
             ]
         )
     gears = "1 gear" if len(lines) == 1 else f"{len(lines)} gears"
@@ -176,7 +176,7 @@ def show_gears(
         _show_trend(console, lines, joint)
     console.print(work_sentence(lines))
     if within and ahead:
-        console.print(parts_within(lines, found.forecasts, within))
+        console.print(parts_within(lines, within))
 
 
 def _show_trend(console: output.DataConsole, lines: Sequence[FleetLine], joint: int) -> None:

@@ -10,7 +10,6 @@ from operator import itemgetter
 
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, RiggingCheck, Side, plain_tail
-from mlg_troubleshoot.decision.plan import Plan
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order, overhauls
@@ -54,18 +53,18 @@ def more_of(record: Record) -> Mapping[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class TodaysVerdict:
-    """What a check says of a gear today.
+    """What a check says of a gear today; the defaults of one that cannot be judged.
 
-    worst_joint: the joint to look at first. is_fine: whether nothing needs attention.
+    worst_joint: the joint to look at first. next_action: in brief. minutes, restore: of the plan.
     """
 
-    verdict: Verdict
-    predicted_displacement_in: float | None
-    margin_in: float
-    worst_joint: int
-    plan: Plan
-    in_brief: str
-    is_fine: bool
+    verdict: Verdict | None = None
+    predicted_displacement_in: float | None = None
+    margin_in: float | None = None
+    worst_joint: int | None = None
+    next_action: str | None = None
+    minutes: float = 0.0
+    restore: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,8 +77,7 @@ class GearLife:
     overhauls: events from which landings begin anew, by their place, with the joints that were
     restored there.
     judged: what is said of the gear at each inspection, by the hash of its record.
-    state, now: what stands of the gear today, and what is said of that; None until it is judged, or
-    if it cannot be.
+    state, now: what stands of the gear today, and what is said of that once it is judged.
     """
 
     key: GearKey
@@ -90,7 +88,7 @@ class GearLife:
     overhauls: Mapping[int, frozenset[int]] = field(default_factory=dict)
     judged: Mapping[str, TodaysVerdict] = field(default_factory=dict)
     state: GearState | None = None
-    now: TodaysVerdict | None = None
+    now: TodaysVerdict = TodaysVerdict()
 
     @property
     def name(self) -> str:

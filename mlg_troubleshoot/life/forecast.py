@@ -151,7 +151,7 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
     """The forecast of a gear that is outside its margin or has a joint over its limit: nothing
     remains of anything.
     """
-    if life.state is None or life.now is None:
+    if life.state is None:
         return None
     over = _over_limit(life.state.inspection.clearance_in, gear)
     outside = life.now.verdict is Verdict.OUTSIDE_MARGIN

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.ranking import Listed
+from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.life.folding import GearLife, TodaysVerdict
@@ -42,7 +42,7 @@ def judge_lives(
             life,
             judged={digest: each for (n, digest), each in said.items() if n == place and digest},
             state=found.get((place, _NOW)),
-            now=said.get((place, _NOW)),
+            now=said.get((place, _NOW), TodaysVerdict()),
         )
         for place, life in enumerate(asked)
     ]
@@ -59,12 +59,10 @@ def _judged(states: Sequence[GearState], gear: Gear, table: IndexTable) -> list[
             found.predicted_displacement_in,
             found.margin_in,
             found.ranked[0].joint,
-            found.plan,
             found.in_brief,
-            Listed.of(replace(found, older=state.older)).is_fine,
+            sum(step.minutes for step in found.plan.steps),
+            tuple(n for s in found.plan.steps if s.action is Action.RESTORE for n in s.joints),
         )
-        for state, found in zip(
-            states, assess([state.inspection for state in states], gear, table), strict=True
-        )
+        for found in assess([state.inspection for state in states], gear, table)
         if isinstance(found, Assessment)
     ]

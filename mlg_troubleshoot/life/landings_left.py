@@ -5,19 +5,26 @@ comes first.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import date
+from math import inf
 from operator import attrgetter
 from typing import NamedTuple
 
-from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import GearLife
+from mlg_troubleshoot.life.folding import GearLife, TodaysVerdict
 from mlg_troubleshoot.life.forecast import Forecast, Quantiles
 from mlg_troubleshoot.life.logbook import log_of
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.life.unrecorded_work import suggestion
-from mlg_troubleshoot.life.urgency import OVER_LIMIT, changes_since, repair_sentence, urgency_of
+from mlg_troubleshoot.life.urgency import (
+    OVER_LIMIT,
+    Urgency,
+    changes_since,
+    repair_sentence,
+    urgency_of,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +46,8 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FleetLine:
-    """One gear of a fleet as every output shows it: its latest inspection, what stands of it today,
-    and its landings left once they are forecast.
+    """One gear of a fleet as every output shows it: its latest inspection, what is said of it
+    today, and its landings left.
 
     inspections, repairs: how many count. Numbers stand as they did in the record.
     """
@@ -50,138 +57,89 @@ class FleetLine:
     inspections: int
     repairs: int
     warnings: tuple[str, ...]
-    record_id: str = ""
-    inspection_date: str | None = None
-    gear_landings: int | float | None = None
-    verdict: str | None = None
-    worst_joint: int | None = None
-    predicted_displacement_in: int | float | None = None
-    margin_in: int | float | None = None
-    next_action: str | None = None
-    minutes: int | float = 0
-    restore: tuple[int, ...] = ()
-    landings_to_limit: Quantiles | None = None
-    limit_joint: int | None = None
-    landings_to_margin: Quantiles | None = None
-    next_inspection_landings: float | None = None
-    due_date: str | None = None
-    rank: int = 0
-    size: float = 0.0
-    why: str = ""
-    failed: tuple[str, ...] = ()
-    repair: str = ""
-    suggestion: str = ""
-    changed: tuple[str, ...] = ()
-    readings: tuple[Reading, ...] = ()
+    now: TodaysVerdict
+    ahead: Forecast
+    record_id: str
+    inspection_date: date | None
+    gear_landings: int | float | None
+    urgency: Urgency
+    failed: tuple[str, ...]
+    repair: str
+    suggestion: str
+    changed: tuple[str, ...]
+    readings: tuple[Reading, ...]
 
     @classmethod
-    def of(cls, life: GearLife, asked: Asked) -> FleetLine:
-        counts = len(life.inspections), len(life.repairs)
-        line = cls(*life.key, *counts, life.warnings)
-        if life.latest is None:
-            return line
-        lines = log_of(life, asked.gear, () if asked.joint is None else (asked.joint,))
-        urgent = urgency_of(life, lines, asked.gear)
+    def of(cls, life: GearLife, asked: Asked, ahead: Forecast) -> FleetLine:
+        gear = asked.gear
+        lines = log_of(life, gear, () if asked.joint is None else (asked.joint,))
         failed = [e.date or "no date" for e in lines if e.counts and e.kind == "FAILED"]
-        line = replace(
-            line,
-            rank=urgent.rank,
-            size=urgent.size,
-            why=urgent.why,
-            failed=tuple(day for day in failed if day >= asked.since),
-            repair=repair_sentence(lines),
-            suggestion=suggestion(life, asked.gear),
-            changed=changes_since(life, lines, asked.since) if asked.since else (),
-            readings=tuple(
+        row = None if life.latest is None else life.latest.inspection
+        return cls(
+            *life.key,
+            len(life.inspections),
+            len(life.repairs),
+            life.warnings,
+            life.now,
+            ahead,
+            "" if row is None else row.record_id,
+            None if row is None else row.inspection_date,
+            None if row is None else row.gear_landings,
+            urgency_of(life, lines, gear),
+            tuple(day for day in failed if day >= asked.since),
+            repair_sentence(lines),
+            suggestion(life, gear),
+            changes_since(life, lines, asked.since) if asked.since else (),
+            tuple(
                 Reading(e.date, e.gear_landings, e.value_in or 0.0)
                 for e in lines
                 if e.counts and e.kind == "reading" and e.joints == (asked.joint,)
             ),
         )
-        kept, found = life.latest, life.now
-        line = replace(
-            line,
-            record_id=kept.inspection.record_id,
-            inspection_date=None if kept.at is None else kept.at.isoformat(),
-            gear_landings=kept.inspection.gear_landings,
-        )
-        if found is None:
-            return line
-        return replace(
-            line,
-            verdict=found.verdict.value,
-            worst_joint=found.worst_joint,
-            predicted_displacement_in=found.predicted_displacement_in,
-            margin_in=found.margin_in,
-            next_action=found.in_brief,
-            minutes=sum(step.minutes for step in found.plan.steps),
-            restore=tuple(
-                n for s in found.plan.steps if s.action is Action.RESTORE for n in s.joints
-            ),
-        )
 
     def by_when(self, gear: Gear) -> str:
         """When the gear is to be looked at: now, on a day, or after so many landings."""
-        if self.rank <= OVER_LIMIT:
+        if self.urgency.rank <= OVER_LIMIT:
             return "now"
-        after = self.next_inspection_landings
+        after = self.ahead.next_inspection_landings
         left = "-" if after is None else f"{landings_shown(after, gear)} landings"
-        return self.due_date or left
-
-    def forecast(self, ahead: Forecast) -> FleetLine:
-        """The same gear with its landings left."""
-        return replace(
-            self,
-            landings_to_limit=ahead.landings_to_limit,
-            limit_joint=ahead.limit_joint,
-            landings_to_margin=ahead.landings_to_margin,
-            next_inspection_landings=ahead.next_inspection_landings,
-            due_date=ahead.due_date,
-        )
+        return self.ahead.due_date or left
 
     @property
     def key(self) -> GearKey:
         return self.tail_no, self.side
 
     @property
-    def urgency(self) -> tuple[int, float, float, GearKey]:
+    def place(self) -> tuple[int, float, float, GearKey]:
         """By what is most urgent, how far it is, and landings to the next inspection."""
-        due = self.next_inspection_landings
-        return self.rank, -self.size, float("inf") if due is None else due, self.key
+        due = self.ahead.next_inspection_landings
+        return self.urgency.rank, -self.urgency.size, inf if due is None else due, self.key
 
 
-def fleet_lines(
-    lines: Iterable[FleetLine],
-    forecasts: Mapping[GearKey, Forecast],
-) -> list[FleetLine]:
-    """The gears that were inspected, with their forecasts; the most urgent first."""
-    seen = [
-        line.forecast(forecasts.get(line.key, Forecast())) for line in lines if line.inspections
-    ]
-    return sorted(seen, key=attrgetter("urgency"))
+def most_urgent_first(lines: Iterable[FleetLine]) -> list[FleetLine]:
+    """The gears that were inspected."""
+    return sorted((line for line in lines if line.inspections), key=attrgetter("place"))
 
 
 def work_sentence(lines: Sequence[FleetLine]) -> str:
     """Sum the minutes and the parts that the plans of a fleet expect."""
-    parts = Counter(joint for line in lines for joint in line.restore)
+    parts = Counter(joint for line in lines for joint in line.now.restore)
     restored = ", ".join(f"#{joint} ({count})" for joint, count in sorted(parts.items()))
-    minutes = sum(line.minutes for line in lines)
+    minutes = sum(line.now.minutes for line in lines)
     return (
         f"Work that the plans expect: {minutes:.0f} min on"
-        f" {sum(line.minutes > 0.0 for line in lines)} of {len(lines)} gears; joints to restore"
+        f" {sum(line.now.minutes > 0.0 for line in lines)} of {len(lines)} gears; joints to restore"
         f" (number of gears): {restored or 'none'}."
     )
 
 
-def parts_within(
-    lines: Iterable[FleetLine], forecasts: Mapping[GearKey, Forecast], landings: float
-) -> str:
+def parts_within(lines: Iterable[FleetLine], landings: float) -> str:
     """The joints that more likely than not reach their limit within so many landings."""
     parts = Counter(
         joint
         for line in lines
-        for joint, left in forecasts.get(line.key, Forecast()).joints.items()
-        if joint not in line.restore and left["p50"] is not None and left["p50"] <= landings
+        for joint, left in line.ahead.joints.items()
+        if joint not in line.now.restore and left["p50"] is not None and left["p50"] <= landings
     )
     listed = ", ".join(f"#{joint} ({count})" for joint, count in sorted(parts.items()))
     return (

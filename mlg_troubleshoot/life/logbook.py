@@ -180,7 +180,7 @@ def _void(records: Sequence[Record], one: Mapping[str, str]) -> set[str]:
 def _verdict(life: GearLife, record: Record) -> list[LogLine]:
     """What the program says today of an inspection that counts."""
     said = life.judged.get(record.digest)
-    if said is None:
+    if said is None or said.verdict is None:
         return []
     text = f"verdict: {said.verdict.value.replace('_', ' ')}"
     # It is zero only where no joint has play, or none was read.

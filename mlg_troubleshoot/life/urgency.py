@@ -30,10 +30,10 @@ class Urgency:
 
 def urgency_of(life: GearLife, lines: Sequence[LogLine], gear: Gear) -> Urgency:
     """What is most urgent about a gear, of what stands of it today."""
-    if life.state is None or life.now is None:
+    now = life.now
+    if life.state is None or now.margin_in is None:
         return Urgency(_OPEN, 0.0, "not judged")
     row = life.state.inspection
-    now = life.now
     share = (now.predicted_displacement_in or 0.0) / now.margin_in
     reasons: list[tuple[int, float, str]] = []
     failed = any(fact.kind is FactKind.FAILED for fact in (*row.facts, *life.state.older))
@@ -64,7 +64,8 @@ def urgency_of(life: GearLife, lines: Sequence[LogLine], gear: Gear) -> Urgency:
         Length(now.predicted_displacement_in or 0.0, named=False),
         Length(now.margin_in),
     )
-    rank = {Verdict.OUTSIDE_MARGIN: _COULD, Verdict.WITHIN_MARGIN: _FINE}.get(now.verdict, _OPEN)
+    known = {Verdict.OUTSIDE_MARGIN: _COULD, Verdict.WITHIN_MARGIN: _FINE}
+    rank = _OPEN if now.verdict is None else known.get(now.verdict, _OPEN)
     reasons.append((rank, share, worst_case))
     # A reason that is more urgent says it all of the worst case.
     words = [why for _rank, _size, why in (reasons[:-1] or reasons)]
@@ -101,7 +102,7 @@ def changes_since(life: GearLife, lines: Sequence[LogLine], day: str) -> tuple[s
         if line.kind in (*Outcome, "restored") or line.text == "rigging corrected":
             said.append(f"{line.text} on {line.date}")
     before = [line for line in lines if line.verdict and (line.date or "") < day]
-    now = None if life.now is None else life.now.verdict.value
+    now = life.now.verdict
     was = before[-1].verdict if before else "not inspected"
     if now is not None and now != was:
         said.append(f"{was} → {now}".replace("_MARGIN", ""))

@@ -94,7 +94,7 @@ _AS_JSON: dict[type, Callable[[Any], Any]] = {
     WorstCase: _worst_case_as_json,
     Gear: gear_as_json,
     Catalogue: _catalogue_as_json,
-    Lives: lambda r: fleet_as_json(r.lines, r.forecasts),
+    Lives: lambda r: fleet_as_json(r.lines),
 }
 
 

@@ -4,19 +4,18 @@ side.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.landings_left import (
     FleetLine,
-    fleet_lines,
+    most_urgent_first,
     outlook_sentence,
     work_sentence,
 )
 from mlg_troubleshoot.life.logbook import as_found_as_left, log_of, shortened
-from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.life.urgency import repair_sentence
 from mlg_troubleshoot.reporting.fleet_figures import wear_figure
 from mlg_troubleshoot.reporting.formats import Lengths
@@ -30,7 +29,6 @@ from mlg_troubleshoot.units import LengthUnit
 def fleet_document(
     lives: Iterable[GearLife],
     every: Sequence[FleetLine],
-    forecasts: Mapping[GearKey, Forecast],
     gear: Gear,
     provenance: ReportProvenance,
     unit: LengthUnit,
@@ -40,7 +38,7 @@ def fleet_document(
     """
     lengths = Lengths(unit)
     by_key = {life.key: life for life in lives}
-    gears = fleet_lines(every, forecasts)
+    gears = most_urgent_first(every)
     lines = []
     for line in gears:
         life = by_key[line.key]

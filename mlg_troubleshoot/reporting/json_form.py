@@ -68,17 +68,20 @@ def _parts(value: Any) -> Any:
 _ENCODED = json.JSONEncoder(allow_nan=False, ensure_ascii=False, check_circular=False).encode
 
 
-def written(kind: Any, record: Any = None, /, **given: Any) -> dict[str, Any]:
-    """Return a record in the form of an output: each key as it is given, or as the record has
-    it. The version of the schema stands in every output that has one.
+def written(kind: Any, *records: Any, **given: Any) -> dict[str, Any]:
+    """Return records in the form of an output: each key as it is given, or as the first record has
+    it that does. The version of the schema stands in every output that has one.
     """
-    return cast("dict[str, Any]", plain(filled(kind, record, **given)))
+    return cast("dict[str, Any]", plain(filled(kind, *records, **given)))
 
 
-def filled(kind: Any, record: Any, /, **given: Any) -> dict[str, Any]:
+def filled(kind: Any, *records: Any, **given: Any) -> dict[str, Any]:
     """The same with values as they stand, for a part of an output."""
     known = {"schema_version": SCHEMA_VERSION, **given}
-    return {n: known[n] if n in known else getattr(record, n) for n in kind.__annotations__}
+    return {
+        n: known[n] if n in known else next(getattr(r, n) for r in records if hasattr(r, n))
+        for n in kind.__annotations__
+    }
 
 
 def check_as_json(

@@ -13,31 +13,36 @@ from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.landings_left import (
     FleetLine,
-    fleet_lines,
+    most_urgent_first,
     parts_within,
     work_sentence,
 )
 from mlg_troubleshoot.life.logbook import log_of
-from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.reporting.json_form import filled, written
 
 
 def fleet_as_json(
     gears: Sequence[FleetLine],
-    forecasts: Mapping[GearKey, Forecast],
     within: float = 0.0,
 ) -> dict[str, Any]:
     """One line per gear, the most urgent first; `within`: parts for so many landings."""
-    lines = fleet_lines(gears, forecasts)
+    lines = most_urgent_first(gears)
     return written(
         FleetOutput,
         gears=[
-            filled(FleetGear, line, readings=[each._asdict() for each in line.readings])
+            filled(
+                FleetGear,
+                line,
+                line.now,
+                line.ahead,
+                line.urgency,
+                readings=[each._asdict() for each in line.readings],
+            )
             for line in lines
         ],
         work=work_sentence(lines),
-        parts_within=parts_within(lines, forecasts, within) if within else None,
+        parts_within=parts_within(lines, within) if within else None,
         warnings=[warning for gear in gears for warning in gear.warnings],
     )
 

@@ -61,9 +61,7 @@ class Lives(Result):
     lives : tuple of GearLife
         What is known of each gear; empty where the whole was not asked for.
     lines : tuple of FleetLine
-        Each gear in its fleet, without its forecast.
-    forecasts : mapping of tail and side to Forecast
-        Landings that each has left. [landings]
+        Each gear in its fleet, with its forecast.
     model : WearModel or None
         How joints wear; None if nothing can be learnt.
     problems : tuple of Problem
@@ -73,9 +71,13 @@ class Lives(Result):
     gear: Gear
     lives: tuple[GearLife, ...]
     lines: tuple[FleetLine, ...]
-    forecasts: Mapping[GearKey, Forecast]
     model: WearModel | None
     problems: tuple[Problem, ...] = ()
+
+    @property
+    def forecasts(self) -> Mapping[GearKey, Forecast]:
+        """Landings that each gear has left. [landings]"""
+        return {line.key: line.ahead for line in self.lines}
 
     def chosen(self, *, changed: bool, failed: bool) -> Lives:
         """The gears of which something changed, or that failed, as far as that is asked."""
@@ -92,7 +94,7 @@ class Lives(Result):
         """Write the fleet as CSV, one line per gear."""
         from mlg_troubleshoot.reporting.life_json import fleet_as_json, fleet_table
 
-        gears = fleet_as_json(self.lines, self.forecasts)["gears"]
+        gears = fleet_as_json(self.lines)["gears"]
         write_csv(file, *fleet_table(gears))
 
 
@@ -122,17 +124,16 @@ def show_fleet(
     doing = "Looking ahead" if ahead else "Reading the store"
     found: list[GearLife] = []
     lines: list[FleetLine] = []
-    forecasts: dict[GearKey, Forecast] = {}
     # What was unpacked of one part is let go before the next one.
     for first in range(0, len(keys), _AT_ONCE):
         progress(doing, first, len(keys))
         part = lives_of(store, keys[first : first + _AT_ONCE]).values()
         judged = judge_lives(part, gear, table, every=whole or bool(since))
-        forecasts |= forecast(judged, model, gear)
-        lines += [FleetLine.of(life, asked) for life in judged]
+        forecasts = forecast(judged, model, gear)
+        lines += [FleetLine.of(life, asked, forecasts[life.key]) for life in judged]
         found += judged if whole else ()
     progress(doing, len(keys), len(keys))
-    return Lives(gear, tuple(found), tuple(lines), forecasts, model, problems)
+    return Lives(gear, tuple(found), tuple(lines), model, problems)
 
 
 def _taught(
@@ -179,8 +180,9 @@ def show_lives(
         progress("Looking ahead", 0, None)
     known = lives_of(store, wanted).values()
     found = tuple(judge_lives(known, gear, load_index_table(gear), every=True))
-    lines = tuple(FleetLine.of(life, Asked(gear)) for life in found)
-    return Lives(gear, found, lines, forecast(found, model, gear), model)
+    forecasts = forecast(found, model, gear)
+    lines = tuple(FleetLine.of(life, Asked(gear), forecasts[life.key]) for life in found)
+    return Lives(gear, found, lines, model)
 
 
 def write_pages(
@@ -199,20 +201,19 @@ def write_pages(
     from mlg_troubleshoot.reporting.publish import publish
     from mlg_troubleshoot.workflows.witness import witness_of
 
-    verdicts = {line.key: line.verdict for line in shown.lines}
+    verdicts = {line.key: line.now.verdict for line in shown.lines}
     made = provenance_of(shown.gear, {}, witness=witness_of(store, shown.gear, verdicts))
+    forecasts = shown.forecasts
     write = partial(publish, directory=directory, page=page, replace_files=replace_files)
     documents = (
         fleet_report.life_document(
-            life, shown.forecasts[life.key], shown.gear, made.about(*life.key), unit
+            life, forecasts[life.key], shown.gear, made.about(*life.key), unit
         )
         for life in shown.lives
     )
     if not fleet:
         return [*map(write, documents)]
-    sheet = fleet_report.fleet_document(
-        shown.lives, shown.lines, shown.forecasts, shown.gear, made, unit
-    )
+    sheet = fleet_report.fleet_document(shown.lives, shown.lines, shown.gear, made, unit)
     written = [write(sheet)]
     # The pages behind the lines of a fleet are for the screen.
     return written + [write(each, formats=("html",)) for each in documents]

@@ -10,7 +10,6 @@ from pathlib import Path
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import lives_of
 from mlg_troubleshoot.life.judged import judge_lives
-from mlg_troubleshoot.life.landings_left import Asked, FleetLine
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.reporting.provenance import program_version
 from mlg_troubleshoot.reporting.witness import ReportedGear, Witness, read_witness
@@ -84,7 +83,7 @@ def _lost(store: Store, printed: Witness) -> tuple[str, ...]:
 def _changed(store: Store, gear: Gear, printed: Witness) -> Iterable[str]:
     keys = [(each.tail_no, each.side) for each in printed.gears]
     lives = judge_lives(lives_of(store, keys).values(), gear, load_index_table(gear))
-    today = {life.key: FleetLine.of(life, Asked(gear)).verdict for life in lives}
+    today = {life.key: life.now.verdict for life in lives}
     made = [f"program {printed.program}, now {program_version()}"]
     made += ["another gear file"] * (printed.geometry != gear.geometry_sha256)
     changed = printed.program != program_version() or len(made) > 1

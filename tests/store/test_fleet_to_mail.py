@@ -120,7 +120,7 @@ def test_the_page_of_a_gear_plots_each_joint_with_limit_and_forecast(
     (file,) = tmp_path.glob("*.html")
     page = file.read_text(encoding="utf-8")
     (drawn,) = re.findall(r'<svg[^>]*aria-label="Clearance of each joint.*?</svg>', page, re.DOTALL)
-    assert drawn.count("<polygon") == 10 + 1
+    assert drawn.count("<polygon") == 10
     assert "#10 plunger pin" in drawn
 
 

@@ -451,8 +451,9 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
     gear = load_gear()
     found = judge_lives(lives(Store()).values(), gear, load_index_table(gear))
     model = fit_fleet(found[:5], gear)
-    lines = [FleetLine.of(life, Asked(gear)) for life in found]
-    fleet = fleet_as_json(lines, forecast(found, model, gear))["gears"]
+    ahead = forecast(found, model, gear)
+    lines = [FleetLine.of(life, Asked(gear), ahead[life.key]) for life in found]
+    fleet = fleet_as_json(lines)["gears"]
     pages = [life_as_json(life, forecast([life], model, gear)[life.key], gear) for life in found]
     assert len(fleet) == len(pages) == 200
     assert max(value for told in (*fleet, *pages) for value in shown(told)) == 0.0
