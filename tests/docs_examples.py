@@ -226,9 +226,10 @@ def options_table() -> str:
                 variable = f" Else `{option.envvar}`." if option.envvar else ""
                 key = words, f"{option.help}{variable}", user
                 found.setdefault(key, []).append(path)
+    log = [path for path, command in all_commands() if path.startswith("history ")]
     lines = ["| option | does | of | for |", "|---|---|---|---|"]
     lines += [
-        f"| `{words}` | {does} | {', '.join(of)} | {user} |"
+        f"| `{words}` | {does} | {', '.join(of).replace(', '.join(log), 'history')} | {user} |"
         for (words, does, user), of in sorted(found.items())
     ]
     return "\n".join(lines) + "\n"

@@ -65,14 +65,13 @@ def _of_file(path: Path) -> Iterator[Chosen]:
 
 def page() -> str:
     """The page as it should be."""
-    rows = []
-    for (file, meaning), same in groupby(chosen(), key=lambda c: (c.file, c.meaning)):
-        together = list(same)
-        names = ", ".join(f"`{c.name}`" for c in together)
-        values = ", ".join(f"`{c.value}`" for c in together)
-        rows.append(f"| `{file}` | {names} | {values} | {meaning} |")
-    head = "| file | name | value | meaning |\n|---|---|---|---|\n"
-    return _HEAD + head + "\n".join(rows) + "\n"
+    parts = []
+    for file, numbers in groupby(chosen(), key=lambda c: c.file):
+        parts.append(f"\n`{file}`:\n")
+        for meaning, same in groupby(numbers, key=lambda c: c.meaning):
+            names = ", ".join(f"`{c.name}` = `{c.value}`" for c in same)
+            parts.append(f"- {names}: {meaning}")
+    return _HEAD + "\n".join(parts).lstrip() + "\n"
 
 
 if __name__ == "__main__":
