@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from mlg_troubleshoot.arrays import Array, Mask, numbered
 from mlg_troubleshoot.decision.columns import LANDINGS
@@ -34,10 +33,6 @@ _MANY_CUT = 0.1
 LEAST_ROWS = 5
 # Chance of a false statement about the data of a table. [1]
 BY_CHANCE = 0.001
-# Values before the last one that lead to it, and the chance that one is more frequent by so much;
-# it is twenty times there at all in few sound tables. [1]
-_LED_BY = 3
-_PILED_BY_CHANCE = 0.01
 # What rows that are set aside hold, and what to record next time.
 _ASIDE = {
     "copied": (
@@ -254,7 +249,7 @@ def _ends(table: DiagnosisTable) -> Iterator[DataCondition]:
     found, counts = np.unique(np.round(values[np.isfinite(values)], 7), return_counts=True)
     small = np.any(found < 2.0 * np.median(table.gauge_u_in))
     for place, way, sign, beyond in ((0, -1, "<", "less"), (-1, 1, ">", "more")):
-        if (way < 0 and small) or not _more_than_led_to(counts[::way].astype(float)):
+        if (way < 0 and small) or not _piled_up(counts[::way].astype(float)):
             continue
         share = float(counts[place] / counts.sum())
         yield DataCondition(
@@ -267,24 +262,20 @@ def _ends(table: DiagnosisTable) -> Iterator[DataCondition]:
         )
 
 
-def _more_than_led_to(counts: Array) -> bool:
+def _piled_up(counts: Array) -> bool:
     """Tell whether the last of successive values is more frequent than those before it lead to.
 
     The logarithm of the counts of a unimodal distribution bends downwards, so the line through the
-    three before lies above the last one. Where people prefer some values (heaping), others lie
-    above their line as far, and nothing is said.
+    three before lies above the last one.
     """
-    if len(counts) < _LED_BY + 2 or counts[-1] < LEAST_VALUES:
+    if len(counts) < LEAST_ROWS or counts[-1] < LEAST_VALUES:
         return False
-    surely = np.zeros(len(counts))
-    for place in range(_LED_BY, len(counts)):
-        before = counts[place - _LED_BY : place]
-        line, covariance = np.polyfit(
-            np.arange(-_LED_BY, 0), np.log(before), 1, w=np.sqrt(before), cov="unscaled"
-        )
-        error = np.sqrt(1.0 / counts[place] + covariance[1, 1])
-        surely[place] = np.log(counts[place]) - line[1] + ndtri(_PILED_BY_CHANCE) * error
-    return bool(surely[-1] > max(0.0, float(surely[:-1].max())))
+    before = counts[-4:-1]
+    line, covariance = np.polyfit(
+        (-3.0, -2.0, -1.0), np.log(before), 1, w=np.sqrt(before), cov="unscaled"
+    )
+    error = np.sqrt(1.0 / counts[-1] + covariance[1, 1])
+    return bool(np.log(counts[-1]) - line[1] > 2.0 * error)
 
 
 def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
@@ -312,11 +303,13 @@ def _habit(table: DiagnosisTable, whose: str, rows: Mask) -> Iterator[DataCondit
     stopped &= values[np.arange(len(values)), last] >= np.nanmax(values, axis=1)
     share = float(blank.sum() / (known.sum() + blank.sum()))
     least = np.nanmin(values)
+    landings = table.numbers(LANDINGS.variable)[rows]
+    blanks = np.isnan(table.clearance_in[rows]).sum(axis=1)
     if stopped.sum() >= (1.0 - 2.0 * EXCEPTIONS) * partly.sum():
         what = "joints were read until the first that is worn"
         effect = "what the blanks add is estimated from the wear of other gears"
         record = "every joint, also after a worn one"
-    elif least > 2.0 * np.median(table.gauge_u_in) and _fewer_as_worn(table, rows):
+    elif least > 2.0 * np.median(table.gauge_u_in) and _rank_correlation(landings, blanks) < 0.0:
         what = "worn joints were written, sound ones were not"
         effect = f"each blank stands for less than {least:.4g} in"
         record = "every joint that was read, also the sound ones"
@@ -328,36 +321,30 @@ def _habit(table: DiagnosisTable, whose: str, rows: Mask) -> Iterator[DataCondit
     yield DataCondition("blank_not_at_random", where, share, effect, record, doubtful)
 
 
-def _fewer_as_worn(table: DiagnosisTable, rows: Mask) -> bool:
-    """Rows with fewer landings have more blanks."""
-    landings = table.numbers(LANDINGS.variable)
-    known = rows & np.isfinite(landings)
-    blanks = np.isnan(table.clearance_in[known]).sum(axis=1)
-    if len(blanks) < LEAST_ROWS or not np.ptp(blanks) or not np.ptp(landings[known]):
-        return False
+def _rank_correlation(x: Array, y: Array) -> float:
+    """Rank correlation beyond chance of what is known of two columns, else 0. [1]"""
+    known = np.isfinite(x)
+    if not known.any() or not np.ptp(x[known]) or not np.ptp(y[known]):
+        return 0.0
     # Only where it is needed: the import of scipy.stats takes as long as a diagnosis.
     from scipy.stats import spearmanr
 
-    return bool(spearmanr(landings[known], blanks, alternative="less").pvalue < BY_CHANCE)
+    found = spearmanr(x[known], y[known])
+    return float(found.statistic) if found.pvalue < BY_CHANCE else 0.0
 
 
 def _selected(table: DiagnosisTable) -> Iterator[DataCondition]:
     """Whether the plunger was read depends on how worn the gear is."""
-    read = np.isfinite(table.readings_in).any(axis=1)
+    read = np.isfinite(table.readings_in).any(axis=1).astype(float)
     known = np.isfinite(table.clearance_in)
-    worn = np.nan_to_num(table.clearance_in).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    one = worn[known.any(axis=1) & read]
-    other = worn[known.any(axis=1) & ~read]
-    if min(len(one), len(other)) < 2 * LEAST_ROWS:
-        return
-    from scipy.stats import mannwhitneyu
-
-    if mannwhitneyu(one, other).pvalue < BY_CHANCE:
-        more = "more" if np.median(one) > np.median(other) else "less"
+    count = known.sum(axis=1)
+    worn = np.nan_to_num(table.clearance_in).sum(axis=1) / np.where(count > 0, count, np.nan)
+    correlation = _rank_correlation(worn, read)
+    if correlation:
         yield DataCondition(
             "selected",
-            f"plunger readings: of gears that are {more} worn",
-            len(one) / (len(one) + len(other)),
+            f"plunger readings: of gears that are {'more' if correlation > 0.0 else 'less'} worn",
+            float(np.mean(read[count > 0])),
             "the mean misfit is that of the gears chosen, not of the fleet",
             "the plunger at every inspection, also of gears that retract",
         )
@@ -368,19 +355,15 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
     anew.
     """
     landings = table.numbers(LANDINGS.variable)
-    numbers = gears_of(table)
-    order = visits(table) if "day" in table.quantities else {}
-    fell = list[str]()
-    for name, rows in order.items():
-        known = rows[np.isfinite(landings[rows])]
-        same = np.diff(numbers[known]) == 0
-        if np.any(same & (np.diff(landings[known]) < 0.0)):
-            fell.append(name)
-    if fell:
+    order = np.concatenate([*visits(table).values()])
+    order = order[np.isfinite(landings[order])]
+    falls = (np.diff(landings[order]) < 0.0) & (np.diff(gears_of(table)[order]) == 0)
+    fell = np.unique(table.gears[order[1:]][falls]).tolist()
+    if fell and "day" in table.quantities:
         yield DataCondition(
             "landings_fall",
             f"gear{'s' * (len(fell) > 1)} {first_few(fell)}",
-            len(fell) / len(order),
+            len(fell) / len(visits(table)),
             "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"
             " before and after is taken as one",
             "landings since overhaul, and the date of the overhaul",
