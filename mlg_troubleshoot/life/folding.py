@@ -56,6 +56,7 @@ class TodaysVerdict:
     """What a check says of a gear today; the defaults of one that cannot be judged.
 
     worst_joint: the joint to look at first. next_action: in brief. minutes, restore: of the plan.
+    is_fine: whether nothing needs attention.
     """
 
     verdict: Verdict | None = None
@@ -65,6 +66,7 @@ class TodaysVerdict:
     next_action: str | None = None
     minutes: float = 0.0
     restore: tuple[int, ...] = ()
+    is_fine: bool = True
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from dataclasses import replace
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.plan import Action
+from mlg_troubleshoot.decision.ranking import Listed
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.life.folding import GearLife, TodaysVerdict
@@ -62,7 +63,10 @@ def _judged(states: Sequence[GearState], gear: Gear, table: IndexTable) -> list[
             found.in_brief,
             sum(step.minutes for step in found.plan.steps),
             tuple(n for s in found.plan.steps if s.action is Action.RESTORE for n in s.joints),
+            Listed.of(replace(found, older=state.older)).is_fine,
         )
-        for found in assess([state.inspection for state in states], gear, table)
+        for state, found in zip(
+            states, assess([state.inspection for state in states], gear, table), strict=True
+        )
         if isinstance(found, Assessment)
     ]

@@ -482,9 +482,9 @@ def attention_of_kept(seen: Counter[GearKey], store: Store, gear: Gear) -> list[
     lives = lives_of(store, kept_as).items()
     more = [life for key, life in lives if len(life.visits) > kept_as[key]]
     return [
-        f"{life.name}: with all that is kept of it: {life.now.in_brief}"
+        f"{life.name}: with all that is kept of it: {life.now.next_action}"
         for life in judge_lives(more, gear, load_index_table(gear))
-        if life.now is not None and not life.now.is_fine
+        if not life.now.is_fine
     ]
 
 
