@@ -61,13 +61,10 @@ def show_number(value: float) -> str:
     return f"{value:.15g}"
 
 
-def stored(cell: Cell) -> Cell:
-    """Return a cell without the words that only its number format shows."""
-    return cell.number if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED else cell
-
-
 def show(cell: Cell) -> str:
-    cell = stored(cell)
+    """Return a cell as text, without the words that only its number format shows."""
+    if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED:
+        cell = cell.number
     if cell is None:
         return ""
     if isinstance(cell, str):

@@ -63,7 +63,7 @@ class Folder:
             places = [CellPlace.at(number, p.index, p.header) for p in self._placed]
             row = Row(number, [None] * len(places), places, part.visit)
             self.rows[record, part.visit] = row
-        asked = self.reader.ask_about(cells, of_joint=True)
+        asked = self.reader.ask_about(cells)
         row.questions += [each for each in asked if each not in row.questions]
         for p in self._shared:
             self._put(row, p, number, cells[p.index])

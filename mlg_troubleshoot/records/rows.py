@@ -52,7 +52,6 @@ from mlg_troubleshoot.records.cells import (
     plain_text,
     quote,
     show,
-    stored,
     writable,
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings
@@ -242,8 +241,6 @@ class RowReader:
         # What is only carried, and may still say that the gear failed or how it was read; with the
         # column of readings that each may be and whether any number may be one.
         self._unread_words: list[tuple[PlacedField, str | None, bool]] = []
-        # What a number format adds counts where a unit does.
-        self._worded: set[int] = set()
         self._add(placed)
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
@@ -267,10 +264,6 @@ class RowReader:
         for p in placed:
             self._placed[p.index] = p
             column = None if p.field is None else p.field.column
-            if column is not None and (
-                column.holds in (Holds.LENGTH, Holds.NUMBER) or column in (TAIL_NO, RECORD_ID)
-            ):
-                self._worded.add(p.index)
             if (column is None or column.carried) and not (p.refused or p.is_settled):
                 nearest, is_sure = suspect(p.header, self._options.joints)
                 # A column without a header may only number the rows if it is the first one.
@@ -290,11 +283,11 @@ class RowReader:
         found = _Found(self._read_convention())
         self._read_lengths(found, self._read_row_unit())
         self._read_others(found)
-        self._carry(found)
+        for index, name in self._unread.items():
+            if self._cells[index] is not None:
+                found.carried[name] = writable(show(self._cells[index]))
         asked = self._unit_questions(found)
-        units = {entered.unit for entered in found.entered.values()}
-        outcome = found.values.get(OUTCOME)
-        asked += self.ask_about(self._cells, outcome=outcome, is_in_thou=units == {LengthUnit.THOU})
+        asked += self.ask_about(self._cells, found)
         asked += [each for each in row.questions if each not in asked]
         source = RowSource(self._table.file, self._table.sheet, row.number)
         for index, fault in sorted(self._faults, key=itemgetter(0)):
@@ -473,9 +466,6 @@ class RowReader:
             # Something stands to the right of the last header.
             self._add(PlacedField(i, "", None) for i in range(width, len(cells)))
         cells += [None] * (width - len(cells))
-        for index, cell in enumerate(cells):
-            if cell.__class__ is OddCell and index not in self._worded:
-                cells[index] = stored(cell)
         for index in self._blankable:
             cell = cells[index]
             # None of the words ends in a digit.
@@ -491,47 +481,16 @@ class RowReader:
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
 
-    def _carry(self, found: _Found) -> None:
-        """Carry what is not read; stop a row in which it says that the clearances were read in
-        another way or another unit.
-        """
-        for index, name in self._unread.items():
-            if self._cells[index] is not None:
-                found.carried[name] = writable(show(self._cells[index]))
-        units = {entered.unit for entered in found.entered.values()}
-        stated = found.convention
-        for placed, *_ in self._unread_words:
-            cell = self._cells[placed.index]
-            if cell is None or _is_code(cell):
-                continue
-            _failed, said, unit = _spoken(placed.header, cell)
-            if said is not None and (stated is None or said.per_radial != stated.per_radial):
-                column = CONVENTION
-            elif unit is not None and units and unit not in units:
-                column = UNIT
-            else:
-                continue
-            what = column.filled
-            remedy = (
-                f'If it is the {what}, pass --map "{placed.header}={column.name}"; else'
-                f' "{placed.header}=carry".'
-            )
-            expected = f"the {what} in a column {column.name}"
-            self._fault(placed.index, CellFaultError(f"{what}_elsewhere", expected, remedy))
-            self._bad.add(placed.index)
-
-    def ask_about(
-        self,
-        cells: Cells,
-        *,
-        of_joint: bool = False,
-        outcome: Outcome | None = None,
-        is_in_thou: bool = False,
-    ) -> list[str]:
-        """Ask about what stands in columns that are not read: numbers that may be readings, and
-        words that say that the gear failed or may say what it did.
+    def ask_about(self, cells: Cells, found: _Found | None = None) -> list[str]:
+        """Ask about what stands in columns that are not read: numbers that may be readings, words
+        that say that the gear failed or may say what it did, and those of another convention or
+        unit. Without `found` it is a row of a long table.
         """
         asked = []
+        of_joint = found is None
+        found = found or _Found(None)
+        outcome = found.values.get(OUTCOME)
+        units = {entered.unit for entered in found.entered.values()}
         for placed, nearest, is_sure in self._unread_words:
             cell = cells[placed.index]
             if cell is None:
@@ -541,11 +500,17 @@ class RowReader:
             # Under a header that names nothing only a number that may decide is asked about.
             is_named = nearest or is_sure or of_joint
             smallest = 0.0 if is_named else min(self._options.limit_in.values(), default=0.0)
-            if is_unread and self._may_be_length(cell, smallest, is_sure=is_sure or is_in_thou):
+            any_number = is_sure or units == {LengthUnit.THOU}
+            _failed, said, unit = _spoken(placed.header, cell)
+            if is_unread and self._may_be_length(cell, smallest, is_sure=any_number):
                 target = nearest or CLEARANCE.name
                 meant = f'a reading, pass --map "{header}={target}" (a length with its unit)'
             elif self._may_say_outcome(placed, cell, outcome):
                 meant = f'what the gear did, pass --map "{header}={OUTCOME.name}"'
+            elif said and found.convention and said.per_radial != found.convention.per_radial:
+                meant = f'the convention, pass --map "{header}={CONVENTION.name}"'
+            elif unit is not None and units and unit not in units:
+                meant = f'the unit, pass --map "{header}={UNIT.name}"'
             else:
                 continue
             asked.append(

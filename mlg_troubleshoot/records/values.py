@@ -252,7 +252,8 @@ def read_value(
         return _read_choice(column, cell)
     if not column.carried:
         return read_text(cell, column.asked, required=True)
-    is_shown = isinstance(cell, OddCell) and cell.kind in (OddKind.DATE, OddKind.BOOLEAN)
+    shown = (OddKind.DATE, OddKind.BOOLEAN, OddKind.WORDED)
+    is_shown = isinstance(cell, OddCell) and cell.kind in shown
     return show(cell) if is_shown else read_text(cell, column.asked)
 
 
