@@ -270,15 +270,6 @@ def test_the_dict_of_a_result_is_the_documented_json(name: str, command: str) ->
     jsonschema.validate(result(name).to_dict(), schema(command))
 
 
-def test_the_ensemble_is_a_table_of_the_points_of_each_linkage() -> None:
-    gear = mlg.load_gear()
-    table = gear.to_frame("ensemble").set_index(["linkage", "point"])
-    last = gear.ensemble[-1]
-    assert len(table) == sum(len(linkage.mechanism.points) for linkage in gear.ensemble)
-    place = last.mechanism.point("E")
-    assert tuple(table.loc[(last.name, "E"), ["x_in", "y_in"]]) == (place.x, place.y)
-
-
 def test_the_catalogue_is_a_table_of_its_causes() -> None:
     table = CATALOGUE.to_frame().set_index("name")
     assert table.index.tolist() == [cause.name for cause in CATALOGUE]

@@ -17,7 +17,6 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.geometry.mechanism import Point
 from mlg_troubleshoot.life.folding import lives
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.records.frames import frame_of, label_of
@@ -29,7 +28,7 @@ from mlg_troubleshoot.reporting.json_form import (
     gear_as_json,
     plain,
 )
-from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
+from mlg_troubleshoot.reporting.life_json import fleet_as_json
 from mlg_troubleshoot.reporting.model_json import study_as_json
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.surveying import SurveyResult
@@ -103,35 +102,8 @@ def to_dict(result: Any) -> dict[str, Any]:
     return written
 
 
-def _more_tables(result: Any) -> dict[str, list[Any]]:
-    """Tables that the JSON of a result does not hold."""
-    if isinstance(result, Gear):
-        points = [
-            {"linkage": linkage.name, "point": point.name, "plane": point.plane, **_place(point)}
-            for linkage in result.ensemble
-            for point in linkage.mechanism.points
-        ]
-        return {"ensemble": points}
-    if not isinstance(result, Lives):
-        return {}
-    one_by_one = [
-        life_as_json(life, result.forecasts[life.key], result.gear) for life in result.lives
-    ]
-    joints = [
-        {"tail_no": each["tail_no"], "side": each["side"], **joint}
-        for each in one_by_one
-        for joint in each["joints"]
-    ]
-    return {"joints": joints}
-
-
-def _place(point: Point) -> dict[str, Any]:
-    return {"x_in": float(point.x), "y_in": float(point.y), "fixed": point.fixed}
-
-
 def to_frame(result: Any, of: str = "") -> pd.DataFrame:
-    values = {**to_dict(result), **_more_tables(result)}
-    lists = {name: rows for name, rows in values.items() if isinstance(rows, list)}
+    lists = {name: rows for name, rows in to_dict(result).items() if isinstance(rows, list)}
     known = [name for name in _MAIN if name in lists]
     name = of or next((name for name in known if lists[name]), "".join(known[:1]))
     if name in lists:

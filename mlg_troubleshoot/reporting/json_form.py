@@ -19,6 +19,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.json_outputs import (
     CheckedInspection,
     CheckedJoint,
+    CheckOutput,
     ConditionOfData,
     DiagnoseOutput,
     ExtensionGain,
@@ -90,12 +91,13 @@ def check_as_json(
     problems: Sequence[Problem],
     warnings: Sequence[str],
 ) -> dict[str, Any]:
-    whole = {
-        **_head(gear),
-        "inspections": [_inspection(j, gear) for j in judgements],
-        **_tail(problems, warnings),
-    }
-    return cast("dict[str, Any]", plain(whole))
+    return written(
+        CheckOutput,
+        gear=filled(GearIdentity, gear),
+        inspections=[_inspection(judgement, gear) for judgement in judgements],
+        problems=problems,
+        warnings=warnings,
+    )
 
 
 class CheckText:
@@ -104,8 +106,10 @@ class CheckText:
     """
 
     def __init__(self, gear: Gear, problems: Sequence[Problem], warnings: Sequence[str]) -> None:
-        self.begin = as_text(_head(gear))[:-1] + ', "inspections": [\n'
-        self.end = "\n], " + as_text(_tail(problems, warnings))[1:] + "\n"
+        whole = as_text(check_as_json(gear, (), problems, warnings))
+        head, none, tail = whole.partition('"inspections": []')
+        self.begin = head + none[:-1] + "\n"
+        self.end = f"\n]{tail}\n"
         self._joint = ""
 
     def joined(self, lines: str) -> str:
@@ -116,17 +120,6 @@ class CheckText:
 
 def inspection_lines(gear: Gear, judgements: Iterable[Judgement]) -> str:
     return ",\n".join(as_text(_inspection(judgement, gear)) for judgement in judgements)
-
-
-def _head(gear: Gear) -> dict[str, Any]:
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "gear": written(GearIdentity, gear),
-    }
-
-
-def _tail(problems: Sequence[Problem], warnings: Sequence[str]) -> dict[str, Any]:
-    return {"problems": list(problems), "warnings": list(warnings)}
 
 
 def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:

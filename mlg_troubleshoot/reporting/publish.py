@@ -8,8 +8,8 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from contextlib import closing, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from mlg_troubleshoot.errors import UsageError
@@ -17,7 +17,6 @@ from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
 
-Progress = Callable[[int, int], None]
 FORMATS = ("html", "pdf")
 PAGES = ("A4", "Letter")
 _BOXES = (
@@ -64,95 +63,69 @@ def safe_stem(*identity: str | None) -> str:
 
 
 def publish(
-    document: Document,
+    documents: Iterable[Document],
     directory: Path,
     *,
     formats: Sequence[str] = FORMATS,
     page: str = "A4",
-    engine: PdfEngine | None = None,
+    progress: Callable[[int], object] = lambda _done: None,
     replace_files: bool = True,
-) -> WrittenReport:
+) -> list[WrittenReport]:
+    """Write documents, the PDFs in one child process; files of documents that carry the same
+    identity are numbered.
+    """
     unknown = sorted(set(formats) - set(FORMATS))
     if unknown or page not in PAGES:
         asked, known = (unknown[0], FORMATS) if unknown else (page, PAGES)
         raise UsageError(
             f"a report cannot be written as {asked!r}", f"Give one of {', '.join(known)}."
         )
-    real = Path(os.path.realpath(directory))
-    files = [real / f"{document.stem}.{each}" for each in FORMATS]
-    old = next((file for file in files if file.exists()), None)
-    if old is not None and not replace_files:
-        raise UsageError(
-            f"--report {old} exists: it was not replaced",
-            "Give --report another folder, or --force to replace the file.",
-        )
-    running = engine or PdfEngine()
-    wanted = set(formats)
-    notes = []
-    made: dict[str, Path] = {}
-    web = directory / f"{document.stem}.html"
-    try:
-        if "pdf" in wanted:
-            # The child starts while the HTML is being made; if it cannot, the job says so.
-            with suppress(PdfError):
-                running.start()
-        if "pdf" in wanted:
-            try:
-                html = render(document, page, for_pdf=True)
-                pdf, boxes = running.convert(html, page, document.created)
-                if boxes:
-                    notes.append(_BOXES)
-                    wanted.add("html")
-                made["pdf"] = _written(directory / f"{document.stem}.pdf", pdf)
-            except PdfError as error:
-                instead = f"Open {web.name} in a web browser and print it"
-                notes.append(f"No PDF: {error}. {instead}; it is laid out for {page} paper.")
-                wanted.add("html")
-        if "html" in wanted:
-            made["html"] = _written(web, render(document, page).encode("utf-8"))
-        return WrittenReport(made.get("html"), made.get("pdf"), tuple(notes))
-    finally:
-        if engine is None:
-            running.close()
-
-
-def _written(file: Path, data: bytes) -> Path:
-    write_bytes(file, data)
-    return file
-
-
-def publish_all(
-    documents: Iterable[Document],
-    total: int,
-    directory: Path,
-    *,
-    formats: Sequence[str],
-    page: str,
-    progress: Progress | None,
-    replace_files: bool = True,
-) -> list[WrittenReport]:
-    """Write many documents, the PDFs in one child process."""
-    engine = PdfEngine()
     seen: Counter[str] = Counter()
     written: list[WrittenReport] = []
-    try:
+    with closing(PdfEngine()) as engine:
+        if "pdf" in formats:
+            # The child starts while the first page is being made; if it cannot, the job says so.
+            with suppress(PdfError):
+                engine.start()
         for document in documents:
-            # Files of inspections that carry the same identity are numbered: none overwrites
-            # another.
             seen[document.stem] += 1
             again = seen[document.stem]
-            own = document if again == 1 else replace(document, stem=f"{document.stem}-{again}")
-            report = publish(
-                own,
-                directory,
-                formats=formats,
-                page=page,
-                engine=engine,
-                replace_files=replace_files,
+            file = directory / (document.stem if again == 1 else f"{document.stem}-{again}")
+            if not replace_files:
+                _require_new(file)
+            written.append(_written(document, file, set(formats), page, engine))
+            progress(len(written))
+    return written
+
+
+def _require_new(file: Path) -> None:
+    for kind in FORMATS:
+        old = Path(os.path.realpath(file)).with_suffix(f".{kind}")
+        if old.exists():
+            raise UsageError(
+                f"--report {old} exists: it was not replaced",
+                "Give --report another folder, or --force to replace the file.",
             )
-            written.append(report)
-            if progress is not None:
-                progress(len(written), total)
-        return written
-    finally:
-        engine.close()
+
+
+def _written(
+    document: Document, file: Path, wanted: set[str], page: str, engine: PdfEngine
+) -> WrittenReport:
+    notes = []
+    web = file.with_suffix(".html")
+    paper = None
+    if "pdf" in wanted:
+        try:
+            html = render(document, page, for_pdf=True)
+            pdf, boxes = engine.convert(html, page, document.created)
+            paper = file.with_suffix(".pdf")
+            write_bytes(paper, pdf)
+            notes += [_BOXES] * boxes
+        except PdfError as error:
+            instead = f"Open {web.name} in a web browser and print it"
+            notes.append(f"No PDF: {error}. {instead}; it is laid out for {page} paper.")
+    # What the PDF cannot show stands in the HTML.
+    if "html" not in wanted and not notes:
+        return WrittenReport(None, paper, ())
+    write_bytes(web, render(document, page).encode("utf-8"))
+    return WrittenReport(web, paper, tuple(notes))

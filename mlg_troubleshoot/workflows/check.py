@@ -583,7 +583,7 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
         )
     from mlg_troubleshoot.reporting.inspection_report import batch_document, inspection_document
     from mlg_troubleshoot.reporting.provenance import provenance_of
-    from mlg_troubleshoot.reporting.publish import publish, publish_all
+    from mlg_troubleshoot.reporting.publish import publish
 
     gear = result.gear
     judgements = result.judgements
@@ -605,14 +605,12 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
         )
         for k in places
     )
-    reports = publish_all(
+    write = partial(
+        publish, directory=directory, formats=formats, page=page, replace_files=replace_files
+    )
+    reports = write(
         documents,
-        len(places),
-        directory,
-        formats=formats,
-        page=page,
-        progress=on_written,
-        replace_files=replace_files,
+        progress=lambda done: None if on_written is None else on_written(done, len(places)),
     )
     if alone:
         return tuple(reports)
@@ -622,8 +620,7 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
         for place, (html, pdf) in zip(places, names, strict=True)
     }
     summary = batch_document(judgements, problems, gear, made, result.notes, links, unit)
-    whole = publish(summary, directory, formats=formats, page=page, replace_files=replace_files)
-    return (whole, *reports)
+    return (*write([summary]), *reports)
 
 
 def _found_and_left(result: CheckResult, store: Store | None) -> dict[int, list[AsFoundAsLeft]]:

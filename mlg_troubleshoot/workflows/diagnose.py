@@ -325,7 +325,8 @@ def write_diagnosis_report(
     made = provenance_of(result.gear, result.inputs_sha256)
     findings = (result.extension, unit, result.problems, result.notes)
     document = diagnosis_document(result.diagnosis, result.gear, made, *findings)
-    return publish(document, directory, page=page, replace_files=replace_files)
+    (report,) = publish([document], directory, page=page, replace_files=replace_files)
+    return report
 
 
 def load_model_extension(

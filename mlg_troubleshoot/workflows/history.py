@@ -212,11 +212,10 @@ def write_pages(
         for life in shown.lives
     )
     if not fleet:
-        return [*map(write, documents)]
+        return write(documents)
     sheet = fleet_report.fleet_document(shown.lives, shown.lines, shown.gear, made, unit)
-    written = [write(sheet)]
     # The pages behind the lines of a fleet are for the screen.
-    return written + [write(each, formats=("html",)) for each in documents]
+    return write([sheet]) + write(documents, formats=("html",))
 
 
 def key_of(store: Store, tail: str, side: str) -> GearKey:

@@ -65,7 +65,8 @@ def make(gear: Gear, tmp_path_factory: pytest.TempPathFactory) -> Make:
         document = diagnosis_document(
             found, gear, made_of, extension, notes=("Column 'mood' is not known.",)
         )
-        written = publish(document, tmp_path_factory.mktemp("report"), formats=("html",))
+        folder = tmp_path_factory.mktemp("report")
+        (written,) = publish([document], folder, formats=("html",))
         assert written.html is not None
         html = written.html.read_text(encoding="utf-8")
         body = re.sub(r"<style>.*?</style>", " ", html, flags=re.DOTALL)

@@ -121,7 +121,8 @@ def write_inspection_report(
 ) -> WrittenReport:
     """Write the report of one inspection."""
     document = inspection_document(judgement, gear, provenance, problems, unit)
-    return publish(document, folder, formats=formats, page=page)
+    (report,) = publish([document], folder, formats=formats, page=page)
+    return report
 
 
 def write_reports(

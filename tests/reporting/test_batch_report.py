@@ -33,7 +33,8 @@ def write_batch_report(
     notes: Sequence[str] = (),
 ) -> WrittenReport:
     document = batch_document(judgements, problems, gear, provenance, notes)
-    return publish(document, folder, formats=formats)
+    (report,) = publish([document], folder, formats=formats)
+    return report
 
 
 PROBLEM = Problem("side", "fleet.csv", None, 7, "side", "C7", "LEFT", "LH or RH", "Write LH or RH.")
