@@ -10,7 +10,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
@@ -306,18 +306,12 @@ def write(result: str) -> None:
     write_pieces((result, "\n"))
 
 
-def write_json(result: dict[str, Any] | Iterator[str]) -> None:
-    """Write a result as JSON to stdout, or the pieces of it if it is an iterator."""
-    if isinstance(result, dict):
-        pieces: Iterable[str] = (
-            json.dumps(result, allow_nan=False, ensure_ascii=False, indent=1),
-            "\n",
-        )
-    else:
-        pieces = result
+def write_json(result: dict[str, Any]) -> None:
+    """Write a result as JSON to stdout."""
     utf8 = codecs.lookup(sys.stdout.encoding or "ascii").name == "utf-8"
     beyond = re.compile("[\ud800-\udfff]" if utf8 else "[^\x00-\x7f]")
-    write_pieces(beyond.sub(lambda found: json.dumps(found[0])[1:-1], piece) for piece in pieces)
+    text = json.dumps(result, allow_nan=False, ensure_ascii=False, indent=1)
+    write(beyond.sub(lambda found: json.dumps(found[0])[1:-1], text))
 
 
 def write_pieces(pieces: Iterable[str]) -> None:

@@ -16,14 +16,12 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.paper.study import StudyFindings
+    pass
 
 EPILOG = (
     "Example: mlg study; the paper's design: mlg study --design lhs; the table"
     " that mlg check uses: mlg study --write-table"
 )
-# Bar of the largest first-order index. [characters]
-_LONGEST_BAR = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +50,7 @@ class StudyFlags:
     ] = None
     csv: Annotated[Path | None, typer.Option(metavar="OUT.csv", help="One line per joint.")] = None
     figure: Annotated[
-        Path | None, typer.Option(metavar="OUT.svg", help="The indices of all joints as bars.")
+        Path | None, typer.Option(metavar="OUT.svg", help="A picture of the indices of all joints.")
     ] = None
     write_table: Annotated[
         bool,
@@ -95,7 +93,9 @@ def study(flags: StudyFlags) -> None:
 
         output.write_json(study_as_json(findings))
     else:
-        _show(findings)
+        rows = [*zip(gear.joints, findings.result.table.joints, strict=True)]
+        screen = output.console(elsewhere=output.WIDEST)
+        output.show_page("study", screen, f=findings, rows=rows)
     if flags.csv is not None:
         task.write_study_csv(findings, flags.csv)
     if flags.figure is not None:
@@ -115,21 +115,6 @@ def _size(text: str | None) -> Sequence[int | None]:
             f"size {text!r}", "Give N1,N2,ITERATIONS, for example 100,1000,10."
         ) from None
     return n1, n2, iterations
-
-
-def _show(findings: StudyFindings) -> None:
-    import numpy as np
-
-    rows = [*zip(findings.gear.joints, findings.result.table.joints, strict=True)]
-    first = np.nan_to_num([entry.first_order for _, entry in rows]).clip(0.0)
-    lengths = _LONGEST_BAR * first / max(first.max(), 1e-9)
-    output.show_page(
-        "study",
-        output.console(elsewhere=output.WIDEST),
-        f=findings,
-        rows=rows,
-        bars=["█" * round(length) for length in lengths],
-    )
 
 
 app = options.alone(study, EPILOG)

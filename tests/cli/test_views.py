@@ -204,16 +204,6 @@ def test_a_study_stands_whole_on_80_columns(monkeypatch: pytest.MonkeyPatch) -> 
     assert max(map(len, shown.splitlines())) <= 80
 
 
-def test_bars_of_a_study_are_as_long_as_its_first_order_indices(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    shown = at_width(monkeypatch, 80, "study").out
-    bars = re.findall(r"^#\d+ +(0\.\d{4}) +(█+)", shown, re.MULTILINE)
-    per_share = 50 / max(float(first) for first, _ in bars)
-    assert [len(bar) for _, bar in bars] == [round(float(first) * per_share) for first, _ in bars]
-    assert len(bars) == 10
-
-
 def table(width: int, *headings: str, spare: tuple[str, ...] = ()) -> list[str]:
     """Two rows of a table, as they stand on a screen of some width."""
     screen = output.console()
