@@ -116,11 +116,7 @@ class _Event:
 
     @property
     def moment(self) -> tuple[object, ...]:
-        return self.at, self.landings, self.joints
-
-    @property
-    def landings(self) -> float | None:
-        return self.visit.inspection.gear_landings
+        return self.at, self.joints
 
     @property
     def occasion(self) -> _Event:
@@ -136,10 +132,6 @@ def _is_later(one: _Event, other: _Event) -> bool:
         return True
     if one.visit is other.visit or surely_later(other.at, one.at):
         return False
-    if one.at is not None and one.at == one.visit.at == other.at == other.visit.at:
-        landings, before = one.landings, other.landings
-        if landings is not None and before is not None and landings != before:
-            return landings > before
     return one.visit.typed and one.visit.place > other.visit.place
 
 

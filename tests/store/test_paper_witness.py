@@ -123,14 +123,15 @@ def _change_one(connection: sqlite3.Connection, draw: random.Random, seq: int) -
 TAMPERS: tuple[Tamper, ...] = (_cut_back, _take_one, _change_one)
 
 
+@pytest.mark.parametrize("times", [8, pytest.param(120, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("tamper", TAMPERS)
 def test_a_log_that_was_cut_back_or_changed_is_found_by_any_report(
-    kept: Path, tmp_path: Path, gear: Gear, tamper: Tamper
+    kept: Path, tmp_path: Path, gear: Gear, tamper: Tamper, times: int
 ) -> None:
-    draw = random.Random(tamper.__name__)
+    draw = random.Random(f"{tamper.__name__} {times}")
     some = reports(kept)
     count = Store(kept / "store.sqlite").head()[0]
-    for n in range(40):
+    for n in range(times):
         store = tmp_path / f"{n}.sqlite"
         shutil.copy(kept / "store.sqlite", store)
         with sqlite3.connect(store) as connection:

@@ -89,14 +89,13 @@ def test_a_reading_of_the_day_of_a_repair_counts_only_against_the_gear(
     assert (3 in found.inspection.clearance_in) is stands
 
 
-def test_of_two_readings_of_one_day_the_worse_stands(at: At) -> None:
-    found = at(of(JAN, {3: WORN}), of(JAN, {3: SOUND}), of(FEB, {6: SOUND}))
-    assert found.inspection.clearance_in[3] == WORN
-
-
-def test_landings_order_two_visits_of_one_day(at: At) -> None:
-    first, second = of(JAN, {3: WORN}, gear_landings=90), of(JAN, {3: SOUND}, gear_landings=91)
-    assert at(second, first, of(FEB, {6: SOUND})).inspection.clearance_in[3] == SOUND
+@pytest.mark.parametrize("landings", [(None, None), (100, 500)])
+def test_of_two_readings_of_one_day_the_worse_stands(
+    at: At, landings: tuple[float | None, float | None]
+) -> None:
+    worn = of(JAN, {3: WORN}, gear_landings=landings[0])
+    sound = of(JAN, {3: SOUND}, gear_landings=landings[1])
+    assert at(worn, sound, of(FEB, {6: SOUND})).inspection.clearance_in[3] == WORN
 
 
 def test_an_older_reading_keeps_the_uncertainty_of_its_gauge(at: At) -> None:

@@ -127,11 +127,6 @@ class Told:
             return one > two
         if self.visit == other.visit:
             return False
-        mine, its = self.known.drawn, other.known.drawn
-        if one is not None and one == mine.day == two == its.day:
-            landed = mine.landings, its.landings
-            if landed[0] is not None and landed[1] is not None and landed[0] != landed[1]:
-                return landed[0] > landed[1]
         return self.known.typed and self.known.place > other.known.place
 
 

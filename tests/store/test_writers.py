@@ -6,6 +6,7 @@ import random
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -53,28 +54,27 @@ def test_a_full_disk_leaves_the_old_store_whole_and_says_so(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_a_writer_killed_at_any_moment_leaves_all_of_its_rows_or_none(tmp_path: Path) -> None:
-    rng, seen = random.Random(5), set()
-    began = time.monotonic()
-    with writer(tmp_path / "timed.sqlite", 1, 3001) as whole:
-        assert whole.stdout is not None
-        whole.stdout.readline()
-        ready = time.monotonic()
-    lasts = time.monotonic() - ready
-    for n in range(20):
+def test_a_writer_killed_at_any_moment_loses_nothing_that_it_said_was_kept(tmp_path: Path) -> None:
+    rng, blocks, step = random.Random(5), 10, 40
+    ends = Counter[int]()
+    for n in range(40):
         place = tmp_path / f"{n}.sqlite"
-        with writer(place, 1, 3001) as process:
+        with writer(place, 1, 1 + blocks * step, 0, step) as process:
             assert process.stdout is not None
-            process.stdout.readline()
-            time.sleep(rng.uniform(0.0, 1.1 * lasts))
+            # Somewhere within the block after one that was kept, or before the first one.
+            said = [process.stdout.readline() for _ in range(1 + rng.randrange(blocks))]
+            time.sleep(rng.expovariate(1 / 0.02))
             process.kill()
+            said += process.stdout.readlines()
         count, broken = Store(place).verify()
         assert broken is None
-        assert count in (0, 6000)
-        seen.add(count)
-        Store(place).add(places.records(1, 3001))
-        assert Store(place).verify() == (6000, None)
-    assert 0 in seen, f"no kill came in time: {lasts:.2f} of {time.monotonic() - began:.2f} s"
+        assert count % (2 * step) == 0
+        kept = count // (2 * step)
+        assert kept >= len(said) - 1
+        ends[kept] += 1
+        Store(place).add(places.records(1, 1 + blocks * step))
+        assert Store(place).verify() == (2 * blocks * step, None)
+    assert len(ends) > 3, f"every kill came at one moment: {ends}"
 
 
 @pytest.mark.slow
