@@ -118,6 +118,22 @@ class RecordKind(StrEnum):
 
 _SINCE_2 = ("recorded_at", "recorded_by", "origin")
 _KINDS = {kind.value: kind for kind in RecordKind}
+
+
+def _is_moment(text: str) -> bool:
+    """Whether a text is a day or a time in ISO 8601, or nothing."""
+    try:
+        return not text or bool(datetime.fromisoformat(text))
+    except ValueError:
+        return False
+
+
+# What a column holds beyond its type.
+_FORMS: Mapping[str, Callable[[str], bool]] = {
+    "kind": _KINDS.__contains__,
+    "day": _is_moment,
+    "recorded_at": _is_moment,
+}
 _TEXTS = ("kind", "record_id", "tail_no", "side", "day")
 _BYTES = ("identity", "body", "hash")
 _NAMES = _records.c.keys()
@@ -500,7 +516,8 @@ class Store:
     def _record(self, row: Any) -> Record:
         """A row as a record; a column that cannot be one is named."""
         for name, value, kind in zip(_NAMES, row, _TYPES, strict=True):
-            if value.__class__ is not kind or (name == "kind" and value not in _KINDS):
+            is_one = value.__class__ is kind
+            if not is_one or (name in _FORMS and not _FORMS[name](value)):
                 found = "too large" if value is None else repr(value)[:60]
                 raise StoreError(
                     f"store {self.place}: record {row.seq}, column {name!r} cannot be read:"

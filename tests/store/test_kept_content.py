@@ -314,6 +314,15 @@ def test_a_packed_record_of_more_than_a_megabyte_is_not_fetched(place: Path) -> 
     assert peak_mb < 50
 
 
+@pytest.mark.parametrize("column", ["day", "recorded_at"])
+def test_a_record_whose_moment_is_not_one_is_named(place: Path, column: str) -> None:
+    tampered(place, f"UPDATE mlg_records SET {column} = '2026-13-01' WHERE seq = 1")
+    run = mlg("history", "N1", "LH", "--no-forecast")
+    assert run.code == 5
+    assert f"record 1, column {column!r} cannot be read: '2026-13-01'" in run.err
+    assert mlg("history", "verify").code == 1
+
+
 @pytest.mark.parametrize("version", ["abc", -3, 0, 99])
 def test_a_schema_version_that_is_not_valid_is_named(place: Path, version: object) -> None:
     tampered(place, "UPDATE mlg_meta SET schema_version = ?", version)
