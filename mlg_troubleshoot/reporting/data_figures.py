@@ -1,6 +1,4 @@
-"""Figures of the data of a diagnosis: the values that each technician wrote, when, and what is
-blank.
-"""
+"""Figures of the data of a diagnosis: the values that each technician wrote, and what is blank."""
 
 from __future__ import annotations
 
@@ -9,8 +7,8 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.columns import LANDINGS, TECHNICIAN_ID
-from mlg_troubleshoot.reporting.diagnosis_figures import Residuals, against_column, lanes
-from mlg_troubleshoot.reporting.figures import SOFT, Axis
+from mlg_troubleshoot.reporting.diagnosis_figures import Residuals, lanes
+from mlg_troubleshoot.reporting.figures import Axis
 
 # Lines of technicians that are drawn, those who wrote most; cells of a row of blanks. [1]
 _MOST = 8
@@ -18,7 +16,7 @@ _CELLS = 24
 
 
 def data_figures(residuals: Residuals) -> list[tuple[Markup, str]]:
-    """Draw what was written: by whom and in what steps, when, and which joints were not read.
+    """Draw what was written: by whom and in what steps, and which joints were not read.
 
     Returns
     -------
@@ -35,8 +33,6 @@ def data_figures(residuals: Residuals) -> list[tuple[Markup, str]]:
             " ones a limit gauge, or the end of a gauge.",
         )
     ]
-    if "day" in table.quantities and np.isfinite(table.quantities["day"]).any():
-        figures.append((_dates(residuals), "One line is one inspection."))
     if np.isnan(table.clearance_in).any():
         figures.append(
             (
@@ -72,18 +68,6 @@ def _values(residuals: Residuals) -> Markup:
         tops = place + 1 - 0.9 * counts / counts.max(initial=1)
         for value, top in zip(found.tolist(), tops.tolist(), strict=True):
             plot.canvas.line(*plot.at(value, place + 1), *plot.at(value, top))
-    return plot.canvas.svg()
-
-
-def _dates(residuals: Residuals) -> Markup:
-    days = against_column(residuals, "day")
-    people = _people(residuals)
-    across = Axis.around(days.label, days.values.tolist(), 0.02)
-    plot = lanes("When each technician read", across, [name for name, _rows in people])
-    for place, (_name, rows) in enumerate(people):
-        for day in days.values[rows & np.isfinite(days.values)].tolist():
-            ends = plot.at(day, place + 0.3), plot.at(day, place + 0.9)
-            plot.canvas.line(*ends[0], *ends[1], colour=SOFT, width=0.8)
     return plot.canvas.svg()
 
 

@@ -22,7 +22,6 @@ from pypdf.generic import (
     ArrayObject,
     BooleanObject,
     DictionaryObject,
-    Fit,
     NameObject,
     NumberObject,
     TextStringObject,
@@ -50,12 +49,11 @@ def serve(requests: BinaryIO, answers: BinaryIO, fonts: Mapping[str, bytes]) -> 
             size = getattr(plutoprint, f"PAGE_SIZE_{job['page'].upper()}")
             book = plutoprint.Book(size)
             book.custom_resource_fetcher = OwnFonts()
-            # Links within the document become named destinations only where the document has an
-            # address.
+            # A link to a file next to the document is one only where the document has an address.
             book.load_html(html, base_url=_HERE)
             stream = io.BytesIO()
             book.write_to_pdf_stream(stream)
-            about = job["sections"], job["title"], job["created"], job["keywords"]
+            about = job["title"], job["created"], job["keywords"]
             pdf, boxes = finished(stream.getvalue(), *about)
         except (plutoprint.Error, PyPdfError, OSError, ValueError) as error:
             answer = {"error": str(error) or type(error).__name__, "length": 0}
@@ -66,11 +64,8 @@ def serve(requests: BinaryIO, answers: BinaryIO, fonts: Mapping[str, bytes]) -> 
         answers.flush()
 
 
-def finished(
-    pdf: bytes, sections: Mapping[str, str], title: str, created: str, keywords: str
-) -> tuple[bytes, bool]:
-    """Give a PDF its title, keywords, language, dates and a bookmark for each section (anchor to
-    heading).
+def finished(pdf: bytes, title: str, created: str, keywords: str) -> tuple[bytes, bool]:
+    """Give a PDF its title, keywords, language and dates.
 
     Also tell whether it shows the box that stands for a character that no font has. The dates are
     those given, so that the same document always has the same bytes.
@@ -90,18 +85,11 @@ def finished(
                     NameObject("/D"): ArrayObject([NumberObject(0), NameObject("/Fit")]),
                 }
             )
-    places = writer.named_destinations
-    for anchor, heading in sections.items():
-        place = places[anchor]
-        page = writer.get_destination_page_number(place)
-        writer.add_outline_item(title=heading, page_number=page, fit=Fit.xyz(left=0, top=place.top))
     root = writer.root_object
     root[NameObject("/Lang")] = TextStringObject("en")
     root[NameObject("/ViewerPreferences")] = DictionaryObject(
         {NameObject("/DisplayDocTitle"): BooleanObject(True)}
     )
-    if sections:
-        writer.page_mode = "/UseOutlines"
     writer.metadata = {
         "/Title": title,
         "/Keywords": keywords,

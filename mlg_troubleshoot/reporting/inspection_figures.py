@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 
 from markupsafe import Markup
 
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.reporting import figures
-from mlg_troubleshoot.reporting.figures import INK, PALE, SOFT, Canvas
+from mlg_troubleshoot.reporting.figures import INK, PALE, SOFT, Canvas, Marker
 from mlg_troubleshoot.reporting.formats import Lengths
-
-_PLAIN = "plain model (bound)"
 
 
 def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
@@ -24,56 +21,42 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
         return None
     over = a.over_travel_in
     under = a.under_travel_in
-    margin = a.margin_in
     worst = a.predicted_displacement_in
     sense = 1.0 if over >= -under else -1.0
     u2 = 2.0 * (a.standard_uncertainty_in or 0.0)
-    measured = a.inspection.measured_displacement_in
-    low, high = (sense * value for value in a.geometry_spread_in or (0.0, 0.0))
-    upper = sense * (a.predicted_upper_in or 0.0)
-    bound = sense * (a.rigid_displacement_in or 0.0)
     what = "As loaded (expected)" if a.as_loaded else "Worst case (bound)"
-    what = "With the extension" if bound else what
-    shown = partial(lengths.bare, signed=True)
-    lanes = {what: f"{shown(under)} / {shown(over)}"}
-    if measured is not None:
-        lanes = {"Measured on the gear": shown(measured), **lanes}
-    if bound:
-        lanes[_PLAIN] = shown(bound)
-    if abs(upper) > worst + 5e-5:
-        lanes["unmeasured at limit"] = shown(upper)
+    what = "With the extension" if a.rigid_displacement_in else what
+    # Of each lane its name, its ends [in] and how they are marked.
+    lanes: list[tuple[str, tuple[float, ...], Marker]] = [(what, (under, over), "diamond")]
+    if a.inspection.measured_displacement_in is not None:
+        measured = (a.inspection.measured_displacement_in,)
+        lanes.insert(0, ("Measured on the gear", measured, "triangle"))
+    if a.rigid_displacement_in:
+        lanes.append(("plain model (bound)", (sense * a.rigid_displacement_in,), "diamond"))
+    if a.predicted_upper_in is not None and a.predicted_upper_in > worst + 5e-5:
+        lanes.append(("unmeasured at limit", (sense * a.predicted_upper_in,), "ring"))
     if a.geometry_spread_in:
-        lanes["other geometries"] = " … ".join(dict.fromkeys((shown(low), shown(high))))
-    farthest = max(margin, worst + u2, *map(abs, (measured or 0.0, upper, high, bound)))
-    plot = _gauge(lanes, margin, 1.06 * farthest, lengths)
-    canvas = plot.canvas
-    rows = {name: place + 0.5 for place, name in enumerate(lanes)}
-
-    def at(value_in: float, lane: str) -> figures.Place:
-        return plot.at(lengths.unit.from_inches(value_in), rows[lane])
-
-    if measured is not None:
-        ends = at(0.0, "Measured on the gear"), at(measured, "Measured on the gear")
-        canvas.line(*ends[0], *ends[1], width=2.0)
-        canvas.marker("triangle", *ends[1], 6.5)
-    canvas.line(*at(under, what), *at(over, what), width=4)
-    x, y = at(sense * worst - u2, what)
-    canvas.rectangle(x, y - 6, at(sense * worst + u2, what)[0] - x, 12, colour=INK)
-    for end in (under, over):
-        canvas.marker("diamond", *at(end, what), 5.5)
-    if bound:
-        canvas.line(*at(0.0, _PLAIN), *at(bound, _PLAIN), width=4)
-        canvas.marker("diamond", *at(bound, _PLAIN), 5.5)
-    if "unmeasured at limit" in lanes:
-        ends = at(0.0, "unmeasured at limit"), at(upper, "unmeasured at limit")
-        canvas.line(*ends[0], *ends[1], width=1.5, dash="5 3")
-        canvas.marker("ring", *ends[1], 4.5)
-    if "other geometries" in lanes:
-        canvas.line(*at(low, "other geometries"), *at(high, "other geometries"), width=1.5)
-        for end in (low, high):
-            x, y = at(end, "other geometries")
-            canvas.line(x, y - 5, x, y + 5, width=1.5)
-    return canvas.svg()
+        low, high = a.geometry_spread_in
+        lanes.append(("other geometries", (sense * low, sense * high), "circle"))
+    farthest = max(a.margin_in, worst + u2, *(abs(end) for _, ends, _ in lanes for end in ends))
+    said = {
+        name: " / ".join(dict.fromkeys(lengths.bare(end, True) for end in ends))
+        for name, ends, _ in lanes
+    }
+    plot = _gauge(said, a.margin_in, 1.06 * farthest, lengths)
+    shown = lengths.unit.from_inches
+    for place, (name, ends, marker) in enumerate(lanes):
+        y = place + 0.5
+        start = ends[0] if len(ends) > 1 else 0.0
+        width = 4.0 if name == what else 1.5
+        plot.canvas.line(*plot.at(shown(start), y), *plot.at(shown(ends[-1]), y), width=width)
+        if name == what:
+            left, middle = plot.at(shown(sense * worst - u2), y)
+            right, _ = plot.at(shown(sense * worst + u2), y)
+            plot.canvas.rectangle(left, middle - 6, right - left, 12, colour=INK)
+        for end in ends:
+            plot.canvas.marker(marker, *plot.at(shown(end), y), 5.0)
+    return plot.canvas.svg()
 
 
 def _gauge(

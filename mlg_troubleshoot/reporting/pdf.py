@@ -1,6 +1,4 @@
-"""HTML to PDF in a child process with a time limit, with bookmarks and a check that the fonts are
-inside.
-"""
+"""HTML to PDF in a child process with a time limit, with a check that the fonts are inside."""
 
 from __future__ import annotations
 
@@ -73,7 +71,6 @@ class PdfEngine:
         body = html.encode("utf-8")
         dated = created.astimezone(UTC).strftime("D:%Y%m%d%H%M%SZ")
         about = {
-            "sections": sections_of(html),
             "title": _found(_TITLE, html),
             "created": dated,
             "keywords": _found(_KEYWORDS, html),
@@ -114,23 +111,8 @@ class PdfEngine:
         return made, bool(answer["boxes"])
 
 
-_HEADING = re.compile(
-    r'<h2\b[^>]*\bid="(?P<id>[a-z0-9-]+)"[^>]*><a href="#(?P=id)">(?P<text>.*?)</a></h2>', re.DOTALL
-)
 _TITLE = re.compile(r"<title>(.*?)</title>", re.DOTALL)
 _KEYWORDS = re.compile(r'<meta name="keywords" content="(\w+)">')
-
-
-def sections_of(html: str) -> dict[str, str]:
-    """Return anchor and heading of each section of a document made from the base template, for the
-    bookmarks.
-    """
-    sections = {}
-    for found in _HEADING.finditer(html):
-        without_tags = re.sub(r"<[^>]*>", " ", found["text"])
-        words = html_text.unescape(without_tags).split()
-        sections[found["id"]] = " ".join(words)
-    return sections
 
 
 def _found(pattern: re.Pattern[str], html: str) -> str:

@@ -1,4 +1,4 @@
-"""The PDF: fonts inside, text to search, bookmarks, the same bytes every time, and no way out of
+"""The PDF: fonts inside, text to search, the same bytes every time, and no way out of
 the sandbox.
 """
 
@@ -25,7 +25,7 @@ from mlg_troubleshoot.reporting import pdf
 from mlg_troubleshoot.reporting.engine import check_fonts
 from mlg_troubleshoot.reporting.html import font_faces, render
 from mlg_troubleshoot.reporting.inspection_report import inspection_document
-from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError, sections_of
+from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
 from mlg_troubleshoot.reporting.provenance import ReportProvenance, provenance_of
 
 from .conftest import FAILURE, Judge, Made, write_inspection_report
@@ -104,17 +104,6 @@ def test_each_page_names_the_record_the_program_and_its_number(failure: Made) ->
             "not maintenance data",
         ):
             assert words in said
-
-
-def test_there_is_a_bookmark_for_each_section_from_the_verdict_to_the_last_page(
-    failure: Made,
-) -> None:
-    reader = opened(failure.pdf)
-    sections = re.findall(r'<h2[^>]*id="[^"]*">(.*?)</h2>', failure.html)
-    assert [entry["/Title"] for entry in reader.outline] == sections
-    assert sections[0] == "COULD BE OUTSIDE"
-    ends = [reader.get_destination_page_number(reader.outline[k]) for k in (0, -1)]
-    assert ends == [0, len(reader.pages) - 1]
 
 
 def test_title_language_and_date_are_those_that_were_given(failure: Made) -> None:
@@ -247,8 +236,3 @@ def test_without_an_engine_the_html_still_comes_and_a_note_says_how_to_print(
     assert written.pdf is None
     assert written.html is not None
     assert written.html.is_file()
-
-
-def test_a_heading_with_markup_becomes_a_plain_bookmark() -> None:
-    html = '<h2 class="x" id="a-b"><a href="#a-b">One &amp; <b>two</b></a></h2>'
-    assert sections_of(html) == {"a-b": "One & two"}
