@@ -69,10 +69,21 @@ class TodaysVerdict:
     is_fine: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class LogEntry:
+    """A record in the log of a gear, the version of its inspection before it, and whether it
+    counts; what was recorded in two chains before they were merged is one entry.
+    """
+
+    record: Record
+    before: Record | None
+    counts: bool
+
+
 @dataclass(frozen=True)
 class GearLife:
-    """What stands of one gear: inspections and repairs in the order of time, and every record as it
-    came.
+    """What stands of one gear: inspections and repairs in the order of time, and every entry of its
+    log as it came.
 
     warnings: the records whose dates and landings disagree, and how to correct them; with any of
     them nothing is forecast.
@@ -83,10 +94,9 @@ class GearLife:
     """
 
     key: GearKey
-    records: tuple[Record, ...]
+    entries: tuple[LogEntry, ...]
     events: tuple[Moment, ...]
     warnings: tuple[str, ...]
-    voided: tuple[Record, ...] = ()
     overhauls: Mapping[int, frozenset[int]] = field(default_factory=dict)
     judged: Mapping[str, TodaysVerdict] = field(default_factory=dict)
     state: GearState | None = None
@@ -217,88 +227,95 @@ def is_readable(record: Record) -> bool:
 
 def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     places = _by_clock(_readable_or_not_void(records))
-    one = first_keys(places)
-    # The visit that each version of it is of, and that version of each which stands.
+    one = _first_keys(places)
+    # The visit that each version of it is of, and the last version of each.
     roots: dict[str, Record] = {}
-    kept: dict[Record, Record] = {}
+    last: dict[Record, Record] = {}
+    before: dict[str, Record] = {}
     others: dict[str, Record] = {}
+    void: set[Record] = set()
     for record in places:
         own = one[record.key]
         if record.kind is RecordKind.INSPECTION:
-            kept.setdefault(roots.setdefault(own, record), record)
+            last.setdefault(roots.setdefault(own, record), record)
         elif record.kind is RecordKind.CORRECTION:
             root = roots.get(one.get(more_of(record)["supersedes"], ""))
-            if root is not None:
+            if root is not None and own not in roots:
                 roots[own] = root
-                kept |= {root: record} if root in kept else {}
+                before[own] = last[root]
+                last[root] = record
         elif record.kind is RecordKind.VOID:
             gone = one.get(record.body["voids"], "")
-            kept.pop(roots.get(gone, record), None)
+            void |= {roots[gone]} if gone in roots else set()
             others.pop(gone, None)
         elif record.kind is not RecordKind.ASSESSMENT:
             others.setdefault(own, record)
-    moments: list[Moment] = []
-    for root, record in kept.items():
-        row = inspection_of(record)
-        entered = more_of(root).get("entered")
-        place = places[root] if entered is None else float(entered)
-        visit = GearVisit(row, place, row.source.file is None, record)
-        moments += [
-            *_stated(visit),
-            Moment.of(visit),
-        ]
+    entries = tuple(
+        LogEntry(
+            record,
+            before.get(record.key),
+            roots[record.key] not in void
+            if record.key in roots
+            else record.key in others or record.kind is RecordKind.VOID,
+        )
+        for record in places
+        if one[record.key] == record.key
+    )
+    visits = []
+    for root, record in last.items():
+        if root not in void:
+            row = inspection_of(record)
+            entered = more_of(root).get("entered")
+            place = places[root] if entered is None else float(entered)
+            visits.append(GearVisit(row, place, row.source.file is None, record))
+    moments = [at for visit in visits for at in _moments(visit)]
     # A repair that an inspection states is that of the same day which was recorded by itself; one
     # that came with an inspection falls with it.
     known = {(at.day, at.joints) for at in moments}
-    repaired = {None, *(r.record_id for r in kept.values() if inspection_of(r).is_repaired)}
-    alone = (_alone(r, places[r]) for r in others.values() if r.kind in _WORK)
-    moments += [
-        at
-        for at in alone
-        if (at.day, at.joints) not in known
-        if at.visit and at.visit.kept.body.get("stated_by") in repaired
-    ]
+    repaired = {None, *(v.kept.record_id for v in visits if v.inspection.is_repaired)}
+    for record in others.values():
+        if record.kind in _WORK and record.body.get("stated_by") in repaired:
+            typed = "stated_by" not in record.body
+            work = _moments(GearVisit(_work_of(record), places[record], typed, record))
+            moments += [at for at in work if (at.day, at.joints) not in known]
     moments.sort(key=lambda at: at.visit.place if at.visit else 0.0)
     events = tuple(moments[place] for place in in_order(moments))
-    void = (r for own, r in roots.items() if own == one[r.key] and r not in kept)
-    warnings = _disagreements(key, moments)
-    return GearLife(key, tuple(places), events, warnings, tuple(void), overhauls(events))
+    return GearLife(key, entries, events, _disagreements(key, moments), overhauls(events))
 
 
-def _stated(visit: GearVisit) -> list[Moment]:
-    """What an inspection states of repairs."""
+def _moments(visit: GearVisit) -> list[Moment]:
+    """The repairs that a visit states, and the visit, unless it is a repair by itself."""
     row = visit.inspection
+    is_alone = visit.kept.kind in _WORK
     done = [frozenset(row.restored_joints)] * bool(row.restored_joints)
     done += [frozenset()] * (row.rigging_checked is RiggingCheck.CORRECTED)
-    if row.repair_date is None:
-        return []
-    day = row.repair_date.isoformat()[:10]
-    return [Moment(day, None, joints, visit) for joints in done]
+    day = "" if row.repair_date is None else row.repair_date.isoformat()[:10]
+    if is_alone:
+        return [Moment(day, row.gear_landings, joints, visit, is_alone) for joints in done]
+    stated = [Moment(day, None, joints, visit) for joints in done if day]
+    return [*stated, Moment.of(visit)]
 
 
-def _alone(record: Record, place: float) -> Moment:
+def _work_of(record: Record) -> Inspection:
     """A repair that was recorded by itself."""
     body = record.body
-    joints = frozenset(body.get("joints", ()))
-    landings = body.get("landings")
+    joints = tuple(sorted(body.get("joints", ())))
     day = date.fromisoformat(record.day) if record.day else None
-    row = Inspection(
+    return Inspection(
         record.record_id or record.digest[:LEAST_OF_A_HASH],
         record.tail_no,
         Side(record.side),
         ClearanceConvention.RADIAL,
         {},
         inspection_date=day,
-        gear_landings=landings,
-        restored_joints=tuple(sorted(joints)),
+        gear_landings=body.get("landings"),
+        restored_joints=joints,
         rigging_checked=None if joints else RiggingCheck.CORRECTED,
         repair_date=datetime.fromisoformat(body["at"]) if "at" in body else day,
     )
-    visit = GearVisit(row, place, "stated_by" not in body, record)
-    return Moment(record.day, landings, joints, visit, is_alone=True)
 
 
-def first_keys(records: Iterable[Record]) -> dict[str, str]:
+def _first_keys(records: Iterable[Record]) -> dict[str, str]:
     """For each record, by its first hash, that of the record which says the same: what was recorded
     in two chains before they were merged is one.
     """

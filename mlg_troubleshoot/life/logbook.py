@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from itertools import groupby
@@ -11,7 +11,7 @@ from typing import Any
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.life.folding import GearLife, first_keys, inspection_of, more_of
+from mlg_troubleshoot.life.folding import GearLife, inspection_of
 from mlg_troubleshoot.store import Record, RecordKind
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
@@ -128,24 +128,19 @@ def log_of(life: GearLife, gear: Gear, joints: Collection[int] | None = None) ->
     """Every fact of a gear, and what was corrected or voided, in the order of time; what has no
     day stands where it was entered. `joints`: without readings of others.
     """
-    versions: dict[str, Inspection] = {}
-    one = first_keys(life.records)
-    void = _void(life.records, one)
     lines: list[LogLine] = []
-    for record in life.records:
-        if one[record.key] != record.key:
-            continue
+    for entry in life.entries:
+        record = entry.record
         about: dict[str, Any] = {
             "record_id": record.record_id or None,
             "hash": record.digest,
-            "counts": record.key not in void,
+            "counts": entry.counts,
         }
         if record.kind in _VISITS:
-            row = versions[record.key] = inspection_of(record)
+            row = inspection_of(record)
             about["gear_landings"] = row.gear_landings
-            old = one.get(more_of(record).get("supersedes", ""), "")
-            found = visit_lines(row, gear, versions.get(old), joints)
-            found += _verdict(life, record)
+            before = None if entry.before is None else inspection_of(entry.before)
+            found = visit_lines(row, gear, before, joints) + _verdict(life, record)
         else:
             about["gear_landings"] = record.body.get("landings")
             found = _other_lines(record)
@@ -164,17 +159,6 @@ def _without_corrected(lines: Sequence[LogLine]) -> list[LogLine]:
         gone = line.kind == "reading" and at[0] in wrong
         kept.append(replace(line, counts=False) if gone else line)
     return kept[::-1]
-
-
-def _void(records: Sequence[Record], one: Mapping[str, str]) -> set[str]:
-    """First hashes of what was voided, with the earlier versions of it."""
-    gone: set[str] = set()
-    for record in reversed(records):
-        if record.kind is RecordKind.VOID:
-            gone.add(one.get(record.body["voids"], ""))
-        elif record.kind is RecordKind.CORRECTION and one[record.key] in gone:
-            gone.add(one.get(record.body["supersedes"], ""))
-    return gone
 
 
 def _verdict(life: GearLife, record: Record) -> list[LogLine]:

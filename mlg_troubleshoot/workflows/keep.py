@@ -100,16 +100,18 @@ class _KnownContents:
         self._by: defaultdict[Hashable, list[Told]] = defaultdict(list)
         self._void: dict[tuple[object, ...], set[bytes]] = {}
         for life in lives:
-            for record in life.voided:
-                self._void.setdefault(record.content[:4], set()).add(Told.of(record).content)
             standing = {}
             for visit in life.inspections:
                 told = standing[visit.kept.record_id] = Told.of(visit.kept)
                 self.add(told)
-            # A table that comes back may have the day that was corrected.
-            for record in life.records:
-                name = record.record_id
-                if record.kind is RecordKind.INSPECTION and name in standing:
+            for entry in life.entries:
+                record, name = entry.record, entry.record.record_id
+                if record.kind is not RecordKind.INSPECTION:
+                    continue
+                if not entry.counts:
+                    self._void.setdefault(record.content[:4], set()).add(Told.of(record).content)
+                # A table that comes back may have the day that was corrected.
+                if name in standing:
                     of_day = self._by["id", name, *life.key, record.day]
                     of_day[:] = of_day or [standing[name]]
 

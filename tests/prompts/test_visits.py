@@ -193,10 +193,10 @@ def test_a_reading_tighter_than_the_last_is_asked_about(sit: Sit) -> None:
 
 def test_a_word_that_nobody_knows_changes_nothing(sit: Sit, life: Life) -> None:
     sit(*failed("8", "done"), "")
-    records = len(life().records)
+    records = len(life().entries)
     screen = sit("N1 LH", "46", "x", "plumger 4", "s", "n 3", "?", "").screen
     assert screen.count("is not understood") + screen.count("✗") >= 4
-    assert len(life().records) == records
+    assert len(life().entries) == records
 
 
 def test_a_report_is_written_where_it_says_and_one_that_cannot_be_ends_nothing(
