@@ -417,7 +417,7 @@ def test_the_page_of_a_life_is_a_log_book_in_the_order_of_time(tmp_path: Path, p
     seeded((2, 0.0007))
     assert mlg("history", "N123", "LH", "--no-forecast", "--report", tmp_path).code == 0
     (file,) = tmp_path.glob("*life*.html")
-    page = re.sub(r"<[^>]+>", " ", file.read_text(encoding="utf-8"))
+    page = re.sub(r"<[^>]+>", " ", file.read_text(encoding="utf-8")).replace("\u00a0", " ")
     lines = (r"#3 0\.0101 in \(limit 0\.0075\)", "restored #3", r"#3 0\.0007 in, radial")
     assert re.search(".*".join(lines), page, re.DOTALL)
 
