@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 from rich.text import Text
 
-from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, text, word
+from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, show_page, text, word
 from mlg_troubleshoot.cli.views.tables import (
     MARKS,
     TONES,
@@ -15,14 +15,9 @@ from mlg_troubleshoot.cli.views.tables import (
 )
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
 from mlg_troubleshoot.decision.plan import Action
-from mlg_troubleshoot.decision.sentences import (
-    chance_wrong_sentence,
-    joint_list,
-    percent,
-    rigging_sentence,
-)
+from mlg_troubleshoot.decision.sentences import chance_wrong_sentence, rigging_sentence
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, Length, Sentence
+from mlg_troubleshoot.units import ClearanceConvention
 
 # Joints that are listed at least and at most. [1]
 _JOINTS = 3, 5
@@ -44,7 +39,7 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
     said = screen.said(judgement.headline) if is_judged else judgement.title
     title.append_text(text(f"[{MARKS[judgement.verdict]}] {said}", TONES[judgement.tone]))
     origin = word(f"{row.record_id or 'record ?'}: {gear.provenance}. {_DISCLAIMER}", "dim")
-    body = [origin, title, *_body(judgement, screen, detail=detail)]
+    body = [origin, title, *_body(judgement, screen)]
     notes = [text(f"* {screen.said(note)}") for note in judgement.warnings]
     room = _LINES - 1 - lines_of(body)
     if isinstance(judgement, Assessment) and detail:
@@ -66,42 +61,15 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
         screen.print(line)
 
 
-def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> list[Text]:
-    """What was found and NEXT; with `detail` what stands behind them."""
-    lines: list[tuple[str, str]] = []
-    if isinstance(judgement, Assessment) and detail:
-        lines += [(said, "") for said in _numbers(judgement)]
-        posterior = judgement.posterior
-        lines += [] if posterior is None else [(posterior.text, "")]
-    lines.append((next_words(judgement), "bold"))
+def _body(judgement: Judgement, screen: DataConsole) -> list[Text]:
+    """NEXT, and what follows it."""
+    lines = [(next_words(judgement), "bold")]
     if isinstance(judgement, Assessment):
         follows = what_follows(judgement)
         lines += [(follows, "")] if follows is not None else []
         question = judgement.plan.open_question
         lines += [(f"OPEN: {question}", "bold")] if question is not None else []
     return [text(screen.said(said), style) for said, style in lines]
-
-
-def _numbers(a: Assessment) -> Iterator[str]:
-    """What stands with the prediction: probability, spread over the linkages, unmeasured joints."""
-    if a.geometry_spread_in is not None and a.probability_within_margin is not None:
-        low, high = a.geometry_spread_in
-        yield Sentence.of(
-            "Probability that {} is within the margin: {}. The ensemble of reconstructed linkages"
-            " gives {} to {}.",
-            "the worst case" if a.decided_by_bound else "the plunger",
-            percent(a.probability_within_margin),
-            Length(low, named=False),
-            Length(high),
-        )
-    if any(f.clearance_in is None for f in a.joints):
-        yield Sentence.of(
-            "Unmeasured joints count as tight in these numbers; with them at their limit the worst"
-            " case is: {}.",
-            "the linkage does not close"
-            if a.predicted_upper_in is None
-            else Length(a.predicted_upper_in),
-        )
 
 
 def _show_joints(
@@ -148,57 +116,15 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
     budget.
     """
     _show_joints(a, screen, detail=True)
-    alike = sorted({tuple(sorted((f.joint, *f.alike))) for f in a.joints if f.alike})
-    if alike:
-        pairs = ", ".join("#" + " = #".join(str(n) for n in group) for group in alike)
-        screen.print(
-            f"Both ends of one link act alike ({pairs}): the plunger cannot tell which end is worn."
-        )
-    if a.repair_sets:
-        _show_repairs(a, screen)
-        parts = sorted({gear.joint(n).new_part.value for s in a.repair_sets for n in s.joints})
-        listed = " to ".join(screen.length(each) for each in dict.fromkeys((parts[0], parts[-1])))
-        screen.print(
-            f"A restored joint counts with the radial clearance of a new part, {listed}"
-            f" {screen.unit}."
-        )
-    if a.rigging is not None:
-        screen.print(rigging_sentence(a.rigging))
-    if a.budget is not None:
-        shares = ", ".join(
-            f"{name} {screen.length(u)} {screen.unit} ({percent(share)})"
-            for name, u, share in a.budget.lines
-        )
-        screen.print(
-            Sentence.of(
-                "Standard uncertainty, with shares: {}. Model: {}.", shares, a.budget.model_source
-            )
-        )
-    wrong = chance_wrong_sentence(a)
-    if wrong is not None:
-        screen.print(wrong)
-    what = (
-        "The displacement as loaded is an expectation; the worst case is a bound."
-        if a.as_loaded
-        else "The worst case is a bound."
+    restored = {number for each in a.repair_sets or () for number in each.joints}
+    pairs = (" = ".join(map("#{}".format, group)) for group in gear.link_groups if len(group) > 1)
+    show_page(
+        "detail",
+        screen,
+        a=a,
+        gear=gear,
+        alike=", ".join(pairs),
+        parts=sorted({gear.joint(number).new_part.value for number in restored}),
+        rigging=a.rigging and rigging_sentence(a.rigging),
+        wrong=chance_wrong_sentence(a),
     )
-    screen.print(f"Model: {gear.name}. {what}", style="dim")
-
-
-def _show_repairs(a: Assessment, screen: DataConsole) -> None:
-    screen.print(
-        "Repairs: sure = within the margin in the worst case; try = restore, then read the plunger"
-    )
-    headings = ("restore", "kind", "minutes>", f"worst case {screen.unit}>", "within>")
-    rows = [
-        (
-            joint_list(s.joints),
-            str(s.kind),
-            f"{s.minutes:.0f}",
-            screen.length(s.predicted_displacement_in),
-            percent(s.probability_within_margin),
-            "-" if s.second_repair_probability is None else percent(s.second_repair_probability),
-        )
-        for s in a.repair_sets or ()
-    ]
-    print_table(screen, (*headings, "second repair>"), rows)
