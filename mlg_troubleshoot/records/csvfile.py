@@ -68,7 +68,7 @@ class _CsvSheet(Sheet):
         self._delimiter = delimiter
         self._budget = _QUOTE_BUDGET
 
-    def _read(self) -> Iterator[NumberedRow]:
+    def rows(self) -> Iterator[NumberedRow]:
         for number, fields in enumerate(self._records(), 1):
             cells: list[Cell] = [
                 field if field and not field.isspace() else None for field in fields

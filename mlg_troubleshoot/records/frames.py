@@ -62,7 +62,7 @@ class FrameSheet(Sheet):
         self.labels: list[object] = frame.index.tolist()
         self._columns = [_cells(frame.iloc[:, place]) for place in range(frame.shape[1])]
 
-    def _read(self) -> Iterator[NumberedRow]:
+    def rows(self) -> Iterator[NumberedRow]:
         yield self.header.row, self.header.texts
         for number, cells in enumerate(zip(*self._columns, strict=True), _FIRST_ROW):
             if any(cell is not None for cell in cells):

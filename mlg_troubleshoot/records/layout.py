@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -401,16 +400,10 @@ class Columns:
         missing = {c.name: f"a column {c.name}" for c in needed if not self.at(c)}
         if not self.at(CLEARANCE) and not any(p.refused for p in self.placed):
             missing["clearance_1_in"] = "at least one clearance column, such as clearance_3_in"
-        unknown = {
-            _in_one_word(p.header): p.header
-            for p in reversed(self.placed)
-            if p.field is None and p.header
-        }
+        unknown = [p.header for p in self.placed if p.field is None and p.header]
         for name, expected in missing.items():
             remedy = "Add the column, or name the one that is meant with --map."
-            for close in difflib.get_close_matches(name, unknown, 1, 0.6):
-                hint = unknown[close]
-                remedy += f' If "{hint}" is meant, pass --map "{hint}={name}".'
+            remedy += nearest(name, unknown)
             place = CellPlace(self._row, name)
             self._table.tell("column_missing", None, expected, remedy, place)
         headers = [p.header for p in self.placed if p.header]

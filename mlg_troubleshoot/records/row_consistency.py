@@ -43,9 +43,8 @@ def settle_duplicates(
                 note = f"the same inspection as {where(found[0].source)}"
                 rows[place] = replace(row, warnings=(*row.warnings, note))
                 continue
-            others = [where(other.source) for other in found[:4] if other is not row][:3]
-            if len(found) > len(others) + 1:
-                others[-1] += f" and {len(found) - 1 - len(others)} more"
+            other = where(next(each.source for each in found if each is not row))
+            other += f" and {len(found) - 2} more" if len(found) > 2 else ""
             header, cell = cell_of(row.source, layouts, RECORD_ID)
             problems.append(
                 Problem(
@@ -56,8 +55,7 @@ def settle_duplicates(
                     header,
                     cell,
                     record_id,
-                    "a record id that no other inspection of the file has;"
-                    f" {', '.join(others)} also has it",
+                    f"a record id that no other inspection of the file has; {other} also has it",
                     "Keep the right row, or give each inspection its own record id.",
                 )
             )

@@ -113,16 +113,11 @@ class Sheet(ABC):
         self.hidden = hidden
         self.facts = SheetFacts()
 
-    def rows(self) -> Iterator[NumberedRow]:
-        """Read the rows that are not blank, with their numbers counted from 1; the facts begin
-        anew.
-        """
-        self.facts = SheetFacts()
-        yield from self._read()
-
     @abstractmethod
-    def _read(self) -> Iterator[NumberedRow]:
-        """Read the rows as each kind of file holds them, and note the facts on the way."""
+    def rows(self) -> Iterator[NumberedRow]:
+        """Read the rows that are not blank, with their numbers counted from 1, and note the facts
+        on the way.
+        """
 
     def merged(self) -> Sequence[MergedRange]:
         """Return merged ranges as first row, first column, last row, last column (rows from 1,

@@ -11,7 +11,6 @@ from openpyxl.comments import Comment
 from openpyxl.styles import Alignment, Border, Font, PatternFill
 from openpyxl.styles import Side as Edge
 from openpyxl.worksheet.datavalidation import DataValidation
-from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.properties import PageSetupProperties
 from openpyxl.worksheet.worksheet import Worksheet
 
@@ -20,7 +19,6 @@ from mlg_troubleshoot.decision.columns import (
     COLUMNS,
     CONVENTION,
     DATE,
-    MARGIN_U,
     OUTCOME,
     PLUNGER_DISPLACEMENT,
     REMARKS,
@@ -207,10 +205,6 @@ def _table(book: Workbook, gear: Gear, unit: LengthUnit, *, every_column: bool) 
     sheet.page_setup.paperSize = 9
     sheet.page_setup.orientation = "landscape"
     sheet.page_setup.scale = 53
-    for after in (CLEARANCE, MARGIN_U, REMARKS) if every_column else ():
-        sheet.col_breaks.append(
-            Break(id=max(i for i, field in enumerate(fields, 1) if field.column is after))
-        )
 
 
 def _is_must(column: Column) -> bool:

@@ -78,7 +78,7 @@ class _XlsSheet(Sheet):
             for top, bottom, left, right in self._sheet.merged_cells
         ]
 
-    def _read(self) -> Iterator[NumberedRow]:
+    def rows(self) -> Iterator[NumberedRow]:
         sheet = self._sheet
         for place in range(sheet.nrows):
             cells = [self._cell(place, column) for column in range(sheet.row_len(place))]

@@ -69,39 +69,13 @@ _RAISED = "{*}rPr/{*}vertAlign[@val='superscript']"
 _EXCEL_ROWS = 1 << 20
 _EXCEL_COLUMNS = 1 << 14
 _TRUE = ("1", "true", "on")
-# "Strict Open XML", which Excel offers, differs from what openpyxl knows in the names of two
-# vocabularies.
-_STRICT = (
-    (b"http://purl.oclc.org/ooxml/spreadsheetml/main", SHEET_MAIN_NS.encode()),
-    (
-        b"http://purl.oclc.org/ooxml/officeDocument/relationships",
-        b"http://schemas.openxmlformats.org/officeDocument/2006/relationships",
-    ),
-)
-_MAX_STRUCTURE_BYTES = 8_000_000
-
-
-class _Package(GuardedZip):
-    def chunks(self, name: str) -> Iterator[bytes]:
-        """Unpack a part piece by piece, in the vocabulary that openpyxl knows."""
-        pieces = super().chunks(name)
-        root = next(pieces, b"")
-        for strict, usual in _STRICT:
-            root = root.replace(strict, usual)
-        yield root
-        yield from pieces
-
-    def read(self, name: str) -> bytes:
-        if self.size(name) > _MAX_STRUCTURE_BYTES:
-            raise too_large(f"{name} unpacks to {self.size(name) / 1e6:.0f} MB")
-        return super().read(name)
 
 
 class XlsxFile(Workbook):
     sheets: Sequence[XlsxSheet]
 
     def __init__(self, data: bytes) -> None:
-        self.archive = _Package(data)
+        self.archive = GuardedZip(data)
         macros = any(name.endswith("vbaproject.bin") for name in self.archive.names)
         super().__init__("xlsm" if macros else "xlsx", (), [MACROS] if macros else [])
         with damage("its list of sheets cannot be read"), warnings.catch_warnings(action="ignore"):
@@ -227,7 +201,7 @@ class XlsxSheet(Sheet):
                 )
             tail = piece[piece.rfind(b"<") :] if piece.rfind(b"<") > piece.rfind(b">") else b""
 
-    def _read(self) -> Iterator[NumberedRow]:
+    def rows(self) -> Iterator[NumberedRow]:
         with damage(f"sheet {self.name!r} cannot be read"):
             number = 0
             for element in self.elements():

@@ -23,6 +23,19 @@ _CHUNK = 1 << 16
 _BEFORE_ROOT = re.compile(
     rb"(?:\xef\xbb\xbf|\xff\xfe|\xfe\xff)?(?:\s++|<\?.*?\?>|<!--.*?-->)*+", re.DOTALL
 )
+# "Strict Open XML", which Excel offers, differs from what openpyxl knows in the names of two
+# vocabularies.
+_STRICT = (
+    (
+        b"http://purl.oclc.org/ooxml/spreadsheetml/main",
+        b"http://schemas.openxmlformats.org/spreadsheetml/2006/main",
+    ),
+    (
+        b"http://purl.oclc.org/ooxml/officeDocument/relationships",
+        b"http://schemas.openxmlformats.org/officeDocument/2006/relationships",
+    ),
+)
+_MAX_STRUCTURE_BYTES = 8_000_000
 # A tree is kept until a row or a text is complete, and an empty shell of each until the end of its
 # part.
 MAX_OPEN_BYTES = 2_000_000
@@ -105,9 +118,6 @@ class GuardedZip:
         """Names of the parts, in lower case, with plain slashes."""
         return frozenset(self._members)
 
-    def size(self, name: str) -> int:
-        return self._member(name).file_size
-
     def _member(self, name: str) -> zipfile.ZipInfo:
         member = self._members.get(name.lower())
         if member is None:
@@ -115,13 +125,19 @@ class GuardedZip:
         return member
 
     def read(self, name: str) -> bytes:
+        size = self._member(name).file_size
+        if size > _MAX_STRUCTURE_BYTES:
+            raise too_large(f"{name} unpacks to {size / 1e6:.0f} MB")
         return b"".join(self.chunks(name))
 
     def chunks(self, name: str) -> Iterator[bytes]:
+        """Unpack a part piece by piece, in the vocabulary that openpyxl knows."""
         member = self._member(name)
         total = 0
         with damage(f"{name} cannot be unpacked"), self._zip.open(member) as part:
             while piece := part.read(_CHUNK):
+                for strict, usual in () if total else _STRICT:
+                    piece = piece.replace(strict, usual)
                 total += len(piece)
                 if total > MAX_EXPANDED_BYTES:
                     raise too_large(f"{name} unpacks to more than it claims")

@@ -244,16 +244,6 @@ def test_the_template_has_lists_of_choices_and_explains_each_column(template):
     assert sheet.freeze_panes == "D2"
 
 
-def test_on_paper_the_clearances_of_the_template_stand_together_on_the_first_page(template):
-    sheet = openpyxl.load_workbook(template)["Inspections"]
-    headers = [cell.value for cell in sheet[1]]
-    first = min(brk.id for brk in sheet.col_breaks.brk)
-    assert headers[first - 1 : first + 1] == [
-        f"clearance_{GEAR.joint_numbers[-1]}_in",
-        "inspection_date",
-    ]
-
-
 @pytest.mark.parametrize("name", ["Instructions", "Form"])
 def test_every_line_of_the_template_is_as_high_as_its_text(template, name):
     sheet = openpyxl.load_workbook(template)[name]

@@ -84,9 +84,7 @@ def test_thousands_of_rows_of_one_record_id_are_each_named_in_linear_time() -> N
     result = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv")
     assert time.process_time() - start < 10 * SLOWER
     assert [p.row for p in result.problems] == list(range(2, 16_002))
-    assert "row 3 of t.csv, row 4 of t.csv, row 5 of t.csv and 15996 more" in (
-        result.problems[0].expected
-    )
+    assert "row 3 of t.csv and 15998 more" in result.problems[0].expected
 
 
 @pytest.mark.parametrize("rows", [6_000, 99_000])
