@@ -73,18 +73,15 @@ _Found = tuple[FileRead, Collected]
 
 @dataclass(slots=True, eq=False)
 class _Candidate:
-    """A sheet that may hold inspections, with its first rows; `is_filled`: it holds some."""
+    """A sheet that may hold inspections, with its first rows and its header, of a table or a form;
+    `is_filled`: it holds some.
+    """
 
     sheet: Sheet
     peeked: list[NumberedRow]
     rows: Iterator[NumberedRow]
     header: Header | None
-    form: Form | None
     is_filled: bool
-
-    @property
-    def is_table_or_form(self) -> bool:
-        return self.header is not None or self.form is not None
 
     @property
     def is_instructions(self) -> bool:
@@ -275,36 +272,28 @@ def _packed(data: bytes, suffix: str) -> Workbook:
 def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     rows = sheet.rows()
     peeked = list(islice(rows, _PEEKED_ROWS))
-    header = find_header(peeked, options, sheet.merged)
-    form = None if header is not None else find_form(peeked, options)
+    header = find_header(peeked, options, sheet.merged) or find_form(peeked, options)
     # A form that nobody touched holds no inspection; a header may stand too far below to be seen.
-    is_filled = (
-        any(number > header.row for number, _ in peeked)
-        if header is not None
-        else not form.is_untouched
-        if form is not None
-        else any(header_score(cells, options) for _, cells in peeked)
-    )
-    return _Candidate(sheet, peeked, chain(peeked, rows), header, form, is_filled)
+    if isinstance(header, Form):
+        is_filled = not header.is_untouched
+    elif header is not None:
+        is_filled = any(number > header.row for number, _ in peeked)
+    else:
+        is_filled = any(header_score(cells, options) for _, cells in peeked)
+    return _Candidate(sheet, peeked, chain(peeked, rows), header, is_filled)
 
 
 def _read_book(book: Workbook, options: ReadOptions, label: str, found: Collected) -> None:
     chosen = _choose(book, options, found)
     for candidate in chosen:
-        sheet = candidate.sheet
-        if candidate.form is not None:
-            part = read_form(candidate.form, options, file=label, sheet=sheet.name)
-        elif candidate.header is not None:
-            part = read_table(
-                sheet,
-                candidate.header,
-                candidate.rows,
-                options,
-                file=label,
-                delimiter=book.delimiter,
-            )
+        sheet, header = candidate.sheet, candidate.header
+        if header is None:
+            raise _no_header([candidate])
+        if isinstance(header, Form):
+            part = read_form(header, options, file=label, sheet=sheet.name)
         else:
-            raise _no_header(candidate)
+            rows = candidate.rows
+            part = read_table(sheet, header, rows, options, file=label, delimiter=book.delimiter)
         found.join(part, f"sheet {sheet.name!r}: " if len(chosen) > 1 else "")
 
 
@@ -323,8 +312,8 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
     hidden = [c for c in every if c.sheet.hidden]
     instructions = [c for c in every if c.is_instructions]
     candidates = [c for c in every if c not in hidden and c not in instructions]
-    chosen = [c for c in candidates if c.is_filled and c.is_table_or_form]
-    tables = [c for c in chosen if c.header is not None]
+    chosen = [c for c in candidates if c.is_filled and c.header]
+    tables = [c for c in chosen if not isinstance(c.header, Form)]
     for note, left in (
         ("hidden sheets were not read: ", hidden),
         (
@@ -333,7 +322,7 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
         ),
         (
             "no header of inspections, not read: sheet ",
-            [c for c in candidates if c.peeked and not c.is_table_or_form],
+            [c for c in candidates if c.peeked and not c.header],
         ),
     ):
         found.notes += [note + _names(left)] if left else []
@@ -351,9 +340,20 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
         if len(every) - len(hidden) > 1 and options.sheet is None:
             found.notes.append(f"read from sheet{'s' * (len(chosen) > 1)} {_names(chosen)}")
         return chosen
-    if any(c.is_table_or_form for c in candidates):
-        return [c for c in candidates if c.header is not None][:1]
-    raise _nothing_found(every)
+    found_headers = [c for c in candidates if c.header]
+    if found_headers:
+        return [c for c in found_headers if not isinstance(c.header, Form)][:1]
+    for candidate in hidden:
+        if candidate.header:
+            name = candidate.sheet.name
+            raise FileRefusedError(
+                "sheet_hidden",
+                f"the inspections are on the hidden sheet {name!r}",
+                "inspections on a sheet that can be seen",
+                f'Unhide the sheet, or name it: --sheet "{name}".',
+                sheet=name,
+            )
+    raise _no_header([c for c in every if not c.sheet.hidden])
 
 
 def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) -> _Candidate:
@@ -369,30 +369,18 @@ def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) 
     return _candidate(sheet, options)
 
 
-def _nothing_found(every: Sequence[_Candidate]) -> FileRefusedError:
-    name = next((c.sheet.name for c in every if c.sheet.hidden and c.is_table_or_form), None)
-    if name is not None:
-        return FileRefusedError(
-            "sheet_hidden",
-            f"the inspections are on the hidden sheet {name!r}",
-            "inspections on a sheet that can be seen",
-            f'Unhide the sheet, or name it: --sheet "{name}".',
-            sheet=name,
-        )
-    visible = [c for c in every if not c.sheet.hidden]
-    if len(visible) == 1:
-        return _no_header(visible[0])
-    what = f"no sheet holds a table of inspections (sheets: {_names(visible)})"
-    return FileRefusedError("header_missing", what)
-
-
-def _no_header(candidate: _Candidate) -> FileRefusedError:
-    shown = "it holds nothing"
-    for number, cells in candidate.peeked[:1]:
-        texts = ", ".join([str(cell) for cell in cells if isinstance(cell, str)][:8])
-        shown = f"row {number} {f'reads: {texts[:120]}' if texts else 'holds no text'}"
+def _no_header(candidates: Sequence[_Candidate]) -> FileRefusedError:
+    """Refuse sheets without a header, a single one with the text of its first row."""
+    shown = f"sheets {_names(candidates)}"
+    sheet = None
+    if len(candidates) == 1:
+        sheet = candidates[0].sheet.name
+        shown = "it holds nothing"
+        for number, cells in candidates[0].peeked[:1]:
+            texts = ", ".join([str(cell) for cell in cells if isinstance(cell, str)][:8])
+            shown = f"row {number} {f'reads: {texts[:120]}' if texts else 'holds no text'}"
     found = f"no header of inspections was found ({shown})"
-    return FileRefusedError("header_missing", found, sheet=candidate.sheet.name)
+    return FileRefusedError("header_missing", found, sheet=sheet)
 
 
 def _finish(results: Sequence[_Found]) -> ReadResult:
