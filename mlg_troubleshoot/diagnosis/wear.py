@@ -9,7 +9,7 @@ together by expectation maximisation (Laird and Ware 1982).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -230,17 +230,13 @@ def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
     readings = table.clearance_in
     gears = gears_of(table)
     kilo, landed = landings_of(table.numbers("gear_landings"), gears)
-    worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
-    dated = np.where(landed[:, None], readings, np.nan)[:, worn]
-    dated = np.where(np.isfinite(dated).any(axis=0), dated, readings[:, worn])
+    worn = np.nan_to_num(readings).max(axis=0) > 0.0
+    dated = np.where(landed[:, None], readings, np.nan)
+    dated = np.where(np.isfinite(dated).any(axis=0), dated, readings)
     # Rounding to a step is an error that is even over it.
     each = table.gauge_u_in**2 + steps_of(table, read_in(table)) ** 2 / 12.0
     declared = np.broadcast_to(each[:, None], dated.shape)
-    own = wear_history(dated, gears, kilo, declared)
-    every = {f.name: np.zeros(readings.shape) for f in fields(own)}
-    for name, values in every.items():
-        values[:, worn] = getattr(own, name)
-    return WearHistory(**every), kilo, landed
+    return wear_history(np.where(worn, dated, np.nan), gears, kilo, declared), kilo, landed
 
 
 def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Array) -> WearHistory:
@@ -263,7 +259,7 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     # Gears of which a joint was never read say nothing about the fleet.
     read = by_gear @ here
     many = known & (read[gears] >= 3)
-    mean = y.sum(axis=0) / here.sum(axis=0)
+    mean = y.sum(axis=0) / np.maximum(here.sum(axis=0), 1.0)
     fleet, spread = _fleet(x, y, here)
     least = np.maximum(_LEAST_LEVEL * mean, _TIGHT_IN)
     least_spread = 1e-6 * spread
@@ -271,7 +267,7 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     scatter = np.full(y.shape[1], ROWS_APART**2)
     share = np.ones(y.shape[1])
     far = np.ones(y.shape)
-    seen = (read > 0.0) / (read > 0.0).sum(axis=0)
+    seen = (read > 0.0) / np.maximum((read > 0.0).sum(axis=0), 1)
     enough = many.sum(axis=0) >= _LEAST_ROWS
     lines = unsure = np.empty(0)
     for step in range(_ROUNDS):
@@ -304,14 +300,14 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
         scatter * np.maximum(expected, least) ** 2,
         share * reading_in2.reshape(y.shape),
     )
-    return WearHistory(*(values.reshape(shape) for values in found))
+    return WearHistory(*((values * known.any(axis=0)).reshape(shape) for values in found))
 
 
 def _fleet(x: Array, y: Array, here: Array) -> tuple[Array, Array]:
     """Line through all readings, (2, n_joints), and how widely levels and rates of single gears may
     lie about it.
     """
-    size = here.sum(axis=0)
+    size = np.maximum(here.sum(axis=0), 1.0)
     mean_x = (here * x).sum(axis=0) / size
     mean_y = (here * y).sum(axis=0) / size
     off = here * (x - mean_x)
