@@ -1,10 +1,9 @@
-"""What is believed of a gear that failed: exact chances of all that nobody knows of it, and drawn
-states.
+"""What is believed of a gear that failed: chances of all that nobody knows of it, and drawn states.
 
-The model is that of docs/reference/models.md; (1) to (11) are its equations. What each joint moves
-the plunger by is a distribution over cells of 0.8 thou; sums of joints are products of discrete
-Fourier transforms, for each context: a level of wear, with free or with held pins. States are drawn
-from the posterior backwards, joint by joint, as in a hidden Markov chain.
+The model is that of docs/reference/models.md; (1) to (12) are its equations. Each joint has a
+characteristic function for each wear; readings weigh the wears, a sum of joints is a product, and
+the plunger's reading is met on a grid by discrete Fourier transforms, for each level of wear with
+free and with held pins.
 """
 
 from __future__ import annotations
@@ -12,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from statistics import NormalDist
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, frozen
 from mlg_troubleshoot.decision.case import Cases
@@ -26,32 +25,36 @@ from mlg_troubleshoot.decision.verdict_rule import tabled_normal_cdf
 from mlg_troubleshoot.gear.directions import random_directions
 from mlg_troubleshoot.gear.gear import Gear
 
-# Cells of the plunger's displacement, with mid-position in the middle of one; the largest
-# displacement of all joints worn out together lies inside. [1, in]
-_CELLS = 400
-_CELL_IN = 0.0008
-_AT = (np.arange(_CELLS) - _CELLS // 2) * _CELL_IN
+# Cells of the plunger's displacement, mid-position first, then over-travel, then under-travel; all
+# joints worn out together stay inside. [1, in]
+_CELLS = 256
+_CELL_IN = 0.00125
+_AT = np.fft.fftfreq(_CELLS, 1.0 / (_CELLS * _CELL_IN))
 _BELOW, _ABOVE = _AT - 0.5 * _CELL_IN, _AT + 0.5 * _CELL_IN
-_FREQUENCIES = 2.0 * np.pi * np.arange(_CELLS // 2 + 1) / (_CELLS * _CELL_IN)
+_FREQUENCIES = 2.0 * np.pi * np.fft.rfftfreq(_CELLS, _CELL_IN)
+# Transform of what the linkage adds (5).
+_LINKAGE = np.exp(-0.5 * (PRIORS.linkage_u_in * _FREQUENCIES) ** 2)
 
-# Shares of its limit that a joint may be worn to: centres of cells. [1]
-SHARES = np.asarray((np.arange(50) + 0.5) * 0.04, np.float64)
-_WORN = np.asarray(SHARES > 1.0, float)
-
-# Errors of a reading by which it is averaged, with their weights (Gauss–Hermite). [1]
-_ERRORS, _GAUSS = np.polynomial.hermite_e.hermegauss(5)
-_WEIGHTS = np.array([_GAUSS / _GAUSS.sum()], np.float64)
+# Shares of its limit that a joint may be worn to: ends and centres of cells. [1]
+_ENDS = np.linspace(0.0, 2.0, 51)
+SHARES = np.asarray(0.5 * (_ENDS[1:] + _ENDS[:-1]), np.float64)
+_WORN = SHARES > 1.0
 
 # States drawn of failures of the joints, and of each other kind. [1]
 STATES = 192
 _OTHERS = 64
-# Contexts less likely than this move no chance that is stated. [1]
-_NEGLIGIBLE = 1e-4
+# Points that stand for the wear of a joint, denser where it is worn, the matrix that sums by their
+# weights, and what stands for where its pin rests. [1]
+_LEFT = (np.arange(32)[::-1] + 0.5) / 32
+_QUANTILES = 1.0 - _LEFT**2
+_SUMS = np.tri(32) * _LEFT
+_TURNS = np.mod(np.arange(1, 33) * 0.5 * np.sqrt(5.0), 1.0)[:, None]
+_SCORES = np.array([[NormalDist().inv_cdf(turn)] for turn in _TURNS[:, 0].tolist()])
 
 
 def _wear() -> Array:
     levels = np.geomspace(*PRIORS.levels, 6)[:, None]
-    usual = np.exp(-SHARES / levels) * (1.0 - _WORN)
+    usual = np.exp(-SHARES / levels) * ~_WORN
     usual /= usual.sum(axis=1, keepdims=True)
     chance = np.geomspace(*PRIORS.worn_out, 6)[:, None]
     alike = (1.0 - chance) * usual + chance * _WORN / _WORN.sum()
@@ -64,37 +67,37 @@ WEAR = _wear()
 LEVELS = np.append(np.full(6, PRIORS.alike / 6), 1.0 - PRIORS.alike)
 
 
-def level_chances(cases: Cases) -> Array:
-    """Chances of the levels of wear of each gear given its readings, by (1) and (2). [1]"""
-    share = np.clip(cases.filled(0.0) / cases.gear.limits_in, 0.0, 2.0)
-    each = np.array([np.interp(share, SHARES, level) for level in np.log(WEAR)])
-    total = np.sum(np.where(cases.measured, each, 0.0), axis=2).T
-    chances = np.exp(total - total.max(axis=1, keepdims=True)) * (cases.fleet.levels or LEVELS)
-    return np.asarray(chances / chances.sum(axis=1, keepdims=True))
-
-
-def _moved(reach_in: Array, shift_in: Array, *, held: bool) -> Array:
-    """Chance of each cell for a joint that reaches so far in its best direction (4), shape
-    (..., cells). [1]
+def given_readings(cases: Cases) -> tuple[Array, Array]:
+    """Chances of the levels of each gear given its readings (1) to (3), (n, levels), and of each
+    cell of wear at each level, (n, joints, levels, wear). [1]
     """
-    reach = np.maximum(np.asarray(reach_in, float), 1e-9)[..., None]
-    if held:
-        mean, spread = PRIORS.cosine
-        below = tabled_normal_cdf((_BELOW - mean * reach) / (spread * reach))
-        return np.asarray(tabled_normal_cdf((_ABOVE - mean * reach) / (spread * reach)) - below)
-    shift = np.asarray(shift_in, float)[..., None]
-    turn = np.arccos(np.clip((np.append(_BELOW, _ABOVE[-1]) - shift) / reach, -1.0, 1.0))
-    return np.asarray((turn[..., :-1] - turn[..., 1:]) / np.pi)
+    limits = cases.gear.limits_in
+    share = np.clip(cases.filled(0.0) / limits, 0.0, 2.0)[..., None]
+    doubtful = (cases.over_limit & ~cases.own_gauge)[..., None]
+    u = np.maximum(cases.gauge_u_in / limits, 1e-3)[..., None]
+    slip = doubtful * -np.expm1(-PRIORS.wrong_readings / len(limits))
+    likely = np.zeros((*cases.measured.shape, len(SHARES)))
+    for factor, often in ((1.0, 1.0 - slip), (2.0, slip)):
+        spread = np.hypot(u, doubtful * PRIORS.gauge_scale * factor * SHARES)
+        above, below = ((factor * ends - share) / spread for ends in (_ENDS[1:], _ENDS[:-1]))
+        likely += often / factor * (tabled_normal_cdf(above) - tabled_normal_cdf(below))
+    likely[~cases.measured] = 1.0
+    wear = likely[:, :, None] * WEAR
+    fits = wear.sum(axis=3, keepdims=True)
+    levels = fits[..., 0].prod(axis=1) * (cases.fleet.levels or LEVELS)
+    return levels / levels.sum(axis=1, keepdims=True), wear / fits
 
 
-def _transform(moved: Array) -> Array:
-    return np.asarray(np.fft.rfft(np.fft.ifftshift(moved, axes=-1)))
-
-
-def _density(transform: Array) -> Array:
-    """Chance of each cell from a transform. [1]"""
-    found = np.fft.fftshift(np.fft.irfft(transform, _CELLS), axes=-1)
-    return np.asarray(np.maximum(found, 0.0))
+def _characteristic(reach_in: Array, shift_in: Array) -> Array:
+    """Characteristic function of what a joint moves the plunger by, with free and with held pins
+    (4), that reaches so far in its best direction, shape (2, ..., frequencies).
+    """
+    reach = reach_in[..., None] * _FREQUENCIES
+    turns = (np.arange(32) + 0.5) * np.pi / 64
+    free = sum(np.cos(reach * np.cos(turn)) for turn in turns) / len(turns)
+    mean, spread = PRIORS.cosine
+    held = np.exp(-0.5 * (spread * reach) ** 2 - 1j * mean * reach)
+    return np.array([free * np.exp(-1j * shift_in[..., None] * _FREQUENCIES), held])
 
 
 @lru_cache(maxsize=4)
@@ -106,223 +109,97 @@ def _reach(gear: Gear) -> tuple[Array, Array]:
     return response.amplification * gear.limits_in, bend * gear.limits_in**2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Joints:
-    """What joints move the plunger by, with free and with held pins.
-
-    cells, worn : ndarray, shape (2, levels, joints, cells)
-        Chance of each cell, and the part of it that is worn; one level stands for all where the
-        level does not matter. [1]
-    transforms : ndarray, shape (2, levels, joints, frequencies)
-        Transform of the cells.
-    excess_in2 : ndarray, shape (2, levels, joints)
-        By how much the cells scatter more than the joints. [in²]
-    """
-
-    cells: Array
-    worn: Array
-    transforms: Array
-    excess_in2: Array
-
-    @classmethod
-    def of(cls, table: Array, chance: Array, share: Array, reach_in: Array, over: Array) -> _Joints:
-        """Joints from their cells by wear (2, joints, wear, cells), the chance of each wear
-        (levels, joints, wear), and the chance that each is worn.
-        """
-        cells = np.einsum("kjs,pjsc->pkjc", chance, table)
-        worn = np.einsum("kjs,pjsc->pkjc", chance * over, table)
-        of_pins = np.array([0.5, PRIORS.cosine[0] ** 2 + PRIORS.cosine[1] ** 2])[:, None, None]
-        share2 = np.sum(chance * share**2, axis=2)
-        excess = cells @ _AT**2 - of_pins * share2 * reach_in**2
-        return cls(cells, worn, _transform(cells), excess)
-
-    def take(self, joints: Places) -> _Joints:
-        parts = (self.cells, self.worn, self.transforms, self.excess_in2)
-        return _Joints(*(part[:, :, joints] for part in parts))
-
-
 @lru_cache(maxsize=4)
-def _prior(gear: Gear) -> tuple[Array, _Joints]:
-    """Joints that nobody read: cells by wear (2, joints, wear, cells), and the joints."""
+def _by_wear(gear: Gear) -> Array:
+    """Characteristic functions of joints for each wear, real and imaginary parts in turns, shape
+    (2, joints, wear, 2 frequencies).
+    """
     reach, bend = _reach(gear)
-    at, shift = reach[:, None] * SHARES, bend[:, None] * SHARES**2
-    table = np.array([_moved(at, shift, held=held) for held in (False, True)])
-    chance = np.repeat(WEAR[:, None], len(reach), axis=1)
-    return table, _Joints.of(table, chance, SHARES, reach, _WORN)
+    return _characteristic(reach[:, None] * SHARES, bend[:, None] * SHARES**2).view(float)
 
 
-@lru_cache(maxsize=1024)
-def _unread(gear: Gear, unread: tuple[bool, ...]) -> tuple[Array, Array]:
-    """Transform and excess of all joints together that nobody read."""
-    joints = _prior(gear)[1]
-    some = np.array(unread)
-    return joints.transforms[:, :, some].prod(axis=2), joints.excess_in2[:, :, some].sum(axis=2)
+def _density(transform: Array) -> Array:
+    """Chance of each cell from a transform. [1]"""
+    return np.asarray(np.maximum(np.fft.irfft(transform, _CELLS), 0.0))
 
 
-def _read_exactly(cases: Cases) -> tuple[Mask, _Joints]:
-    """Joints that read what they are (3), those of all gears in one row."""
-    exact = cases.measured & (~cases.over_limit | cases.own_gauge)
-    at = np.nonzero(exact)
-    limits = cases.gear.limits_in[at[1]]
-    share = np.abs(
-        (cases.clearance_in[at] / limits)[:, None]
-        + (cases.gauge_u_in[at] / limits)[:, None] * _ERRORS
-    )
-    over = tabled_normal_cdf(
-        (cases.clearance_in[at] - limits) / np.maximum(cases.gauge_u_in[at], 1e-9)
-    )
-    reach, bend = (each[at[1]] for each in _reach(cases.gear))
-    parts = []
-    for some in np.array_split(np.arange(len(share)), max(len(share) // 512, 1)):
-        of = share[some]
-        places = reach[some, None] * of, bend[some, None] * of**2
-        table = np.array([_moved(*places, held=held) for held in (False, True)])
-        chance = np.broadcast_to(_WEIGHTS, (1, *of.shape))
-        parts.append(_Joints.of(table, chance, of, reach[some], over[some, None]))
-    joined = (
-        np.concatenate([getattr(part, name) for part in parts], axis=2)
-        for name in ("cells", "worn", "transforms", "excess_in2")
-    )
-    return exact, _Joints(*joined)
-
-
-def _share_within(margin_in: float) -> Array:
+def _share_within(margin_in: Array | float) -> Array:
     """Share of each cell within the margin. [1]"""
     return np.asarray(np.clip((margin_in - np.abs(_AT)) / _CELL_IN + 0.5, 0.0, 1.0))
 
 
-@lru_cache(maxsize=4)
-def _even(dimensions: int, n: int) -> Array:
-    """Even numbers from 0 to 1, the same for every gear, shape (dimensions, n). [1]"""
-    return frozen(random_directions(dimensions, n).T / (2.0 * np.pi))
+def _products_before(factors: Array) -> Array:
+    """Product of the factors before each one along the second axis."""
+    before = np.ones_like(factors)
+    for j in range(factors.shape[1] - 1):
+        before[:, j + 1] = before[:, j] * factors[:, j]
+    return before
 
 
-def _noise(excess_in2: Array) -> Array:
-    """Transform of what the linkage adds (5), less the variance that cells add already."""
-    variance = np.maximum(PRIORS.linkage_u_in**2 - excess_in2, (0.5 * _CELL_IN) ** 2)
-    return np.exp(-0.5 * variance[..., None] * _FREQUENCIES**2)
+@lru_cache(maxsize=8)
+def usual_of(gear: Gear, fleet: Fleet) -> tuple[Array, float]:
+    """Of a gear of the fleet of which nothing was read: the chance of leaving the margin with free
+    and with held pins, and how rarely work on it leaves its worn joints as they are. [1]
+    """
+    levels = np.array(fleet.levels or LEVELS)
+    whole = (WEAR @ _by_wear(gear)).view(complex).prod(axis=1) * _LINKAGE
+    out = _density(whole) @ (1.0 - _share_within(gear.margin.value)) @ levels
+    left = (1.0 - (1.0 - PRIORS.overlooked) * (WEAR @ _WORN)) ** len(gear.joints)
+    return np.clip(out, 1e-9, 1.0 - 1e-9), float(levels @ left)
 
 
 class Belief:
-    """What is believed of one gear: chances by the equations, states drawn from them.
+    """What is believed of one gear that failed, by everything that is known of it.
 
     Attributes
     ----------
+    looked : bool
+        Whether the rigging was checked.
     chances : tuple of float
         Chances that the joints, the rigging and something else are the cause (9). [1]
-    worn : ndarray, shape (joints,)
-        Chance of each joint to be beyond its limit (10). [1]
     held : float
         How much likelier the plunger's reading is with held pins than with free ones. [1]
     """
 
     chances: tuple[float, float, float]
 
-    def __init__(self, one: Cases, levels: Array, exact: Mask, read: _Joints) -> None:
-        gear = one.gear
+    def __init__(self, one: Cases) -> None:
+        levels, wear = (each[0] for each in given_readings(one))
+        gear, fleet = one.gear, one.fleet
         self.gear = gear
         self.margin_in = float(one.margin_in[0])
         self._one = one
-        self._exact, self._read = exact, read
-        self._doubted = {
-            j: self._in_doubt(j) for j in np.flatnonzero(one.measured[0] & ~exact).tolist()
-        }
-        unread = tuple((~one.measured[0]).tolist())
-        whole, excess = _unread(gear, unread)
-        for some in (read, *(joints for _chance, joints in self._doubted.values())):
-            whole = whole * some.transforms.prod(axis=2)
-            excess = excess + some.excess_in2.sum(axis=2)
-        self._noise = _noise(excess)
-        self._stands = _density(self._noise * whole)
-        loaded = one.fleet.loaded
-        before = np.outer([1.0 - loaded, loaded], levels)
-        usual, overlooked = usual_of(gear, one.fleet)
+        self.looked = one.inspections[0].rigging_checked not in (None, RiggingCheck.NO)
+        self._wear = wear
+        # By pins, joints and levels.
+        self._transforms = (wear @ _by_wear(gear)).view(complex)
+        self._before = _products_before(self._transforms)
+        self._stands = _density(self._before[:, -1] * self._transforms[:, -1] * _LINKAGE)
+        usual, overlooked = usual_of(gear, fleet)
+        before = np.outer([1.0 - fleet.loaded, fleet.loaded], levels)
         often = usual[:, None]
-        self._factors = (
-            before / often,
-            before / (1.0 - often) / PRIORS.joints_for_one_elsewhere,
-        )
-        self._seen_at = [_both_senses(each) for each in self._likelihoods()]
-        self._weights = np.array(
-            [
-                factor * np.einsum("pkc,pc->pk", self._stands, seen)
-                for factor, seen in zip(self._factors, self._seen_at, strict=True)
-            ]
-        )
+        elsewhere = before / (1.0 - often) / PRIORS.joints_for_one_elsewhere
+        # By cause, pins and levels; by cause, pins and cells.
+        self._factors = np.array([before / often, elsewhere])
+        self._seen_at = np.array([_both_senses(each) for each in self._likelihoods()])
+        self._weights = self._factors * np.einsum("pkx,cpx->cpk", self._stands, self._seen_at)
         self._rigging(levels, overlooked)
-        self.held = self._likelier_held(before)
-
-    def _in_doubt(self, j: int) -> tuple[Array, _Joints]:
-        """Chance of each wear of a joint that reads over its limit, by level, and the joint (3)."""
-        one = self._one
-        limits = one.gear.limits_in
-        read, u = one.clearance_in[0, j] / limits[j], one.gauge_u_in[0, j] / limits[j]
-        slip = -np.expm1(-PRIORS.wrong_readings / len(limits))
-        chance = np.zeros_like(WEAR)
-        for factor, often in ((1.0, 1.0 - slip), (2.0, slip)):
-            spread = np.hypot(u, PRIORS.gauge_scale * factor * SHARES)
-            off = (read - factor * SHARES) / spread
-            chance += often * WEAR * np.exp(-0.5 * off**2) / spread
-        chance = chance / chance.sum(axis=1, keepdims=True)
-        table = _prior(self.gear)[0][:, [j]]
-        reach = _reach(self.gear)[0][[j]]
-        return chance, _Joints.of(table, chance[:, None], SHARES, reach, _WORN)
-
-    @cached_property
-    def _contexts(self) -> tuple[Places, Places]:
-        """Pins and levels that count."""
-        total = self._weights.sum(axis=0)
-        pins, levels = np.nonzero(total > _NEGLIGIBLE * float(total.sum()))
-        return (pins, levels) if len(pins) else (np.array([0]), np.array([0]))
-
-    @cached_property
-    def _joints(self) -> tuple[Array, Array, Array]:
-        """Cells, worn cells and transforms of all joints in the contexts that count, (contexts,
-        joints, …).
-        """
-        pins, levels = self._contexts
-        prior = _prior(self.gear)[1]
-        found = []
-        for name in ("cells", "worn", "transforms"):
-            whole = getattr(prior, name)[pins, levels]
-            whole[:, self._exact] = getattr(self._read, name)[pins, 0]
-            for j, (_chance, joint) in self._doubted.items():
-                whole[:, j] = getattr(joint, name)[pins, levels, 0]
-            found.append(whole)
-        return found[0], found[1], found[2]
-
-    def _rigging(self, levels: Array, overlooked: float) -> None:
-        """Weigh the causes (8), (9); work that left the rigging wrong leaves few worn joints."""
-        worn = np.repeat((WEAR @ _WORN)[:, None], len(self.gear.joints), axis=1)
-        worn[:, self._exact] = self._read.worn[0].sum(axis=2)
-        for j, (chance, _joint) in self._doubted.items():
-            worn[:, j] = chance @ _WORN
-        sound = 1.0 - (1.0 - PRIORS.overlooked) * worn
-        weight = levels * np.prod(sound, axis=1) / overlooked * self._of_rigging()
-        weight = weight / PRIORS.joints_for_one_misrigged
-        joints, elsewhere = (float(each.sum()) for each in self._weights)
-        rigging = float(weight.sum())
-        total = max(joints + elsewhere + rigging, 1e-300)
-        self.chances = joints / total, rigging / total, elsewhere / total
-        self._rigging_levels = weight / max(rigging, 1e-300)
-        self._left_worn = PRIORS.overlooked * worn / sound
-
-    def _likelier_held(self, before: Array) -> float:
-        fits = self._weights.sum(axis=0)
-        if not self._one.failed[0]:
-            seen = self._seen_at[0] + self._seen_at[1]
-            fits = before * np.einsum("pkc,pc->pk", self._stands, seen)
-        free, held = fits.sum(axis=1).tolist()
-        loaded = self._one.fleet.loaded
-        return float(held / loaded / max(free / (1.0 - loaded), 1e-300))
+        fits = (
+            self._weights
+            if one.failed[0]
+            else before * np.einsum("pkx,cpx->cpk", self._stands, self._seen_at)
+        )
+        free, held = fits.sum(axis=(0, 2)).tolist()
+        self.held = float(held / fleet.loaded / max(free / (1.0 - fleet.loaded), 1e-300))
 
     def _likelihoods(self) -> tuple[Array, Array]:
         """Likelihood of the reading in each cell beyond and within the margin. [1]"""
         margin = self.margin_in
-        pieces = []
-        for low, high in ((margin, np.inf), (-np.inf, -margin), (-margin, margin)):
-            pieces.append(self._seen(np.clip(_BELOW, low, high), np.clip(_ABOVE, low, high)))
-        return pieces[0] + pieces[1], pieces[2]
+        over, under, within = (
+            self._seen(np.clip(_BELOW, low, high), np.clip(_ABOVE, low, high))
+            for low, high in ((margin, np.inf), (-np.inf, -margin), (-margin, margin))
+        )
+        return over + under, within
 
     def _seen(self, low: Array, high: Array) -> Array:
         y = float(self._one.plunger_in[0])
@@ -332,14 +209,26 @@ class Belief:
         share = tabled_normal_cdf((high - y) / u) - tabled_normal_cdf((low - y) / u)
         return np.asarray(share * np.sqrt(2.0 * np.pi) * u / _CELL_IN)
 
+    def _rigging(self, levels: Array, overlooked: float) -> None:
+        """Weigh the causes (8), (9); work that left the rigging wrong leaves few worn joints."""
+        left = self._wear * np.where(_WORN, PRIORS.overlooked, 1.0)
+        sound = left.sum(axis=2)
+        weight = levels * np.prod(sound, axis=0) / overlooked * self._of_rigging()
+        weight = weight / PRIORS.joints_for_one_misrigged
+        joints, elsewhere = self._weights.sum(axis=(1, 2)).tolist()
+        rigging = float(weight.sum())
+        total = max(joints + elsewhere + rigging, 1e-300)
+        self.chances = joints / total, rigging / total, elsewhere / total
+        self._rigging_levels = weight / max(rigging, 1e-300)
+        self._left_worn = left[..., _WORN].sum(axis=2) / sound
+
     def _of_rigging(self) -> float:
         """Likelihood of the plunger's reading where the rigging is wrong (7), and that somebody
         looked at it. [1]
         """
         one = self._one
         y, margin = float(one.plunger_in[0]), self.margin_in
-        looked = one.inspections[0].rigging_checked not in (None, RiggingCheck.NO)
-        likely = PRIORS.overlooked if looked else 1.0
+        likely = PRIORS.overlooked if self.looked else 1.0
         if not np.isfinite(y):
             return likely
         u = float(np.hypot(one.plunger_u_in[0], 1e-4))
@@ -349,30 +238,26 @@ class Belief:
         return float(likely * even * out * np.sqrt(2.0 * np.pi) * u / width)
 
     @cached_property
-    def _others(self) -> Array:
-        """Transform of all joints but each one, and of the linkage, (contexts, joints, …)."""
-        transforms = self._joints[2]
-        joints = range(transforms.shape[1])
-        each = [np.delete(transforms, j, axis=1).prod(axis=1) for j in joints]
-        return np.stack(each, axis=1) * self._noise[self._contexts][:, None]
+    def wear(self) -> Array:
+        """Chance of each cell of wear of each joint where the rigging is right, (joints, wear): all
+        others as they are, this one worn so far. [1]
+        """
+        after = _products_before(self._transforms[:, ::-1])[:, ::-1]
+        seen = np.fft.rfft(self._seen_at)
+        seen[..., 1:-1] *= 2.0
+        weighed = np.einsum("cpk,cpf->pkf", self._factors, np.conj(seen))
+        others = self._before * after * (_LINKAGE * weighed)[:, None]
+        # Parseval.
+        by_wear = np.conj(others).view(float) @ _by_wear(self.gear).swapaxes(2, 3)
+        found = np.maximum(np.einsum("pjks,jks->js", by_wear, self._wear), 1e-300)
+        return np.asarray(found / found.sum(axis=1, keepdims=True))
 
     @cached_property
     def worn(self) -> Array:
-        """All joints but one as they are, that one worn (10)."""
-        worn = self._joints[1]
-        pins, levels = self._contexts
-        others = self._others * _transform(worn)
-        share = np.zeros(worn.shape[1])
-        for factor, likelihood in zip(self._factors, self._seen_at, strict=True):
-            seen = np.conj(_transform(likelihood))
-            seen[:, 1:-1] *= 2.0
-            # Parseval.
-            by_context = np.einsum("cjf,cf->cj", others, seen[pins]).real / _CELLS
-            share += factor[pins, levels] @ by_context
-        share /= max(float(self._weights.sum()), 1e-300)
+        """Chance of each joint to be beyond its limit (10). [1]"""
         rigging = self.chances[1]
-        found = (1.0 - rigging) * share + rigging * (self._rigging_levels @ self._left_worn)
-        return np.asarray(np.clip(found, 0.0, 1.0))
+        found = (1.0 - rigging) * (self.wear @ _WORN)
+        return np.asarray(found + rigging * (self._left_worn @ self._rigging_levels))
 
     @property
     def worn_by_leverage(self) -> Array:
@@ -382,43 +267,21 @@ class Belief:
         amplification = responses(self.gear)[0].amplification
         return np.asarray(self.worn * amplification / amplification.max())
 
-    @cached_property
-    def states(self) -> States:
-        """Drawn failures, the same ones whoever else is judged."""
-        rng = np.random.default_rng(1)
-        cause = np.repeat([0, 1], [STATES, _OTHERS])
-        moved, worn, stands, held = self._backwards(cause)
-        moved = moved[:STATES]
-        level = _drawn(rng.random(_OTHERS), self._rigging_levels[None])
-        rigging = rng.random((_OTHERS, worn.shape[1])) < self._left_worn[level]
-        mean, spread = PRIORS.cosine
-        loaded = mean + spread * rng.standard_normal(moved.shape)
-        free = np.cos(2.0 * np.pi * rng.random(moved.shape))
-        turns = np.where(held[:STATES, None], loaded, free)
-        reach = responses(self.gear)[0].amplification * self.gear.new_parts_in
-        counts = [STATES, _OTHERS, _OTHERS]
-        return States(
-            np.repeat(np.diag(np.divide(self.chances, counts)), counts, axis=1),
-            np.vstack([worn[:STATES], rigging, worn[STATES:]]),
-            moved,
-            reach * turns,
-            stands[:STATES],
-            self.margin_in,
-        )
+    def clearances_in(self, at: Sequence[float]) -> Array:
+        """Quantiles of the clearance of each joint, (joints, quantiles). [in]"""
+        steps = np.cumsum(self.wear, axis=1)
+        found = [np.interp(at, [0.0, *each], _ENDS) for each in steps]
+        return np.array(found) * self.gear.limits_in[:, None]
 
     def second_repair(self, restored: Mask) -> float:
         """Chance that the plunger is beyond its margin once some joints are new (11). [1]"""
-        pins, levels = self._contexts
-        transforms = self._joints[2]
-        gone = transforms[:, restored].prod(axis=1)
-        stay = self._noise[pins, levels] * transforms[:, ~restored].prod(axis=1)
-        reach = _reach(self.gear)[0] * self.gear.new_parts_in / self.gear.limits_in
-        new = [_moved(reach[restored], 0.0 * reach[restored], held=held) for held in (False, True)]
-        fresh = _transform(np.array(new)).prod(axis=1)[pins]
-        weight = _density(np.conj(gone) * _transform(self._seen_at[0][pins])) * _density(stay)
-        weight *= self._factors[0][pins, levels][:, None]
-        inside = _density(np.conj(fresh) * _transform(_share_within(self.margin_in)))
-        within = np.sum(weight * inside) / max(float(weight.sum()), 1e-300)
+        gone, stay = (self._transforms[:, some].prod(axis=1) for some in (restored, ~restored))
+        fresh = _as_new(self.gear)[:, restored].prod(axis=1)
+        out = np.fft.rfft(self._seen_at[0])[:, None]
+        weight = _density(np.conj(gone) * out) * _density(stay * _LINKAGE)
+        weight *= self._factors[0][..., None]
+        inside = _density(np.conj(fresh) * np.fft.rfft(_share_within(self.margin_in)))
+        within = np.sum(weight * inside[:, None]) / max(float(weight.sum()), 1e-300)
         return max(1.0 - float(within), 0.0)
 
     def chance_of_any(self, joints: Sequence[int]) -> float:
@@ -428,86 +291,86 @@ class Belief:
         several = self.states.causes.sum(axis=0) @ (worn.sum(axis=1) - worn.any(axis=1))
         return max(float(each.sum() - several), float(each.max()))
 
-    def _backwards(self, cause: Places) -> tuple[Array, Mask, Array, Mask]:
-        """Draw failures of some causes: what each joint moves and whether it is worn, given where
-        the plunger was read; where it stands, and whether pins are held.
+    @cached_property
+    def states(self) -> States:
+        """Drawn failures, the same ones whoever else is judged: where the plunger stands, then what
+        each joint moved, one after another, as in a hidden Markov chain.
         """
-        pins, levels = self._contexts
-        cells, worn_cells, transforms = self._joints
-        n, joints = len(cause), cells.shape[1]
-        even = _even(2 * joints + 3, n)
-        weights = np.array([each[pins, levels] for each in self._weights])
-        of = _drawn(even[0], weights[cause])
-        posterior = self._stands[pins, levels] * np.array(self._seen_at)[:, pins] + 1e-300
-        place = _drawn(even[1], posterior[cause, of])
-        before = np.ones_like(transforms)
-        before[:, 1:] = np.cumprod(transforms[:, :-1], axis=1)
-        sums = _density(self._noise[pins, levels][:, None] * before)
-        stands = np.asarray(_AT[place] + _CELL_IN * (even[2] - 0.5))
+        rng = np.random.default_rng(1)
+        cause = np.repeat([0, 1], [STATES, _OTHERS])
+        n, joints = len(cause), len(self.gear.joints)
+        even = _even(joints + 3, n)
+        weights = self._weights.reshape(2, -1)[cause]
+        used, context = np.unique(
+            _drawn(even[0], np.cumsum(weights.T, axis=0)), return_inverse=True
+        )
+        pins, levels = np.divmod(used, len(WEAR))
+        likely = self._stands[pins, levels][context] * self._seen_at[cause, pins[context]] + 1e-300
+        place = _drawn(even[1], np.cumsum(likely, axis=1).T)
+        stands = _AT[place] + _CELL_IN * (even[2] - 0.5)
+        before = _density(self._before[pins, :, levels] * _LINKAGE)
+        is_worn, at_in = self._points(pins, levels)
+        cell = np.rint(at_in / _CELL_IN).astype(int)
         moved = np.empty((n, joints))
         worn = np.empty(moved.shape, bool)
-        middle = _CELLS // 2
         for j in range(joints - 1, -1, -1):
-            some = np.flatnonzero(cells[:, j].max(axis=0) > 1e-12)
-            # The window of the farthest cells closes one cell before it meets itself.
-            most = min(int(np.abs(some - middle).max()), middle - 1)
-            round_about = np.concatenate(
-                [sums[:, j, -most:], sums[:, j], sums[:, j, :most]], axis=1
-            )
-            left = sliding_window_view(round_about, 2 * most + 1, axis=1)[of, place]
-            own = cells[of, j, middle - most : middle + most + 1][:, ::-1]
-            chosen = most - _drawn(even[3 + j], own * left + 1e-300)
-            cell = middle + chosen
-            moved[:, j] = _AT[cell]
-            whole = np.maximum(cells[of, j, cell], 1e-300)
-            worn[:, j] = even[3 + joints + j] * whole < worn_cells[of, j, cell]
-            place = (place - chosen) % _CELLS
-        return moved, worn, stands, pins[of] == 1
-
-    def clearances_in(self, joint: int, at: Sequence[float]) -> list[float]:
-        """Quantiles of the clearance of the joint at a place, its wear weighed by the reading.
-        [in]
-        """
-        pins, levels = self._contexts
-        others = self._others[:, joint]
-        weight = sum(
-            factor[pins, levels, None] * seen[pins]
-            for factor, seen in zip(self._factors, self._seen_at, strict=True)
+            left = (place - cell[j].take(context, axis=1)) & (_CELLS - 1)
+            of = _drawn(even[3 + j], _SUMS @ before[:, j].take(_CELLS * context + left))
+            place = left[of, np.arange(n)]
+            moved[:, j] = at_in[j, of, context]
+            worn[:, j] = is_worn[j, of, context]
+        level = _drawn(rng.random(_OTHERS), np.cumsum(self._rigging_levels)[:, None])
+        rigging = rng.random((_OTHERS, joints)) < self._left_worn[:, level].T
+        mean, spread = PRIORS.cosine
+        loaded = mean + spread * rng.standard_normal((STATES, joints))
+        free = np.cos(2.0 * np.pi * rng.random((STATES, joints)))
+        turns = np.where(pins[context[:STATES], None] == 1, loaded, free)
+        reach = responses(self.gear)[0].amplification * self.gear.new_parts_in
+        counts = [STATES, _OTHERS, _OTHERS]
+        return States(
+            np.repeat(np.diag(np.divide(self.chances, counts)), counts, axis=1),
+            np.vstack([worn[:STATES], rigging, worn[STATES:]]),
+            moved[:STATES],
+            reach * turns,
+            stands[:STATES],
+            self.margin_in,
         )
-        reach, bend = (each[joint] for each in _reach(self.gear))
-        share, chance = SHARES, WEAR
-        if joint in self._doubted:
-            chance = self._doubted[joint][0]
-        elif self._exact[joint]:
-            one = self._one
-            errors = np.linspace(-4.0, 4.0, 33)
-            read = one.clearance_in[0, joint] + one.gauge_u_in[0, joint] * errors
-            share = np.abs(read) / self.gear.limits_in[joint]
-            chance = np.repeat([np.exp(-0.5 * errors**2)], len(WEAR), axis=0)
-        total = np.zeros(len(share))
-        for context, (held, level) in enumerate(zip(pins.tolist(), levels.tolist(), strict=True)):
-            own = _transform(_moved(reach * share, bend * share**2, held=bool(held)))
-            fits = _density(others[context] * own) @ np.asarray(weight)[context]
-            total += chance[level] * fits
-        order = np.argsort(share)
-        steps = np.cumsum(total[order]) / max(float(total.sum()), 1e-300)
-        values = np.interp(at, steps, share[order]) * self.gear.limits_in[joint]
-        return [float(value) for value in values]
+
+    def _points(self, pins: Places, levels: Places) -> tuple[Mask, Array]:
+        """Points that stand for each joint in some contexts, (joints, points, contexts): whether it
+        is worn, and what it moves the plunger by. [in]
+        """
+        steps = np.cumsum(self._wear[:, levels], axis=2)[:, None, :, :-1]
+        share = SHARES[(steps < _QUANTILES[:, None, None]).sum(axis=3)]
+        reach, bend = (each[:, None, None] for each in _reach(self.gear))
+        mean, spread = PRIORS.cosine
+        turned = np.where(pins == 1, mean + spread * _SCORES, np.cos(2.0 * np.pi * _TURNS))
+        return share > 1.0, reach * share * turned + (pins == 0) * bend * share**2
+
+
+@lru_cache(maxsize=4)
+def _as_new(gear: Gear) -> Array:
+    """Characteristic functions of new joints, (2, joints, frequencies)."""
+    reach = _reach(gear)[0] * gear.new_parts_in / gear.limits_in
+    return _characteristic(reach, 0.0 * reach)
+
+
+@lru_cache(maxsize=4)
+def _even(dimensions: int, n: int) -> Array:
+    """Even numbers from 0 to 1, the same for every gear, shape (dimensions, n). [1]"""
+    return frozen(random_directions(dimensions, n).T / (2.0 * np.pi))
 
 
 def _both_senses(likelihood: Array) -> Array:
     """A likelihood with free pins, and with held ones, which may rest with either sign; shape
     (2, cells). [1]
     """
-    mirrored = np.roll(likelihood[::-1], 1)
-    return np.array([likelihood, 0.5 * (likelihood + mirrored)])
+    return np.array([likelihood, 0.5 * (likelihood + np.roll(likelihood[::-1], 1))])
 
 
-def _drawn(even: Array, weights: Array) -> Places:
-    """One place of each row, by its weights."""
-    steps = np.cumsum(weights, axis=1)
-    at = even * steps[:, -1]
-    return np.asarray(np.argmax(steps >= at[:, None], axis=1))
+def _drawn(even: Array, steps: Array) -> Places:
+    """One place of each column, by the sums of its weights."""
+    return np.asarray((steps < even * steps[-1]).sum(axis=0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -542,32 +405,6 @@ class States:
         return np.asarray(np.abs(left) > self.margin_in)
 
 
-@lru_cache(maxsize=8)
-def usual_of(gear: Gear, fleet: Fleet) -> tuple[Array, float]:
-    """Of a gear of the fleet of which nothing was read: the chance of leaving the margin with free
-    and with held pins, and how rarely work on it leaves its worn joints as they are. [1]
-    """
-    levels = np.array(fleet.levels or LEVELS)
-    beyond = 1.0 - _share_within(gear.margin.value)
-    whole, excess = _unread(gear, (True,) * len(gear.joints))
-    out = _density(_noise(excess) * whole) @ beyond @ levels
-    left = (1.0 - (1.0 - PRIORS.overlooked) * (WEAR @ _WORN)) ** len(gear.joints)
-    return np.clip(out, 1e-9, 1.0 - 1e-9), float(levels @ left)
-
-
-def believe(cases: Cases) -> list[Belief]:
-    """Weigh what may be the matter with each gear, by everything that is known of it."""
-    levels = level_chances(cases)
-    exact, joints = _read_exactly(cases)
-    ends = np.cumsum(exact.sum(axis=1))
-    found = []
-    for i, (end, n) in enumerate(zip(ends.tolist(), exact.sum(axis=1).tolist(), strict=True)):
-        of = np.arange(end - n, end)
-        one = cases.take(np.array([i]))
-        found.append(Belief(one, levels[i], exact[i], joints.take(of)))
-    return found
-
-
 # Sets of random directions and wear by which the chance of unread joints is counted. [1]
 _IMAGINED = 1024
 
@@ -583,9 +420,7 @@ def _imagined(gear: Gear) -> tuple[Array, Array, Array]:
     even = _even(2 * joints, _IMAGINED)
     turned = np.cos(2.0 * np.pi * even[:joints])
     steps = np.cumsum(WEAR, axis=1)
-    share = np.array(
-        [np.interp(even[joints:], np.r_[0.0, each], np.linspace(0, 2, 51)) for each in steps]
-    )
+    share = np.array([np.interp(even[joints:], np.r_[0.0, each], _ENDS) for each in steps])
     moved = share * reach[:, None] * turned + share**2 * bend[:, None]
     per_clearance = reach / gear.limits_in
     return per_clearance[:, None] * turned, bend / gear.limits_in**2, moved
@@ -600,7 +435,7 @@ def chance_random(cases: Cases) -> Array:
     base = read @ linear + (read**2 @ bend)[:, None]
     y, u = cases.plunger_in[:, None], np.hypot(cases.plunger_u_in, PRIORS.linkage_u_in)[:, None]
     is_read = np.isfinite(y[:, 0])
-    levels = level_chances(cases)
+    levels = given_readings(cases)[0]
     beyond = np.empty_like(levels)
     for k, each in enumerate(moved):
         at = base + (~cases.measured).astype(float) @ each

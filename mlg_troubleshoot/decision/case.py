@@ -136,6 +136,10 @@ class Cases:
         return np.asarray((~self.measured & self.gear.critical).any(axis=1))
 
     @property
+    def repaired(self) -> Mask:
+        return np.array([i.is_repaired for i in self.inspections])
+
+    @property
     def failed_as_new(self) -> Mask:
         """Gears of which a failure stands that is not surely older than their plunger reading."""
         return np.array(
@@ -179,7 +183,7 @@ class Cases:
             self.gear, self.inspections, clearance_in, known, self.gauge_u_in, self.extension
         )
 
-    def take(self, rows: Places) -> Cases:
+    def take(self, rows: Places | list[int]) -> Cases:
         arrays = {
             f.name: getattr(self, f.name)[rows]
             for f in fields(self)

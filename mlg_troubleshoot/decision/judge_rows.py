@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
-from functools import partial
+from functools import cache, partial
 from itertools import chain
 from operator import attrgetter
 from typing import Any
@@ -24,7 +24,7 @@ from mlg_troubleshoot.decision.assessment import (
     UncertaintyBudget,
     Verdict,
 )
-from mlg_troubleshoot.decision.belief import Belief, believe, chance_random
+from mlg_troubleshoot.decision.belief import Belief, chance_random
 from mlg_troubleshoot.decision.case import Cases, chance_at, predict_batch
 from mlg_troubleshoot.decision.consequences import consequences
 from mlg_troubleshoot.decision.fleet import Fleet
@@ -208,42 +208,19 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
         p_lower,
         batch.lower.standard_uncertainty(cases.margin_u_in),
     )
-    beliefs = _beliefs(cases)
-    planned = plans(cases, judged, beliefs, _with_chances(cases, beliefs, sets))
-    return [
-        _assessment(cases, judged, i, findings[i], *planned[i], advice) for i in range(len(cases))
-    ]
-
-
-def _beliefs(cases: Cases) -> list[Belief | None]:
-    """What is believed of each gear that failed, or was repaired."""
-    repaired = np.array([i.is_repaired for i in cases.inspections])
-    rows = np.flatnonzero(cases.failed | repaired)
-    found: list[Belief | None] = [None] * len(cases)
-    for row, belief in zip(rows.tolist(), believe(cases.take(rows)), strict=True):
-        found[row] = belief
-    return found
-
-
-def _with_chances(
-    cases: Cases, beliefs: Sequence[Belief | None], sets: Sequence[tuple[RepairSet, ...]]
-) -> list[tuple[RepairSet, ...]]:
-    """Repair sets with the chance of a second repair after each, of gears whose plunger was read
-    beyond its margin.
-    """
+    belief = cache(lambda row: Belief(cases.take([row])))
     numbers = np.array(cases.gear.joint_numbers)
-    found = list(sets)
-    for row in np.flatnonzero(cases.beyond_margin).tolist():
-        belief = beliefs[row]
-        if belief is not None and sets[row]:
-            found[row] = tuple(
-                replace(
-                    each,
-                    second_repair_probability=belief.second_repair(np.isin(numbers, each.joints)),
-                )
-                for each in sets[row]
-            )
-    return found
+    for row in np.flatnonzero(cases.beyond_margin & (cases.failed | cases.repaired)).tolist():
+        chances = [belief(row).second_repair(np.isin(numbers, s.joints)) for s in sets[row]]
+        sets[row] = tuple(
+            replace(each, second_repair_probability=chance)
+            for each, chance in zip(sets[row], chances, strict=True)
+        )
+    planned = plans(cases, judged, belief, sets)
+    return [
+        _assessment(cases, judged, i, findings[i], *planned[i], belief if advice else None)
+        for i in range(len(cases))
+    ]
 
 
 def _verdicts(
@@ -278,7 +255,7 @@ def _assessment(
     findings: tuple[JointFinding, ...],
     plan: Plan,
     sets: tuple[RepairSet, ...],
-    advice: bool,
+    belief: Callable[[int], Belief] | None,
 ) -> Assessment:
     inspection = cases.inspections[i]
     found = judged.verdicts[i]
@@ -295,7 +272,7 @@ def _assessment(
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.batch, cases, i) if known else None
-    detail = _detail(cases, judged, i, budget) if advice and closes else {}
+    detail = _detail(cases, judged, i, budget, belief) if belief is not None and closes else {}
     return Assessment(
         inspection=inspection,
         verdict=found,
@@ -363,17 +340,21 @@ def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
 
 
 def _detail(
-    cases: Cases, judged: Judged, i: int, budget: UncertaintyBudget | None
+    cases: Cases,
+    judged: Judged,
+    i: int,
+    budget: UncertaintyBudget | None,
+    belief: Callable[[int], Belief],
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
-    one = cases.take(np.array([i]))
+    one = cases.take([i])
     detail: dict[str, Any] = {}
     if budget is not None and judged.verdicts[i] in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
         lower = one.predict(one.filled(0.0))
         worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
         detail["rigging"] = rigging_alternative(one, worst_in, budget)
     if np.isfinite(one.plunger_in[0]) and one.failed[0]:
-        detail["posterior"] = explain(one)
+        detail["posterior"] = explain(belief(i))
     return detail
 
 

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import betaincinv
 
-from mlg_troubleshoot.decision.belief import LEVELS, SHARES, WEAR, believe, level_chances
+from mlg_troubleshoot.decision.belief import LEVELS, SHARES, WEAR, Belief, given_readings
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection
@@ -44,7 +44,7 @@ def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:
     """
     known = Cases.of(gear, inspections)
     read = known.measured.any(axis=1)
-    fits = level_chances(known)[read] / LEVELS
+    fits = given_readings(known)[0][read] / LEVELS
     levels = LEVELS
     for _ in range(_ROUNDS):
         each = fits * levels
@@ -54,7 +54,7 @@ def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:
     share = betaincinv(PRIORS.loaded, 1.0 - PRIORS.loaded, _QUANTILES)
     likely = np.zeros(len(share))
     if len(whole):
-        ratio = np.array([each.held for each in believe(known.take(whole))])
+        ratio = np.array([Belief(known.take([i])).held for i in whole.tolist()])
         likely = np.log1p(share[:, None] * (ratio - 1.0)).sum(axis=1)
     weight = np.exp(likely - likely.max())
     loaded = float(np.sum(share * weight) / np.sum(weight))

@@ -7,19 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
-from mlg_troubleshoot.decision.belief import believe
-from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.inspection import RiggingCheck
+from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 
 _ENDS = 1.0 - CONFORMANCE, 0.5, CONFORMANCE
 
 
-def explain(one: Cases) -> Posterior:
+def explain(belief: Belief) -> Posterior:
     """Find which joints explain the plunger's reading of one gear that failed."""
-    gear = one.gear
-    (belief,) = believe(one)
+    gear = belief.gear
     every = [*gear.link_groups, gear.joint_numbers]
     places = [[gear.joint_numbers.index(n) for n in group] for group in every]
     # Nothing is surer than what drawn states allow.
@@ -29,16 +26,24 @@ def explain(one: Cases) -> Posterior:
     groups = [GroupChance(*each) for each in zip(gear.link_groups, chances, strict=True)]
     groups.sort(key=lambda group: -group.probability)
     intervals = tuple(
-        ClearanceInterval(number, low, median, high, float(belief.worn[j]))
-        for j, number in enumerate(gear.joint_numbers)
-        for low, median, high in [belief.clearances_in(j, _ENDS)]
+        ClearanceInterval(number, low, median, high, worn)
+        for number, (low, median, high), worn in zip(
+            gear.joint_numbers,
+            belief.clearances_in(_ENDS).tolist(),
+            belief.worn.tolist(),
+            strict=True,
+        )
     )
     called = tuple(group.joints for group in groups if group.probability > 0.5)
     none = 1.0 - worn
     rigging = belief.chances[1]
-    looked = one.inspections[0].rigging_checked not in (None, RiggingCheck.NO)
     return Posterior(
-        tuple(groups), none, rigging, intervals, called, _text(groups, none, rigging, looked=looked)
+        tuple(groups),
+        none,
+        rigging,
+        intervals,
+        called,
+        _text(groups, none, rigging, looked=belief.looked),
     )
 
 

@@ -7,7 +7,7 @@ limit is restored, nothing else. What comes after the first step is the expected
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from mlg_troubleshoot.decision import sentences
 from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Verdict
 from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.choice import Choice, Possible, choose
+from mlg_troubleshoot.decision.choice import Choice, choose
 from mlg_troubleshoot.decision.inspection import InvalidRow, RiggingCheck
 from mlg_troubleshoot.decision.plan import (
     Action,
@@ -36,22 +36,20 @@ from mlg_troubleshoot.decision.repair import removable, restored
 from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
 
 
-def _doubted(cases: Cases, beliefs: Sequence[Belief | None]) -> Mask:
+def _doubted(cases: Cases, belief: Callable[[int], Belief]) -> Mask:
     """Readings over their limits that are taken again: within two standard uncertainties of the
     limit, or, on a gear that failed, at odds with the plunger; of no joint far beyond its limit.
     """
     gear = cases.gear
     read = cases.filled(0.0)
-    near = read - gear.limits_in <= THRESHOLDS.doubtful * cases.gauge_u_in
-    contradicts = np.zeros_like(near)
-    rows = np.flatnonzero(cases.over_limit.any(axis=1) & np.isfinite(cases.plunger_in))
-    for row in rows.tolist():
-        belief = beliefs[row]
-        if belief is not None:
-            contradicts[row] = 1.0 - belief.worn > gear.second_repair_chance.value
     may_be = cases.over_limit & cases.reachable & ~cases.own_gauge
     may_be &= read <= THRESHOLDS.surely_worn * gear.limits_in
-    return np.asarray(may_be & (near | contradicts))
+    found = may_be & (read - gear.limits_in <= THRESHOLDS.doubtful * cases.gauge_u_in)
+    failed = (cases.failed | cases.repaired) & np.isfinite(cases.plunger_in)
+    for row in np.flatnonzero(failed & (may_be & ~found).any(axis=1)).tolist():
+        contradicts = 1.0 - belief(row).worn > gear.second_repair_chance.value
+        found[row] |= may_be[row] & contradicts
+    return np.asarray(found)
 
 
 def _correction(text: str) -> Plan:
@@ -91,11 +89,11 @@ class Judged:
 def plans(
     cases: Cases,
     judged: Judged,
-    beliefs: Sequence[Belief | None],
+    belief: Callable[[int], Belief],
     sets: Sequence[tuple[RepairSet, ...]],
 ) -> list[tuple[Plan, tuple[RepairSet, ...]]]:
     """The plan of each gear, and the repairs that it chose from."""
-    facts = _BatchContext(cases, judged, beliefs)
+    facts = _BatchContext(cases, judged, belief)
     courses = [_PlanBuilder(facts, i, sets[i]) for i in range(len(cases))]
     planned = [course.plan() for course in courses]
     _predict_tried(cases, courses)
@@ -125,17 +123,17 @@ def _predict_tried(cases: Cases, courses: Sequence[_PlanBuilder]) -> None:
 class _BatchContext:
     """What the plans of a batch are made from, worked out for all gears at once."""
 
-    def __init__(self, cases: Cases, judged: Judged, beliefs: Sequence[Belief | None]) -> None:
+    def __init__(self, cases: Cases, judged: Judged, belief: Callable[[int], Belief]) -> None:
         gear = cases.gear
         self.cases = cases
         self.judged = judged
-        self.beliefs = beliefs
+        self.belief = belief
         self.numbers = gear.joint_numbers
         self.complained = cases.complained
         self.over = cases.over_limit & cases.restorable
         self.removable = removable(cases)
         self.open: Mask = np.asarray(~cases.measured & cases.reachable)
-        self.doubted = _doubted(cases, beliefs)
+        self.doubted = _doubted(cases, belief)
         u = np.hypot(cases.plunger_u_in, cases.margin_u_in)
         apart = np.abs(np.abs(cases.plunger_in) - cases.margin_in)
         self.at_edge: Mask = np.asarray(apart < THRESHOLDS.doubtful * u)
@@ -165,9 +163,7 @@ class _PlanBuilder:
     @property
     def belief(self) -> Belief:
         """What is believed of a gear that failed, or failed before its repair."""
-        found = self.facts.beliefs[self.row]
-        assert found is not None
-        return found
+        return self.facts.belief(self.row)
 
     def plan(self) -> Plan:
         """The steps in their order."""
@@ -241,16 +237,17 @@ class _PlanBuilder:
             return self._restore_over_limit()._end(End.NOT_EXPLAINED)
         f = self.facts
         i = self.row
-        possible = Possible(
+        choice = choose(
+            self.gear,
+            self.belief,
             over=self.cases.over_limit[i],
             worn=f.removable[i],
             spare=self.cases.restorable[i],
             unread=f.open[i],
             doubted=f.doubted[i],
             looked=self.looked or not self.read_plunger,
-            opened=self.opened,
         )
-        return self._follow(choose(self.gear, self.belief, possible))
+        return self._follow(choice)
 
     def _follow(self, choice: Choice) -> Plan:
         """Do what was chosen; what comes after it is the expected course."""

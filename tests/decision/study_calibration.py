@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlg_troubleshoot.decision.belief import believe
+from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.life.looking_back import expected_of
@@ -49,7 +49,8 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
     fleet = None if hangar.store is None else expected_of(hangar.store, result.gear)
     rows = [judgement.inspection for judgement in result.judgements]
     cases = Cases.of(result.gear, rows, fleet=fleet)
-    causes = [belief.chances for belief in believe(cases)]
+    beliefs = [Belief(cases.take([i])) for i in range(len(cases))]
+    causes = [belief.chances for belief in beliefs]
     for i, (gear, said) in enumerate(zip(gears, unread, strict=True)):
         read = cases.measured[i]
         if read.all():
@@ -69,7 +70,7 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
             pairs["rigging"].append((causes[i][1], gear.kind == MISRIGGED))
             pairs["something else"].append((causes[i][2], gear.kind == OTHER))
         if gear.kind in (CLEARANCE, MISRIGGED):
-            found = explain(cases.take(np.array([i])))
+            found = explain(beliefs[i])
             for each in found.intervals:
                 j = each.joint - 1
                 inside = each.low_in <= true[i, j] <= each.high_in

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.belief import SHARES, WEAR, believe, level_chances
+from mlg_troubleshoot.decision.belief import SHARES, WEAR, Belief, given_readings
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection
@@ -61,7 +61,7 @@ def test_unread_joints_are_worn_as_the_fleet_is(
 ) -> None:
     fleet = learned(gear, [inspected(every_joint(clearance_in))] * 20)
     expected = [
-        (level_chances(Cases.of(gear, [inspected({})], fleet=known)) @ WEAR @ SHARES)[0]
+        (given_readings(Cases.of(gear, [inspected({})], fleet=known))[0] @ WEAR @ SHARES)[0]
         for known in (Fleet(), fleet)
     ]
     assert bool(expected[1] > expected[0]) is more
@@ -78,9 +78,7 @@ def test_a_failure_near_the_bound_is_repaired_again_more_often_where_loads_hold_
     """Plain draws of the model: .025 with free pins, .203 with held ones."""
     reading = float(0.8 * gear.model.plunger_amplification() @ np.full(10, 0.0035))
     row = inspected(every_joint(0.0035), readings_in=(reading,))
-    least, most = (
-        believe(Cases.of(gear, [row], fleet=Fleet(loaded)))[0] for loaded in (0.001, 0.999)
-    )
+    least, most = (Belief(Cases.of(gear, [row], fleet=Fleet(loaded))) for loaded in (0.001, 0.999))
     shut = np.arange(10) < 2
     assert most.second_repair(shut) == pytest.approx(0.203, abs=0.02)
     assert least.second_repair(shut) == pytest.approx(0.025, abs=0.02)

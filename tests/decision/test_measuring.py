@@ -9,7 +9,7 @@ import pytest
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.belief import SHARES, WEAR, believe, level_chances
+from mlg_troubleshoot.decision.belief import SHARES, WEAR, Belief, given_readings
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.plan import minutes_to_measure
@@ -25,7 +25,7 @@ MARGIN_IN = 0.03
 
 
 def levels_of(gear: Gear, clearance_in: dict[int, float]) -> Array:
-    return level_chances(Cases.of(gear, [inspected(clearance_in)]))[0]
+    return given_readings(Cases.of(gear, [inspected(clearance_in)]))[0][0]
 
 
 def test_the_second_order_worst_case_is_within_one_percent_up_to_the_limit(gear: Gear) -> None:
@@ -88,7 +88,7 @@ def test_readings_unlike_each_other_speak_for_joints_that_each_have_their_own_le
 
 def doubt(gear: Gear, clearance_in: dict[int, float], joint: int, **more: Any) -> float:
     """Chance that a joint that reads over its limit is within it."""
-    (belief,) = believe(Cases.of(gear, [inspected(clearance_in, **more)]))
+    belief = Belief(Cases.of(gear, [inspected(clearance_in, **more)]))
     return float(1.0 - belief.worn[joint - 1])
 
 

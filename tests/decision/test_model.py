@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.decision.belief import believe
+from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.priors import PRIORS
@@ -53,19 +53,22 @@ def drawn_shares(rng: np.random.Generator, gear: Gear, read: Mapping[int, float]
     """(1) to (3), of readings within their limit."""
     wear = wear_by_level()
     prior = np.append(np.full(6, PRIORS.alike / 6), 1.0 - PRIORS.alike)
-    likely = prior.copy()
+    # Each cell in forty parts.
+    fine = (np.arange(2000) + 0.5) / 1000
+    given = {}
     for joint, clearance in read.items():
-        share = clearance / gear.joint(joint).limit.value
-        likely *= [np.exp(np.interp(share, CENTRES, np.log(level))) for level in wear]
+        off = (fine * gear.joint(joint).limit.value - clearance) / GAUGE_U_IN
+        given[joint] = np.repeat(wear, 40, axis=1) * np.exp(-0.5 * off**2)
+    likely = prior * np.prod([each.sum(axis=1) for each in given.values()], axis=0)
     level = rng.choice(7, n, p=likely / likely.sum())
     share = np.empty((n, len(gear.joints)))
     for k in range(7):
         of = level == k
         cells = rng.choice(50, (int(of.sum()), share.shape[1]), p=wear[k])
         share[of] = 0.04 * (cells + rng.random(cells.shape))
-    for joint, clearance in read.items():
-        seen = clearance + GAUGE_U_IN * rng.standard_normal(n)
-        share[:, joint - 1] = np.abs(seen) / gear.joint(joint).limit.value
+        for joint, each in given.items():
+            chance = each[k] / each[k].sum()
+            share[of, joint - 1] = rng.choice(fine, int(of.sum()), p=chance)
     return share
 
 
@@ -144,7 +147,7 @@ def believed(gear: Gear, read: Mapping[int, float], y: float, sets: Array) -> Tr
         plunger_gauge_u_in=PLUNGER_U_IN,
         gauge_u_in=GAUGE_U_IN,
     )
-    (found,) = believe(Cases.of(gear, [row]))
+    found = Belief(Cases.of(gear, [row]))
     return Truth(
         np.array(found.chances),
         found.worn,
