@@ -33,14 +33,6 @@ class Verdict(StrEnum):
         }[self.value]
 
 
-def title(verdict: Verdict, basis: Basis) -> str:
-    """A verdict in capitals, with what it rests on."""
-    if basis is Basis.MEASURED:
-        where = "OUTSIDE" if verdict is Verdict.OUTSIDE_MARGIN else "WITHIN"
-        return f"{where} MARGIN, MEASURED"
-    return verdict.words
-
-
 class VerdictTone(StrEnum):
     """How loud a verdict is: RED is for what must be done now."""
 
@@ -357,9 +349,20 @@ class Assessment(_Planned, Result):
         return self.inspection
 
     @property
+    def unread(self) -> tuple[int, ...]:
+        """Joints that were not measured."""
+        return tuple(f.joint for f in self.joints if f.clearance_in is None)
+
+    @property
     def title(self) -> str:
         """The verdict in capitals, as it heads every channel."""
-        return title(self.verdict, self.basis)
+        if self.basis is Basis.MEASURED:
+            return (
+                "OUTSIDE MARGIN, MEASURED"
+                if self.is_measured_outside
+                else "WITHIN MARGIN, MEASURED"
+            )
+        return self.verdict.words
 
     @property
     def is_measured_outside(self) -> bool:

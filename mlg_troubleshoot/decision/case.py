@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -32,8 +33,11 @@ from mlg_troubleshoot.gear.directions import chance_beyond
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 
+# A reading less than this above a new part: restoring the joint gains nothing. [in]
+_AS_NEW_IN = 1e-4
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, eq=False)
 class Cases:
     """n gears under judgement, NaN where nothing was measured; `own_gauge`: joints that were
     measured again. [in]
@@ -102,20 +106,37 @@ class Cases:
         """Scatter that an extension leaves; None without one. [in]"""
         return None if self.extension is None else self.extension.residual_u_in
 
-    @property
+    @cached_property
     def measured(self) -> Mask:
         return np.isfinite(self.clearance_in)
 
-    @property
+    @cached_property
     def over_limit(self) -> Mask:
         return self.gear.over_limit(self.clearance_in)
 
-    @property
+    @cached_property
     def beyond_margin(self) -> Mask:
         """Gears whose plunger was measured beyond its margin."""
         return np.abs(self.plunger_in) > self.margin_in + ROUNDING_IN
 
-    @property
+    @cached_property
+    def clears_margin(self) -> Mask:
+        """Gears whose plunger was measured within its margin by two standard uncertainties."""
+        u = np.hypot(self.plunger_u_in, self.margin_u_in)
+        return np.asarray(np.abs(self.plunger_in) + 2.0 * u <= self.margin_in)
+
+    @cached_property
+    def must_restore(self) -> Mask:
+        """Joints over their limit that can be restored today."""
+        return self.over_limit & self.restorable
+
+    @cached_property
+    def removable(self) -> Mask:
+        """Joints that can be restored with a gain: measured, and worn beyond a new part."""
+        worn = self.filled(0.0) > self.gear.new_parts_in + _AS_NEW_IN
+        return np.asarray(self.measured & self.restorable & worn)
+
+    @cached_property
     def off_down_lock(self) -> Mask:
         """Gears whose plunger was measured out of its position at Down Lock, and whose rigging was
         not corrected since.
@@ -130,16 +151,16 @@ class Cases:
             ]
         )
 
-    @property
+    @cached_property
     def critical_missing(self) -> Mask:
         """True for a gear with a critical joint that was not measured."""
         return np.asarray((~self.measured & self.gear.critical).any(axis=1))
 
-    @property
+    @cached_property
     def repaired(self) -> Mask:
         return np.array([i.is_repaired for i in self.inspections])
 
-    @property
+    @cached_property
     def failed_as_new(self) -> Mask:
         """Gears of which a failure stands that is not surely older than their plunger reading."""
         return np.array(
@@ -152,7 +173,7 @@ class Cases:
             ]
         )
 
-    @property
+    @cached_property
     def complained(self) -> Mask:
         """True for a gear that failed, or whose plunger stood beyond its margin, before it was
         repaired, and that was surely not tried since.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision import plunger_reading, sentences
 from mlg_troubleshoot.decision.assessment import (
     Assessment,
@@ -42,7 +42,7 @@ from mlg_troubleshoot.decision.prediction import (
 from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.decision.repair import repair_sets, rigging_alternative
 from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.verdict_rule import PlungerState, verdict, with_reading
+from mlg_troubleshoot.decision.verdict_rule import verdict, with_reading
 from mlg_troubleshoot.gear.gauges import DEFAULT_PLUNGER_U_IN
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
@@ -178,16 +178,14 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
     batch = predict_batch(cases, chance_random)
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
-    plunger = plunger_reading.compare(cases, batch.upper)
     closes = np.isfinite(batch.lower.displacement_in)
-    questions = np.array([bool(i.unit_question) for i in cases.inspections])
     # A reading clears a gear by what is known of its joints: those that were not read count as 0.
     known = batch.chance_random.copy()
-    rows = np.flatnonzero(plunger.clears & ~cases.measured.all(axis=1))
+    rows = np.flatnonzero(cases.clears_margin & ~cases.measured.all(axis=1))
     if len(rows):
         some = cases.take(rows)
         known[rows] = chance_at(some, some.filled(0.0))
-    verdicts = _verdicts(cases, plunger, (p_lower, p_upper), known, questions)
+    verdicts = _verdicts(cases, p_lower, p_upper, known)
     found = [verdict for verdict, _basis in verdicts]
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes
     sets = repair_sets(cases, batch.upper, np.flatnonzero(wanted))
@@ -203,7 +201,6 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
         found,
         [basis for _verdict, basis in verdicts],
         batch,
-        plunger,
         order,
         p_lower,
         batch.lower.standard_uncertainty(cases.margin_u_in),
@@ -224,28 +221,28 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
 
 
 def _verdicts(
-    cases: Cases,
-    plunger: plunger_reading.Compared,
-    p_within: tuple[Array, Array],
-    chance: Array,
-    questions: Mask,
+    cases: Cases, p_lower: Array, p_upper: Array, chance: Array
 ) -> list[tuple[Verdict, Basis]]:
     """The verdict of each gear, and what it rests on."""
+    questions = np.array([bool(i.unit_question) for i in cases.inspections])
+    off = cases.off_down_lock
+    clears = cases.clears_margin & np.isfinite(chance) & ~off & ~questions & ~cases.failed_as_new
+    close = np.isfinite(cases.plunger_in) & ~cases.beyond_margin & ~cases.clears_margin
     # A gear whose entry leaves a question cannot be cleared either.
     absent = cases.critical_missing | questions
-    off = cases.off_down_lock
-    clears = plunger.clears & np.isfinite(chance) & ~off & ~questions & ~cases.failed_as_new
-    found = []
-    for i, missing in enumerate(absent.tolist()):
-        low, high = (float(p[i]) for p in p_within)
-        state = PlungerState(
-            bool(plunger.beyond[i]),
-            bool(clears[i]),
-            bool(plunger.unsettled[i] or off[i]),
-            float(chance[i]),
+    of_each = (p_lower, p_upper, absent, cases.beyond_margin, clears, close | off, chance)
+    return [
+        with_reading(
+            verdict(low, high, critical_missing=missing),
+            beyond=beyond,
+            clears=clear,
+            unsettled=unsettled,
+            chance=p,
         )
-        found.append(with_reading(verdict(low, high, critical_missing=missing), state))
-    return found
+        for low, high, missing, beyond, clear, unsettled, p in zip(
+            *(each.tolist() for each in of_each), strict=True
+        )
+    ]
 
 
 def _assessment(
@@ -258,9 +255,7 @@ def _assessment(
     belief: Callable[[int], Belief] | None,
 ) -> Assessment:
     inspection = cases.inspections[i]
-    found = judged.verdicts[i]
     lower = judged.batch.lower
-    plunger = judged.plunger
     margin = float(cases.margin_in[i])
     closes = bool(np.isfinite(lower.displacement_in[i]))
     # A linkage of the ensemble may not close where the reference does: the uncertainty is then
@@ -272,10 +267,12 @@ def _assessment(
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.batch, cases, i) if known else None
+    size = abs(float(cases.plunger_in[i]))
+    most = _explained_at_most(cases, judged.batch.upper, i)
     detail = _detail(cases, judged, i, budget, belief) if belief is not None and closes else {}
-    return Assessment(
+    found = Assessment(
         inspection=inspection,
-        verdict=found,
+        verdict=judged.verdicts[i],
         # Adding zero turns a minus zero into zero.
         predicted_displacement_in=number_or_none(lower.displacement_in[i] + 0.0),
         over_travel_in=number_or_none(worst[0]),
@@ -301,9 +298,9 @@ def _assessment(
         plan=plan,
         basis=judged.bases[i],
         bound_in=number_or_none(lower.bound_in[i] + 0.0, True),
-        explained_at_most_in=number_or_none(plunger.explained_at_most_in[i]),
-        unexplained_in=number_or_none(plunger.unexplained_in[i]),
-        headline=_headline(cases, judged, i),
+        explained_at_most_in=number_or_none(most),
+        unexplained_in=number_or_none(size - most),
+        headline="",
         alarm=sentences.alarms(
             [f.joint for f in findings if f.over_limit], failed=bool(cases.failed[i])
         ),
@@ -311,6 +308,17 @@ def _assessment(
         warnings=_warnings(cases, i, findings, worst, float(judged.u_in[i])),
         **detail,
     )
+    return replace(found, headline=_headline(found, cases, i))
+
+
+def _explained_at_most(cases: Cases, upper: Prediction, i: int) -> float:
+    """What of a measured displacement the joints explain at most, unmeasured ones at their limit.
+    [in]
+    """
+    measured = float(cases.plunger_in[i])
+    worst = upper.worst
+    bound = float(worst.over_in[i] if measured > 0.0 else -worst.under_in[i])
+    return min(abs(measured), max(bound, 0.0)) if np.isfinite(bound) else abs(measured)
 
 
 _PROVISIONAL = Sentence.of(
@@ -358,31 +366,14 @@ def _detail(
     return detail
 
 
-def _headline(cases: Cases, judged: Judged, i: int) -> str:
-    lower = judged.batch.lower
-    plunger_in = float(cases.plunger_in[i])
-    numbers = cases.gear.joint_numbers
-    worst = float(lower.displacement_in[i])
-    said = sentences.Numbers(
-        # Adding zero turns a minus zero into zero.
-        worst_in=worst + 0.0 if np.isfinite(worst) else None,
-        margin_in=float(cases.margin_in[i]),
-        chance=float(judged.batch.chance_random[i]),
-        measured_in=plunger_in if np.isfinite(plunger_in) else None,
-        unread=tuple(n for n, read in zip(numbers, cases.measured[i], strict=True) if not read),
-        read=int(cases.measured[i].sum()),
-        loaded=worst != float(lower.bound_in[i]),
-    )
-    question = cases.inspections[i].unit_question
-    head = sentences.headline(judged.verdicts[i], judged.bases[i], said, question)
-    if judged.verdicts[i] is Verdict.INCONCLUSIVE and cases.off_down_lock[i]:
-        head = Sentence.joined([head, sentences.OFF_DOWN_LOCK])
-    elif said.measured_in is not None and judged.bases[i] is Basis.PREDICTED:
-        read = sentences.close_reading(said.measured_in, float(cases.plunger_u_in[i]))
-        head = Sentence.joined([head, read])
-    over = [numbers[j] for j in np.flatnonzero(cases.over_limit[i])]
-    alarm = sentences.alarms(over, failed=bool(cases.failed[i]))
-    return Sentence.joined([head, alarm]) if alarm else head
+def _headline(a: Assessment, cases: Cases, i: int) -> str:
+    measured = float(cases.plunger_in[i])
+    said: list[str] = [sentences.headline(a, measured)]
+    if a.verdict is Verdict.INCONCLUSIVE and cases.off_down_lock[i]:
+        said.append(sentences.OFF_DOWN_LOCK)
+    elif np.isfinite(measured) and a.basis is Basis.PREDICTED:
+        said.append(sentences.close_reading(measured, float(cases.plunger_u_in[i])))
+    return Sentence.joined([*said, a.alarm] if a.alarm else said)
 
 
 _OF_EXTENSION = "The extension of the model"

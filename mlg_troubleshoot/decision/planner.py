@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -29,27 +30,10 @@ from mlg_troubleshoot.decision.plan import (
     minutes_to_measure,
     minutes_to_restore,
 )
-from mlg_troubleshoot.decision.plunger_reading import Compared
 from mlg_troubleshoot.decision.prediction import BatchPrediction
 from mlg_troubleshoot.decision.priors import PRIORS, THRESHOLDS
-from mlg_troubleshoot.decision.repair import removable, restored
+from mlg_troubleshoot.decision.repair import restored
 from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
-
-
-def _doubted(cases: Cases, belief: Callable[[int], Belief]) -> Mask:
-    """Readings over their limits that are taken again: within two standard uncertainties of the
-    limit, or, on a gear that failed, at odds with the plunger; of no joint far beyond its limit.
-    """
-    gear = cases.gear
-    read = cases.filled(0.0)
-    may_be = cases.over_limit & cases.reachable & ~cases.own_gauge
-    may_be &= read <= THRESHOLDS.surely_worn * gear.limits_in
-    found = may_be & (read - gear.limits_in <= THRESHOLDS.doubtful * cases.gauge_u_in)
-    failed = (cases.failed | cases.repaired) & np.isfinite(cases.plunger_in)
-    for row in np.flatnonzero(failed & (may_be & ~found).any(axis=1)).tolist():
-        contradicts = 1.0 - belief(row).worn > gear.second_repair_chance.value
-        found[row] |= may_be[row] & contradicts
-    return np.asarray(found)
 
 
 def _correction(text: str) -> Plan:
@@ -80,7 +64,6 @@ class Judged:
     verdicts: Sequence[Verdict]
     bases: Sequence[Basis]
     batch: BatchPrediction
-    plunger: Compared
     order: Places
     p_within: Array
     u_in: Array
@@ -93,8 +76,7 @@ def plans(
     sets: Sequence[tuple[RepairSet, ...]],
 ) -> list[tuple[Plan, tuple[RepairSet, ...]]]:
     """The plan of each gear, and the repairs that it chose from."""
-    facts = _BatchContext(cases, judged, belief)
-    courses = [_PlanBuilder(facts, i, sets[i]) for i in range(len(cases))]
+    courses = [_PlanBuilder(cases, judged, belief, i, sets[i]) for i in range(len(cases))]
     planned = [course.plan() for course in courses]
     _predict_tried(cases, courses)
     return [(plan, course.sets) for plan, course in zip(planned, courses, strict=True)]
@@ -120,57 +102,65 @@ def _predict_tried(cases: Cases, courses: Sequence[_PlanBuilder]) -> None:
         courses[row].sets = (*courses[row].sets, found)
 
 
-class _BatchContext:
-    """What the plans of a batch are made from, worked out for all gears at once."""
-
-    def __init__(self, cases: Cases, judged: Judged, belief: Callable[[int], Belief]) -> None:
-        gear = cases.gear
-        self.cases = cases
-        self.judged = judged
-        self.belief = belief
-        self.numbers = gear.joint_numbers
-        self.complained = cases.complained
-        self.over = cases.over_limit & cases.restorable
-        self.removable = removable(cases)
-        self.open: Mask = np.asarray(~cases.measured & cases.reachable)
-        self.doubted = _doubted(cases, belief)
-        u = np.hypot(cases.plunger_u_in, cases.margin_u_in)
-        apart = np.abs(np.abs(cases.plunger_in) - cases.margin_in)
-        self.at_edge: Mask = np.asarray(apart < THRESHOLDS.doubtful * u)
-
-
 class _PlanBuilder:
     """The course of one gear: each branch appends its steps and ends."""
 
-    def __init__(self, facts: _BatchContext, row: int, sets: tuple[RepairSet, ...]) -> None:
-        self.facts = facts
+    def __init__(
+        self,
+        cases: Cases,
+        judged: Judged,
+        belief: Callable[[int], Belief],
+        row: int,
+        sets: tuple[RepairSet, ...],
+    ) -> None:
+        self.cases = cases
+        self.judged = judged
         self.row = row
         self.sets = sets
-        self.cases = facts.cases
-        self.judged = facts.judged
-        self.gear = facts.cases.gear
-        self.numbers = facts.numbers
-        self.inspection = self.cases.inspections[row]
+        self.gear = cases.gear
+        self.numbers = cases.gear.joint_numbers
+        self.inspection = cases.inspections[row]
+        self.beyond = bool(cases.beyond_margin[row])
+        self._belief = belief
         self.steps: list[Step] = []
         self.tried: RepairSet | None = None
         self.taken_again = False
         self.opened: frozenset[str] = frozenset()
         self.over_limit = self._joints(self.cases.over_limit[row])
-        self.over = self._joints(facts.over[row])
+        self.over = self._joints(self.cases.must_restore[row])
         self.read_plunger = bool(np.isfinite(self.cases.plunger_in[row]))
         self.looked = self.inspection.rigging_checked not in (None, RiggingCheck.NO)
 
     @property
     def belief(self) -> Belief:
         """What is believed of a gear that failed, or failed before its repair."""
-        return self.facts.belief(self.row)
+        return self._belief(self.row)
+
+    @cached_property
+    def doubted(self) -> Mask:
+        """Readings over their limits that are taken again: within two standard uncertainties of the
+        limit, or, on a gear that failed, at odds with the plunger; of no joint far beyond its
+        limit.
+        """
+        cases = self.cases
+        i = self.row
+        limits = self.gear.limits_in
+        read = cases.clearance_in[i]
+        may_be = cases.over_limit[i] & cases.reachable[i] & ~cases.own_gauge[i]
+        may_be &= read <= THRESHOLDS.surely_worn * limits
+        near = may_be & (read - limits <= THRESHOLDS.doubtful * cases.gauge_u_in[i])
+        failed = cases.failed[i] or self.inspection.is_repaired
+        if failed and self.read_plunger and (may_be & ~near).any():
+            sound = 1.0 - self.belief.worn
+            near |= may_be & (sound > self.gear.second_repair_chance.value)
+        return np.asarray(near)
 
     def plan(self) -> Plan:
         """The steps in their order."""
         i = self.row
         if not np.isfinite(self.judged.batch.lower.displacement_in[i]):
             return NOT_CLOSING
-        if self.inspection.unit_question and not self.judged.plunger.beyond[i]:
+        if self.inspection.unit_question and not self.beyond:
             return CONFIRM
         found = self._course()
         return replace(found, open_question=self._open_question(found))
@@ -181,8 +171,7 @@ class _PlanBuilder:
             self._check_rigging(again=True)
         if self.cases.failed[i]:
             return self._failed()
-        beyond = bool(self.judged.plunger.beyond[i])
-        if self.facts.complained[i] or (self.inspection.is_repaired and beyond):
+        if self.cases.complained[i] or (self.inspection.is_repaired and self.beyond):
             return self._repaired()
         return self._without_complaint()
 
@@ -203,18 +192,16 @@ class _PlanBuilder:
             text = sentences.read_to_clear(minutes)
             self._step(Action.READ_PLUNGER, minutes, text, required=False)
             return self._done()
-        beyond = bool(self.judged.plunger.beyond[i])
-        return self._end(End.OUTSIDE_NO_COMPLAINT if beyond else End.TOO_CLOSE)
+        return self._end(End.OUTSIDE_NO_COMPLAINT if self.beyond else End.TOO_CLOSE)
 
     def _repaired(self) -> Plan:
         """A gear that failed and was repaired: the plunger says whether the repair holds."""
-        beyond = self.judged.plunger.beyond[self.row]
         if self.over:
             return self._try(self.cases.over_limit[self.row])
         if self.over_limit:
             # The plunger is read after these are restored, whatever it reads before.
             return self._restore_over_limit()._stop_for_today()
-        if self.read_plunger and beyond and not self._again():
+        if self.beyond and not self._again():
             return self._failed()
         if not self.read_plunger or self._again():
             self._read_the_plunger(again=self.read_plunger)
@@ -224,9 +211,12 @@ class _PlanBuilder:
         """Whether the plunger is read again: read only once and at the edge of its margin, or
         perhaps before the repair.
         """
-        readings = self.inspection.standing_readings_in
-        at_edge = bool(self.facts.at_edge[self.row]) and len(readings) < 2
-        return at_edge or self.inspection.is_plunger_in_doubt
+        cases = self.cases
+        i = self.row
+        u = np.hypot(cases.plunger_u_in[i], cases.margin_u_in[i])
+        at_edge = abs(abs(cases.plunger_in[i]) - cases.margin_in[i]) < THRESHOLDS.doubtful * u
+        once = len(self.inspection.standing_readings_in) < 2
+        return bool(at_edge and once) or self.inspection.is_plunger_in_doubt
 
     def _failed(self) -> Plan:
         """A gear that failed: the plunger first, then what has the fewest expected minutes."""
@@ -235,16 +225,16 @@ class _PlanBuilder:
         joints, _rigging, elsewhere = self.belief.chances
         if not self.read_plunger and joints < elsewhere:
             return self._restore_over_limit()._end(End.NOT_EXPLAINED)
-        f = self.facts
+        cases = self.cases
         i = self.row
         choice = choose(
             self.gear,
             self.belief,
-            over=self.cases.over_limit[i],
-            worn=f.removable[i],
-            spare=self.cases.restorable[i],
-            unread=f.open[i],
-            doubted=f.doubted[i],
+            over=cases.over_limit[i],
+            worn=cases.removable[i],
+            spare=cases.restorable[i],
+            unread=~cases.measured[i] & cases.reachable[i],
+            doubted=self.doubted,
             looked=self.looked or not self.read_plunger,
         )
         return self._follow(choice)
@@ -277,7 +267,7 @@ class _PlanBuilder:
         worn = self.belief.worn_by_leverage
         # What is over its limit already does not suffice, or there would be nothing to read: one
         # joint more is restored on average.
-        joints = self.facts.over[self.row].copy()
+        joints = self.cases.must_restore[self.row].copy()
         joints[max(places, key=lambda j: float(worn[j]))] = True
         without = self._joints(joints & ~self.cases.restorable[self.row])
         if without:
@@ -345,13 +335,12 @@ class _PlanBuilder:
     def _check_rigging(self, *, again: bool = False) -> _PlanBuilder:
         checked = any(step.action is Action.CHECK_RIGGING for step in self.steps)
         if not checked and (again or not self.looked):
-            beyond = bool(self.judged.plunger.beyond[self.row])
             as_new = self._joints(
                 self.cases.measured[self.row]
                 & (self.cases.filled(0.0)[self.row] <= 2.0 * self.gear.new_parts_in)
             )
             text = sentences.check_rigging(
-                float(self.cases.plunger_in[self.row]) if beyond else None,
+                float(self.cases.plunger_in[self.row]) if self.beyond else None,
                 () if self.inspection.is_repaired or not self.cases.failed[self.row] else as_new,
             )
             self._step(Action.CHECK_RIGGING, self.gear.rigging_check.value, text)
@@ -365,7 +354,7 @@ class _PlanBuilder:
             where,
             self.inspection,
             failed=bool(self.cases.failed[self.row]),
-            beyond=bool(self.judged.plunger.beyond[self.row]),
+            beyond=self.beyond,
             looked=self.looked,
         )
         required = where is not End.TOO_CLOSE
@@ -406,7 +395,7 @@ class _PlanBuilder:
 
     def _reread(self) -> bool:
         """Take the readings in doubt again, once in a plan; whether there are any."""
-        doubted = self._joints(self.facts.doubted[self.row])
+        doubted = self._joints(self.doubted)
         if doubted and not self.taken_again:
             self._measure(doubted, BETTER_GAUGES_IN[-1])
             self.taken_again = True

@@ -23,8 +23,6 @@ _SHOWN = 5
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
 # may be off. [in]
 _ABOUT_IN = 5e-4
-# A reading less than this above a new part: restoring the joint gains nothing. [in]
-_AS_NEW_IN = 1e-4
 
 
 @lru_cache(maxsize=4)
@@ -38,12 +36,6 @@ def subsets_of(gear: Gear) -> tuple[Mask, Array]:
     minutes = np.array([minutes_to_restore(gear, numbers[row].tolist()) for row in members])
     order = np.lexsort((members.sum(axis=1), np.round(minutes, 6)))
     return members[order], minutes[order]
-
-
-def removable(cases: Cases) -> Mask:
-    """Joints that can be restored with a gain: measured, and worn beyond a new part."""
-    worn = cases.filled(0.0) > cases.gear.new_parts_in + _AS_NEW_IN
-    return np.asarray(cases.measured & cases.restorable & worn)
 
 
 def restored(cases: Cases, rows: Sequence[int], sets: Sequence[Mask]) -> tuple[Cases, Prediction]:
@@ -68,13 +60,12 @@ class Sets:
     def __init__(self, cases: Cases, upper: Prediction, row: int) -> None:
         gear = cases.gear
         members, minutes = subsets_of(gear)
-        over = (cases.over_limit & cases.restorable)[row]
-        allowed = ~(members & ~removable(cases)[row]).any(axis=1)
-        allowed &= (members | ~over).all(axis=1)
+        allowed = ~(members & ~cases.removable[row]).any(axis=1)
+        allowed &= (members | ~cases.must_restore[row]).all(axis=1)
         self.row = row
         self.members = members[allowed]
         self.minutes = minutes[allowed]
-        now = cases.filled(gear.limits_in)[[row]]
+        now = np.where(cases.measured[[row]], cases.clearance_in[[row]], gear.limits_in)
         after = np.where(self.members, np.minimum(now, gear.new_parts_in), now)
         each = np.array([linkage.magnitude(after) for linkage in responses(gear)])
         reference = responses(gear)[0]

@@ -7,7 +7,6 @@ Instructions have at most 20 words, descriptions 25 (ASD-STE100).
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from datetime import date
 
 from mlg_troubleshoot.decision.assessment import (
@@ -15,7 +14,6 @@ from mlg_troubleshoot.decision.assessment import (
     JointFinding,
     Rigging,
     Verdict,
-    title,
 )
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.plan import STOP, Basis, End
@@ -84,62 +82,48 @@ def joint_list(joints: Sequence[int]) -> str:
     return ", ".join(f"#{joint}" for joint in joints)
 
 
-@dataclass(frozen=True, slots=True)
-class Numbers:
-    """What a headline is made of.
-
-    worst_in: worst case, None where the linkage does not close. loaded: whether it is an
-    expectation as loaded. [in, 1]
-    """
-
-    worst_in: float | None
-    margin_in: float
-    chance: float | None
-    measured_in: float | None
-    unread: tuple[int, ...]
-    read: int
-    loaded: bool = False
-
-    @property
-    def chance_words(self) -> str:
-        # No chance of a few thousand sets of directions is smaller than can be counted.
-        beyond = (self.worst_in or 0.0) > self.margin_in
-        return "< 0.1 %" if beyond and not self.chance else percent(self.chance or 0.0)
+def _chance(a: Assessment) -> str:
+    # No chance of a few thousand sets of directions is smaller than can be counted.
+    chance = a.probability_exceed_random_directions or 0.0
+    beyond = (a.predicted_displacement_in or 0.0) > a.margin_in
+    return "< 0.1 %" if beyond and not chance else percent(chance)
 
 
-def headline(verdict: Verdict, basis: Basis, said: Numbers, question: str = "") -> Sentence:
-    """The words of a verdict, as every channel prints them."""
-    head = title(verdict, basis)
-    margin = Length(said.margin_in)
-    if basis is Basis.MEASURED:
+def headline(a: Assessment, measured_in: float) -> Sentence:
+    """The words of a verdict, as every channel prints them; NaN if the plunger was not read."""
+    head = a.title
+    margin = Length(a.margin_in)
+    if a.basis is Basis.MEASURED:
         head = Sentence.of(
-            "{} {} of {}.", head, Length(said.measured_in or 0.0, sign=True, named=False), margin
+            "{} {} of {}.", head, Length(measured_in, sign=True, named=False), margin
         )
-        within = verdict is Verdict.WITHIN_MARGIN
-        return Sentence.joined([head, _worst(said)]) if within and said.worst_in else head
+        within = a.verdict is Verdict.WITHIN_MARGIN
+        said = within and a.predicted_displacement_in
+        return Sentence.joined([head, _worst(a)]) if said else head
+    question = a.inspection.unit_question
     if question:
         return Sentence.of("{}: confirm the readings. {}", head, question)
-    if said.worst_in is None:
+    if a.predicted_displacement_in is None:
         return Sentence(NO_CLOSURE)
-    if verdict is Verdict.INCOMPLETE:
-        return Sentence.of("{}: {} not measured.", head, joint_list(said.unread))
-    worst = Length(said.worst_in, named=False)
-    what = "as loaded" if said.loaded else "worst case"
-    if verdict is Verdict.WITHIN_MARGIN:
-        where = "as loaded" if said.loaded else "even in the worst directions"
+    if a.verdict is Verdict.INCOMPLETE:
+        return Sentence.of("{}: {} not measured.", head, joint_list(a.unread))
+    worst = Length(a.predicted_displacement_in, named=False)
+    if a.verdict is Verdict.WITHIN_MARGIN:
+        where = "as loaded" if a.as_loaded else "even in the worst directions"
         return Sentence.of("{}, {}: {} of {}.", head, where, worst, margin)
-    return Sentence.of("{}: {} {} of {}, chance {}.", head, what, worst, margin, said.chance_words)
+    what = "as loaded" if a.as_loaded else "worst case"
+    return Sentence.of("{}: {} {} of {}, chance {}.", head, what, worst, margin, _chance(a))
 
 
-def _worst(said: Numbers) -> Sentence:
-    if not said.read:
-        return Sentence.of("No joint was read: chance of leaving the margin {}.", said.chance_words)
-    alone = " from the joints that were read" if said.unread else ""
+def _worst(a: Assessment) -> Sentence:
+    if len(a.unread) == len(a.joints):
+        return Sentence.of("No joint was read: chance of leaving the margin {}.", _chance(a))
+    alone = " from the joints that were read" if a.unread else ""
     return Sentence.of(
         "Worst directions could reach {}{}, chance {}.",
-        Length(said.worst_in or 0.0),
+        Length(a.predicted_displacement_in or 0.0),
         alone,
-        said.chance_words,
+        _chance(a),
     )
 
 
@@ -344,11 +328,7 @@ def chance_wrong_sentence(a: Assessment) -> str | None:
     if a.chance_wrong is None:
         return None
     what = "worst case" if a.decided_by_bound else "displacement as loaded"
-    unread = (
-        " Joints that were not measured count as 0."
-        if any(f.clearance_in is None for f in a.joints)
-        else ""
-    )
+    unread = " Joints that were not measured count as 0." if a.unread else ""
     return (
         f"The chance that the {what} lies on the other side of the margin is"
         f" {percent(a.chance_wrong)}.{unread}"
@@ -357,14 +337,13 @@ def chance_wrong_sentence(a: Assessment) -> str | None:
 
 def no_repair_set(a: Assessment) -> str:
     """Why no repair is offered."""
-    unread = [finding.joint for finding in a.joints if finding.clearance_in is None]
     if (a.probability_within_margin or 0.0) >= CONFORMANCE:
-        of_which = " of the measured joints" if unread else ""
+        of_which = " of the measured joints" if a.unread else ""
         return f"None needed: the worst case{of_which} is within the margin already."
-    if unread:
-        are = "is" if len(unread) == 1 else "are"
+    if a.unread:
+        are = "is" if len(a.unread) == 1 else "are"
         return (
-            f"No repair set is certain while {joint_list(unread)} {are} not measured. Unmeasured"
+            f"No repair set is certain while {joint_list(a.unread)} {are} not measured. Unmeasured"
             " joints count at their limit here."
         )
     return f"No {_SET_THAT_HOLDS}"

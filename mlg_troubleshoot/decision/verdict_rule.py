@@ -5,7 +5,6 @@ probability 95 %).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
@@ -54,30 +53,21 @@ def verdict(p_lower: float, p_upper: float, *, critical_missing: bool) -> Verdic
     return lower
 
 
-def with_reading(predicted: Verdict, read: PlungerState) -> tuple[Verdict, Basis]:
+def with_reading(
+    predicted: Verdict, *, beyond: bool, clears: bool, unsettled: bool, chance: float
+) -> tuple[Verdict, Basis]:
     """Apply the rule to the plunger that was read; what is predicted stands where it decides
     nothing.
-    """
-    if read.beyond:
-        return Verdict.OUTSIDE_MARGIN, Basis.MEASURED
-    if read.clears and read.chance <= 1.0 - CONFORMANCE:
-        return Verdict.WITHIN_MARGIN, Basis.MEASURED
-    if read.clears or (read.unsettled and predicted is Verdict.WITHIN_MARGIN):
-        return Verdict.INCONCLUSIVE, Basis.PREDICTED
-    return predicted, Basis.PREDICTED
-
-
-@dataclass(frozen=True, slots=True)
-class PlungerState:
-    """What the plunger of one gear says.
 
     beyond: a reading is beyond the margin. clears: every reading is within it, the mean also by
     two standard uncertainties, and no failure is as new. unsettled: it is read, or was found at
     Down Lock, such that nothing is cleared. chance: of leaving the margin with random directions;
     NaN where the linkage does not close. [1]
     """
-
-    beyond: bool
-    clears: bool
-    unsettled: bool
-    chance: float
+    if beyond:
+        return Verdict.OUTSIDE_MARGIN, Basis.MEASURED
+    if clears and chance <= 1.0 - CONFORMANCE:
+        return Verdict.WITHIN_MARGIN, Basis.MEASURED
+    if clears or (unsettled and predicted is Verdict.WITHIN_MARGIN):
+        return Verdict.INCONCLUSIVE, Basis.PREDICTED
+    return predicted, Basis.PREDICTED

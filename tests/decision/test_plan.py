@@ -7,10 +7,9 @@ import math
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.case import Cases, predict_batch
+from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
 from mlg_troubleshoot.decision.plan import Action, Basis, End
-from mlg_troubleshoot.decision.plunger_reading import compare
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
 from tests.decision.conftest import Judge, every_joint, inspected
@@ -69,20 +68,7 @@ def test_a_reading_clears_a_gear_from_two_standard_uncertainties_within_its_marg
 ) -> None:
     u_in = math.hypot(0.002, 0.002)
     cases = Cases.of(gear, [inspected({}, readings_in=(apart * u_in - 0.03,), margin_u_in=0.002)])
-    assert compare(cases, predict_batch(cases).upper).clears == [clears]
-
-
-@pytest.mark.parametrize(("apart", "explained"), [(1.9, True), (2.1, False)])
-def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyond_their_worst_case(
-    gear: Gear, judge: Judge, apart: float, explained: bool
-) -> None:
-    found = judge(every_joint(0.0005))
-    u_in = math.hypot(found.standard_uncertainty_in or 0.0, 0.002)
-    read = inspected(
-        every_joint(0.0005), readings_in=((found.over_travel_in or 0.0) + apart * u_in,)
-    )
-    cases = Cases.of(gear, [read])
-    assert compare(cases, predict_batch(cases).upper).explained == [explained]
+    assert cases.clears_margin == [clears]
 
 
 def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judge: Judge) -> None:

@@ -58,9 +58,7 @@ def test_only_what_is_measured_and_worn_beyond_a_new_part_can_be_restored_with_a
 ) -> None:
     new = gear.new_parts_in
     read = {1: new[0], 2: new[1] + 5e-5, 3: new[2] + 2e-4, 4: 0.5 * new[3]}
-    assert repair.removable(Cases.of(gear, [inspected(read)]))[0].tolist() == [
-        n == 3 for n in range(1, 11)
-    ]
+    assert Cases.of(gear, [inspected(read)]).removable[0].tolist() == [n == 3 for n in range(1, 11)]
 
 
 def test_restoring_joint_three_alone_is_too_close_and_three_and_five_clear_the_failure(
