@@ -5,7 +5,7 @@ handed on.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -21,11 +21,9 @@ from mlg_troubleshoot.decision.inspection import (
 )
 from mlg_troubleshoot.decision.prediction import (
     DIRECTION_SETS,
-    BatchPrediction,
     Extension,
     Prediction,
     predict,
-    with_rows,
 )
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.adjustment import Adjustment
@@ -204,6 +202,13 @@ class Cases:
             self.gear, self.inspections, clearance_in, known, self.gauge_u_in, self.extension
         )
 
+    def predict_bounds(self) -> tuple[Prediction, Prediction]:
+        """Predict these gears with unmeasured joints at 0, and at their limit."""
+        lower = self.predict(self.filled(0.0))
+        if self.measured.all():
+            return lower, lower
+        return lower, self.predict(self.filled(self.gear.limits_in))
+
     def take(self, rows: Places | list[int]) -> Cases:
         arrays = {
             f.name: getattr(self, f.name)[rows]
@@ -235,31 +240,6 @@ def plunger_u(inspection: Inspection) -> float:
     stated = inspection.plunger_gauge_u_in
     one = DEFAULT_PLUNGER_U_IN if stated is None else stated
     return one / math.sqrt(max(len(inspection.standing_readings_in), 1))
-
-
-def predict_batch(
-    cases: Cases, chance_of_unread: Callable[[Cases], Array] | None = None
-) -> BatchPrediction:
-    """Predict with unmeasured joints at 0 and at their limit, and the chance with random
-    directions.
-
-    chance_of_unread: that chance with unmeasured joints by their wear; None takes them at 0. [1]
-    """
-    at_zero = cases.filled(0.0)
-    lower = upper = cases.predict(at_zero)
-    open_rows = np.flatnonzero(~cases.measured.all(axis=1))
-    if len(open_rows):
-        some = cases.take(open_rows)
-        upper = with_rows(lower, some.predict(some.filled(cases.gear.limits_in)), open_rows)
-    if chance_of_unread is None or cases.extension is not None:
-        return BatchPrediction(lower, upper, chance_at(cases, at_zero))
-    chance = np.empty(len(cases))
-    if len(open_rows):
-        chance[open_rows] = chance_of_unread(cases.take(open_rows))
-    rows = np.flatnonzero(cases.measured.all(axis=1))
-    if len(rows):
-        chance[rows] = chance_at(cases.take(rows), at_zero[rows])
-    return BatchPrediction(lower, upper, chance)
 
 
 def chance_at(cases: Cases, clearance_in: Array) -> Array:

@@ -91,10 +91,6 @@ class Column:
         Place among the covariates of a diagnosis, from 1; 0 for any other column.
     words : str
         What the column is about, in a sentence.
-    sign_off : int
-        Place on the sign-off page of the prompts, from 1.
-    prompt, prompt_word : str
-        What is asked there, and the word that leads back to it.
     in_template : bool
         It stands in the workbook and in its form.
     """
@@ -122,9 +118,6 @@ class Column:
     blank_by_word: bool = True
     covariate: int = 0
     words: str = ""
-    sign_off: int = 0
-    prompt: str = ""
-    prompt_word: str = ""
     in_template: bool = True
 
     def header(self, number: int | None = None, unit: LengthUnit | None = None) -> str:
@@ -296,9 +289,6 @@ DATE = Column(
     meaning="Year-month-day, for example 2026-03-04.",
     spellings="insp date|inspected on|date inspected|date measured|date|date of inspection",
     words="date",
-    sign_off=2,
-    prompt="Date of the inspection",
-    prompt_word="date",
     covariate=9,
 )
 OUTCOME = Column(
@@ -325,9 +315,6 @@ LANDINGS = Column(
         "ldgs|landings since o h|landings|landings since overhaul|gear landings since overhaul"
     ),
     words="landings since overhaul",
-    sign_off=3,
-    prompt="Landings since overhaul",
-    prompt_word="landings",
     covariate=8,
 )
 GAUGE_U = Column(
@@ -426,9 +413,6 @@ GAUGE_ID = Column(
     expected="a gauge id (text)",
     spellings="gauge id no|gauge s n|gauge|gauge no|gauge number|gauge set",
     words="gauge",
-    sign_off=5,
-    prompt="Gauge",
-    prompt_word="gauge",
     blank_by_word=False,
     covariate=3,
 )
@@ -442,9 +426,6 @@ TECHNICIAN_ID = Column(
         "|measured by"
     ),
     words="technician",
-    sign_off=4,
-    prompt="Measured by",
-    prompt_word="name",
     blank_by_word=False,
     covariate=4,
 )
@@ -453,9 +434,6 @@ WORK_ORDER = Column(
     holds=Holds.TEXT,
     meaning="Goes to the report unchanged.",
     spellings="wo|work order no|work order number|w o",
-    sign_off=1,
-    prompt="Work order",
-    prompt_word="order",
     carried=True,
     blank_by_word=False,
 )
@@ -594,8 +572,5 @@ COLUMNS: tuple[Column, ...] = (
 BY_NAME: Mapping[str, Column] = {column.name: column for column in COLUMNS}
 COVARIATES: tuple[Column, ...] = tuple(
     sorted((column for column in COLUMNS if column.covariate), key=lambda c: c.covariate)
-)
-SIGN_OFF: tuple[Column, ...] = tuple(
-    sorted((column for column in COLUMNS if column.sign_off), key=lambda c: c.sign_off)
 )
 IDENTITY = (RECORD_ID, TAIL_NO, SIDE)

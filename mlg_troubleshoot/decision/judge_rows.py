@@ -25,7 +25,7 @@ from mlg_troubleshoot.decision.assessment import (
     Verdict,
 )
 from mlg_troubleshoot.decision.belief import Belief, chance_random
-from mlg_troubleshoot.decision.case import Cases, chance_at, predict_batch
+from mlg_troubleshoot.decision.case import Cases, chance_at
 from mlg_troubleshoot.decision.consequences import consequences
 from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
@@ -35,7 +35,6 @@ from mlg_troubleshoot.decision.planner import Judged, correct, plans
 from mlg_troubleshoot.decision.prediction import (
     PROVISIONAL_U_IN,
     PROVISIONAL_U_SHARE,
-    BatchPrediction,
     Extension,
     Prediction,
 )
@@ -175,35 +174,38 @@ def _worse(plain: Assessment, extended: Assessment, approval: str) -> Assessment
 
 
 def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessment]:
-    batch = predict_batch(cases, chance_random)
-    p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
-    p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
-    closes = np.isfinite(batch.lower.displacement_in)
+    lower, upper = cases.predict_bounds()
+    p_lower, p_upper = (
+        each.probability_within(cases.margin_in, cases.margin_u_in) for each in (lower, upper)
+    )
+    closes = np.isfinite(lower.displacement_in)
     # A reading clears a gear by what is known of its joints: those that were not read count as 0.
-    known = batch.chance_random.copy()
-    rows = np.flatnonzero(cases.clears_margin & ~cases.measured.all(axis=1))
-    if len(rows):
-        some = cases.take(rows)
-        known[rows] = chance_at(some, some.filled(0.0))
+    known = chance_at(cases, cases.filled(0.0))
+    chance = known.copy()
+    unread = np.flatnonzero(~cases.measured.all(axis=1))
+    if len(unread) and cases.extension is None:
+        chance[unread] = chance_random(cases.take(unread))
     verdicts = _verdicts(cases, p_lower, p_upper, known)
     found = [verdict for verdict, _basis in verdicts]
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes
-    sets = repair_sets(cases, batch.upper, np.flatnonzero(wanted))
+    sets = repair_sets(cases, upper, np.flatnonzero(wanted))
     findings = rank_joints(
         cases.gear,
         table,
         cases.clearance_in,
-        allowances(cases, batch.lower),
+        allowances(cases, lower),
         cases.gauge_u_in,
     )
     order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
     judged = Judged(
         found,
         [basis for _verdict, basis in verdicts],
-        batch,
+        lower,
+        upper,
+        chance,
         order,
         p_lower,
-        batch.lower.standard_uncertainty(cases.margin_u_in),
+        lower.standard_uncertainty(cases.margin_u_in),
     )
     belief = cache(lambda row: Belief(cases.take([row])))
     numbers = np.array(cases.gear.joint_numbers)
@@ -255,7 +257,7 @@ def _assessment(
     belief: Callable[[int], Belief] | None,
 ) -> Assessment:
     inspection = cases.inspections[i]
-    lower = judged.batch.lower
+    lower = judged.lower
     margin = float(cases.margin_in[i])
     closes = bool(np.isfinite(lower.displacement_in[i]))
     # A linkage of the ensemble may not close where the reference does: the uncertainty is then
@@ -266,9 +268,9 @@ def _assessment(
         return float(value) if when and np.isfinite(value) else None
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
-    budget = _budget(judged.batch, cases, i) if known else None
+    budget = _budget(judged.lower, cases, i) if known else None
     size = abs(float(cases.plunger_in[i]))
-    most = _explained_at_most(cases, judged.batch.upper, i)
+    most = _explained_at_most(cases, judged.upper, i)
     detail = _detail(cases, judged, i, budget, belief) if belief is not None and closes else {}
     found = Assessment(
         inspection=inspection,
@@ -277,12 +279,12 @@ def _assessment(
         predicted_displacement_in=number_or_none(lower.displacement_in[i] + 0.0),
         over_travel_in=number_or_none(worst[0]),
         under_travel_in=number_or_none(worst[1]),
-        predicted_upper_in=number_or_none(judged.batch.upper.displacement_in[i], True),
+        predicted_upper_in=number_or_none(judged.upper.displacement_in[i], True),
         margin_in=margin,
         remaining_in=number_or_none(margin - lower.displacement_in[i]),
         standard_uncertainty_in=number_or_none(judged.u_in[i]),
         probability_within_margin=float(judged.p_within[i]),
-        probability_exceed_random_directions=number_or_none(judged.batch.chance_random[i]),
+        probability_exceed_random_directions=number_or_none(judged.chance[i]),
         geometry_spread_in=(
             (
                 float(lower.spread_low_in[i]) + 0.0,
@@ -329,14 +331,13 @@ _PROVISIONAL = Sentence.of(
 )
 
 
-def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
+def _budget(lower: Prediction, cases: Cases, i: int) -> UncertaintyBudget:
     extension = cases.extension
     source = (
         _PROVISIONAL
         if extension is None
         else f"residual scatter of the diagnosis ({extension.describe()})"
     )
-    lower = batch.lower
     by_joint = dict(zip(cases.gear.joint_numbers, lower.u_readings_in[i].tolist(), strict=True))
     return UncertaintyBudget(
         {joint: by_joint[joint] for joint in cases.inspections[i].clearance_in},

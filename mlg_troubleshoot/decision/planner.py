@@ -30,7 +30,7 @@ from mlg_troubleshoot.decision.plan import (
     minutes_to_measure,
     minutes_to_restore,
 )
-from mlg_troubleshoot.decision.prediction import BatchPrediction
+from mlg_troubleshoot.decision.prediction import Prediction
 from mlg_troubleshoot.decision.priors import PRIORS, THRESHOLDS
 from mlg_troubleshoot.decision.repair import restored
 from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
@@ -53,6 +53,10 @@ class Judged:
 
     Attributes
     ----------
+    lower, upper : Prediction
+        With unmeasured joints at 0, and at their limit.
+    chance : ndarray, shape (n,)
+        Chance of leaving the margin with random directions. [1]
     order : ndarray of int, shape (n, joints)
         Places of the joints in the order of their rank.
     p_within : ndarray, shape (n,)
@@ -63,7 +67,9 @@ class Judged:
 
     verdicts: Sequence[Verdict]
     bases: Sequence[Basis]
-    batch: BatchPrediction
+    lower: Prediction
+    upper: Prediction
+    chance: Array
     order: Places
     p_within: Array
     u_in: Array
@@ -158,7 +164,7 @@ class _PlanBuilder:
     def plan(self) -> Plan:
         """The steps in their order."""
         i = self.row
-        if not np.isfinite(self.judged.batch.lower.displacement_in[i]):
+        if not np.isfinite(self.judged.lower.displacement_in[i]):
             return NOT_CLOSING
         if self.inspection.unit_question and not self.beyond:
             return CONFIRM

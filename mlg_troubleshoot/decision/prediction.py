@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import normal_cdf
@@ -161,28 +161,3 @@ def _members(gear: Gear, adjustment: Adjustment, extension: Extension | None) ->
             member[rows] = adjusted_worst_case(model, adjustment.take(rows)).magnitude_in
         members.append(member)
     return members
-
-
-@dataclass(frozen=True, slots=True)
-class BatchPrediction:
-    """n gears with unmeasured joints at 0 and at their limit, and the chance of exceeding the
-    margin at random. [1]
-    """
-
-    lower: Prediction
-    upper: Prediction
-    chance_random: Array
-
-
-def with_rows(whole: Prediction, part: Prediction, rows: Places) -> Prediction:
-    def merged(a: Any, b: Any) -> Any:
-        if not isinstance(a, np.ndarray):
-            return replace(
-                a, **{f.name: merged(getattr(a, f.name), getattr(b, f.name)) for f in fields(a)}
-            )
-        both = a.copy()
-        both[rows] = b
-        return both
-
-    found: Prediction = merged(whole, part)
-    return found

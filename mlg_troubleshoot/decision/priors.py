@@ -68,11 +68,6 @@ class Priors:
         squared = float(np.exp(-variance))
         return float(np.sqrt(squared)), (1.0 - squared) / float(np.sqrt(2.0))
 
-    @property
-    def usual(self) -> float:
-        """Chance that the joints are the cause of a failure that rigging did not cause. [1]"""
-        return self.joints_for_one_elsewhere / (1.0 + self.joints_for_one_elsewhere)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Thresholds:

@@ -8,7 +8,7 @@ at third order (envelope theorem).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -36,16 +36,12 @@ class Response:
         Length of each joint's gradient: A_iP of Eq. 8. [1]
     worst_curvature : ndarray, shape (joints, joints)
         Second derivatives along the over-travel directions. [1/in]
-    over_shift_in, under_shift_in : float
-        What the exact worst cases of one gear add to the expansion. [in]
     """
 
     gradient: Array
     curvature: Array
     amplification: Array
     worst_curvature: Array
-    over_shift_in: float = 0.0
-    under_shift_in: float = 0.0
 
     def displacement(self, links: Array) -> Array:
         """Displacement by the components of the virtual links. [in]"""
@@ -57,7 +53,7 @@ class Response:
         """Worst displacement of both senses. [in]"""
         first = clearance_in @ self.amplification
         second = 0.5 * np.sum((clearance_in @ self.worst_curvature) * clearance_in, axis=-1)
-        return first + second + self.over_shift_in, second - first + self.under_shift_in
+        return first + second, second - first
 
     def magnitude(self, clearance_in: Array) -> Array:
         """Worst displacement, the larger of the two senses. [in]"""
@@ -109,15 +105,6 @@ class Response:
             moved = c @ linear + (c[:, first] * c[:, second]) @ bent
             chance[part] = np.mean(np.abs(moved) > margin_in[part, None], axis=1)
         return chance
-
-    def anchored(self, clearance_in: Array, over_in: float, under_in: float) -> Response:
-        """Shift the expansion so that it is exact for one gear."""
-        over, under = self.worst(clearance_in)
-        return replace(
-            self,
-            over_shift_in=self.over_shift_in + over_in - float(over),
-            under_shift_in=self.under_shift_in + under_in - float(under),
-        )
 
 
 def expand(model: LinkageModel) -> Response:

@@ -9,7 +9,7 @@ import pytest
 
 from mlg_troubleshoot.decision import repair
 from mlg_troubleshoot.decision.assessment import RepairSet
-from mlg_troubleshoot.decision.case import Cases, predict_batch
+from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import allowances
 from mlg_troubleshoot.decision.plan import minutes_to_measure
@@ -29,14 +29,14 @@ def repair_sets(
 ) -> tuple[RepairSet, ...]:
     """Repair sets of one gear."""
     cases = Cases.of(gear, [replace(inspection, margin_in=margin_in)])
-    upper = predict_batch(cases).upper
+    upper = cases.predict_bounds()[1]
     return repair.repair_sets(cases, upper, np.array([0]))[0]
 
 
 def allowance(gear: Gear, inspection: Inspection) -> dict[int, float]:
     """Allowances of one gear."""
     cases = Cases.of(gear, [inspection])
-    found = allowances(cases, predict_batch(cases).lower)[0]
+    found = allowances(cases, cases.predict_bounds()[0])[0]
     return dict(zip(gear.joint_numbers, found.tolist(), strict=True))
 
 
@@ -174,7 +174,7 @@ def test_the_search_knows_what_every_set_leaves_with_unread_joints_at_their_limi
         gear,
         [inspected({j: value for j, value in joints.items() if j not in unread}, margin_in=0.045)],
     )
-    found = repair.Sets(cases, predict_batch(cases).upper, 0)
+    found = repair.Sets(cases, cases.predict_bounds()[1], 0)
     now, n = cases.filled(gear.limits_in)[0], len(found.members)
     rows = np.where(found.members, np.minimum(0.0005, now), now)
     exact = predict(
@@ -187,7 +187,7 @@ def test_the_search_knows_what_every_set_leaves_with_unread_joints_at_their_limi
 
 def test_an_allowance_counts_on_what_an_extension_adds(gear: Gear) -> None:
     cases = Cases.of(gear, [inspected(every_joint(0.001))], Shifted())
-    found = allowances(cases, predict_batch(cases).lower)[0]
+    found = allowances(cases, cases.predict_bounds()[0])[0]
     rows = 0.001 + np.diag(found)[1:5]
     assert 0.004 + worst_case(gear.model, rows).over_in == pytest.approx(
         np.full(4, MARGIN_IN), abs=1e-4
@@ -199,7 +199,7 @@ def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_re
 ) -> None:
     joints = every_joint(0.003, j1=0.004, j3=0.009, j4=0.005, j5=0.006)
     cases = Cases.of(gear, [inspected(joints, margin_in=0.045, gauge_u_in=0.003)])
-    found = repair.Sets(cases, predict_batch(cases).upper, 0)
+    found = repair.Sets(cases, cases.predict_bounds()[1], 0)
     rows = np.where(found.members, 0.0005, cases.clearance_in)
     n = len(rows)
     exact = predict(gear, cases.inspections * n, rows, np.ones(rows.shape, bool), np.full(n, 0.003))

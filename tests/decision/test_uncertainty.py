@@ -14,7 +14,7 @@ from mlg_troubleshoot.decision.assessment import (
     UncertaintyBudget,
     Verdict,
 )
-from mlg_troubleshoot.decision.case import Cases, predict_batch
+from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.prediction import (
@@ -103,9 +103,9 @@ def test_only_measured_joints_carry_reading_uncertainty(gear: Gear, judge: Judge
 
 def test_a_joint_with_an_uncertainty_of_its_own_carries_that_instead(gear: Gear) -> None:
     plain, own = inspected(WORN), inspected(WORN, gauge_u_by_joint_in={3: 0.002, 5: 0.0001})
-    u = predict_batch(Cases.of(gear, [plain, own])).lower.u_clearances_in
+    u = Cases.of(gear, [plain, own]).predict_bounds()[0].u_clearances_in
     ones = [inspected(WORN, gauge_u_in=0.0, gauge_u_by_joint_in={j: 0.0005}) for j in (3, 5)]
-    alone = predict_batch(Cases.of(gear, ones)).lower.u_clearances_in
+    alone = Cases.of(gear, ones).predict_bounds()[0].u_clearances_in
     assert u[1] ** 2 == pytest.approx(u[0] ** 2 + 15 * alone[0] ** 2 - 0.96 * alone[1] ** 2)
     assert min(alone) > 0.0005
     assert u[1] > u[0]
