@@ -29,8 +29,8 @@ from mlg_troubleshoot.gear.gear import Gear
 # joints worn out together stay inside. [1, in]
 _CELLS = 256
 _CELL_IN = 0.00125
-_AT = np.fft.fftfreq(_CELLS, 1.0 / (_CELLS * _CELL_IN))
-_BELOW, _ABOVE = _AT - 0.5 * _CELL_IN, _AT + 0.5 * _CELL_IN
+_AT = np.asarray(np.fft.fftfreq(_CELLS) * _CELLS * _CELL_IN, np.float64)
+_ENDS_IN = np.array([_AT - 0.5 * _CELL_IN, _AT + 0.5 * _CELL_IN], np.float64)
 _FREQUENCIES = 2.0 * np.pi * np.fft.rfftfreq(_CELLS, _CELL_IN)
 # Transform of what the linkage adds (5).
 _LINKAGE = np.exp(-0.5 * (PRIORS.linkage_u_in * _FREQUENCIES) ** 2)
@@ -161,81 +161,49 @@ class Belief:
         How much likelier the plunger's reading is with held pins than with free ones. [1]
     """
 
-    chances: tuple[float, float, float]
-
     def __init__(self, one: Cases) -> None:
         levels, wear = (each[0] for each in given_readings(one))
         gear, fleet = one.gear, one.fleet
         self.gear = gear
-        self.margin_in = float(one.margin_in[0])
-        self._one = one
+        self.margin_in = margin = float(one.margin_in[0])
         self.looked = one.inspections[0].rigging_checked not in (None, RiggingCheck.NO)
         self._wear = wear
         # By pins, joints and levels.
         self._transforms = (wear @ _by_wear(gear)).view(complex)
         self._before = _products_before(self._transforms)
         self._stands = _density(self._before[:, -1] * self._transforms[:, -1] * _LINKAGE)
+        y, u = float(one.plunger_in[0]), float(np.hypot(one.plunger_u_in[0], 1e-4))
+        seen, of_rigging = np.ones(_CELLS), 1.0
+        if np.isfinite(y):
+            # (6), and (7) of a wrong rigging.
+            below, above = tabled_normal_cdf((_ENDS_IN - y) / u)
+            seen = (above - below) / _CELL_IN
+            even = 1.0 / (1.0 + (y / (PRIORS.offset * margin)) ** 8)
+            out = float(tabled_normal_cdf(np.array((abs(y) - margin) / u)))
+            of_rigging = even * out / (2.0 * (PRIORS.offset - 1.0) * margin)
+        within = _share_within(margin)
         usual, overlooked = usual_of(gear, fleet)
         before = np.outer([1.0 - fleet.loaded, fleet.loaded], levels)
         often = usual[:, None]
         elsewhere = before / (1.0 - often) / PRIORS.joints_for_one_elsewhere
         # By cause, pins and levels; by cause, pins and cells.
         self._factors = np.array([before / often, elsewhere])
-        self._seen_at = np.array([_both_senses(each) for each in self._likelihoods()])
-        self._weights = self._factors * np.einsum("pkx,cpx->cpk", self._stands, self._seen_at)
-        self._rigging(levels, overlooked)
-        fits = (
-            self._weights
-            if one.failed[0]
-            else before * np.einsum("pkx,cpx->cpk", self._stands, self._seen_at)
-        )
-        free, held = fits.sum(axis=(0, 2)).tolist()
-        self.held = float(held / fleet.loaded / max(free / (1.0 - fleet.loaded), 1e-300))
-
-    def _likelihoods(self) -> tuple[Array, Array]:
-        """Likelihood of the reading in each cell beyond and within the margin. [1]"""
-        margin = self.margin_in
-        over, under, within = (
-            self._seen(np.clip(_BELOW, low, high), np.clip(_ABOVE, low, high))
-            for low, high in ((margin, np.inf), (-np.inf, -margin), (-margin, margin))
-        )
-        return over + under, within
-
-    def _seen(self, low: Array, high: Array) -> Array:
-        y = float(self._one.plunger_in[0])
-        if not np.isfinite(y):
-            return np.asarray((high - low) / _CELL_IN)
-        u = float(np.hypot(self._one.plunger_u_in[0], 1e-4))
-        share = tabled_normal_cdf((high - y) / u) - tabled_normal_cdf((low - y) / u)
-        return np.asarray(share * np.sqrt(2.0 * np.pi) * u / _CELL_IN)
-
-    def _rigging(self, levels: Array, overlooked: float) -> None:
-        """Weigh the causes (8), (9); work that left the rigging wrong leaves few worn joints."""
-        left = self._wear * np.where(_WORN, PRIORS.overlooked, 1.0)
+        self._seen_at = np.array([_both_senses(seen * each) for each in (1.0 - within, within)])
+        fits = np.einsum("pkx,cpx->cpk", self._stands, self._seen_at)
+        free, held = (fits.sum(axis=0) @ levels).tolist()
+        self.held = held / max(free, 1e-300)
+        self._weights = self._factors * fits
+        # (8), (9): work that left the rigging wrong leaves few worn joints.
+        left = wear * np.where(_WORN, PRIORS.overlooked, 1.0)
         sound = left.sum(axis=2)
-        weight = levels * np.prod(sound, axis=0) / overlooked * self._of_rigging()
-        weight = weight / PRIORS.joints_for_one_misrigged
-        joints, elsewhere = self._weights.sum(axis=(1, 2)).tolist()
-        rigging = float(weight.sum())
-        total = max(joints + elsewhere + rigging, 1e-300)
-        self.chances = joints / total, rigging / total, elsewhere / total
-        self._rigging_levels = weight / max(rigging, 1e-300)
+        of_levels = levels * np.prod(sound, axis=0) / overlooked
+        looked = PRIORS.overlooked if self.looked else 1.0
+        rigging = looked * of_rigging * float(of_levels.sum()) / PRIORS.joints_for_one_misrigged
+        joints, other = self._weights.sum(axis=(1, 2)).tolist()
+        total = max(joints + rigging + other, 1e-300)
+        self.chances = joints / total, rigging / total, other / total
+        self._rigging_levels = of_levels / of_levels.sum()
         self._left_worn = left[..., _WORN].sum(axis=2) / sound
-
-    def _of_rigging(self) -> float:
-        """Likelihood of the plunger's reading where the rigging is wrong (7), and that somebody
-        looked at it. [1]
-        """
-        one = self._one
-        y, margin = float(one.plunger_in[0]), self.margin_in
-        likely = PRIORS.overlooked if self.looked else 1.0
-        if not np.isfinite(y):
-            return likely
-        u = float(np.hypot(one.plunger_u_in[0], 1e-4))
-        even = 1.0 / (1.0 + (y / (PRIORS.offset * margin)) ** 8)
-        out = float(tabled_normal_cdf(np.array((abs(y) - margin) / u)))
-        width = 2.0 * (PRIORS.offset - 1.0) * margin
-        return float(likely * even * out * np.sqrt(2.0 * np.pi) * u / width)
 
     @cached_property
     def wear(self) -> Array:
@@ -330,8 +298,7 @@ class Belief:
         return States(
             np.repeat(np.diag(np.divide(self.chances, counts)), counts, axis=1),
             np.vstack([worn[:STATES], rigging, worn[STATES:]]),
-            moved[:STATES],
-            reach * turns,
+            moved[:STATES] - reach * turns,
             stands[:STATES],
             self.margin_in,
         )
@@ -384,24 +351,24 @@ class States:
         first `STATES` are of the joints. [1]
     worn : ndarray of bool, shape (n, joints)
         Joints beyond their limit.
-    moved_in, fresh_in : ndarray, shape (STATES, joints)
-        By how much each joint moves the plunger in a failure of the joints, and would if new. [in]
+    freed_in : ndarray, shape (STATES, joints)
+        By how much less each joint would move the plunger if it were new, in a failure of the
+        joints: its pin rests anew. [in]
     stands_in : ndarray, shape (STATES,)
         Where the plunger stands then. [in]
     """
 
     causes: Array
     worn: Mask
-    moved_in: Array
-    fresh_in: Array
+    freed_in: Array
     stands_in: Array
     margin_in: float
 
     def stays_out(self, sets: Mask) -> Mask:
         """Whether the plunger is beyond its margin in each failure of the joints once sets of
-        joints are new: their pins rest anew, the others stay, shape (STATES, sets).
+        joints are new, shape (STATES, sets).
         """
-        left = self.stands_in[:, None] - (self.moved_in - self.fresh_in) @ sets.T.astype(float)
+        left = self.stands_in[:, None] - self.freed_in @ sets.T
         return np.asarray(np.abs(left) > self.margin_in)
 
 

@@ -5,7 +5,7 @@ handed on.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -69,6 +69,10 @@ class Cases:
         rows = tuple(inspections)
         margins = [gear.margin.value if i.margin_in is None else i.margin_in for i in rows]
         plunger = [plunger_of(i, margin) for i, margin in zip(rows, margins, strict=True)]
+
+        def flags(holds: Callable[[Inspection, int], bool]) -> Mask:
+            return np.array([[holds(i, n) for n in numbers] for i in rows])
+
         return cls(
             gear=gear,
             inspections=rows,
@@ -77,22 +81,15 @@ class Cases:
                 [[i.clearance_in.get(n, math.nan) for n in numbers] for i in rows], float
             ),
             gauge_u_in=np.array([[i.gauge_u_of(number) for number in numbers] for i in rows]),
-            own_gauge=np.array(
-                [
-                    [n in i.gauge_u_by_joint_in or n in i.measured_again for n in numbers]
-                    for i in rows
-                ]
-            ),
+            own_gauge=flags(lambda i, n: n in i.gauge_u_by_joint_in or n in i.measured_again),
             margin_in=np.array(margins),
             margin_u_in=np.array([i.margin_u_in for i in rows]),
             plunger_in=np.array([each for each, _u in plunger]),
             plunger_u_in=np.array([u for _each, u in plunger]),
             failed=np.array([i.standing_outcome is Outcome.FAILED for i in rows]),
             retracted=np.array([i.standing_outcome is Outcome.RETRACTED for i in rows]),
-            reachable=np.array([[n not in i.cannot_reach for n in numbers] for i in rows]),
-            restorable=np.array(
-                [[n not in (*i.cannot_reach, *i.no_spare) for n in numbers] for i in rows]
-            ),
+            reachable=flags(lambda i, n: n not in i.cannot_reach),
+            restorable=flags(lambda i, n: n not in i.cannot_reach and n not in i.no_spare),
             fleet=fleet or Fleet(),
         )
 
@@ -195,12 +192,10 @@ class Cases:
         """Clearances with something in place of those not measured. [in]"""
         return np.where(self.measured, self.clearance_in, unmeasured)
 
-    def predict(self, clearance_in: Array, measured: Mask | None = None) -> Prediction:
+    def predict(self, clearance_in: Array) -> Prediction:
         """Predict these gears with other clearances than those read. [in]"""
-        known = self.measured if measured is None else measured
-        return predict(
-            self.gear, self.inspections, clearance_in, known, self.gauge_u_in, self.extension
-        )
+        readings = clearance_in, self.measured, self.gauge_u_in
+        return predict(self.gear, self.inspections, *readings, self.extension)
 
     def predict_bounds(self) -> tuple[Prediction, Prediction]:
         """Predict these gears with unmeasured joints at 0, and at their limit."""

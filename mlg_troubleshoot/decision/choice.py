@@ -119,7 +119,7 @@ def _bits(belief: Belief, may: Mask, first: Mask) -> Wholes:
     """The bit of each joint whose restoration is weighed, 0 of the others: some first, then those
     that move the plunger farthest.
     """
-    reach = np.abs(belief.states.moved_in).mean(axis=0)
+    reach = np.abs(belief.states.freed_in).mean(axis=0)
     weighed = np.lexsort((-reach, ~first, ~may))[: min(int(may.sum()), THRESHOLDS.movable)]
     bits = np.zeros(len(may), np.int64)
     bits[weighed] = 1 << np.arange(len(weighed))

@@ -356,13 +356,12 @@ def _detail(
     belief: Callable[[int], Belief],
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
-    one = cases.take([i])
     detail: dict[str, Any] = {}
     if budget is not None and judged.verdicts[i] in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
-        lower = one.predict(one.filled(0.0))
-        worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
-        detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    if np.isfinite(one.plunger_in[0]) and one.failed[0]:
+        worst = judged.lower.worst
+        worst_in = float(worst.over_in[i]), float(worst.under_in[i])
+        detail["rigging"] = rigging_alternative(cases.take([i]), worst_in, budget)
+    if np.isfinite(cases.plunger_in[i]) and cases.failed[i]:
         detail["posterior"] = explain(belief(i))
     return detail
 
