@@ -13,7 +13,7 @@ from typing import Any
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.plan import Action, Consequence
-from mlg_troubleshoot.decision.sentences import joint_list
+from mlg_troubleshoot.decision.sentences import joints_are
 from mlg_troubleshoot.gear.gear import Gear
 
 # Typical readings: shares of a limit or a margin, well within it, and beyond it. [1]
@@ -40,7 +40,7 @@ def _outcomes(a: Assessment, gear: Gear) -> Iterator[tuple[str, dict[str, Any]]]
     """Outcomes of the next action, with what each changes in the inspection."""
     row = a.inspection
     step = a.next_action
-    names = joint_list(step.joints)
+    names_are = joints_are(step.joints)
     day = _LATER if row.is_repaired else row.plunger_date
     match step.action:
         case Action.READ_PLUNGER:
@@ -53,8 +53,8 @@ def _outcomes(a: Assessment, gear: Gear) -> Iterator[tuple[str, dict[str, Any]]]
             yield f"#{step.joints[0]} is over its limit", _read(row, gear, step.joints, (0,))
         case Action.MEASURE_AGAIN:
             again = {"measured_again": (*row.measured_again, *step.joints)}
-            yield f"{names} is over the limit again", again
-            yield f"{names} is within the limit", again | _read(row, gear, step.joints, ())
+            yield f"{names_are} over the limit again", again
+            yield f"{names_are} within the limit", again | _read(row, gear, step.joints, ())
         case Action.CHECK_RIGGING:
             yield "the rigging is right", {"rigging_checked": RiggingCheck.YES}
             corrected = {"rigging_checked": RiggingCheck.CORRECTED, "repair_date": _REPAIR_DAY}
@@ -62,7 +62,7 @@ def _outcomes(a: Assessment, gear: Gear) -> Iterator[tuple[str, dict[str, Any]]]
         case Action.RESTORE:
             new = {n: gear.joint(n).new_part.value for n in step.joints}
             yield (
-                f"{names} restored",
+                f"{names_are} restored",
                 {
                     "clearance_in": {**row.clearance_in, **new},
                     "restored_joints": tuple(sorted({*row.restored_joints, *step.joints})),

@@ -82,6 +82,11 @@ def joint_list(joints: Sequence[int]) -> str:
     return ", ".join(f"#{joint}" for joint in joints)
 
 
+def joints_are(joints: Sequence[int], one: str = "is", more: str = "are") -> str:
+    """Joints as a subject with its verb: ``#3 is``, ``#3, #5 are``."""
+    return f"{joint_list(joints)} {one if len(joints) == 1 else more}"
+
+
 def _chance(a: Assessment) -> str:
     # No chance of a few thousand sets of directions is smaller than can be counted.
     chance = a.probability_exceed_random_directions or 0.0
@@ -265,7 +270,7 @@ def check_rigging(stands_in: float | None, as_new: Sequence[int]) -> Sentence:
     if not as_new:
         return said
     asked = (
-        f" IF {joint_list(as_new)} were restored after the failure, THEN enter them in"
+        f" IF {joints_are(as_new, 'was', 'were')} restored after the failure, THEN enter that in"
         " restored_joints."
     )
     return Sentence.of("{}{}", said, asked)
@@ -275,11 +280,10 @@ def open_question(unread: Sequence[int], over: Sequence[int]) -> str | None:
     """What cannot be settled today."""
     said = []
     if unread:
-        are = "cannot be reached and is" if len(unread) == 1 else "cannot be reached and are"
-        said.append(f"{joint_list(unread)} {are} not read.")
+        barred = joints_are(unread, *(f"cannot be reached and {are}" for are in ("is", "are")))
+        said.append(f"{barred} not read.")
     if over:
-        are = "is" if len(over) == 1 else "are"
-        said.append(f"{joint_list(over)} {are} over the limit and cannot be restored today.")
+        said.append(f"{joints_are(over)} over the limit and cannot be restored today.")
     return " ".join(said) or None
 
 
@@ -312,8 +316,7 @@ def restore(joints: Sequence[int], over: Sequence[int]) -> str:
     said = f"Restore{order} {joint_list(joints)}."
     sound = [joint for joint in joints if joint not in over]
     if over and sound:
-        are = "is" if len(sound) == 1 else "are"
-        said += f" {joint_list(sound)} {are} within the limit and must move less."
+        said += f" {joints_are(sound)} within the limit and must move less."
     return said
 
 
@@ -341,9 +344,8 @@ def no_repair_set(a: Assessment) -> str:
         of_which = " of the measured joints" if a.unread else ""
         return f"None needed: the worst case{of_which} is within the margin already."
     if a.unread:
-        are = "is" if len(a.unread) == 1 else "are"
         return (
-            f"No repair set is certain while {joint_list(a.unread)} {are} not measured. Unmeasured"
+            f"No repair set is certain while {joints_are(a.unread)} not measured. Unmeasured"
             " joints count at their limit here."
         )
     return f"No {_SET_THAT_HOLDS}"

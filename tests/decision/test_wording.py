@@ -1,10 +1,12 @@
-"""A probability is never rounded to a certainty."""
+"""Words of steps and chances: no false certainty, and a verb for each subject."""
 
 from __future__ import annotations
 
 import pytest
 
+from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.sentences import percent
+from tests.decision.conftest import Judge, every_joint
 
 
 @pytest.mark.parametrize(
@@ -25,3 +27,18 @@ def test_a_probability_is_written_as_a_percentage_that_is_not_a_false_certainty(
     share: float, written: str
 ) -> None:
     assert percent(share) == written
+
+
+@pytest.mark.parametrize(
+    ("worn", "beginning"),
+    [
+        ({"j3": 0.0148}, "IF #3 is restored, THEN "),
+        ({"j2": 0.0148, "j3": 0.0148}, "IF #2, #3 are restored, THEN "),
+    ],
+)
+def test_what_follows_a_repair_is_a_sentence_for_one_joint_and_for_several(
+    judge: Judge, worn: dict[str, float], beginning: str
+) -> None:
+    read = every_joint(0.0005, **worn)
+    found = judge(read, advice=True, outcome=Outcome.RETRACTED)
+    assert [each.text.startswith(beginning) for each in found.plan.then] == [True]
