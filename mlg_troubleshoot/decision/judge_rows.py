@@ -188,7 +188,6 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
     verdicts = _verdicts(cases, p_lower, p_upper, known)
     found = [verdict for verdict, _basis in verdicts]
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes
-    sets = repair_sets(cases, upper, np.flatnonzero(wanted))
     findings = rank_joints(
         cases.gear,
         table,
@@ -208,16 +207,11 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
         lower.standard_uncertainty(cases.margin_u_in),
     )
     belief = cache(lambda row: Belief(cases.take([row])))
-    numbers = np.array(cases.gear.joint_numbers)
-    for row in np.flatnonzero(cases.beyond_margin & (cases.failed | cases.repaired)).tolist():
-        chances = [belief(row).second_repair(np.isin(numbers, s.joints)) for s in sets[row]]
-        sets[row] = tuple(
-            replace(each, second_repair_probability=chance)
-            for each, chance in zip(sets[row], chances, strict=True)
-        )
-    planned = plans(cases, judged, belief, sets)
+    planned, tried = plans(cases, judged, belief)
+    sets = repair_sets(cases, upper, np.flatnonzero(wanted), tried, belief)
+    asked = belief if advice else None
     return [
-        _assessment(cases, judged, i, findings[i], *planned[i], belief if advice else None)
+        _assessment(cases, judged, i, findings[i], planned[i], sets[i], asked)
         for i in range(len(cases))
     ]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision import sentences
-from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Verdict
+from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.choice import Choice, choose
@@ -32,7 +32,6 @@ from mlg_troubleshoot.decision.plan import (
 )
 from mlg_troubleshoot.decision.prediction import Prediction
 from mlg_troubleshoot.decision.priors import PRIORS, THRESHOLDS
-from mlg_troubleshoot.decision.repair import restored
 from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
 
 
@@ -76,60 +75,30 @@ class Judged:
 
 
 def plans(
-    cases: Cases,
-    judged: Judged,
-    belief: Callable[[int], Belief],
-    sets: Sequence[tuple[RepairSet, ...]],
-) -> list[tuple[Plan, tuple[RepairSet, ...]]]:
-    """The plan of each gear, and the repairs that it chose from."""
-    courses = [_PlanBuilder(cases, judged, belief, i, sets[i]) for i in range(len(cases))]
+    cases: Cases, judged: Judged, belief: Callable[[int], Belief]
+) -> tuple[list[Plan], dict[int, Mask]]:
+    """The plan of each gear, and the joints of those whose repair is to be tried."""
+    courses = [_PlanBuilder(cases, judged, belief, i) for i in range(len(cases))]
     planned = [course.plan() for course in courses]
-    _predict_tried(cases, courses)
-    return [(plan, course.sets) for plan, course in zip(planned, courses, strict=True)]
-
-
-def _predict_tried(cases: Cases, courses: Sequence[_PlanBuilder]) -> None:
-    """Predict the gears after the repairs to be tried, all at once: the plans need no more than
-    their chances.
-    """
-    rows = [i for i, course in enumerate(courses) if course.tried is not None]
-    if not rows:
-        return
-    numbers = np.array(cases.gear.joint_numbers)
-    tried = [course.tried for course in courses if course.tried is not None]
-    some, after = restored(cases, rows, [np.isin(numbers, each.joints) for each in tried])
-    within = after.probability_within(some.margin_in, some.margin_u_in)
-    for k, row in enumerate(rows):
-        found = replace(
-            tried[k],
-            predicted_displacement_in=float(after.displacement_in[k]),
-            probability_within_margin=float(within[k]),
-        )
-        courses[row].sets = (*courses[row].sets, found)
+    return planned, {c.row: c.tried for c in courses if c.tried is not None}
 
 
 class _PlanBuilder:
     """The course of one gear: each branch appends its steps and ends."""
 
     def __init__(
-        self,
-        cases: Cases,
-        judged: Judged,
-        belief: Callable[[int], Belief],
-        row: int,
-        sets: tuple[RepairSet, ...],
+        self, cases: Cases, judged: Judged, belief: Callable[[int], Belief], row: int
     ) -> None:
         self.cases = cases
         self.judged = judged
         self.row = row
-        self.sets = sets
         self.gear = cases.gear
         self.numbers = cases.gear.joint_numbers
         self.inspection = cases.inspections[row]
         self.beyond = bool(cases.beyond_margin[row])
         self._belief = belief
         self.steps: list[Step] = []
-        self.tried: RepairSet | None = None
+        self.tried: Mask | None = None
         self.taken_again = False
         self.opened: frozenset[str] = frozenset()
         self.over_limit = self._joints(self.cases.over_limit[row])
@@ -257,7 +226,8 @@ class _PlanBuilder:
         if choice.read:
             return self._read_and_restore(choice.read)
         if choice.restore is not None:
-            return self._try(choice.restore, self.belief.second_repair(choice.restore))
+            self.tried = choice.restore
+            return self._try(choice.restore)
         if self.over:
             return self._try(self.cases.over_limit[self.row])
         explained = joints > rigging + elsewhere
@@ -285,18 +255,15 @@ class _PlanBuilder:
         asked = {n for step in self.steps for n in step.joints}
         return [n for n in self._joints(~self.cases.measured[self.row]) if n not in asked]
 
-    def _try(self, members: Mask, second: float | None = None, *, expected: bool = False) -> Plan:
+    def _try(self, members: Mask, *, expected: bool = False) -> Plan:
         """Restore, read the plunger, retract the gear: done. Where something over its limit must
         wait for its spare, that comes after it.
         """
         waits = self.over != self.over_limit
         if waits and not expected:
+            self.tried = None
             return self._restore_over_limit()._stop_for_today()
-        joints = self._joints(members)
-        if second is not None and all({*each.joints} != {*joints} for each in self.sets):
-            minutes = minutes_to_measure(self.gear, joints), minutes_to_restore(self.gear, joints)
-            self.tried = RepairSet(joints, np.nan, np.nan, *minutes, RepairKind.TRY, second)
-        self._restore(joints, expected=expected)
+        self._restore(self._joints(members), expected=expected)
         if waits:
             return self._stop_for_today()
         self._read_the_plunger()

@@ -4,13 +4,14 @@ re-rigging would do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Rigging, UncertaintyBudget
+from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
@@ -94,13 +95,19 @@ class Sets:
         return [k for k in found if self.members[k].any()]
 
 
-def repair_sets(cases: Cases, upper: Prediction, wanted: Places) -> list[tuple[RepairSet, ...]]:
+def repair_sets(
+    cases: Cases,
+    upper: Prediction,
+    wanted: Places,
+    tried: Mapping[int, Mask],
+    belief: Callable[[int], Belief],
+) -> list[tuple[RepairSet, ...]]:
     """Find the sets of joints which, restored, bring the worst case of the wanted gears within the
-    margin; `upper`: with unmeasured joints at their limit.
+    margin; `upper`: with unmeasured joints at their limit. `tried`: sets that plans restore.
 
     Unmeasured joints count with their limit: what holds with them at 0 sends every fifth gear back.
-    Only sets that contain no smaller sufficient set are returned, the quickest first, each checked
-    by the exact worst case.
+    Of sure sets only those that contain no smaller sufficient set are returned, the quickest first,
+    each checked by the exact worst case.
     """
     result: list[tuple[RepairSet, ...]] = [()] * len(cases)
     each = [Sets(cases, upper, row) for row in wanted.tolist()]
@@ -116,20 +123,24 @@ def repair_sets(cases: Cases, upper: Prediction, wanted: Places) -> list[tuple[R
         exact = some.margin_in - after.displacement_in - guard
         for (sets, k), slack in zip(near, exact.tolist(), strict=True):
             sets.slack_in = sets.slack_in + np.nan_to_num(slack - sets.slack_in[k])
-    asked = [(sets, k) for sets, _ in near for k in sets.sufficient()]
+    asked = [(s.row, s.members[k], RepairKind.SURE) for s, _ in near for k in s.sufficient()]
+    asked += [(row, members, RepairKind.TRY) for row, members in tried.items()]
     if not asked:
         return result
-    some, after = restored(cases, [s.row for s, _ in asked], [s.members[k] for s, k in asked])
+    some, after = restored(cases, [row for row, *_ in asked], [each for _, each, _ in asked])
     within = after.probability_within(some.margin_in, some.margin_u_in)
-    numbers = np.array(cases.gear.joint_numbers)
-    for (sets, k), moved, p in zip(
+    complained = cases.beyond_margin & (cases.failed | cases.repaired)
+    for (row, members, kind), moved, p in zip(
         asked, after.displacement_in.tolist(), within.tolist(), strict=True
     ):
-        if p >= CONFORMANCE:
-            joints = tuple(numbers[sets.members[k]].tolist())
-            minutes = minutes_to_measure(cases.gear, joints), float(sets.minutes[k])
-            held = RepairSet(joints, moved, p, *minutes, RepairKind.SURE)
-            result[sets.row] = (*result[sets.row], held)
+        joints = tuple(np.array(cases.gear.joint_numbers)[members].tolist())
+        sure = kind is RepairKind.SURE
+        if p < CONFORMANCE if sure else joints in [each.joints for each in result[row]]:
+            continue
+        minutes = minutes_to_measure(cases.gear, joints), minutes_to_restore(cases.gear, joints)
+        stated = complained[row] or not sure
+        second = belief(row).second_repair(members) if stated else None
+        result[row] = (*result[row], RepairSet(joints, moved, p, *minutes, kind, second))
     return result
 
 

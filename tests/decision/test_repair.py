@@ -9,11 +9,12 @@ import pytest
 
 from mlg_troubleshoot.decision import repair
 from mlg_troubleshoot.decision.assessment import RepairSet
+from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import allowances
 from mlg_troubleshoot.decision.plan import minutes_to_measure
-from mlg_troubleshoot.decision.prediction import predict
+from mlg_troubleshoot.decision.prediction import Prediction, predict
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
@@ -24,13 +25,18 @@ FULL_FAILURE = every_joint(0.001, j3=0.013, j5=0.007)
 MARGIN_IN = 0.03
 
 
+def sure_sets(cases: Cases, upper: Prediction) -> tuple[RepairSet, ...]:
+    """Sets that hold in the worst case."""
+    return repair.repair_sets(cases, upper, np.array([0]), {}, lambda _row: Belief(cases))[0]
+
+
 def repair_sets(
     gear: Gear, inspection: Inspection, margin_in: float = MARGIN_IN
 ) -> tuple[RepairSet, ...]:
     """Repair sets of one gear."""
     cases = Cases.of(gear, [replace(inspection, margin_in=margin_in)])
     upper = cases.predict_bounds()[1]
-    return repair.repair_sets(cases, upper, np.array([0]))[0]
+    return sure_sets(cases, upper)
 
 
 def allowance(gear: Gear, inspection: Inspection) -> dict[int, float]:
@@ -240,4 +246,4 @@ def test_a_set_that_the_exact_prediction_does_not_confirm_is_not_offered(
 
     monkeypatch.setattr(repair.Sets, "sufficient", alone)
     upper = cases.predict(cases.filled(gear.limits_in))
-    assert repair.repair_sets(cases, upper, np.array([0])) == [()]
+    assert sure_sets(cases, upper) == ()
