@@ -32,6 +32,8 @@ _CELL_IN = 0.00125
 _AT = np.asarray(np.fft.fftfreq(_CELLS) * _CELLS * _CELL_IN, np.float64)
 _ENDS_IN = np.array([_AT - 0.5 * _CELL_IN, _AT + 0.5 * _CELL_IN], np.float64)
 _FREQUENCIES = 2.0 * np.pi * np.fft.rfftfreq(_CELLS, _CELL_IN)
+# Share of the likeliest cell below which a chance is none. [1]
+_NEGLIGIBLE = 1e-7
 # Transform of what the linkage adds (5).
 _LINKAGE = np.exp(-0.5 * (PRIORS.linkage_u_in * _FREQUENCIES) ** 2)
 
@@ -120,7 +122,10 @@ def _by_wear(gear: Gear) -> Array:
 
 def _density(transform: Array) -> Array:
     """Chance of each cell from a transform. [1]"""
-    return np.asarray(np.maximum(np.fft.irfft(transform, _CELLS), 0.0))
+    found = np.fft.irfft(transform, _CELLS)
+    # Less is what the frequencies that are left out would take away.
+    least = _NEGLIGIBLE * found.max(axis=-1, keepdims=True)
+    return np.asarray(np.where(found > least, found, 0.0))
 
 
 def _share_within(margin_in: Array | float) -> Array:
@@ -249,7 +254,8 @@ class Belief:
         weight = _density(np.conj(gone) * out) * _density(stay * _LINKAGE)
         weight *= self._factors[0][..., None]
         inside = _density(np.conj(fresh) * np.fft.rfft(_share_within(self.margin_in)))
-        within = np.sum(weight * inside[:, None]) / max(float(weight.sum()), 1e-300)
+        # Where the joints can hardly be the cause no repair is one.
+        within = np.sum(weight * inside[:, None]) / max(float(weight.sum()), 1e-9)
         return max(1.0 - float(within), 0.0)
 
     def chance_of_any(self, joints: Sequence[int]) -> float:

@@ -66,7 +66,7 @@ def choose(
     more = codes != must[:, None]
     allowed = codes & ~(np.where(asked, spare, worn | over) @ bits)[:, None] == 0
     allowed &= (codes & must[:, None] == must[:, None]) & sets.any(axis=1)
-    allowed &= ~more | (out <= 0.5 * causes[:, :1])
+    allowed &= ~more | (out < 0.5 * causes[:, :1])
 
     read, minutes = _minutes(gear, asked, sets)
     read = read[starts]
