@@ -256,7 +256,7 @@ class Belief:
         inside = _density(np.conj(fresh) * np.fft.rfft(_share_within(self.margin_in)))
         # Where the joints can hardly be the cause no repair is one.
         within = np.sum(weight * inside[:, None]) / max(float(weight.sum()), 1e-9)
-        return max(1.0 - float(within), 0.0)
+        return float(np.clip(1.0 - within, _NEGLIGIBLE, 1.0 - _NEGLIGIBLE))
 
     def chance_of_any(self, joints: Sequence[int]) -> float:
         """Chance that any of some joints, by their places, is worn, whatever the cause. [1]"""
