@@ -271,6 +271,17 @@ class Columns:
         unread = "unknown column, carried to the report: " + ", ".join(carried)
         return "; ".join(read), unread if carried else ""
 
+    def left_unread(self) -> list[str]:
+        """Say which columns that bear a verdict the caller leaves unread."""
+        joints = self._options.joints
+        declared = [p.header for p in self.placed if p.is_settled and p.found == UNKNOWN]
+        known = [(header, recognise(header, joints).field) for header in declared]
+        return [
+            f'"{header}" is left unread, as --map says: no verdict counts what it holds'
+            for header, field in known
+            if field is not None and field.column.bears_verdict
+        ]
+
     def _settle_visits(self, units: Sequence[LengthUnit | None]) -> None:
         """Settle the columns whose headings name a reading, a number next to it, or a visit, where
         they leave no doubt.

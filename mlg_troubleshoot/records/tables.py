@@ -61,6 +61,11 @@ class Collected:
             kept: list[Any] = getattr(self, own.name)
             kept += [said + each if said else each for each in getattr(part, own.name)]
 
+    def leave_unread(self, notes: Sequence[str]) -> None:
+        """Take notes that say what was not read."""
+        self.notes += notes
+        self.unread += notes
+
     def tell(self, problem: Problem) -> None:
         """Take a problem; a table that has far too many of them is refused, with the first."""
         self.problems.append(problem)
@@ -112,6 +117,7 @@ def read_table(
     out.notes += filter(
         None, (against, "; ".join(filter(None, (placed, read, said))), carried, about)
     )
+    out.leave_unread(columns.left_unread())
     kind = "long" if columns.is_long else "wide"
     kind = "visits" if len(columns.visits) > 1 else kind
     readings = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
@@ -132,6 +138,7 @@ def read_form(
     out.rows += map(reader.read, form.upright(columns, visits))
     dates = reader.settle_dates(out.rows)
     out.notes += filter(None, (*columns.notes(), dates, form.note(visits)))
+    out.leave_unread(columns.left_unread())
     kind = "visits" if is_several else "form"
     readings = tuple(
         ColumnReading(column, p.header, p.read_as, p.place.row) for p in columns.placed

@@ -5,6 +5,7 @@ drafts, headers.
 from __future__ import annotations
 
 import os
+import sys
 import zipfile
 
 from mlg_troubleshoot.cli.prompts import SavedEntries
@@ -12,13 +13,24 @@ from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.store import Draft, Drafts, Store
 from tests.fuzz.case import Case
 from tests.fuzz.damage import HOSTILE, NUMBERS, damaged
-from tests.fuzz.desk import DATA, GEAR_FILES, HEADERS, Desk
+from tests.fuzz.desk import DATA, GEAR_FILES, HEADERS, OUTSIDE, TABLE, Desk
+from tests.safety.orders import drawn_aircraft
+from tests.safety.orders import table as table_of
 
 DRAFT = """{"id": "draft", "gear": "hawker-800xp", "started": "2026-03-04T10:00:00",
 "cells": {"tail_no": "N1", "side": "LH", "unit": "in", "clearance_convention": "RADIAL",
 "outcome": "FAILED", "plunger_displacement": "0.02 in", "clearance_3": ".013 in",
 "clearance_5": "", "inspection_date": "2026-03-04"},
 "given": [], "todo": null, "confirmed": ["clearance_3"], "continues": ""}"""
+# Sound in every joint that was read, without an outcome.
+TIGHT = OUTSIDE.replace("0.05,FAILED", "0.004,")
+# What is not read under a header, and would stand against the gear.
+ASKED = (
+    *(("Status", word) for word in ("F", "x", "0", "intermittent", "FAILED", "not ok")),
+    *((header, "0.06") for header in ("VI", "six", "Plgr", "reading", "X")),
+    *((header, "12 thou") for header in ("note", "joint six", "?")),
+    *(("remarks", text) for text in ("failed last week", "did not retract")),
+)
 FAILURE = str(DATA / "failure_case.csv")
 
 
@@ -119,4 +131,60 @@ def headers(desk: Desk) -> Case:
     return Case("headers", [[*command, *more, "--map", "headers.toml"]])
 
 
-INPUTS = (table, workbook, name, gear, beside, extension, draft, headers)
+def against(desk: Desk) -> Case:
+    """A gear that something stands against, in rows of any order or under any header: never 0."""
+    rng = desk.rng
+    gear = drawn_aircraft(rng, "N1")
+    text = table_of([gear])
+    if not gear.standing:
+        header, cell = rng.choice(ASKED)
+        lines = rng.choice((OUTSIDE, TIGHT)).splitlines()
+        text = f"{lines[0]},{header}\n{lines[1]},{cell}\n"
+    form = rng.choice(([], ["--json"], ["-q"], ["--csv", "out.csv"]))
+    line = ["check", desk.write("in.csv", text), *form]
+    return Case("against", [line], frozenset({"work/out.csv"}), codes=frozenset({1, 3}))
+
+
+def modules(desk: Desk) -> Case:
+    """Files named like modules next to the input: whichever runs makes a file."""
+    desk.take("in.csv", "in.xlsx", "far.csv")
+    for module in (*sys.modules, "sitecustomize", "plutoprint", "openpyxl", "xlrd", "psycopg"):
+        if "." not in module:
+            desk.write(f"{module}.py", "open('ran', 'w')\n")
+    long = "".join(f"X{n},X{n},LH,RADIAL,0.001,0.001,,,,,,,,\n" for n in range(600))
+    desk.write("long.csv", TABLE + long)
+    command = desk.rng.choice(
+        (
+            ["check", "long.csv", "-q"],
+            ["check", "in.csv", "--report", "pages"],
+            ["check", "in.xlsx", "--annotate", "out.xlsx"],
+            ["diagnose", "far.csv"],
+            ["study", "--design", "lhs", "--size", "2,20,1"],
+            ["template", "out.pdf"],
+            ["gear", "verify"],
+        )
+    )
+    made = frozenset({"work/out.xlsx", "work/out.pdf"})
+    return Case("modules", [command], made, ("work/pages",))
+
+
+def crowd(desk: Desk) -> Case:
+    """Many rows of one gear or of one record, whose days or repairs nobody can order."""
+    rng = desk.rng
+    day = rng.choice(("2026-01-05", "", "32 Foo", "2026-01-{day:02d}", "{day:02d}/03/26"))
+    cells = [rng.choice(("R{n}", "R")), rng.choice(("N1", "N{n}", "n-1")), "LH,RADIAL"]
+    cells += ["0.00{digit}", "0.005", "", "0.0{digit}", "", day, rng.choice(("", "{n}", "7"))]
+    cells += [rng.choice(("", "FAILED", "RETRACTED", "{n}")), rng.choice(("", "failed {n}")), "W"]
+    row = ",".join(cells) + "\n"
+    rows = rng.choice((300, 1000, 3000))
+    made = (row.format(n=n, digit=n % 10, day=1 + n % 28) for n in range(rows))
+    text = TABLE.splitlines()[0] + "\n" + "".join(made)
+    form = rng.choice((["--json"], ["-q"], ["--keep", "--store", "crowd.sqlite", "-q"]))
+    line = ["check", desk.write("in.csv", text), *form]
+    return Case("crowd", [line], keeps=frozenset({"work/crowd.sqlite"}))
+
+
+INPUTS = (
+    *(table, workbook, name, gear, beside, extension, draft, headers),
+    *(against, modules, crowd),
+)

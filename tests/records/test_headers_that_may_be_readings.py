@@ -162,6 +162,15 @@ def test_carry_answers_the_question(header: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("header", "value"), [("plunger_displacement_in", "0.06"), ("Outcome", "FAILED")]
+)
+def test_what_bears_the_verdict_and_is_left_unread_is_said(header: str, value: str) -> None:
+    text = ",".join([*ALL, header]) + "\n" + ",".join([*GOOD, value]) + "\n"
+    result = check(Named(text.encode(), "t.csv"), advice=False, column_map={header: "carry"})
+    assert [note for note in result.unread if f'"{header}" is left unread' in note]
+
+
+@pytest.mark.parametrize(
     ("header", "value"),
     [
         ("limit 6 (in)", "0.0075"),
