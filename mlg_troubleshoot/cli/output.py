@@ -213,7 +213,10 @@ def print_table(
     the first are printed, and where the `others` are listed.
     """
     shown = rows[:_LINES] if others else rows
-    cells = [[word(each) if isinstance(each, str) else each for each in row] for row in shown]
+    cells = [
+        [text(visible(each, one_line=True)) if isinstance(each, str) else each for each in row]
+        for row in shown
+    ]
     kept = {_MARK.sub("", heading): place for place, heading in enumerate(headings)}
     last = folded or [*kept][-1]
     wide = {

@@ -289,7 +289,7 @@ def lanes(title: str, across: Axis, names: Sequence[str], high: float = 20.0) ->
     height = margins["top"] + high * len(names) + margins["bottom"]
     canvas = Canvas(_PLOT[0], height, title, f"one line per name: {', '.join(names)}")
     plot = Plot(canvas, across, Axis("", float(len(names)), 0.0), **margins)
-    plot.draw_vertical_grid()
+    plot.draw_axes(lanes=True)
     left, top, right, _ = plot.area
     canvas.text(left, top - 9, title, bold=True)
     for place, name in enumerate(names, 1):

@@ -275,10 +275,30 @@ class Plot:
         up = (y - self.y.low) / (self.y.high - self.y.low)
         return x0 + across * (x1 - x0), y1 - up * (y1 - y0)
 
-    def draw_axes(self, x_ticks: int = 6, names: Sequence[str] = ()) -> None:
+    def draw_axes(
+        self, x_ticks: int = 6, names: Sequence[str] = (), *, lanes: bool = False
+    ) -> None:
         """Draw grid, ticks, frame and labels; names take the place of numbers on the horizontal
-        axis.
+        axis. Of lanes, which their names tell apart, the grid is vertical, stronger at zero.
         """
+        x0, y0, x1, y1 = self.area
+        if not lanes:
+            self._draw_vertical_axis()
+        ticks = nice_ticks(self.x.low, self.x.high, x_ticks)
+        room = max(2, int((x1 - x0) / max(len(names), 1) / 6.5))
+        marks = [(float(k), short(name, room)) for k, name in enumerate(names)]
+        for value, text in marks or [(value, number(value, decimals_of(ticks))) for value in ticks]:
+            x, _ = self.at(value, self.y.low)
+            if lanes:
+                colour, width = (SOFT, 1.0) if value == 0.0 else (RULE, 0.5)
+                self.canvas.line(x, y0, x, y1, colour=colour, width=width)
+            else:
+                self.canvas.line(x, y1, x, y1 + 4, colour=SOFT)
+            self.canvas.text(x, y1 + 14, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
+        self.canvas.line(x0, y1, x1, y1, colour=SOFT)
+        self.canvas.text((x0 + x1) / 2, y1 + 28, self.x.label, size=10, anchor="middle")
+
+    def _draw_vertical_axis(self) -> None:
         x0, y0, x1, y1 = self.area
         ticks = nice_ticks(self.y.low, self.y.high)
         for value in ticks:
@@ -292,17 +312,7 @@ class Plot:
                 anchor="end",
                 colour=SOFT,
             )
-        ticks = nice_ticks(self.x.low, self.x.high, x_ticks)
-        room = max(2, int((x1 - x0) / max(len(names), 1) / 6.5))
-        marks = [(float(k), short(name, room)) for k, name in enumerate(names)]
-        for value, text in marks or [(value, number(value, decimals_of(ticks))) for value in ticks]:
-            x, _ = self.at(value, self.y.low)
-            self.canvas.line(x, y1, x, y1 + 4, colour=SOFT)
-            self._tick_label(x, y1 + 14, text)
-        self.canvas.line(x0, y1, x1, y1, colour=SOFT)
         self.canvas.line(x0, y0, x0, y1, colour=SOFT)
-        middle = (x0 + x1) / 2
-        self.canvas.text(middle, y1 + 29, self.x.label, size=10, anchor="middle")
         self.canvas.add(
             "text",
             self.y.label,
@@ -311,28 +321,6 @@ class Plot:
             font_size=10.0,
             fill=INK,
         )
-
-    def _tick_label(self, x: float, y: float, text: str) -> None:
-        self.canvas.text(x, y, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
-
-    def draw_vertical_grid(self) -> None:
-        """Draw the horizontal axis with a line at each tick, a stronger one at zero."""
-        x0, y0, x1, y1 = self.area
-        ticks = nice_ticks(self.x.low, self.x.high, 6)
-        for value in ticks:
-            x, _ = self.at(value, self.y.low)
-            self.canvas.line(
-                x,
-                y0,
-                x,
-                y1,
-                colour=SOFT if value == 0.0 else RULE,
-                width=1.0 if value == 0.0 else 0.5,
-            )
-            self._tick_label(x, y1 + 13, number(value, decimals_of(ticks)))
-        self.canvas.line(x0, y1, x1, y1, colour=SOFT)
-        middle = (x0 + x1) / 2
-        self.canvas.text(middle, y1 + 27, self.x.label, size=10, anchor="middle")
 
     def draw(self, series: Series) -> None:
         places = zip(series.x, series.y, strict=True)

@@ -83,7 +83,7 @@ def _gauge(
     left, top, right, bottom = plot.area
     ends = [plot.at(lengths.unit.from_inches(end), 0.0)[0] for end in (-margin_in, margin_in)]
     canvas.rectangle(ends[0], top, ends[1] - ends[0], bottom - top, fill=PALE)
-    plot.draw_vertical_grid()
+    plot.draw_axes(lanes=True)
     canvas.text(left, 10, "◀ short of mid-position", size=10, colour=SOFT)
     canvas.text(
         (left + right) / 2,

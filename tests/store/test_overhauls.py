@@ -182,12 +182,18 @@ def test_history_says_from_where_landings_count(kept: GearLife) -> None:
 
 def test_the_plot_begins_before_the_overhaul_and_marks_it(kept: GearLife) -> None:
     from mlg_troubleshoot.life.forecast import Forecast
-    from mlg_troubleshoot.reporting.fleet_figures import WearInTime
+    from mlg_troubleshoot.reporting.fleet_figures import wear_figure
+    from mlg_troubleshoot.reporting.formats import Lengths
 
-    wear = WearInTime.of(kept, Forecast(), load_gear())
-    assert wear is not None
-    assert (wear.first, wear.last) == (-800.0, 1100.0)
-    assert (wear.restored(1), wear.restored(4)) == ([0.0], [])
+    svg = str(wear_figure(kept, Forecast(), load_gear(), Lengths()))
+    marked = {
+        panel.partition(">#")[2].partition(" ")[0]
+        for panel in svg.split('font-weight="bold"')[1:]
+        if "<polygon" in panel
+    }
+    assert marked >= {"1", "2", "3", "5"}
+    assert "4" not in marked
+    assert ">−500</text>" in svg
 
 
 @pytest.mark.parametrize("joints", [("1", "2"), ("1", "2", "3")])
