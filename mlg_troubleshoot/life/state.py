@@ -63,6 +63,11 @@ class GearVisit:
     def at(self) -> date | None:
         return self.inspection.inspection_date
 
+    @property
+    def visit(self) -> GearVisit:
+        """Itself, where it is compared in time with what was found at others."""
+        return self
+
 
 @dataclass(frozen=True, slots=True)
 class GearState:
@@ -118,16 +123,11 @@ class _Event:
     def moment(self) -> tuple[object, ...]:
         return self.at, self.joints
 
-    @property
-    def occasion(self) -> _Event:
-        """Its visit, as what is compared in time."""
-        return _Event(self.visit, self.visit.at)
-
     def fact(self, kind: FactKind, joint: int | None = None, value_in: float | None = None) -> Fact:
         return Fact(kind, joint, value_in, self.at, self.visit.inspection.record_id)
 
 
-def _is_later(one: _Event, other: _Event) -> bool:
+def _is_later(one: _Event | GearVisit, other: _Event | GearVisit) -> bool:
     if surely_later(one.at, other.at):
         return True
     if one.visit is other.visit or surely_later(other.at, one.at):
@@ -136,14 +136,14 @@ def _is_later(one: _Event, other: _Event) -> bool:
 
 
 def _newest(events: Sequence[_Event]) -> list[_Event]:
-    # Most are replaced by one of the last day; each is compared with each only of the others.
-    days = [(e.at, n) for n, e in enumerate(events) if e.at.__class__ is date]
-    last = events[max(days)[1]] if days else None
+    # Of what a table states with its day alone nothing is later than the last day.
+    last = max((e.at for e in events if e.at.__class__ is date), default=None)
+    others = [e for e in events if e.visit.typed or e.at.__class__ is not date]
     return [
         e
         for e in events
-        if not (last and surely_later(last.at, e.at))
-        if not any(_is_later(other, e) for other in events)
+        if not surely_later(last, e.at)
+        if not any(_is_later(other, e) for other in others)
     ]
 
 
@@ -307,9 +307,8 @@ class _AsOf:
         self._gear = known.gear
         self._visit = visit
         self._row = visit.inspection
-        self._at = _Event(visit, visit.at)
         self._now = now
-        self._repairs = [e for e in known.repairs if now or not _is_later(e.occasion, self._at)]
+        self._repairs = [e for e in known.repairs if now or not _is_later(e.visit, self._visit)]
         self._retracted = self._counting(known.retracted)
         self._older: list[Fact] = []
         self._said: list[str] = []
@@ -345,8 +344,8 @@ class _AsOf:
             for e in events
             if self._now
             or self._is_own(e)
-            or _is_later(self._at, e.occasion)
-            or (e.visit.place < inf and not _is_later(e.occasion, self._at))
+            or _is_later(self._visit, e.visit)
+            or (e.visit.place < inf and not _is_later(e.visit, self._visit))
         ]
 
     def _is_own(self, event: _Event) -> bool:
@@ -365,7 +364,7 @@ class _AsOf:
         """
         if self._is_own(event) and not self._now:
             return True
-        is_before = self._now or _is_later(self._at, event.occasion)
+        is_before = self._now or _is_later(self._visit, event.visit)
         # A row tells of a joint how it was left.
         repairs = (r for r in self._of(joint) if joint is None or r.visit is not event.visit)
         return is_before and all(_is_later(event, r) for r in repairs)
@@ -515,7 +514,7 @@ class _AsOf:
             if not self._is_own(r) and (self._now or not own)
             if any(_is_later(r, e) for e in dated.values())
             or self._is_closed_by(outcome, r)
-            or not _is_later(own[0] if own else self._at, r)
+            or not _is_later(own[0] if own else self._visit, r)
         ]
         repairs = [*own, *since]
         if not repairs or not (since or any(not self._is_own(e) for e in dated.values())):
@@ -526,7 +525,7 @@ class _AsOf:
         changed: dict[str, Any] = {"restored_joints": tuple(sorted(joints)), "repair_date": day}
         if any(r.visit.inspection.rigging_checked is RiggingCheck.CORRECTED for r in repairs):
             changed["rigging_checked"] = RiggingCheck.CORRECTED
-        self._say_repairs([r for r in since if not _is_later(self._at, r)])
+        self._say_repairs([r for r in since if not _is_later(self._visit, r)])
         return changed | {name: _place(e, self._repairs, day) for name, e in dated.items()}
 
     def _is_closed_by(self, outcome: _Event | None, repair: _Event) -> bool:
@@ -547,7 +546,7 @@ class _AsOf:
             when = "without a date" if repair.at is None else f"on {repair.at.isoformat()}"
             then = (
                 "what is older does not count"
-                if _is_later(repair, self._at)
+                if _is_later(repair, self._visit)
                 else "this visit may be older or newer, so its worse readings count"
             )
             self._said.append(f"{done.record_id} states a repair of {what} {when}: {then}.")

@@ -6,7 +6,7 @@ import gc
 import pickle
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from mlg_troubleshoot.arrays import Array
+    from mlg_troubleshoot.life.folding import GearLife
     from mlg_troubleshoot.life.logbook import AsFoundAsLeft
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.records.frames import Frame
@@ -386,7 +387,8 @@ def _judge(
             found = replace(found, notes=(*found.notes, _set_aside(len(blank))))
     total = len(rows)
     if counting is None:
-        kept = _kept_visits(rows, store)
+        keys = {key_of(row) for row in rows if isinstance(row, Inspection)}
+        kept = {} if store is None else _kept_lives(keys, store)
         counting = _states(rows, found.gear, kept, typed=found.read is None)
     if total > 1:
         found = replace(found, notes=(*found.notes, *other_visits_count(counting)))
@@ -474,13 +476,10 @@ def attention_of_kept(seen: Counter[GearKey], store: Store, gear: Gear) -> list[
     """Say which of some gears need attention with all that is kept of them, where more is kept
     than the visits that were just seen.
     """
-    from mlg_troubleshoot.life.folding import as_spelt, lives_of
     from mlg_troubleshoot.life.judged import judge_lives
 
-    tails = as_spelt((tail for tail, _side in seen), store)
-    kept_as = {(tails[tail], side): count for (tail, side), count in seen.items()}
-    lives = lives_of(store, kept_as).items()
-    more = [life for key, life in lives if len(life.visits) > kept_as[key]]
+    kept = _kept_lives(seen, store).items()
+    more = [life for key, life in kept if len(life.visits) > seen[key]]
     return [
         f"{life.name}: with all that is kept of it: {life.now.next_action}"
         for life in judge_lives(more, gear, load_index_table(gear))
@@ -488,25 +487,20 @@ def attention_of_kept(seen: Counter[GearKey], store: Store, gear: Gear) -> list[
     ]
 
 
-def _kept_visits(
-    rows: Iterable[Inspection | InvalidRow], store: Store | None
-) -> Mapping[GearKey, Sequence[GearVisit]]:
-    """What a store keeps of the gears of some rows."""
-    if store is None:
-        return {}
+def _kept_lives(keys: Collection[GearKey], store: Store) -> dict[GearKey, GearLife]:
+    """What a store keeps of some gears, by their tails as they were given."""
     from mlg_troubleshoot.life.folding import as_spelt, lives_of
 
-    keys = {key_of(row) for row in rows if isinstance(row, Inspection)}
     tails = as_spelt((tail for tail, _side in keys), store)
     kept_as = {key: (tails[key[0]], key[1]) for key in keys}
     lives = lives_of(store, set(kept_as.values()))
-    return {key: lives[kept].visits for key, kept in kept_as.items() if kept in lives}
+    return {key: lives[kept] for key, kept in kept_as.items() if kept in lives}
 
 
 def _states(
     rows: Sequence[Inspection | InvalidRow],
     gear: Gear,
-    kept: Mapping[GearKey, Sequence[GearVisit]],
+    kept: Mapping[GearKey, GearLife],
     *,
     typed: bool,
 ) -> list[GearState | None]:
@@ -520,7 +514,8 @@ def _states(
         new = [GearVisit(row, typed=typed) for n in own if isinstance(row := rows[n], Inspection)]
         # A visit that is kept already, or takes the place of one, is the one that is judged.
         ids = {each.inspection.record_id for each in new}
-        old = [each for each in kept.get(key, ()) if each.inspection.record_id not in ids]
+        was = kept[key].visits if key in kept else ()
+        old = [each for each in was if each.inspection.record_id not in ids]
         for place, state in zip(own, states([*old, *new], gear)[len(old) :], strict=True):
             is_alone = state.inspection is rows[place]
             found[place] = None if is_alone else state
@@ -631,11 +626,10 @@ def _found_and_left(result: CheckResult, store: Store | None) -> dict[int, list[
     if store is None and not any(row.is_repaired for row in rows.values()):
         return {}
     from mlg_troubleshoot.life import logbook
-    from mlg_troubleshoot.life.folding import lives_of
 
     gear = result.gear
     if store is not None:
-        lives = lives_of(store, {key_of(row) for row in rows.values()})
+        lives = _kept_lives({key_of(row) for row in rows.values()}, store)
         logs = {key: logbook.log_of(life, gear) for key, life in lives.items()}
     else:
         logs = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -46,4 +47,4 @@ def forecast(
     with TemporaryDirectory() as folder:
         store = Store(Path(folder) / "inspections.sqlite")
         keep(told_by(checked.judgements), store)
-        return show_fleet(store, known, ahead=True, problems=checked.problems)
+        return replace(show_fleet(store, known, ahead=True), problems=checked.problems)

@@ -106,12 +106,12 @@ def show_fleet(
     whole: bool = True,
     since: str = "",
     joint: int | None = None,
+    only: Sequence[GearKey] | None = None,
     progress: StageProgress = lambda _name, _done, _total: None,
-    problems: tuple[Problem, ...] = (),
 ) -> Lives:
-    """Every gear, judged by the model of today, with its forecast if asked for; `whole`, with all
-    of its records, each judged as it was found; with what changed since a day, and the readings
-    of one joint.
+    """Every gear, or some of them, judged by the model of today, with its forecast if asked for;
+    `whole`, with all of its records, each judged as it was found; with what changed since a day,
+    and the readings of one joint.
     """
     from mlg_troubleshoot.life.forecast import forecast
     from mlg_troubleshoot.life.judged import judge_lives
@@ -121,6 +121,7 @@ def show_fleet(
     keys = store.gears()
     table = load_index_table(gear)
     model = _taught(store, gear, keys, progress) if ahead else None
+    keys = keys if only is None else [*only]
     doing = "Looking ahead" if ahead else "Reading the store"
     found: list[GearLife] = []
     lines: list[FleetLine] = []
@@ -133,7 +134,7 @@ def show_fleet(
         lines += [FleetLine.of(life, asked, forecasts[life.key]) for life in judged]
         found += judged if whole else ()
     progress(doing, len(keys), len(keys))
-    return Lives(gear, tuple(found), tuple(lines), model, problems)
+    return Lives(gear, tuple(found), tuple(lines), model)
 
 
 def _taught(
@@ -167,22 +168,11 @@ def show_lives(
     progress: StageProgress = lambda _name, _done, _total: None,
 ) -> Lives:
     """The lives of one aircraft's gears, or of one of them."""
-    from mlg_troubleshoot.life.forecast import forecast
-    from mlg_troubleshoot.life.judged import judge_lives
-
-    keys = store.gears()
     tail, meant = key_of(store, tail, "LH" if side is None else side)
-    wanted = [key for key in keys if key == (tail, meant if side else key[1])]
+    wanted = [key for key in store.gears() if key == (tail, meant if side else key[1])]
     if not wanted:
         life_of(store, tail, meant)
-    model = _taught(store, gear, keys, progress) if ahead else None
-    if ahead:
-        progress("Looking ahead", 0, None)
-    known = lives_of(store, wanted).values()
-    found = tuple(judge_lives(known, gear, load_index_table(gear), every=True))
-    forecasts = forecast(found, model, gear)
-    lines = tuple(FleetLine.of(life, Asked(gear), forecasts[life.key]) for life in found)
-    return Lives(gear, found, lines, model)
+    return show_fleet(store, gear, ahead=ahead, only=wanted, progress=progress)
 
 
 def write_pages(
