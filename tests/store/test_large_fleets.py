@@ -74,7 +74,7 @@ def test_the_life_of_one_gear_says_how_far_the_wear_of_its_fleet_is_learnt(tmp_p
         progress=lambda name, *how_far: said.setdefault(name, []).append(how_far),
     )
     learning = said["Learning how joints wear"]
-    assert [*said] == ["Learning how joints wear", "Looking ahead"]
+    assert [*said] == ["Reading the store", "Learning how joints wear", "Looking ahead"]
     assert learning == [
         (0, None),
         *((done, len(learning) - 1) for done in range(len(learning) - 1)),
