@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Collection, Iterator, Sequence, Set
+from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -265,11 +265,7 @@ def recognise(header: str, joints: Joints) -> Recognition:
     whole = " ".join([plain, *(part.replace("°", "") for part in bracketed)]).strip()
     if whole in _WITH_OTHER_UNIT:
         return Recognition(Field(_WITH_OTHER_UNIT[whole]))
-    return (
-        _numbered(words, units, joints)
-        or _aliased(plain, units)
-        or next(_resembling(words, units, joints), UNKNOWN)
-    )
+    return _numbered(words, units, joints) or _aliased(plain, units) or UNKNOWN
 
 
 def suspect(header: str, joints: Joints) -> tuple[str | None, bool]:
@@ -289,7 +285,7 @@ def suspect(header: str, joints: Joints) -> tuple[str | None, bool]:
     is_plunger = _PLUNGER.search(text) is not None
     is_reading = bool(said & (_CLEARANCE_WORDS | _CONVENTION_WORDS | _READING_WORDS))
     named = len(said) > 1 and said <= joints.vocabulary
-    is_sure = is_plunger or is_reading or named or has_unit
+    is_sure = is_plunger or is_reading or named or has_unit or bool(numbers and not plain)
     sure = is_sure and not said & _OTHER_MATTER
     if not (sure or is_plunger or numbers or said & joints.vocabulary or not text):
         return (None if said & _OTHER_MATTER else ""), False
@@ -316,28 +312,6 @@ def _aliased(plain: str, units: _Units) -> Recognition | None:
     if column is None or (stated and not column.is_length):
         return None
     return units.given_to(Field.of(column))
-
-
-def _resembling(words: list[str], units: _Units, joints: Joints) -> Iterator[Recognition]:
-    """Doubt what may decide a verdict although it does not say so plainly."""
-    said = {*words} - _FILLERS
-    if said & _OTHER_MATTER or not said:
-        return
-    if units.known and "plunger" in said:
-        reason = "it may be the measured displacement of the plunger"
-        yield Recognition(None, reason, PLUNGER_DISPLACEMENT.name)
-    alone = re.fullmatch(r"(?:c|cl)?0?(\d{1,2})", words[0], re.ASCII) if len(words) == 1 else None
-    if alone is not None and int(alone[1]) in joints.numbers:
-        reason = "a number alone does not say what was measured"
-        yield Recognition(None, reason, CLEARANCE.header(int(alone[1])))
-    rest = said - _CLEARANCE_WORDS - _JOINT_WORDS
-    speaks_of_joint = rest != said
-    named = len(rest) > 1 and rest <= joints.vocabulary
-    if (speaks_of_joint and units.known and rest) or (named and (speaks_of_joint or units.known)):
-        fitting = joints.called(rest)
-        meant = CLEARANCE.header(fitting[0]) if len(fitting) == 1 else None
-        reason = "it may be a joint's clearance, but does not give the joint's number"
-        yield Recognition(None, reason, meant)
 
 
 def _numbered(words: list[str], units: _Units, joints: Joints) -> Recognition | None:

@@ -28,6 +28,7 @@ from mlg_troubleshoot.records.headers import (
     parse_canonical,
     parse_target,
     recognise,
+    suspect,
     tidy,
 )
 from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
@@ -234,6 +235,8 @@ class Columns:
             )
         if any(p.field is None and not p.is_settled for p in self.placed):
             self._settle_visits(header.units)
+        if not self.at(CLEARANCE):
+            self._doubt_readings()
         for p in self.placed:
             if p.refused:
                 self._doubt(p, by_hand=by_hand)
@@ -281,6 +284,16 @@ class Columns:
             for header, field in known
             if field is not None and field.column.bears_verdict
         ]
+
+    def _doubt_readings(self) -> None:
+        """Refuse the headers that may name readings where no clearance surely is named."""
+        for p in self.placed:
+            meant, may_be = suspect(p.header, self._options.joints)
+            if may_be and p.header and p.field is None and not (p.refused or p.is_settled):
+                p.refused = True
+                target = CLEARANCE.name if self.at(JOINT) else meant
+                reason = "it may be a joint's clearance, but does not say so"
+                p.found = Recognition(None, reason, target)
 
     def _settle_visits(self, units: Sequence[LengthUnit | None]) -> None:
         """Settle the columns whose headings name a reading, a number next to it, or a visit, where

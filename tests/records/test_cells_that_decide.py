@@ -118,7 +118,8 @@ def test_usual_headers_of_a_plunger_reading_are_understood(tmp_path, gear, heade
 
 
 def test_a_length_of_the_plunger_that_no_column_names_is_in_doubt(tmp_path, gear):
-    assert isinstance(one(tmp_path, gear, **{"Plunger stroke (in)": "0.045"}), InvalidRow)
+    asked = one(tmp_path, gear, **{"Plunger stroke (in)": "0.045"}).unit_question
+    assert '"Plunger stroke (in)=plunger_displacement"' in asked
 
 
 @pytest.mark.parametrize(

@@ -53,11 +53,7 @@ DOUBTFUL = [
     "J3 radial (in)",
     "Play J3 (in)",
     "Joint 3/5 (in)",
-    "Joint three (in)",
-    "3 (in)",
-    "3",
     "clearance_3_in_old",
-    "Short link inner (in)",
 ]
 
 
@@ -74,6 +70,20 @@ def test_a_doubtful_header_is_refused_with_a_hint_to_map_it(read, table, header)
     assert "--map" in problem.remedy
     assert isinstance(result.rows[0], InvalidRow)
     assert result.rows[0].correct == (header,)
+
+
+@pytest.mark.parametrize("header", ["Joint three (in)", "3 (in)", "3", "Short link inner (in)"])
+@pytest.mark.parametrize("outcome", ["", "RETRACTED"])
+def test_what_may_be_a_clearance_is_asked_about_and_refused_where_no_other_is(
+    read, table, header, outcome
+):
+    cells = (*GOOD, outcome, 0.001, 13)
+    result = read(table((*HEADER, "outcome", "clearance_1_in", header), [cells]))
+    assert f'"{header}=clearance_' in result.rows[0].unit_question
+    result = read(table((*HEADER, "outcome", "remarks", header), [cells]))
+    assert [(p.code, p.cell) for p in result.problems] == [("header_doubtful", "G1")]
+    assert f'"{header}=clearance_' in result.problems[0].remedy
+    assert isinstance(result.rows[0], InvalidRow)
 
 
 def test_a_row_with_nothing_under_a_doubtful_header_is_still_read(read, table):
