@@ -93,7 +93,7 @@ def study(flags: StudyFlags) -> None:
 
         output.write_json(study_as_json(findings))
     else:
-        rows = [*zip(gear.joints, findings.result.table.joints, strict=True)]
+        rows = [*zip(gear.joints, findings.table.joints, strict=True)]
         screen = output.console(elsewhere=output.WIDEST)
         output.show_page("study", screen, f=findings, rows=rows)
     if flags.csv is not None:

@@ -40,7 +40,7 @@ def _unmeasured(gear: Gear) -> list[Markup]:
 
 
 def _indices(result: StudyFindings | IndexTable) -> list[Markup]:
-    table = result.result.table if isinstance(result, StudyFindings) else result
+    table = result.table if isinstance(result, StudyFindings) else result
     return [indices_figure(table)]
 
 

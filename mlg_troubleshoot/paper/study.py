@@ -86,24 +86,6 @@ class StudyOptions(Result):
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
-class StudyResult(Result):
-    """What a study found.
-
-    table: indices of every joint with their spread over the ensemble.
-    indices: indices of the reference, with moments and notes.
-    plain, shape (n_joints,): first-order indices of a paper design before its bias is removed. [1]
-    groups: both ends of each link as one; empty if the design cannot tell.
-    growth: amplification indices of the reference.
-    """
-
-    table: IndexTable
-    indices: Indices
-    plain: Array | None
-    groups: tuple[GroupIndices, ...]
-    growth: Amplification
-
-
-@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class StudyFindings(Result):
     """A study and what was found with it.
 
@@ -113,13 +95,25 @@ class StudyFindings(Result):
         The gear.
     options : StudyOptions
         What was asked for.
-    result : StudyResult
-        Indices and amplification.
+    table : IndexTable
+        Indices of every joint with their spread over the ensemble.
+    indices : Indices
+        Indices of the reference, with moments and notes.
+    plain : ndarray, shape (n_joints,), or None
+        First-order indices of a paper design before its bias is removed. [1]
+    groups : tuple of GroupIndices
+        Both ends of each link as one; empty if the design cannot tell.
+    growth : Amplification
+        Amplification indices of the reference.
     """
 
     gear: Gear
     options: StudyOptions
-    result: StudyResult
+    table: IndexTable
+    indices: Indices
+    plain: Array | None
+    groups: tuple[GroupIndices, ...]
+    growth: Amplification
 
 
 @dataclass(slots=True)
@@ -133,7 +127,7 @@ class _Run:
 
 def run_study(
     gear: Gear, options: StudyOptions, progress: StageProgress = lambda _stage, _done, _total: None
-) -> StudyResult:
+) -> StudyFindings:
     """Study the reference of a gear by the chosen design, and the other linkages of its ensemble by
     the tensor.
     """
@@ -153,7 +147,7 @@ def run_study(
         progress("ensemble", k, len(gear.ensemble) - 1)
     growth = amplification(gear)
     table = _table(gear, limits, options, found, growth)
-    return StudyResult(table, run.indices, run.plain, run.groups, growth)
+    return StudyFindings(gear, options, table, run.indices, run.plain, run.groups, growth)
 
 
 def _on_linkage(gear: Gear, limits: Array, options: StudyOptions, k: int) -> _Run:

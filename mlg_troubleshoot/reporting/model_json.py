@@ -13,17 +13,16 @@ from mlg_troubleshoot.reporting.json_form import plain, written
 
 def study_as_json(findings: StudyFindings) -> dict[str, Any]:
     """Return the study as plain values, as the JSON contract has it; what is not known is null."""
-    result = findings.result
-    growth = result.growth
+    growth = findings.growth
     values = {
-        **msgspec.to_builtins(result.table),
+        **msgspec.to_builtins(findings.table),
         "directions": "worst",
         "distribution": "uniform",
-        "note": result.indices.note,
-        "mean": result.indices.mean,
-        "variance": result.indices.variance,
-        "first_order_plain": result.plain,
-        "groups": result.groups,
+        "note": findings.indices.note,
+        "mean": findings.indices.mean,
+        "variance": findings.indices.variance,
+        "first_order_plain": findings.plain,
+        "groups": findings.groups,
         "ensemble": [linkage.name for linkage in findings.gear.ensemble],
         "amplification": written(StudiedAmplification, growth, exact_plunger=growth.exact),
     }

@@ -49,9 +49,7 @@ def run_study(
     """
     from mlg_troubleshoot.paper import study
 
-    known = load_gear(gear)
-    wanted = options or study.StudyOptions()
-    return study.StudyFindings(known, wanted, study.run_study(known, wanted, progress))
+    return study.run_study(load_gear(gear), options or study.StudyOptions(), progress)
 
 
 def refuse_other_tables(options: StudyOptions) -> None:
@@ -63,7 +61,7 @@ def refuse_other_tables(options: StudyOptions) -> None:
 def write_study_table(findings: StudyFindings) -> None:
     """Write the table of indices that goes with the gear; another one is refused."""
     refuse_other_tables(findings.options)
-    write_index_table(findings.result.table, findings.gear.indices_file)
+    write_index_table(findings.table, findings.gear.indices_file)
 
 
 def write_study_figure(findings: StudyFindings, file: Path) -> None:
@@ -72,7 +70,7 @@ def write_study_figure(findings: StudyFindings, file: Path) -> None:
     from mlg_troubleshoot.reporting.study_figures import indices_figure
 
     title = f"Sensitivity indices of {findings.gear.name}"
-    Picture.of(title, indices_figure(findings.result.table)).save(file)
+    Picture.of(title, indices_figure(findings.table)).save(file)
 
 
 _HEADS = (
@@ -96,7 +94,7 @@ _HEADS = (
 
 def write_study_csv(findings: StudyFindings, path: Path) -> None:
     rows = []
-    for joint, e in zip(findings.gear.joints, findings.result.table.joints, strict=True):
+    for joint, e in zip(findings.gear.joints, findings.table.joints, strict=True):
         numbers = (
             e.first_order,
             *e.first_order_interval,
