@@ -21,7 +21,7 @@ COLUMNS = (
     *("record_id", "tail_no", "side", "clearance_convention", "inspection_date"),
     *(f"clearance_{joint}_in" for joint in range(1, 11)),
     *("plunger_displacement_in", "plunger_gauge_u_in", "plunger_date", "outcome", "outcome_date"),
-    *("restored_joints", "repair_date"),
+    *("restored_joints", "repair_date", "gear_landings"),
 )
 
 
@@ -85,6 +85,8 @@ class Visit:
     outcome_when: When = UNKNOWN
     restored: tuple[int, ...] = ()
     repaired: When = UNKNOWN
+    # Landings order nothing: two numbers of one day contradict each other.
+    landings: str = ""
 
     def of_plunger(self) -> When:
         return self.plunger_when if self.plunger_when.text else self.when
@@ -104,6 +106,7 @@ class Visit:
             "plunger_date": self.plunger_when.text,
             "restored_joints": " ".join(map(str, self.restored)),
             "repair_date": self.repaired.text,
+            "gear_landings": self.landings,
         }
         if self.plunger_in is not None:
             written["plunger_displacement_in"] = f"{self.plunger_in:.4f}"
@@ -166,7 +169,7 @@ class Aircraft:
 
 
 def drawn_visit(rng: random.Random, of: datetime, kind: str, worn: int) -> Visit:
-    visit = Visit(drawn_when(rng, of, kind))
+    visit = Visit(drawn_when(rng, of, kind), landings=rng.choice(["", "100", "500"]))
     if rng.random() < 0.9:
         # Tight everywhere: without evidence against it the gear is within its margin.
         joints = range(1, 11) if rng.random() < 0.9 else rng.sample(range(1, 11), 3)
