@@ -378,9 +378,12 @@ class Inspection(Result):
 
     @property
     def says_nothing(self) -> bool:
-        """Whether nothing was found or done: no reading, outcome, repair or check."""
+        """Whether nothing was found or done, or may have been: no reading, outcome, repair, check
+        or question.
+        """
         found = (self.clearance_in, self.readings_in, self.outcome, self.restored_joints)
-        return not any(found) and self.rigging_checked is None and self.plunger_down_lock_in is None
+        is_blank = self.rigging_checked is None and self.plunger_down_lock_in is None
+        return is_blank and not any(found) and not self.unit_question
 
     @property
     def measured_displacement_in(self) -> float | None:

@@ -90,6 +90,18 @@ def test_a_failure_in_a_remark_leaves_what_was_measured_judged() -> None:
     assert asked.verdict is Verdict.OUTSIDE_MARGIN
 
 
+@pytest.mark.parametrize(
+    ("header", "cell"), [("remarks", "did not retract"), ("Status", "hung"), ("VI", "0.06")]
+)
+def test_a_row_that_says_something_only_where_nobody_reads_is_not_set_aside(
+    header: str, cell: str
+) -> None:
+    blank = ["R2", "N2", *GOOD[2:4], *[""] * 10, cell]
+    text = "\n".join(",".join(line) for line in ([*ALL, header], [*GOOD, ""], blank))
+    result = check(Named(text.encode(), "t.csv"), advice=False)
+    assert [each.verdict for each in result.judgements][1:] == [Verdict.INCOMPLETE]
+
+
 UNCLEAR = ("F", "x", "0", "3", "intermittent", "hung", "partial", "FAULT", "slow", "OK?")
 
 
