@@ -5,7 +5,7 @@ written over.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import sqlalchemy as sql
 
@@ -47,14 +47,8 @@ class Drafts:
             newest = sql.select(sql.func.max(DRAFTS.c.saved))
             last = connection.scalar(newest) or 0
             connection.execute(DRAFTS.delete().where(DRAFTS.c.draft_id == draft.id))
-            row = {
-                "owner": draft.owner,
-                "writer": draft.writer,
-                "complete": draft.complete,
-                "content": draft.content,
-            }
-            new = DRAFTS.insert().values(draft_id=draft.id, saved=last + 1, **row)
-            connection.execute(new)
+            named = {f"draft_{n}" if n == "id" else n: v for n, v in asdict(draft).items()}
+            connection.execute(DRAFTS.insert().values(saved=last + 1, **named))
         return True
 
     def newest_first(self, owner: str | None = None) -> list[Draft]:

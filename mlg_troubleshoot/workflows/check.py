@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
@@ -675,53 +676,34 @@ def write_template(
 
 # Wrong cells that an error names at most.
 _MOST_SAID = 20
-# Columns of the verdicts that bear the names of what an assessment holds; margin_used_in is its
-# margin.
-_NUMBERS = (
-    *(
-        "predicted_displacement_in",
-        "over_travel_in",
-        "under_travel_in",
-        "margin_used_in",
-        "remaining_in",
-    ),
-    *("probability_within_margin", "probability_exceed_random_directions"),
-    "rigid_displacement_in",
+# Columns of the verdicts; most bear the names of what an assessment, its row or its source holds.
+_ABOUT = (
+    *("verdict", "basis", "predicted_displacement_in", "over_travel_in", "under_travel_in"),
+    *("margin_used_in", "remaining_in", "probability_within_margin"),
+    *("probability_exceed_random_directions", "rigid_displacement_in", "rigid_verdict"),
+    *("joints_over_limit", "next_action", "in_brief", "end"),
 )
 _VERDICT_HEADER = (
     *("record_id", "tail_no", "side", "inspection_date", "gear_landings"),
-    *(
-        "verdict",
-        "basis",
-        *_NUMBERS,
-        "rigid_verdict",
-        "joints_over_limit",
-        "next_action",
-        "in_brief",
-        "end",
-    ),
+    *_ABOUT,
     *("file", "sheet", "row"),
 )
 VERDICT_HEADER = csv_lines([_VERDICT_HEADER])
 
 
-def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:
+def _columns(judgement: Judgement, names: Sequence[str]) -> dict[str, Any]:
+    """What some columns of the verdicts say; None of a row that was not judged."""
     a = judgement if isinstance(judgement, Assessment) else None
-    return {
-        "verdict": str(judgement.verdict),
-        "basis": None if a is None else str(a.basis),
-        **{
-            name: getattr(a, "margin_in" if name == "margin_used_in" else name, None)
-            for name in _NUMBERS
-        },
-        "rigid_verdict": None if a is None else a.rigid_verdict,
-        "joints_over_limit": (
-            None if a is None else ", ".join(f"#{f.joint}" for f in a.joints if f.over_limit)
-        ),
+    known = {
+        "margin_used_in": a and a.margin_in,
+        "joints_over_limit": a and ", ".join(f"#{f.joint}" for f in a.joints if f.over_limit),
         "next_action": judgement.next_action.text,
-        "in_brief": judgement.in_brief,
-        "end": str(judgement.end),
     }
+    holders = judgement.row.source, judgement.row, judgement
+    for name in names:
+        held = (getattr(holder, name) for holder in holders if hasattr(holder, name))
+        known.setdefault(name, next(held, None))
+    return {name: known[name] for name in names}
 
 
 def write_verdicts(result: CheckResult, file: Path) -> None:
@@ -731,17 +713,12 @@ def write_verdicts(result: CheckResult, file: Path) -> None:
 
 def verdict_lines(judgements: Sequence[Judgement]) -> str:
     """Lines of the CSV of verdicts, without its header."""
-    rows = []
-    for judgement in judgements:
-        row = judgement.row
-        side = None if row.side is None else str(row.side)
-        a = row if isinstance(row, Inspection) else None
-        day = None if a is None or a.inspection_date is None else a.inspection_date.isoformat()
-        seen = day, None if a is None else a.gear_landings
-        identity = (row.record_id, row.tail_no, side, *seen)
-        place = (row.source.file, row.source.sheet, row.source.row)
-        rows.append((*identity, *_verdict_columns(judgement).values(), *place))
-    return csv_lines(rows)
+    rows = [_columns(judgement, _VERDICT_HEADER) for judgement in judgements]
+    return csv_lines([[_iso(value) for value in row.values()] for row in rows])
+
+
+def _iso(value: Any) -> Any:
+    return value.isoformat() if isinstance(value, date) else value
 
 
 class Annotated(NamedTuple):
@@ -756,7 +733,7 @@ class Annotated(NamedTuple):
 def annotated(judgements: Sequence[Judgement]) -> dict[RowSource, Annotated]:
     return {
         j.row.source: Annotated(
-            _verdict_columns(j),
+            _columns(j, _ABOUT),
             {f.joint: f.limit_in for f in j.joints if f.over_limit}
             if isinstance(j, Assessment)
             else {},
