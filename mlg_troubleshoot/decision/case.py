@@ -96,11 +96,6 @@ class Cases:
     def __len__(self) -> int:
         return len(self.inspections)
 
-    @property
-    def residual_u_in(self) -> float | None:
-        """Scatter that an extension leaves; None without one. [in]"""
-        return None if self.extension is None else self.extension.residual_u_in
-
     @cached_property
     def measured(self) -> Mask:
         return np.isfinite(self.clearance_in)

@@ -12,6 +12,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.decision.belief import STATES, Belief
+from mlg_troubleshoot.decision.plan import minutes_of
 from mlg_troubleshoot.decision.priors import PRIORS, THRESHOLDS
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -68,8 +69,9 @@ def choose(
     allowed &= (codes & must[:, None] == must[:, None]) & sets.any(axis=1)
     allowed &= ~more | (out < 0.5 * causes[:, :1])
 
-    read, minutes = _minutes(gear, asked, sets)
-    read = read[starts]
+    nothing = np.zeros_like(over)
+    read = minutes_of(gear, asked[starts], nothing)[0]
+    minutes = minutes_of(gear, sets, asked[:, None])[1]
     check = gear.rigging_check.value
     after = gear.plunger_reading.value + gear.retraction.value
     # (13)
@@ -124,18 +126,6 @@ def _bits(belief: Belief, may: Mask, first: Mask) -> Wholes:
     bits = np.zeros(len(may), np.int64)
     bits[weighed] = 1 << np.arange(len(weighed))
     return bits
-
-
-def _minutes(gear: Gear, asked: Mask, sets: Mask) -> tuple[Array, Array]:
-    """Minutes to read joints, and to restore each set in the areas that are then open and others,
-    (patterns,), (patterns, sets). [min]
-    """
-    inside = np.array([[joint.area == area.name for area in gear.areas] for joint in gear.joints])
-    opening = np.array([area.access.value for area in gear.areas])
-    each = np.array([joint.restore.value for joint in gear.joints])
-    opened = asked @ inside
-    read = asked @ gear.access_minutes + opened @ opening
-    return read, sets @ each + (~opened * opening) @ (sets @ inside).T
 
 
 def _groups(gear: Gear, belief: Belief, unread: Mask, doubted: Mask) -> list[tuple[int, ...]]:

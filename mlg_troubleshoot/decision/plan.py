@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 
-from mlg_troubleshoot.gear.gear import Gear, JointSpec
+import numpy as np
+
+from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.gear.gear import Gear
 
 
 class Action(StrEnum):
@@ -140,22 +144,18 @@ def how_to(gear: Gear, action: Action, joints: Sequence[int]) -> str:
     return " ".join([*places, *gear.how[name]])
 
 
-def minutes_to_measure(
-    gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()
-) -> float:
-    """Minutes to read joints, opening an area once where it is not open."""
-    specs = [gear.joint(n) for n in joints]
-    return _opening(gear, specs, opened) + sum(spec.access.value for spec in specs)
+@lru_cache(maxsize=4)
+def _areas(gear: Gear) -> tuple[Mask, Array, Array]:
+    """Which joint is in which area; minutes to open the areas, and to restore the joints. [min]"""
+    inside = np.array([[joint.area == area.name for area in gear.areas] for joint in gear.joints])
+    opening = np.array([area.access.value for area in gear.areas])
+    return inside, opening, np.array([joint.restore.value for joint in gear.joints])
 
 
-def minutes_to_restore(
-    gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()
-) -> float:
-    """Minutes to restore joints, opening an area once where it is not open."""
-    specs = [gear.joint(n) for n in joints]
-    return _opening(gear, specs, opened) + sum(spec.restore.value for spec in specs)
-
-
-def _opening(gear: Gear, specs: Sequence[JointSpec], opened: frozenset[str]) -> float:
-    names = {spec.area for spec in specs} - opened
-    return sum(area.access.value for area in gear.areas if area.name in names)
+def minutes_of(gear: Gear, joints: Mask, opened: Mask) -> tuple[Array, Array]:
+    """Minutes to read joints, and to restore them, shape (..., joints): an area is opened once, and
+    not where it is open for other joints. [min]
+    """
+    inside, opening, restoring = _areas(gear)
+    opens = (joints @ inside & ~(opened @ inside)) @ opening
+    return opens + joints @ gear.access_minutes, opens + joints @ restoring

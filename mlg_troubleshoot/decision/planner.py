@@ -27,8 +27,7 @@ from mlg_troubleshoot.decision.plan import (
     Plan,
     Step,
     how_to,
-    minutes_to_measure,
-    minutes_to_restore,
+    minutes_of,
 )
 from mlg_troubleshoot.decision.prediction import Prediction
 from mlg_troubleshoot.decision.priors import PRIORS, THRESHOLDS
@@ -100,7 +99,8 @@ class _PlanBuilder:
         self.steps: list[Step] = []
         self.tried: Mask | None = None
         self.taken_again = False
-        self.opened: frozenset[str] = frozenset()
+        # Joints whose areas are open.
+        self.opened: Mask = np.zeros(len(self.numbers), bool)
         self.over_limit = self._joints(self.cases.over_limit[row])
         self.over = self._joints(self.cases.must_restore[row])
         self.read_plunger = bool(np.isfinite(self.cases.plunger_in[row]))
@@ -349,8 +349,9 @@ class _PlanBuilder:
 
     def _measure(self, joints: tuple[int, ...], needed: float | None = None) -> None:
         """Measure joints; again where it is said how well."""
-        minutes = minutes_to_measure(self.gear, joints, self.opened)
-        self.opened |= {self.gear.joint(n).area for n in joints}
+        places = np.isin(self.numbers, joints)
+        minutes = float(minutes_of(self.gear, places, self.opened)[0])
+        self.opened = self.opened | places
         if needed is None:
             self._step(Action.MEASURE, minutes, sentences.measure(self.gear, joints), joints)
         else:
@@ -361,10 +362,10 @@ class _PlanBuilder:
         """Restore joints; where a reading over the limit is in doubt it is taken again first."""
         if not expected:
             self._reread()
-        minutes = minutes_to_restore(self.gear, joints, self.opened)
+        minutes = float(minutes_of(self.gear, np.isin(self.numbers, joints), self.opened)[1])
         text = sentences.RESTORE_WORN if expected else sentences.restore(joints, self.over)
         self._step(Action.RESTORE, minutes, text, joints)
-        self.opened = frozenset()
+        self.opened = np.zeros_like(self.opened)
 
     def _reread(self) -> bool:
         """Take the readings in doubt again, once in a plan; whether there are any."""

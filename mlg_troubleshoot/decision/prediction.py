@@ -45,13 +45,13 @@ class Extension(Protocol):
         """Return the columns that the extension needs and an inspection lacks."""
 
 
-def model_uncertainty(displacement_in: Array, residual_u_in: float | None) -> Array:
+def model_uncertainty(displacement_in: Array, extension: Extension | None) -> Array:
     """Standard uncertainty of the model itself.
 
     Provisional without a diagnosis: one published failure is too little to estimate it. [in]
     """
-    if residual_u_in is not None:
-        return np.full(np.shape(displacement_in), residual_u_in)
+    if extension is not None:
+        return np.full(np.shape(displacement_in), extension.residual_u_in)
     return np.maximum(PROVISIONAL_U_IN, PROVISIONAL_U_SHARE * np.abs(displacement_in))
 
 
@@ -128,9 +128,7 @@ def predict(
     slopes = adjusted_slopes(gear.model, adjustment, worst)
     each_u = gauge_u_in if gauge_u_in.ndim == 2 else gauge_u_in[:, None]
     u_readings = np.abs(slopes * measured * each_u)
-    u_model = model_uncertainty(
-        worst.magnitude_in, None if extension is None else extension.residual_u_in
-    )
+    u_model = model_uncertainty(worst.magnitude_in, extension)
     bound = worst.magnitude_in
     if adjustment.direction_factors is not None:
         bound = adjusted_worst_case(

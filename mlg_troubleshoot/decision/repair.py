@@ -13,7 +13,7 @@ from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Rigging, UncertaintyBudget
 from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases, exact_chance
-from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
+from mlg_troubleshoot.decision.plan import minutes_of
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, normal_cdf
@@ -33,8 +33,7 @@ def subsets_of(gear: Gear) -> tuple[Mask, Array]:
     """
     n = len(gear.joints)
     members = ((np.arange(2**n)[:, None] >> np.arange(n)) & 1).astype(bool)
-    numbers = np.array(gear.joint_numbers)
-    minutes = np.array([minutes_to_restore(gear, numbers[row].tolist()) for row in members])
+    minutes = minutes_of(gear, members, np.zeros(n, bool))[1]
     order = np.lexsort((members.sum(axis=1), np.round(minutes, 6)))
     return members[order], minutes[order]
 
@@ -72,7 +71,7 @@ class Sets:
         reference = responses(gear)[0]
         worst = each[0] + upper.displacement_in[row] - reference.magnitude(now)
         read = (reference.slopes(after) * cases.gauge_u_in[row] * cases.measured[row]) ** 2
-        variance = read.sum(axis=1) + model_uncertainty(worst, cases.residual_u_in) ** 2
+        variance = read.sum(axis=1) + model_uncertainty(worst, cases.extension) ** 2
         variance += cases.margin_u_in[row] ** 2
         variance += each.var(axis=0, ddof=1) if len(each) > 1 else 0.0
         # Rounded: both ends of one link leave the same, and noise must not choose between them.
@@ -137,10 +136,10 @@ def repair_sets(
         sure = kind is RepairKind.SURE
         if p < CONFORMANCE if sure else joints in [each.joints for each in result[row]]:
             continue
-        minutes = minutes_to_measure(cases.gear, joints), minutes_to_restore(cases.gear, joints)
+        access, minutes = map(float, minutes_of(cases.gear, members, np.zeros_like(members)))
         stated = complained[row] or not sure
         second = belief(row).second_repair(members) if stated else None
-        result[row] = (*result[row], RepairSet(joints, moved, p, *minutes, kind, second))
+        result[row] = (*result[row], RepairSet(joints, moved, p, access, minutes, kind, second))
     return result
 
 

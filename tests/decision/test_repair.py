@@ -13,7 +13,7 @@ from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import allowances
-from mlg_troubleshoot.decision.plan import minutes_to_measure
+from mlg_troubleshoot.decision.plan import minutes_of
 from mlg_troubleshoot.decision.prediction import Prediction, predict
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -116,9 +116,9 @@ def test_repair_sets_come_by_access_time_and_then_by_size(gear: Gear) -> None:
 
 def test_opening_an_area_counts_once(gear: Gear) -> None:
     # Sidestay 15 min, #3 and #5 8 min each; link assembly 20 min, #6 6 min.
-    assert minutes_to_measure(gear, (3,)) == 23
-    assert minutes_to_measure(gear, (3, 5)) == 31
-    assert minutes_to_measure(gear, (3, 5, 6)) == 57
+    for joints, minutes in (([3], 23), ([3, 5], 31), ([3, 5, 6], 57)):
+        places = np.isin(gear.joint_numbers, joints)
+        assert minutes_of(gear, places, np.zeros(10, bool))[0] == minutes
 
 
 def test_a_restored_joint_has_the_clearance_of_a_new_part(gear: Gear) -> None:
