@@ -80,6 +80,8 @@ def given_readings(cases: Cases) -> tuple[Array, Array]:
     slip = doubtful * -np.expm1(-PRIORS.wrong_readings / len(limits))
     likely = np.zeros((*cases.measured.shape, len(SHARES)))
     for factor, often in ((1.0, 1.0 - slip), (2.0, slip)):
+        if not often.any():
+            continue
         spread = np.hypot(u, doubtful * PRIORS.gauge_scale * factor * SHARES)
         above, below = ((factor * ends - share) / spread for ends in (_ENDS[1:], _ENDS[:-1]))
         likely += often / factor * (normal_cdf(above) - normal_cdf(below))
