@@ -21,7 +21,7 @@ from mlg_troubleshoot.decision.fleet import Fleet
 from mlg_troubleshoot.decision.inspection import RiggingCheck
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.verdict_rule import normal_cdf
+from mlg_troubleshoot.decision.verdict_rule import tabled_normal_cdf
 from mlg_troubleshoot.gear.directions import random_directions
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -84,7 +84,7 @@ def given_readings(cases: Cases) -> tuple[Array, Array]:
             continue
         spread = np.hypot(u, doubtful * PRIORS.gauge_scale * factor * SHARES)
         above, below = ((factor * ends - share) / spread for ends in (_ENDS[1:], _ENDS[:-1]))
-        likely += often / factor * (normal_cdf(above) - normal_cdf(below))
+        likely += often / factor * (tabled_normal_cdf(above) - tabled_normal_cdf(below))
     likely[~cases.measured] = 1.0
     wear = likely[:, :, None] * WEAR
     fits = wear.sum(axis=3, keepdims=True)
@@ -183,10 +183,10 @@ class Belief:
         seen, of_rigging = np.ones(_CELLS), 1.0
         if np.isfinite(y):
             # (6), and (7) of a wrong rigging.
-            below, above = normal_cdf((_ENDS_IN - y) / u)
+            below, above = tabled_normal_cdf((_ENDS_IN - y) / u)
             seen = (above - below) / _CELL_IN
             even = 1.0 / (1.0 + (y / (PRIORS.offset * margin)) ** 8)
-            out = float(normal_cdf(np.array((abs(y) - margin) / u)))
+            out = float(tabled_normal_cdf(np.array((abs(y) - margin) / u)))
             of_rigging = even * out / (2.0 * (PRIORS.offset - 1.0) * margin)
         within = _share_within(margin)
         usual, overlooked = usual_of(gear, fleet)
