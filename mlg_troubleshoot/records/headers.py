@@ -401,9 +401,10 @@ def column_named(name: str, joints: Joints) -> str:
     found = recognise(_SHORT.get(text.lower(), text), joints)
     if found.field is None:
         text = _snake(found.nearest or text)
+        known = [*_SHORT, *BY_NAME, *map(CLEARANCE.header, joints.numbers)]
         raise UsageError(
             f"{name!r} is not a column of the inspection table",
-            f"Give a joint or a column.{nearest(text, [*_SHORT, *BY_NAME])}",
+            f"Give a joint or a column.{nearest(text, known)}",
         )
     return found.field.name
 
