@@ -16,6 +16,7 @@ from scipy.special import ndtri
 
 from mlg_troubleshoot.arrays import Array, numbered, rms
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
 
 # What is not a cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy
@@ -79,8 +80,12 @@ class Rows:
         Prediction from the readings as they are, minus the prediction with all readings shrunk
         to their expectation. [in]
     trends : ndarray, shape (n, k)
-        Trends, habits and readers that always differ in some small measure, each at one standard
-        deviation over the scatter of a row. [1]
+        Shapes of trends and habits that are always present in some small measure. [1]
+    readers : tuple of ndarray, shape (n, k) each
+        Rows of each gauge, and of each technician. [1]
+    own : ndarray, shape (n, k)
+        Rows of each value of a column that only this table has. Their shifts are not counted as
+        scatter between readers. [1]
     """
 
     predicted_in: Array
@@ -91,6 +96,8 @@ class Rows:
     unread_in: Array
     drawn_in: Array
     trends: Array
+    readers: tuple[Array, ...]
+    own: Array
 
 
 def estimate_repeatability(table: DiagnosisTable) -> tuple[float, str]:
@@ -137,22 +144,22 @@ def standardised(values: Array) -> Array | None:
     return z
 
 
-def small_trends(table: DiagnosisTable) -> Array:
-    """Trends, habits and readers that always differ in some small measure: people, gauges, seasons,
-    wear; each at one standard deviation over the scatter of a row, shape (n, k). [1]
+def small_trends(table: DiagnosisTable) -> tuple[Array, tuple[Array, ...], Array]:
+    """Trends and habits that are always there in some small measure: people, gauges, seasons,
+    wear; rows of each reader, and of each value of the table's own columns.
     """
-    trends = [np.empty((len(table), 0))]
+    trends = []
     for values in table.quantities.values():
         if (z := standardised(values)) is not None:
             trends += [np.nan_to_num(z), np.nan_to_num(z * z - 1.0) / np.sqrt(2.0)]
     habits = [_levels(table, name) for name in ("side", "approach")]
-    readers = [_levels(table, name) for name in ("gauge_id", "technician_id")]
-    return np.hstack(
-        [
-            HABIT * np.column_stack([*trends, *habits]),
-            *(USUAL_RATIO * levels for levels in readers if levels.shape[1] > 1),
-        ]
+    readers = tuple(
+        levels
+        for name in ("gauge_id", "technician_id")
+        if (levels := _levels(table, name)).shape[1] > 1
     )
+    own = np.hstack([habits[0][:, :0], *(_levels(table, name) for name in table.own_factors)])
+    return np.column_stack([*trends, *habits]), readers, own
 
 
 def _levels(table: DiagnosisTable, name: str) -> Array:
@@ -207,7 +214,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows, far: float) -> NoiseModel:
         SLOPE * predicted / scale,
         SHARE_DOUBT * rows.drawn_in / scale,
     ]
-    loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, rows.trends])
+    loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, HABIT * rows.trends])
     noise = NoiseModel(
         relative * far_out,
         numbers,
@@ -221,26 +228,36 @@ def _scatter(rest: Array, alone: Array, rows: Rows, far: float) -> NoiseModel:
         of_gear=rows.u_shared_in / scale,
         far_out=far_out,
     )
-    return replace(noise, gear_ratio=_ratio_of_gears(noise, rest / scale))
+    standard = rest / scale
+    usual = [USUAL_RATIO * levels for levels in rows.readers]
+    shifted = Beliefs().shape_size * rows.own
+    each_own = []
+    for place, levels in enumerate(rows.readers):
+        others = usual[:place] + usual[place + 1 :]
+        with_others = replace(noise, loadings=np.hstack([loadings, *others, shifted]))
+        each_own.append(_ratio(with_others, levels, standard) * levels)
+    loadings = np.hstack([loadings, *each_own])
+    alike = replace(noise, loadings=loadings, gear_ratio=0.0)
+    some = gears < _MOST_LEVELS
+    marks = np.arange(_MOST_LEVELS)[: gears.max() + 1]
+    each = (gears[some][:, None] == marks).astype(float)
+    ratio = _ratio(alike.take(some), each, standard[some])
+    return replace(noise, loadings=loadings, gear_ratio=ratio)
 
 
-def _ratio_of_gears(noise: NoiseModel, rest: Array) -> float:
-    """Scatter between the gears of a tail over that of a row. [1]
+def _ratio(noise: NoiseModel, levels: Array, rest: Array) -> float:
+    """Scatter between the levels of a factor over that of a row. [1]
 
     Restricted likelihood with the fleet's level and the one that stands out most left free, because
     that may be an effect; weighed with what is expected before the data are looked at (median, and
     spread of the logarithm), and enlarged by what the one that stands out most among as many
     carries on average.
     """
-    some = noise.gears < _MOST_LEVELS
-    gears = noise.gears[some]
-    count = int(gears.max()) + 1
+    count = levels.shape[1]
     if count < _LEAST_LEVELS:
         return USUAL_RATIO
-    data = rest[some]
-    held = np.column_stack([np.ones(len(data)), gears[:, None] == np.arange(count)])
-    alike = replace(noise, gear_ratio=0.0).take(some)
-    product, _log = alike.precision_times(np.column_stack([held, data]), noise.tail_ratios[-1])
+    held = np.column_stack([np.ones(len(rest)), levels])
+    product, _log = noise.precision_times(np.column_stack([held, rest]), noise.tail_ratios[-1])
     inner = held.T @ product[:, :-1]
     along = held.T @ product[:, -1]
     square, score = _apart(inner, along, 0)

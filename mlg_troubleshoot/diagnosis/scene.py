@@ -47,7 +47,7 @@ def build_scene(
         shared_in,
         slopes * worn.u_fleet_in,
         np.nan_to_num(read - scene.over_in),
-        small_trends(table),
+        *small_trends(table),
     )
     return scene, rows
 

@@ -355,7 +355,7 @@ def test_what_moves_with_a_column_is_as_likely_beforehand_whatever_the_number_of
     None
 ):
     shapes, none = RNG.standard_normal((N, 4)), np.empty((N, 0))
-    by_hand = Rows(*(np.zeros(N),) * 5, none, np.zeros(N), none)
+    by_hand = Rows(*(np.zeros(N),) * 5, none, np.zeros(N), none, (), none)
     bank = Bank(
         EffectColumns.of(shapes), (("day",), ("day",), ("day",), ("side",)), {}, np.zeros(4)
     )
