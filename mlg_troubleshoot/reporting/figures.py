@@ -279,7 +279,7 @@ class Plot:
         self, x_ticks: int = 6, names: Sequence[str] = (), *, lanes: bool = False
     ) -> None:
         """Draw grid, ticks, frame and labels; names take the place of numbers on the horizontal
-        axis. Of lanes, which their names tell apart, the grid is vertical, stronger at zero.
+        axis. Of lanes, which their names distinguish, the grid is vertical, stronger at zero.
         """
         x0, y0, x1, y1 = self.area
         if not lanes:

@@ -677,6 +677,7 @@ class Store:
         return self.records(_records.c.kind == kind.value, newest=most)
 
     def all(self) -> list[Record]:
+        """Every record, in the order of the chain."""
         return self.records()
 
     def verify(self, visit: Callable[[Record], None] | None = None) -> tuple[int, Broken | None]:
