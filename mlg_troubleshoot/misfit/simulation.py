@@ -56,6 +56,8 @@ _SPARE = 0.25
 # Rows that stand for all in a smooth shape; lengths in units of the median distance of the rows.
 _LANDMARKS = 60
 _LENGTHS = 1 / 2 ** np.arange(2, -1, -1)
+# What rows that were given one after the other move with.
+_ORDER = "order of the rows"
 # Computing only: suspects that act together at most, and rounds until the same is likeliest again.
 _MOST = 12
 _ROUNDS = 8
@@ -72,6 +74,7 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     *,
     series: ArrayLike | None = None,
     time: ArrayLike | None = None,
+    covariates: Mapping[str, ArrayLike] | None = None,
 ) -> SimulationDiagnosis:
     """Find which parameters of a simulation its measured data show to be wrong.
 
@@ -109,6 +112,9 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     time : array_like, shape (n,), optional
         When each row of a series was read, numbers or dates; without it steps are equal, in the
         order given.
+    covariates : mapping or DataFrame, each array_like, shape (n,), optional
+        Numbers that are known of each row. What no suspect explains may move with them, as with the
+        prediction, with what the suspects do, and with the order of the rows.
 
     Returns
     -------
@@ -144,7 +150,8 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     # The matrices are small: threads that wait for each other cost several times what they save.
     with threadpool_limits(1, "blas"):
         follow = None if series is None else (chain, when)
-        study = _Study(run, len(suspects), group, follow, declared, beliefs or Beliefs())
+        known = inputs.read_covariates(covariates, len(data))
+        study = _Study(run, len(suspects), group, follow, declared, beliefs or Beliefs(), known)
         return study.diagnosis()
 
 
@@ -195,6 +202,7 @@ class _Study:
     follow: tuple[Wholes, Array] | None
     declared: Array | None
     beliefs: Beliefs
+    covariates: Mapping[str, Array]
 
     @property
     def nuisance(self) -> list[int]:
@@ -213,10 +221,16 @@ class _Study:
         n = len(self.group)
         moves = np.zeros((n, run.shape[1], self.count))
         moves[run.row, run.output] = run.columns(run.nominal, range(self.count))
-        order = np.arange(n, dtype=float)[:, None]
-        features = (np.nan_to_num(run.call(run.nominal)), moves.reshape(n, -1), order)
+        features = {
+            "prediction": np.nan_to_num(run.call(run.nominal)),
+            "effects of the suspects": moves.reshape(n, -1),
+            _ORDER: np.arange(n, dtype=float)[:, None],
+            **self.covariates,
+        }
         shapes = [
-            shape for own in features for shape in _smooth_shapes(own, self.group, own is order)
+            (name, shape)
+            for name, own in features.items()
+            for shape in _smooth_shapes(own, self.group, name == _ORDER)
         ]
         sizes = self.beliefs.shape_size * np.array(Beliefs().sizes)
         share = self.beliefs.expected * self.beliefs.unlisted / max(len(shapes) * len(sizes), 1)
@@ -225,12 +239,12 @@ class _Study:
             Context.none(len(run.row)),
             *(
                 Context(
-                    (UNLISTED, None),
+                    (UNLISTED, name),
                     float(np.log(share)),
                     size * (own * shape[run.row][:, None]).reshape(len(own), -1),
                     listed=False,
                 )
-                for shape in shapes
+                for name, shape in shapes
                 for size in sizes
             ),
         ]
@@ -396,6 +410,7 @@ class _Study:
         pairs = [own[index][1:] @ own[index][:-1] for index in self.outputs]
         in_sequence = bool(sum(pairs) > FAR * (own @ own) / np.sqrt(len(own)))
         testable = [k for members in at.classes for k in members]
+        moves = [str(name) for what, name in follows.posterior.names if what == UNLISTED]
         reason = {True: "absorbed by the nuisance parameters", False: "no effect here"}
         return SimulationDiagnosis(
             verdict=verdict,
@@ -410,6 +425,7 @@ class _Study:
             },
             p_nothing=follows.posterior.nothing,
             p_unlisted=min(follows.posterior.unlisted, 1.0),
+            unlisted_variable=moves[0] if moves and follows.unlisted_acts else "",
             gain=HeldOutGain(rms(before), rms(final.less_nuisance(final.whole - explained)), by),
             parameters=dict(zip(names, best.values.tolist(), strict=True)),
             noise=tuple(float(at.unit[index[0]]) for index in self.outputs),

@@ -39,6 +39,19 @@ def read_measured(measured: Any) -> tuple[Array, list[str]]:
     return data, names
 
 
+def read_covariates(covariates: Any, n: int) -> dict[str, Array]:
+    """Each covariate as a column, shape (n, 1)."""
+    columns = {name: read_numbers(covariates[name], name) for name in covariates or ()}
+    for name, values in columns.items():
+        if values.shape != (n,) or not np.isfinite(values).all():
+            raise UsageError(
+                f"covariate {name!r} has shape {values.shape} for {n} rows, or values that are not"
+                " finite",
+                "give one number for each row",
+            )
+    return {str(name): values[:, None] for name, values in columns.items()}
+
+
 def read_labels(labels: ArrayLike | None, n: int, name: str) -> Wholes:
     """One number for each different label; one for all where there are no labels."""
     given = np.zeros(n) if labels is None else np.asarray(labels)

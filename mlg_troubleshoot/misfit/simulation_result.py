@@ -143,6 +143,9 @@ class SimulationDiagnosis(Result):
         Probability that nothing is wrong. [1]
     p_unlisted : float
         Probability that something is wrong that no suspect explains. [1]
+    unlisted_variable : str
+        What that most likely moves with: a covariate, the prediction, what the suspects do, or the
+        order of the rows; empty unless it acts.
     gain : HeldOutGain
         Gain on held-out rows.
     parameters : mapping of str to float
@@ -173,6 +176,7 @@ class SimulationDiagnosis(Result):
     why_untestable: Mapping[str, str]
     p_nothing: float
     p_unlisted: float
+    unlisted_variable: str
     gain: HeldOutGain
     parameters: Mapping[str, float]
     noise: tuple[float, ...]
@@ -193,6 +197,8 @@ class SimulationDiagnosis(Result):
             f"{self.verdict}: nothing is wrong with probability {self.p_nothing:.3f}, something"
             f" that no suspect explains acts with {self.p_unlisted:.3f}"
         ]
+        if self.unlisted_variable:
+            lines.append(f"what no suspect explains moves with: {self.unlisted_variable}")
         lines += [f"cause: {cause.words()}" for cause in self.causes]
         lines += [f"possible: {cause.words()}" for cause in self.also_possible]
         lines += [f"not testable: {name}, {why}" for name, why in self.why_untestable.items()]

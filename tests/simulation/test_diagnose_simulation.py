@@ -120,6 +120,24 @@ def test_a_curve_that_no_suspect_has_is_unlisted_and_hides_in_no_suspect() -> No
     assert found.p_unlisted > 0.99
 
 
+def test_it_is_said_with_which_covariate_moves_what_no_suspect_explains() -> None:
+    x, rig = line(80)
+    rng = np.random.default_rng(7)
+    known = {"humidity": rng.uniform(20.0, 90.0, 80), "shift": rng.uniform(0.0, 1.0, 80)}
+    read = rig.predict(rig.nominal) + 0.02 * rng.standard_normal((80, 1))
+    damp = read + 0.1 * np.maximum(known["humidity"] / 20.0 - 2.5, 0.0)[:, None]
+    found = diagnose_simulation(rig.predict, damp, rig.suspected, rig.unknown, covariates=known)
+    assert found.verdict is Verdict.UNLISTED
+    assert found.unlisted_variable == "humidity"
+    assert "moves with: humidity" in found.summary()
+    dry = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, covariates=known)
+    assert (dry.verdict, dry.unlisted_variable) == (Verdict.NONE, "")
+    with pytest.raises(TroubleshootError, match="'damp' has shape"):
+        diagnose_simulation(
+            rig.predict, read, rig.suspected, rig.unknown, covariates={"damp": x[:5]}
+        )
+
+
 def test_a_cause_that_alternates_is_named_beside_an_unlisted_curve() -> None:
     rng = np.random.default_rng(8)
     x, way = np.repeat(np.linspace(-1.0, 1.0, 15), 2), np.tile([-1.0, 1.0], 15)
