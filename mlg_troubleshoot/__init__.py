@@ -48,14 +48,14 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis.causes.base import Cause
     from mlg_troubleshoot.diagnosis.extension import write_extension
     from mlg_troubleshoot.errors import Problem, TroubleshootError
-    from mlg_troubleshoot.gear.directions import WorstCase
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
+    from mlg_troubleshoot.gear.linkage import WorstCase
     from mlg_troubleshoot.indices.index_table import IndexTable
     from mlg_troubleshoot.misfit.simulation import diagnose_simulation
     from mlg_troubleshoot.misfit.simulation_result import SimulationDiagnosis, Suspect
     from mlg_troubleshoot.paper.study import StudyFindings, StudyOptions
-    from mlg_troubleshoot.reporting.picture import Picture
+    from mlg_troubleshoot.reporting.publish import Picture
     from mlg_troubleshoot.schemas import schema
     from mlg_troubleshoot.store.database import Store
     from mlg_troubleshoot.surveying import SurveyResult, survey
@@ -65,6 +65,7 @@ if TYPE_CHECKING:
         CheckResult,
         check,
         check_files,
+        load_index_table,
         predict,
         read_inspections,
         write_reports,
@@ -76,9 +77,7 @@ if TYPE_CHECKING:
         diagnose_files,
         load_model_extension,
     )
-    from mlg_troubleshoot.workflows.forecast import forecast
-    from mlg_troubleshoot.workflows.history import Lives
-    from mlg_troubleshoot.workflows.index_tables import load_index_table
+    from mlg_troubleshoot.workflows.history import Lives, forecast
     from mlg_troubleshoot.workflows.study import run_study
 
 _HOME = {
@@ -88,26 +87,25 @@ _HOME = {
     "diagnosis.extension": "write_extension",
     "errors": "Problem TroubleshootError",
     "gear.gear": "Gear",
-    "gear.directions": "WorstCase",
+    "gear.linkage": "WorstCase",
     "gear.gear_file": "load_gear shipped_gears",
     "indices.index_table": "IndexTable",
     "misfit.simulation": "diagnose_simulation",
     "misfit.simulation_result": "SimulationDiagnosis Suspect",
     "paper.study": "StudyFindings StudyOptions",
-    "reporting.picture": "Picture",
+    "reporting.publish": "Picture",
     "schemas": "schema",
     "store.database": "Store",
     "surveying": "SurveyResult survey",
     "units": "ClearanceConvention LengthUnit parse_length",
     "workflows.check": (
-        "CheckOptions CheckResult check check_files predict read_inspections write_reports"
+        "CheckOptions CheckResult check check_files load_index_table predict "
+        "read_inspections write_reports"
     ),
     "workflows.diagnose": (
         "DiagnoseOptions DiagnoseResult diagnose diagnose_files load_model_extension"
     ),
-    "workflows.forecast": "forecast",
-    "workflows.history": "Lives",
-    "workflows.index_tables": "load_index_table",
+    "workflows.history": "Lives forecast",
     "workflows.study": "run_study",
 }
 _MODULES = {name: module for module, names in _HOME.items() for name in names.split()}

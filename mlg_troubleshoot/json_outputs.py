@@ -11,14 +11,17 @@ from typing import Annotated, Literal, NotRequired, TypedDict
 from msgspec import Meta
 
 from mlg_troubleshoot.decision.assessment import (
+    Action,
+    Basis,
+    End,
     Posterior,
     RepairSet,
     Rigging,
     RigidBound,
+    Step,
     Verdict,
 )
 from mlg_troubleshoot.decision.inspection import FactKind, Side
-from mlg_troubleshoot.decision.plan import Action, Basis, End, Step
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Sourced
 

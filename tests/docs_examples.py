@@ -92,7 +92,7 @@ def columns_table() -> str:
     """The columns of an inspection table, one line per column, from the table of the package."""
     from mlg_troubleshoot import load_gear
     from mlg_troubleshoot.decision.columns import COLUMNS, Need
-    from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
+    from mlg_troubleshoot.gear.gear import DEFAULT_GAUGE_U_IN
 
     gear = load_gear()
     low, high = gear.down_lock_range
@@ -270,8 +270,8 @@ def refreshed(text: str, folder: Path) -> str:
 def pictures() -> dict[str, str]:
     """Draw the picture of the README: the linkage of the published failure."""
     from mlg_troubleshoot import ClearanceConvention, Inspection, Side, check, load_gear
-    from mlg_troubleshoot.reporting.formats import Lengths
-    from mlg_troubleshoot.reporting.schematic import joint_key, schematic
+    from mlg_troubleshoot.reporting.figures import Lengths
+    from mlg_troubleshoot.reporting.inspection_figures import joint_key, schematic
 
     gear = load_gear()
     failure = {3: 0.013, 5: 0.007}

@@ -11,13 +11,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.gear.directions import chance_beyond, worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.model import links_from
-from mlg_troubleshoot.indices.amplification import Amplification, amplification
-from mlg_troubleshoot.indices.index_table import IndexTable
-from mlg_troubleshoot.indices.inputs import worst_directions
-from mlg_troubleshoot.indices.tensor import tensor_indices
+from mlg_troubleshoot.gear.linkage import chance_beyond, links_from, worst_case
+from mlg_troubleshoot.indices.index_table import Amplification, IndexTable, amplification
+from mlg_troubleshoot.indices.variance import tensor_indices, worst_directions
 
 from .geometry.vectors import locate_joint
 

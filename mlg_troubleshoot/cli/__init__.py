@@ -26,4 +26,6 @@ def main() -> None:
     app(prog_name="mlg")
 
 
-__all__ = ["main"]
+__all__ = [
+    "main",
+]

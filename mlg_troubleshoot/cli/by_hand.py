@@ -18,7 +18,7 @@ from mlg_troubleshoot.decision.columns import (
     UNIT,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.ranking import listed
+from mlg_troubleshoot.decision.judge_rows import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear

@@ -16,17 +16,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli import by_hand, options, output
-from mlg_troubleshoot.cli.progress import stages
-from mlg_troubleshoot.cli.views import batch, notes, one_gear
+from mlg_troubleshoot.cli.output import stages
+from mlg_troubleshoot.cli.views import batch, one_gear
+from mlg_troubleshoot.cli.views import batch as notes
 from mlg_troubleshoot.decision.inspection import RowSource, Side
-from mlg_troubleshoot.decision.ranking import Listed, listed
+from mlg_troubleshoot.decision.judge_rows import Listed, listed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import whole_file
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
+from mlg_troubleshoot.workflows.check import load_index_table
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
-from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.cli.check import Flags, Wanted

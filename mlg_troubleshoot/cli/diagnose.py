@@ -54,8 +54,8 @@ def diagnose(
 
     Exit codes: 0 nothing found; 1 something found; 3 this table allows no conclusion; 2 usage.
     """
-    from mlg_troubleshoot.cli.progress import stages
-    from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
+    from mlg_troubleshoot.cli.output import stages
+    from mlg_troubleshoot.cli.views.batch import show_notes, show_problems
     from mlg_troubleshoot.diagnosis import write_extension as keep_extension
     from mlg_troubleshoot.json_outputs import NotConcluded
     from mlg_troubleshoot.reporting.json_form import diagnosis_as_json, written
@@ -132,8 +132,8 @@ def _unwritten(diagnosis: Diagnosis) -> str:
 
 
 def _show(result: DiagnoseResult, unit: LengthUnit) -> None:
-    from mlg_troubleshoot.cli.views.notes import show_unread
-    from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
+    from mlg_troubleshoot.cli.views.batch import show_unread
+    from mlg_troubleshoot.reporting.diagnosis_figures import seven_lines
 
     console = output.console(unit=unit)
     for line in seven_lines(result.diagnosis):

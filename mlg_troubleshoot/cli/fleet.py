@@ -60,7 +60,7 @@ def fleet(
 
     Exit code 0, whatever the verdicts.
     """
-    from mlg_troubleshoot.cli.progress import stages
+    from mlg_troubleshoot.cli.output import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.reporting.life_json import fleet_as_json
     from mlg_troubleshoot.workflows.history import show_fleet

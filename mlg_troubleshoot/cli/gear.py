@@ -12,7 +12,7 @@ from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.paper.targets import Computed
+    from mlg_troubleshoot.paper.verification import Computed
 
 
 def show(
@@ -39,7 +39,8 @@ def show(
 def verify(context: typer.Context, as_json: options.Json = False) -> None:
     """Print every number of the paper and that of the model; exit 1 if a required one fails."""
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.paper import statements, verification
+    from mlg_troubleshoot.paper import verification
+    from mlg_troubleshoot.paper import verification as statements
 
     gear = load_gear(context.obj)
     checked = statements.check_statements(gear)

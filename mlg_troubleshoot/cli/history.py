@@ -18,8 +18,7 @@ from mlg_troubleshoot.units import LengthUnit, said_in
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.life.folding import GearLife
-    from mlg_troubleshoot.life.forecast import Forecast
-    from mlg_troubleshoot.life.landings_left import FleetLine
+    from mlg_troubleshoot.life.forecast import FleetLine, Forecast
     from mlg_troubleshoot.store import Record, Store
     from mlg_troubleshoot.workflows.history import Lives
 
@@ -65,7 +64,7 @@ def show(
     shown: options.Shown,
 ) -> None:
     """Show all gears with their latest state, or the life of one gear with its forecast."""
-    from mlg_troubleshoot.cli.progress import stages
+    from mlg_troubleshoot.cli.output import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.reporting import life_json
     from mlg_troubleshoot.workflows import history
@@ -137,8 +136,8 @@ def show_gears(
     """Show one line per gear, the most urgent first and why; `within`: with the parts of so many
     landings, `joint`: with the readings of that joint.
     """
-    from mlg_troubleshoot.cli.views.tables import STYLES, Cell
-    from mlg_troubleshoot.life.landings_left import most_urgent_first, parts_within, work_sentence
+    from mlg_troubleshoot.cli.views.batch import STYLES, Cell
+    from mlg_troubleshoot.life.forecast import most_urgent_first, parts_within, work_sentence
 
     console = output.console(unit=unit)
     lines = most_urgent_first(found.lines)
@@ -207,7 +206,7 @@ def _show_warnings(console: output.DataConsole, warnings: Iterable[str]) -> None
 
 
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
-    from mlg_troubleshoot.life.landings_left import outlook_sentence
+    from mlg_troubleshoot.life.forecast import outlook_sentence
     from mlg_troubleshoot.life.logbook import log_of, shortened
     from mlg_troubleshoot.life.urgency import repair_sentence
     from mlg_troubleshoot.reporting.life_json import life_as_json
@@ -243,8 +242,7 @@ def _show_joints(
     gear: Gear,
 ) -> None:
     from mlg_troubleshoot.decision.sentences import joint_list
-    from mlg_troubleshoot.life.landings_left import span
-    from mlg_troubleshoot.life.wear_paths import stretches
+    from mlg_troubleshoot.life.forecast import span, stretches
 
     headings = (
         "joint",
@@ -395,7 +393,7 @@ def verify(
     The last hash is printed. Note it elsewhere and pass it to --expect later: this shows whether
     records were removed.
     """
-    from mlg_troubleshoot.cli.progress import stages
+    from mlg_troubleshoot.cli.output import stages
     from mlg_troubleshoot.workflows import history
 
     if report is not None:
@@ -423,7 +421,7 @@ def verify(
 @options.flat
 def export(*, file: Chain, records: options.Records, force: options.Force = False) -> None:
     """Write the whole chain as JSON Lines."""
-    from mlg_troubleshoot.cli.claims import claim
+    from mlg_troubleshoot.cli.output import claim
     from mlg_troubleshoot.outputs import write_text
 
     claim(None, (), [("the export", file)], store=records.store, force=force)

@@ -18,7 +18,7 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.cli.claims import Outputs
+    from mlg_troubleshoot.cli.output import Outputs
     from mlg_troubleshoot.store import Store
 
 
@@ -188,7 +188,7 @@ class Shown:
         store: str | None = None,
     ) -> None:
         """Refuse, before anything is read, what must not be written."""
-        from mlg_troubleshoot.cli.claims import claim
+        from mlg_troubleshoot.cli.output import claim
 
         claim(gear, inputs, outputs, self.report, store=store, force=self.force)
 
@@ -209,7 +209,7 @@ class Records:
         """The store, in which every content is judged as it is read."""
         from mlg_troubleshoot.gear.gear_file import load_gear
         from mlg_troubleshoot.store import Store
-        from mlg_troubleshoot.workflows.kept import KeptGate
+        from mlg_troubleshoot.workflows.keep import KeptGate
 
         return Store(self.store, judge=KeptGate(load_gear(self.gear)))
 

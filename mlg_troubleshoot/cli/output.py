@@ -1,5 +1,9 @@
 """Where results and messages go: stdout, stderr, what they can show, and what a reader that went
 away means.
+
+A progress bar on stderr for long work; silent without a terminal.
+
+Which files a command may write: checked before anything is read.
 """
 
 from __future__ import annotations
@@ -10,8 +14,9 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterable, Sequence
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from itertools import groupby
 from pathlib import Path
 from textwrap import TextWrapper
@@ -23,12 +28,13 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from mlg_troubleshoot.errors import ExitCode, OutputError
+from mlg_troubleshoot.errors import ExitCode, OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.units import LengthUnit, said_in
 from mlg_troubleshoot.visible import unbroken, visible
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.reporting.publish import WrittenReport
+
 
 _WIDTH_ELSEWHERE = 80
 WIDE = 100
@@ -251,7 +257,7 @@ def print_table(
 
 def page(name: str, unit: LengthUnit = LengthUnit.INCH, **values: object) -> list[str]:
     """The lines that a template says, lengths in the unit of the reader."""
-    from mlg_troubleshoot.reporting.formats import Lengths
+    from mlg_troubleshoot.reporting.figures import Lengths
     from mlg_troubleshoot.reporting.html import environment
 
     said = environment().get_template(f"{name}.txt.j2").render(lengths=Lengths(unit), **values)
@@ -325,3 +331,142 @@ def write_pieces(pieces: Iterable[str]) -> None:
         sys.stdout.flush()
     except BrokenPipeError:
         abandon_stdout()
+
+
+Advance = Callable[[str, int, int | None], None]
+
+# A bar that would be gone before it is read is not shown. [s]
+_WORTH_SHOWING_AFTER_S = 0.5
+
+
+@contextmanager
+def stages(*, quiet: bool) -> Iterator[Advance]:
+    """Show how far each stage of a run is, once it has run long enough to be worth it."""
+    if quiet or is_plain() or not sys.stderr.isatty():
+        yield lambda _name, _done, _total: None
+        return
+    start = time.monotonic()
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TaskID,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    tasks: dict[str, TaskID] = {}
+
+    def advance(name: str, done: int, total: int | None) -> None:
+        if not tasks:
+            if time.monotonic() - start < _WORTH_SHOWING_AFTER_S:
+                return
+            bar.start()
+        if name not in tasks:
+            tasks[name] = bar.add_task(name, total=total)
+        bar.update(tasks[name], completed=done, total=total)
+
+    try:
+        yield advance
+    finally:
+        if tasks:
+            bar.stop()
+
+
+WRITE_TABLE = "--write-table"
+_STANDARD_INPUT = "-"
+Outputs = Sequence[tuple[str, str | Path | None]]
+
+
+def claim(
+    gear: str | None,
+    inputs: Iterable[str | Path | None],
+    outputs: Outputs,
+    report: Path | None = None,
+    *,
+    store: str | None = None,
+    force: bool = False,
+) -> None:
+    """Refuse, before anything is read, an output that would replace what it must not.
+
+    Inputs of every command are the store, the gear file and what it names. The names of reports
+    follow from what is read: here none of the inputs may have one, in the folder of the reports.
+    """
+    wanted = [(option, path) for option, path in outputs if path is not None]
+    if not wanted and report is None:
+        return
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.outputs import claim_outputs
+    from mlg_troubleshoot.store import files_of
+
+    files: list[str | Path | int] = [*files_of(store)]
+    files += [path for _, path in wanted if _is_gear_file(Path(path))]
+    for name in inputs:
+        files += _read(name)
+    if gear is not None:
+        known = load_gear(gear)
+        writes_table = any(option == WRITE_TABLE for option, _ in wanted)
+        # The table of indices may be written again, unless it is the gear file that is named so.
+        own = {known.indices_file} - {known.path} if writes_table else set()
+        files += [file for file in known.files if file not in own]
+    claim_outputs(files, wanted, force=force)
+    if report is not None:
+        claim_outputs(files, _reports(report, wanted), force=True)
+
+
+def _read(name: str | Path | None) -> Sequence[str | Path | int]:
+    """Return the files that an argument stands for; standard input by its descriptor."""
+    from mlg_troubleshoot.records import expand
+
+    if name is None:
+        return ()
+    if str(name) != _STANDARD_INPUT:
+        return [Path(str(file)) for file in expand(str(name))]
+    try:
+        return [sys.stdin.fileno()]
+    except (OSError, ValueError):
+        return ()
+
+
+def _is_gear_file(path: Path) -> bool:
+    """Whether a gear file stands there, in use or not."""
+    from mlg_troubleshoot.gear.gear_file import load_gear
+
+    if path.suffix != ".toml" or not path.is_file():
+        return False
+    try:
+        load_gear(str(path))
+    except TroubleshootError:
+        return False
+    return True
+
+
+def _reports(folder: Path, others: Outputs) -> Outputs:
+    """Return the files of a folder that a report could replace."""
+    from mlg_troubleshoot.reporting.publish import could_be_report
+
+    real = Path(os.path.realpath(folder))
+    for option, other in others:
+        path = Path(os.path.realpath(str(other)))
+        if could_be_report(path) and path.parent == real:
+            raise UsageError(
+                f"{option} {other} has the name of a report in --report {folder}",
+                f"Give {option} another name.",
+            )
+    try:
+        known = [*real.iterdir()] if real.exists() else []
+    except OSError as error:
+        raise OutputError(
+            f"--report {folder} cannot be read: {error.strerror}",
+            "Give a folder that you may read and write.",
+        ) from error
+    return [("--report", path) for path in known if could_be_report(path)]

@@ -65,8 +65,7 @@ class StudyFlags:
 @options.flat
 def study(flags: StudyFlags) -> None:
     """Recompute the sensitivity and amplification indices of every joint."""
-    from mlg_troubleshoot.cli.claims import WRITE_TABLE, claim
-    from mlg_troubleshoot.cli.progress import stages
+    from mlg_troubleshoot.cli.output import WRITE_TABLE, claim, stages
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.paper.study import StudyDesign, StudyOptions
     from mlg_troubleshoot.workflows import study as task

@@ -28,7 +28,7 @@ def template(
     ] = "usual",
 ) -> None:
     """Write an empty inspection workbook, or a one-page form (.pdf, .html) to fill in by hand."""
-    from mlg_troubleshoot.cli.claims import claim
+    from mlg_troubleshoot.cli.output import claim
     from mlg_troubleshoot.workflows import check as task
 
     if file.suffix.lower() not in (".xlsx", ".pdf", ".html"):

@@ -3,12 +3,9 @@
 __all__ = [
     "assessment",
     "columns",
-    "fleet",
     "inspection",
     "judge_rows",
     "learning",
-    "plan",
     "prediction",
-    "ranking",
     "sentences",
 ]

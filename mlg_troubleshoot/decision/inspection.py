@@ -1,5 +1,8 @@
 """One inspection of one gear, as the decision and the diagnosis need it: radial clearances in
 inches.
+
+What other gears of a fleet say of one before anything is read on it: how far they are worn, and
+whether loads hold their pins near their worst directions.
 """
 
 from __future__ import annotations
@@ -13,8 +16,9 @@ from datetime import date, datetime, timedelta
 from enum import StrEnum
 from typing import Any
 
+from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
+from mlg_troubleshoot.gear.gear import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence, with_unit
 
@@ -417,3 +421,22 @@ class InvalidRow:
     source: RowSource = RowSource()
     understood: Inspection | None = None
     cells: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """What is expected of a gear before anything is read on it.
+
+    Parameters
+    ----------
+    loaded : float
+        Chance that loads hold its pins near their worst directions. [1]
+    levels : tuple of float
+        Chances of the levels of wear of `belief`; empty if each is as likely. [1]
+    text : str
+        What was learned and from how many gears, in words; empty if nothing was.
+    """
+
+    loaded: float = PRIORS.loaded
+    levels: tuple[float, ...] = ()
+    text: str = ""

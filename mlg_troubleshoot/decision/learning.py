@@ -15,9 +15,8 @@ import numpy as np
 from scipy.special import betaincinv
 
 from mlg_troubleshoot.decision.belief import LEVELS, SHARES, WEAR, Belief, given_readings
-from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.fleet import Fleet
-from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.inspection import Fleet, Inspection
+from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear

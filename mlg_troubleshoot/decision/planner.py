@@ -3,35 +3,198 @@
 A gear that failed is followed by what is believed of it (`belief`): the joints, the rigging or
 something else. A gear without a complaint is read until there is a verdict, and what is over its
 limit is restored, nothing else. What comes after the first step is the expected course.
+
+What to do next on a gear that failed: the action with the fewest expected minutes to an end.
+
+One step ahead over the states of its belief, by (13) to (16) of docs/reference/models.md.
+
+What to restore: all subsets of a gear by the expansion, the best checked exactly; and what
+re-rigging would do.
+
+What follows each outcome of the next action: IF … THEN …, by the same rule that gave it.
+
+Each outcome is a typical reading, entered in the inspection and judged again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from datetime import date
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.arrays import Array, Mask, Places, Wholes
 from mlg_troubleshoot.decision import sentences
-from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.belief import Belief
-from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.choice import Choice, choose
-from mlg_troubleshoot.decision.inspection import InvalidRow, RiggingCheck
-from mlg_troubleshoot.decision.plan import (
+from mlg_troubleshoot.decision.assessment import (
     Action,
+    Assessment,
     Basis,
+    Consequence,
     End,
     Plan,
+    RepairKind,
+    RepairSet,
+    Rigging,
     Step,
+    UncertaintyBudget,
+    Verdict,
     how_to,
     minutes_of,
 )
-from mlg_troubleshoot.decision.prediction import Prediction
+from mlg_troubleshoot.decision.belief import STATES, Belief
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, RiggingCheck
+from mlg_troubleshoot.decision.prediction import (
+    Cases,
+    Prediction,
+    exact_chance,
+    model_uncertainty,
+    responses,
+)
 from mlg_troubleshoot.decision.priors import PRIORS, THRESHOLDS
-from mlg_troubleshoot.gear.gauges import BETTER_GAUGES_IN
+from mlg_troubleshoot.decision.sentences import joints_are
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, normal_cdf
+from mlg_troubleshoot.gear.gear import BETTER_GAUGES_IN, Gear
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Choice:
+    """The next action.
+
+    read : places of the joints to read. restore : joints to restore; None where the cause is looked
+    for elsewhere. then : what follows a check of the rigging, which comes first, if it is right.
+    """
+
+    read: tuple[int, ...] = ()
+    restore: Mask | None = None
+    then: Choice | None = None
+
+
+def choose(
+    gear: Gear,
+    belief: Belief,
+    *,
+    over: Mask,
+    worn: Mask,
+    spare: Mask,
+    unread: Mask,
+    doubted: Mask,
+    looked: bool,
+) -> Choice:
+    """The action with the fewest expected minutes.
+
+    over : joints over their limit. worn : joints that can be restored with a gain. spare : joints
+    that may be restored. unread : joints that nobody read and that can be reached. doubted :
+    readings over the limit that may be taken again. looked : whether the rigging was checked, or
+    cannot be asked for yet.
+    """
+    states = belief.states
+    groups = [(), *_groups(gear, belief, unread, doubted)]
+    starts = np.cumsum([0, *(1 << len(group) for group in groups[:-1])])
+    # A row is one pattern of what is worn of one group.
+    asked, found = _patterns(groups, len(over))
+    rows = np.arange(len(asked))
+    differs = states.worn @ (asked & ~found).T | ~states.worn @ (asked & found).T
+    matches = (~differs).T.astype(float)
+    causes = matches @ states.causes.T
+
+    fixed = over & ~doubted
+    bits = _bits(belief, (worn | unread & spare | doubted) & ~fixed, doubted)
+    codes = np.arange(bits.sum() + 1)
+    sets = ((codes[:, None] & bits) > 0) | fixed
+    out = matches[:, :STATES] @ (states.stays_out(sets) * states.causes[0, :STATES, None])
+    must = np.where(asked, found, over) @ bits
+    more = codes != must[:, None]
+    allowed = codes & ~(np.where(asked, spare, worn | over) @ bits)[:, None] == 0
+    allowed &= (codes & must[:, None] == must[:, None]) & sets.any(axis=1)
+    allowed &= ~more | (out < 0.5 * causes[:, :1])
+
+    nothing = np.zeros_like(over)
+    read = minutes_of(gear, asked[starts], nothing)[0]
+    minutes = minutes_of(gear, sets, asked[:, None])[1]
+    check = gear.rigging_check.value
+    after = gear.plunger_reading.value + gear.retraction.value
+    # (13)
+    second = np.median([joint.restore.value for joint in gear.joints])
+    second /= THRESHOLDS.one_repair * gear.second_repair_chance.value
+
+    def ends(causes: Array, late: float = 0.0) -> tuple[Array, int]:
+        """Minutes of the best end after each pattern (14), and the place of its set without a
+        reading, -1 where the cause is looked for elsewhere; `late`: of a check of the rigging after
+        the repair. [min]
+        """
+        total = causes.sum(axis=1, keepdims=True)
+        # In vain: sound joints where the joints are not the cause.
+        vain = more * causes[:, 1:].sum(axis=1, keepdims=True)
+        restored = total * (minutes + after) + second * (out + vain) + late * causes[:, 1:2]
+        restored = np.where(allowed, restored, np.inf)
+        places = np.argmin(np.round(restored, 6), axis=1)
+        elsewhere = total[:, 0] * (minutes[rows, must] + after * sets[must].any(axis=1))
+        elsewhere += THRESHOLDS.sent_away * second * (out[rows, must] + causes[:, 1])
+        best = restored[rows, places]
+        place = -1 if elsewhere[0] < best[0] else int(places[0])
+        return np.minimum(best, elsewhere), place
+
+    def first_step(values: Array, place: int) -> Choice:
+        if k := int(values.argmin()):
+            return Choice(read=groups[k])
+        return Choice(restore=sets[place] if place >= 0 else None)
+
+    # (15)
+    right = causes * [1.0, PRIORS.overlooked, 1.0]
+    wrong = (causes - right).sum(axis=1) * minutes[rows, must]
+    checked, place = ends(right)
+    checked += wrong
+    now, place_now = ends(causes, 0.0 if looked else check + gear.plunger_reading.value)
+    if not looked:
+        now[1:] = np.minimum(now, checked + check * causes.sum(axis=1))[1:]
+    # (16), rounded: both ends of one link are worth the same, and noise must not choose between
+    # them.
+    now = np.round(read + np.add.reduceat(now, starts), 6)
+    checked = np.round(check + right[0].sum() * read + np.add.reduceat(checked, starts), 6)
+    if looked or now.min() <= checked.min():
+        return first_step(now, place_now)
+    return Choice(then=first_step(checked, place))
+
+
+def _bits(belief: Belief, may: Mask, first: Mask) -> Wholes:
+    """The bit of each joint whose restoration is weighed, 0 of the others: some first, then those
+    that move the plunger farthest.
+    """
+    reach = np.abs(belief.states.freed_in).mean(axis=0)
+    weighed = np.lexsort((-reach, ~first, ~may))[: min(int(may.sum()), THRESHOLDS.movable)]
+    bits = np.zeros(len(may), np.int64)
+    bits[weighed] = 1 << np.arange(len(weighed))
+    return bits
+
+
+def _groups(gear: Gear, belief: Belief, unread: Mask, doubted: Mask) -> list[tuple[int, ...]]:
+    """Joints that may be read together: in each area those likeliest worn per minute, by how far
+    they move the plunger; readings in doubt.
+    """
+    rate = np.round(belief.worn_by_leverage, 4) / gear.access_minutes
+    found = []
+    for area in gear.areas:
+        inside = [j for j, joint in enumerate(gear.joints) if joint.area == area.name]
+        some = sorted((j for j in inside if unread[j]), key=lambda j: -rate[j])
+        some = some[: THRESHOLDS.together]
+        found += [tuple(some[:count]) for count in range(1, len(some) + 1)]
+    again = tuple(np.flatnonzero(doubted).tolist())
+    return [*found, again] if again else found
+
+
+def _patterns(groups: Sequence[tuple[int, ...]], joints: int) -> tuple[Mask, Mask]:
+    """The joints of each group, once for each pattern of its worn ones, and these."""
+    found = []
+    for group in groups:
+        both = np.zeros((2, 1 << len(group), joints), bool)
+        both[0, :, group] = True
+        both[1, :, group] = np.arange(1 << len(group)) >> np.arange(len(group))[:, None] & 1
+        found.append(both)
+    asked, worn = np.concatenate(found, axis=1)
+    return asked, worn
 
 
 def _correction(text: str) -> Plan:
@@ -396,3 +559,218 @@ class _PlanBuilder:
         unread = self._joints(~cases.measured[i] & ~cases.reachable[i])
         over = self._joints(cases.over_limit[i] & ~cases.restorable[i])
         return sentences.open_question(unread, over)
+
+
+# Repair sets that are shown. [1]
+_SHOWN = 5
+# Within this of the conformance limit a subset counts as about sufficient: how far the expansion
+# may be off. [in]
+_ABOUT_IN = 5e-4
+
+
+@lru_cache(maxsize=4)
+def subsets_of(gear: Gear) -> tuple[Mask, Array]:
+    """All subsets of a gear's joints, the quickest to restore first, then the smallest, and the
+    minutes of each. [min]
+    """
+    n = len(gear.joints)
+    members = ((np.arange(2**n)[:, None] >> np.arange(n)) & 1).astype(bool)
+    minutes = minutes_of(gear, members, np.zeros(n, bool))[1]
+    order = np.lexsort((members.sum(axis=1), np.round(minutes, 6)))
+    return members[order], minutes[order]
+
+
+def restored(cases: Cases, rows: Sequence[int], sets: Sequence[Mask]) -> tuple[Cases, Prediction]:
+    """Some gears, each with a set restored, unmeasured joints at their limit."""
+    some = cases.take(np.array(rows))
+    now = some.filled(cases.gear.limits_in)
+    return some, some.predict(np.where(sets, np.minimum(now, cases.gear.new_parts_in), now))
+
+
+class Sets:
+    """The sets of joints that may be restored on one gear.
+
+    Attributes
+    ----------
+    members : ndarray of bool, shape (sets, joints)
+        Every joint over its limit is in each, and none that gains nothing.
+    slack_in : ndarray, shape (sets,)
+        How far the worst case stays inside the conformance limit: margin less worst case less its
+        guard band, by the second-order expansion, anchored at the exact worst case. [in]
+    """
+
+    def __init__(self, cases: Cases, upper: Prediction, row: int) -> None:
+        gear = cases.gear
+        members, minutes = subsets_of(gear)
+        allowed = ~(members & ~cases.removable[row]).any(axis=1)
+        allowed &= (members | ~cases.must_restore[row]).all(axis=1)
+        self.row = row
+        self.members = members[allowed]
+        self.minutes = minutes[allowed]
+        now = np.where(cases.measured[[row]], cases.clearance_in[[row]], gear.limits_in)
+        after = np.where(self.members, np.minimum(now, gear.new_parts_in), now)
+        each = np.array([linkage.magnitude(after) for linkage in responses(gear)])
+        reference = responses(gear)[0]
+        worst = each[0] + upper.displacement_in[row] - reference.magnitude(now)
+        read = (reference.slopes(after) * cases.gauge_u_in[row] * cases.measured[row]) ** 2
+        variance = read.sum(axis=1) + model_uncertainty(worst, cases.extension) ** 2
+        variance += cases.margin_u_in[row] ** 2
+        variance += each.var(axis=0, ddof=1) if len(each) > 1 else 0.0
+        # Rounded: both ends of one link leave the same, and noise must not choose between them.
+        self.slack_in = np.round(cases.margin_in[row] - worst - SCORE * np.sqrt(variance), 7)
+
+    def quickest(self, among: Mask) -> int:
+        """The quickest of some; of equally many joints in equal minutes that with most slack."""
+        first = int(np.argmax(among))
+        size = self.members.sum(axis=1)
+        alike = among & (self.minutes == self.minutes[first]) & (size == size[first])
+        return int(np.argmax(np.where(alike, self.slack_in, -np.inf)))
+
+    def sufficient(self) -> list[int]:
+        """Those that suffice, the quickest first, none within another; none if none is needed."""
+        left = self.slack_in >= 0.0
+        found: list[int] = []
+        while left.any() and len(found) < _SHOWN:
+            found.append(self.quickest(left))
+            left &= (self.members[found[-1]] & ~self.members).any(axis=1)
+        return [k for k in found if self.members[k].any()]
+
+
+def repair_sets(
+    cases: Cases,
+    upper: Prediction,
+    wanted: Places,
+    tried: Mapping[int, Mask],
+    belief: Callable[[int], Belief],
+) -> list[tuple[RepairSet, ...]]:
+    """Find the sets of joints which, restored, bring the worst case of the wanted gears within the
+    margin; `upper`: with unmeasured joints at their limit. `tried`: sets that plans restore.
+
+    Unmeasured joints count with their limit: what holds with them at 0 sends every fifth gear back.
+    Of sure sets only those that contain no smaller sufficient set are returned, the quickest first,
+    each checked by the exact worst case.
+    """
+    result: list[tuple[RepairSet, ...]] = [()] * len(cases)
+    each = [Sets(cases, upper, row) for row in wanted.tolist()]
+    near = [
+        (sets, sets.quickest(about))
+        for sets in each
+        if (about := sets.slack_in >= -_ABOUT_IN).any()
+    ]
+    if near:
+        # Shifted so that it is exact for the quickest set that is about sufficient.
+        some, after = restored(cases, [s.row for s, _ in near], [s.members[k] for s, k in near])
+        guard = SCORE * after.standard_uncertainty(some.margin_u_in)
+        exact = some.margin_in - after.displacement_in - guard
+        for (sets, k), slack in zip(near, exact.tolist(), strict=True):
+            sets.slack_in = sets.slack_in + np.nan_to_num(slack - sets.slack_in[k])
+    asked = [(s.row, s.members[k], RepairKind.SURE) for s, _ in near for k in s.sufficient()]
+    asked += [(row, members, RepairKind.TRY) for row, members in tried.items()]
+    if not asked:
+        return result
+    some, after = restored(cases, [row for row, *_ in asked], [each for _, each, _ in asked])
+    within = after.probability_within(some.margin_in, some.margin_u_in)
+    complained = cases.beyond_margin & (cases.failed | cases.repaired)
+    for (row, members, kind), moved, p in zip(
+        asked, after.displacement_in.tolist(), within.tolist(), strict=True
+    ):
+        joints = tuple(np.array(cases.gear.joint_numbers)[members].tolist())
+        sure = kind is RepairKind.SURE
+        if p < CONFORMANCE if sure else joints in [each.joints for each in result[row]]:
+            continue
+        access, minutes = map(float, minutes_of(cases.gear, members, np.zeros_like(members)))
+        stated = complained[row] or not sure
+        second = belief(row).second_repair(members) if stated else None
+        result[row] = (*result[row], RepairSet(joints, moved, p, access, minutes, kind, second))
+    return result
+
+
+def rigging_alternative(
+    one: Cases, worst_in: tuple[float, float], budget: UncertaintyBudget
+) -> Rigging:
+    """Shift the plunger back by what was measured, else so that the worst cases of both senses are
+    equally far.
+
+    Re-rigging moves the range of the plunger and cannot narrow it: what remains is half the
+    distance between both worst cases, or, where a measured offset is taken out, the worst case of
+    the joints. The uncertainties of the decision rule stay as they are.
+    """
+    over, under = worst_in
+    measured = float(one.plunger_in[0])
+    if np.isfinite(measured):
+        shift = 0.0 - measured
+        left = max(over, -under)
+        chance = exact_chance(one, one.filled(0.0))
+    else:
+        shift = -0.5 * (over + under)
+        left = 0.5 * (over - under)
+        chance = exact_chance(one, one.filled(0.0), shift)
+    within = float(normal_cdf((one.margin_in - left) / budget.combined_in)[0])
+    return Rigging(shift, left, within, float(chance[0]))
+
+
+# Typical readings: shares of a limit or a margin, well within it, and beyond it. [1]
+_WELL_WITHIN, _BEYOND = 0.4, 1.4
+# Days after whatever is known of a gear.
+_REPAIR_DAY, _LATER = date(9999, 12, 1), date(9999, 12, 2)
+
+
+def consequences(
+    a: Assessment, gear: Gear, judge: Callable[[list[Inspection]], list[Assessment]]
+) -> tuple[Consequence, ...]:
+    """Judge a gear once more for each outcome of its next action."""
+    cases = list(_outcomes(a, gear))
+    rows = [replace(a.inspection, **changed) for _outcome, changed in cases]
+    found = []
+    for (outcome, _changed), judged in zip(cases, judge(rows) if rows else [], strict=True):
+        step = judged.next_action
+        text = f"IF {outcome}, THEN {step.text[0].lower()}{step.text[1:]}"
+        found.append(Consequence(outcome, step.action, step.joints, step.minutes, text))
+    return tuple(found)
+
+
+def _outcomes(a: Assessment, gear: Gear) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Outcomes of the next action, with what each changes in the inspection."""
+    row = a.inspection
+    step = a.next_action
+    names_are = joints_are(step.joints)
+    day = _LATER if row.is_repaired else row.plunger_date
+    match step.action:
+        case Action.READ_PLUNGER:
+            for share, where in ((_WELL_WITHIN, "within"), (_BEYOND, "beyond")):
+                reading = (*row.standing_readings_in, share * a.margin_in)
+                changed = {"readings_in": reading, "plunger_date": day}
+                yield f"the plunger is {where} its margin", changed
+        case Action.MEASURE:
+            yield "all are within their limits", _read(row, gear, step.joints, ())
+            yield f"#{step.joints[0]} is over its limit", _read(row, gear, step.joints, (0,))
+        case Action.MEASURE_AGAIN:
+            again = {"measured_again": (*row.measured_again, *step.joints)}
+            yield f"{names_are} over the limit again", again
+            yield f"{names_are} within the limit", again | _read(row, gear, step.joints, ())
+        case Action.CHECK_RIGGING:
+            yield "the rigging is right", {"rigging_checked": RiggingCheck.YES}
+            corrected = {"rigging_checked": RiggingCheck.CORRECTED, "repair_date": _REPAIR_DAY}
+            yield "the rigging was wrong and is set right", corrected
+        case Action.RESTORE:
+            new = {n: gear.joint(n).new_part.value for n in step.joints}
+            yield (
+                f"{names_are} restored",
+                {
+                    "clearance_in": {**row.clearance_in, **new},
+                    "restored_joints": tuple(sorted({*row.restored_joints, *step.joints})),
+                    "repair_date": _REPAIR_DAY,
+                },
+            )
+        case Action.RETRACT:
+            for outcome, word in ((Outcome.RETRACTED, "retracts"), (Outcome.FAILED, "fails")):
+                yield f"the gear {word}", {"outcome": outcome, "outcome_date": _LATER}
+
+
+def _read(
+    row: Inspection, gear: Gear, joints: tuple[int, ...], over: tuple[int, ...]
+) -> dict[str, Any]:
+    """Readings of joints, those at some places over their limits."""
+    shares = {n: _BEYOND if place in over else _WELL_WITHIN for place, n in enumerate(joints)}
+    read = {n: share * gear.joint(n).limit.value for n, share in shares.items()}
+    return {"clearance_in": {**row.clearance_in, **read}}

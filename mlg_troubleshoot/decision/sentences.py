@@ -10,13 +10,15 @@ from collections.abc import Collection, Sequence
 from datetime import date
 
 from mlg_troubleshoot.decision.assessment import (
+    STOP,
     Assessment,
+    Basis,
+    End,
     JointFinding,
     Rigging,
     Verdict,
 )
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.decision.plan import STOP, Basis, End
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear, SourceKind
 from mlg_troubleshoot.units import Length, Sentence

@@ -10,8 +10,7 @@ from statistics import NormalDist
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.plan import Basis
+from mlg_troubleshoot.decision.assessment import Basis, Verdict
 
 # Conformance probability of a verdict (JCGM 106). [1]
 CONFORMANCE = 0.95

@@ -3,7 +3,6 @@ gain.
 """
 
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Cause, Scene, load_causes
-from mlg_troubleshoot.diagnosis.data_condition import DataCondition, data_condition, doubt_of
 from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
 from mlg_troubleshoot.diagnosis.explain import WeighedCause
 from mlg_troubleshoot.diagnosis.extension import (
@@ -12,6 +11,7 @@ from mlg_troubleshoot.diagnosis.extension import (
     load_extension,
     write_extension,
 )
+from mlg_troubleshoot.diagnosis.faults import DataCondition, data_condition, doubt_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.misfit.simulation import diagnose_simulation
 from mlg_troubleshoot.misfit.simulation_result import (
@@ -20,7 +20,7 @@ from mlg_troubleshoot.misfit.simulation_result import (
     Suspect,
     SuspectFound,
 )
-from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
+from mlg_troubleshoot.misfit.simulation_result import MisfitVerdict as Verdict
 
 __all__ = [
     "CATALOGUE",
@@ -49,7 +49,6 @@ __all__ = [
     "load_causes",
     "load_extension",
     "noise",
-    "scene",
     "table",
     "table_from_inspections",
     "write_extension",

@@ -17,7 +17,7 @@ from scipy.special import ndtri
 from mlg_troubleshoot.arrays import Array, numbered, rms
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
+from mlg_troubleshoot.misfit.columns import FAR, NoiseModel
 
 # What is not a cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy
 # tails, scatter between tails, confounded, growing noise) so that at most 2 % alarm; more of it

@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, numbered
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.misfit.covariance import FAR
+from mlg_troubleshoot.misfit.columns import FAR
 from mlg_troubleshoot.units import MM_PER_IN
 
 # Set in 2026 on simulated wear (tests/diagnosis/test_wear.py and the study's tuning seeds); not

@@ -2,14 +2,11 @@
 
 __all__ = [
     "DEFAULT_GEAR",
-    "adjustment",
-    "design",
-    "directions",
-    "gauges",
+    "assembly",
     "gear",
     "gear_file",
     "gear_tables",
-    "model",
+    "linkage",
 ]
 
 DEFAULT_GEAR = "hawker-800xp"

@@ -34,7 +34,7 @@ from mlg_troubleshoot.gear.gear_tables import (
     HowTable,
     SourcedTable,
 )
-from mlg_troubleshoot.gear.model import Calibration
+from mlg_troubleshoot.gear.linkage import Calibration
 from mlg_troubleshoot.geometry.mechanism import Mechanism
 from mlg_troubleshoot.geometry.program import write_program
 

@@ -1,9 +1,6 @@
 """Sensitivity and amplification indices (Eqs. 1, 2, 7 to 10), and the precomputed table of them."""
 
 __all__ = [
-    "amplification",
-    "estimators",
     "index_table",
-    "inputs",
-    "tensor",
+    "variance",
 ]

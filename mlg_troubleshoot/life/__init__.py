@@ -4,14 +4,9 @@ Its modules are its doors: who keeps an inspection needs no forecast, which is s
 """
 
 __all__ = [
-    "chronology",
     "folding",
     "forecast",
-    "judged",
-    "landings_left",
     "logbook",
-    "looking_back",
     "state",
     "urgency",
-    "wear_paths",
 ]

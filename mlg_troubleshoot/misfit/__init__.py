@@ -7,12 +7,7 @@ Its modules are its doors: a check needs the beliefs of a diagnosis, and not sci
 __all__ = [
     "beliefs",
     "columns",
-    "conclusion",
-    "covariance",
-    "explanation",
-    "fitting",
     "posterior",
     "simulation",
     "simulation_result",
-    "verdict",
 ]

@@ -3,17 +3,33 @@ alone.
 
 A table of ten thousand rows has thousands of effects that act in one aircraft each; written out
 they would fill the memory.
+
+Covariance of the rows when nothing is wrong, in a form that is cheap to invert.
+
+    V(r) = B (I + F S(r)² Fᵀ) Bᵀ                                                          (M2)
+
+in units of the common scatter: B what each row scatters by itself, a diagonal or, along a series, a
+process that forgets; F what rows have in common, over B: groups and loadings. S(r) is 1 but for the
+tails T, whose ratio r is one of a few; G is F without them. With C Cᵀ = I + Gᵀ G, P = G C⁻ᵀ,
+Q = T − P Pᵀ T, D Dᵀ = I + r² Tᵀ Q and R = r D⁻¹ (Woodbury, twice):
+V⁻¹ = B⁻ᵀ (I − P Pᵀ − Q Rᵀ R Qᵀ) B⁻¹.
+
+Columns fitted to data under a noise model, freely and with what is known of them beforehand; and
+what a fit explains of held-out rows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.sparse import csc_array, hstack
 
-from mlg_troubleshoot.arrays import Array, Places
+from mlg_troubleshoot.arrays import Array, Mask, Places, Wholes
 
 # Computing only: rows from which a table is large; a column that acts in fewer than one row of so
 # many is kept by these rows.
@@ -128,3 +144,366 @@ class EffectColumns:
         written = np.count_nonzero(self.full, axis=0)
         rows = np.concatenate([written, np.diff(self.few.indptr)])[self.at]
         return np.asarray(np.sqrt(self.squares / np.maximum(rows, 1)))
+
+
+# Rows further out than this many standard deviations count less, and may be entry errors.
+FAR = 3.0
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Covariance of the rows: diagonal scatter, common scatter of each tail, bias and slope.
+
+    Attributes
+    ----------
+    relative : ndarray, shape (n,)
+        Standard deviation of each row in units of the common one. [1]
+    tails, gears : ndarray of int, shape (n,)
+        Number of the tail, and of the single gear, of each row.
+    loadings : ndarray, shape (n, k)
+        Bias, slope and small trends, each at one standard deviation in units of the common one. [1]
+    floor_in : float
+        Scatter that every row has at least. [in]
+    gear_ratio : float
+        Scatter between the gears of one tail over the scatter of a row. [1]
+    tail_ratios : tuple of float
+        Ratios of the scatter between tails to the scatter of a row that are tried. [1]
+    scale_in : float
+        The common standard deviation as it was estimated. [in]
+    absorbed : int
+        How many of the first loadings are nuisance parameters; each takes as much as one row tells.
+    tail_chances : tuple of float
+        Probability of each of the `tail_ratios` beforehand; alike if empty. [1]
+    chain : ndarray of int, shape (n,), optional
+        Number of the series in which a row follows others.
+    time : ndarray, shape (n,), optional
+        When each row was taken, in usual steps of a series.
+    correlation : float
+        Of the own scatter of two rows of a series one usual step apart; rows further apart are less
+        alike by a power of it (a process that forgets, Jones 1980). [1]
+    of_gear : ndarray, shape (n,), optional
+        Further scatter that the rows of a gear have in common, each row in its own measure. [1]
+    of_tail : ndarray, shape (n, k), optional
+        Further scatter that the rows of a tail have in common, column by column and independent of
+        each other, each row in its own measure. [1]
+    far_out : ndarray, shape (n,), optional
+        How many times wider a row's scatter was made, because it lies so much further out than
+        `FAR` standard deviations. [1]
+    """
+
+    relative: Array
+    tails: Wholes
+    gears: Wholes
+    loadings: Array
+    floor_in: float
+    gear_ratio: float
+    tail_ratios: tuple[float, ...]
+    scale_in: float
+    absorbed: int = 0
+    tail_chances: tuple[float, ...] = ()
+    chain: Wholes | None = None
+    time: Array | None = None
+    correlation: float = 0.0
+    of_gear: Array | None = None
+    of_tail: Array | None = None
+    far_out: Array | None = None
+
+    @classmethod
+    def white(cls, n: int) -> NoiseModel:
+        """Noise of rows that are whitened already: equal, independent and of unit size."""
+        none = np.zeros(n, np.int64)
+        return cls(np.ones(n), none, none, np.empty((n, 0)), 0.0, 0.0, (0.0,), 1.0)
+
+    @property
+    def tail_levels(self) -> list[tuple[float, float]]:
+        """Each ratio of the scatter between tails, and the logarithm of its chance beforehand."""
+        chances = self.tail_chances or (1.0,) * len(self.tail_ratios)
+        return list(zip(self.tail_ratios, np.log(chances).tolist(), strict=True))
+
+    def with_tails(self, ratio: float) -> NoiseModel:
+        """The same with one ratio of the scatter between tails."""
+        return replace(self, tail_ratios=(ratio,), tail_chances=())
+
+    @property
+    def distance(self) -> Array:
+        """How far out the rows lie whose scatter was made wider, over what it was; 0 for others."""
+        if self.far_out is None:
+            return np.zeros(len(self.relative))
+        return np.where(self.far_out > 1.0, FAR * self.far_out, 0.0)
+
+    def floored(self, square: Array) -> Array:
+        """Add what no row can be better than to a residual sum of squares."""
+        return np.maximum(square, 0.0) + len(self.relative) * self.floor_in**2
+
+    def take(self, rows: Mask) -> NoiseModel:
+        """Return the noise of some of the rows."""
+        every = {f.name: getattr(self, f.name) for f in fields(self)}
+        own: dict[str, Any] = {k: v[rows] for k, v in every.items() if isinstance(v, np.ndarray)}
+        return replace(self, **own)
+
+    @property
+    def worth(self) -> float:
+        """Independent rows that would say as much of a constant. [1]"""
+        return len(self.relative) * (1.0 - self.correlation) / (1.0 + self.correlation)
+
+    @cached_property
+    def _steps(self) -> tuple[Wholes, Wholes, Array]:
+        """Rows that follow one of their series, the rows that they follow, and how alike the two
+        are.
+        """
+        if self.chain is None or self.time is None or self.correlation == 0.0:
+            return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+        order = np.lexsort((self.time, self.chain))
+        follows = np.diff(self.chain[order]) == 0
+        row = order[1:][follows]
+        before = order[:-1][follows]
+        return row, before, self.correlation ** (self.time[row] - self.time[before])
+
+    def own(self, columns: Array) -> Array:
+        """What of some columns is new in each row, over its scatter: B⁻¹ x."""
+        row, before, alike = self._steps
+        scaled = columns / self.relative[:, None]
+        fresh = scaled.copy()
+        fresh[row] -= alike[:, None] * scaled[before]
+        fresh[row] /= np.sqrt(1.0 - alike**2)[:, None]
+        return fresh
+
+    def _back(self, fresh: Array) -> Array:
+        """Multiply by B⁻ᵀ, shape (..., n, k)."""
+        row, before, alike = self._steps
+        fresh = fresh.copy()
+        fresh[..., row, :] /= np.sqrt(1.0 - alike**2)[:, None]
+        product = fresh.copy()
+        product[..., before, :] -= alike[:, None] * fresh[..., row, :]
+        return product / self.relative[:, None]
+
+    def with_effects(self, effects_in: Array) -> NoiseModel:
+        """Add effects of unknown size, each at one standard deviation."""
+        return replace(self, loadings=np.hstack([self.loadings, effects_in / self.scale_in]))
+
+    def with_tails_apart(self, scatter_in: Array) -> NoiseModel:
+        """Add what the rows of each tail have in common, (n, k), at one standard deviation."""
+        return replace(self, of_tail=scatter_in / self.scale_in)
+
+    def share_of(self, effects_in: Array, data: Array) -> Array:
+        """What effects of unknown size that are part of this covariance most likely explain of data
+        (BLUP). [in]
+        """
+        product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
+        return effects_in @ (effects_in.T @ product[:, 0]) / self.scale_in**2
+
+    def share_of_groups(self, scatter_in: Array, group: Wholes, data: Array) -> Array:
+        """BLUP of what the rows of each group scatter alike, each in its own measure. [in]"""
+        product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
+        pull = np.bincount(group, scatter_in * product[:, 0])
+        return scatter_in * pull[group] / self.scale_in**2
+
+    def own_part(self, data: Array) -> tuple[Array, float]:
+        """What each row scatters by itself, all that rows have in common taken out, and the share
+        of the rows that is left to tell it. [in, 1]
+        """
+        common, tails, roots, _log = self._common
+        low = np.vstack([common.T, roots[-1] @ tails.T])
+        own = self.own(data[:, None])[:, 0]
+        left = own - low.T @ (low @ own)
+        return self.relative * left, float(1.0 - np.mean(np.sum(low**2, axis=0)))
+
+    @cached_property
+    def _common(self) -> tuple[Array, Array, Array, Array]:
+        """P, Q, R of each ratio of the scatter between tails, (levels, t, t), and log |V|."""
+        one = np.ones(len(self.relative))
+        kinds = [(self.gears, self.gear_ratio * one)]
+        kinds += [] if self.of_gear is None else [(self.gears, self.of_gear)]
+        kinds += [] if self.of_tail is None else [(self.tails, own) for own in self.of_tail.T]
+        parts = [_by_group(group, scatter) for group, scatter in kinds if scatter.any()]
+        shared = self.own(np.hstack([self.loadings, *parts]))
+        tails = self.own(_by_group(self.tails, one)[:, : None if any(self.tail_ratios) else 0])
+        ratios = np.array(self.tail_ratios)[:, None, None]
+        lower = np.linalg.cholesky(np.eye(shared.shape[1]) + shared.T @ shared)
+        common = solve_triangular(lower, shared.T, lower=True).T
+        apart = tails - common @ (common.T @ tails)
+        inner = np.linalg.cholesky(np.eye(tails.shape[1]) + ratios**2 * (tails.T @ apart))
+        log = 2.0 * np.log(np.diagonal(inner, axis1=1, axis2=2)).sum(axis=1)
+        log += 2.0 * np.sum(np.log(np.diagonal(lower))) + 2.0 * np.sum(np.log(self.relative))
+        log += np.sum(np.log1p(-(self._steps[2] ** 2)))
+        return common, apart, np.linalg.inv(inner) * ratios, log
+
+    def each_precision_times(
+        self, columns: Array, levels: slice = slice(None)
+    ) -> tuple[Array, Array]:
+        """Columns times V⁻¹, (levels, n, k), and log |V|, (levels,), of each ratio or of some."""
+        common, tails, roots, log = self._common
+        roots = roots[levels]
+        own = self.own(columns)
+        left = own - common @ (common.T @ own)
+        bent = roots.swapaxes(1, 2) @ (roots @ (tails.T @ own))
+        return self._back(left - tails @ bent), log[levels]
+
+    def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
+        """Columns times V⁻¹, and log |V|, of one ratio of the scatter between tails."""
+        level = self.tail_ratios.index(tail_ratio)
+        (product,), (log,) = self.each_precision_times(columns, slice(level, level + 1))
+        return product, float(log)
+
+    def square(self, data: Array, tail_ratio: float) -> Array:
+        """Squared length of data sets under V⁻¹."""
+        each: Array = self.squares(EffectColumns.of(data))[self.tail_ratios.index(tail_ratio)]
+        return each
+
+    def squares(self, columns: EffectColumns) -> Array:
+        """Squared length of many columns, for each ratio of the scatter between tails, (levels,
+        p).
+        """
+        common, tails, roots, _log = self._common
+        if self.correlation:
+            columns = EffectColumns.of(self.own(columns.take(np.arange(columns.p))))
+            scale = np.ones(len(self.relative))
+        else:
+            scale = 1.0 / self.relative
+        own = columns.squared_onto(scale**2)
+        own -= np.sum(columns.onto((common * scale[:, None]).T) ** 2, axis=0)
+        low = columns.onto((tails * scale[:, None]).T)
+        return np.array([own - np.sum((root @ low) ** 2, axis=0) for root in roots])
+
+
+def _by_group(group: Wholes, scatter: Array) -> Array:
+    """What the rows of each group have in common, one column each."""
+    return np.asarray(scatter[:, None] * (group[:, None] == np.arange(group.max() + 1)))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Least-squares fit of some columns under the noise model.
+
+    Attributes
+    ----------
+    values, errors : ndarray, shape (k,)
+        Parameters, and their standard errors.
+    log_likelihood : float
+        Profiled over scale and scatter between tails. [1]
+    tail_ratio : float
+        Scatter between tails over scatter of a row. [1]
+    scale : float
+        Common standard deviation. [in]
+    """
+
+    values: Array
+    errors: Array
+    log_likelihood: float
+    tail_ratio: float
+    scale: float
+
+
+def shrunk(
+    noise: NoiseModel, free: Array, columns: Array, covariance: Array, data: Array
+) -> tuple[Array, Array]:
+    """Fit free columns, and columns whose values are known beforehand to a covariance: values, and
+    their covariance.
+    """
+    both = np.hstack([free, columns])
+    scale = noise.scale_in
+    product, _log = noise.precision_times(np.column_stack([both, data]), noise.tail_ratios[-1])
+    inner = both.T @ product[:, :-1] / scale**2
+    k = free.shape[1]
+    inner[k:, k:] += np.linalg.inv(covariance)
+    inverse = np.linalg.pinv(inner)
+    return inverse @ (both.T @ product[:, -1]) / scale**2, np.asarray(inverse, float)
+
+
+def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
+    """Fit columns to one data set, scale and tail scatter included."""
+    n = len(data) - noise.absorbed
+    k = columns.shape[1]
+    best: Fit | None = None
+    every, determinants = noise.each_precision_times(np.column_stack([columns, data]))
+    levels = zip(noise.tail_levels, every, determinants.tolist(), strict=True)
+    for (ratio, chance), product, log_determinant in levels:
+        inner = columns.T @ product[:, :k]
+        inverse = np.linalg.pinv(inner)
+        values = inverse @ (columns.T @ product[:, k])
+        rest = float(noise.floored(data @ product[:, k] - values @ inner @ values))
+        likelihood = chance - 0.5 * n * np.log(rest / n) - 0.5 * log_determinant
+        if best is None or likelihood > best.log_likelihood:
+            scale = np.sqrt(rest / max(n - k, 1))
+            errors = scale * np.sqrt(np.maximum(np.diag(inverse), 0.0))
+            best = Fit(values, errors, float(likelihood), ratio, float(scale))
+    if best is None:
+        raise ValueError("no tail ratio to try")
+    return best
+
+
+_FOLDS = 10
+# Share of what a cause does that must remain in the rows it is learned from. [1]
+_LEARNED = 0.1
+
+
+def folds_of(
+    row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes
+) -> tuple[Wholes, str]:
+    """Number the fold in which each reading is held out: whole groups, or rows where a cause acts
+    in one group only.
+    """
+    if group is not None and group.max() > 0:
+        numbers = np.argsort(np.argsort(shuffled[: group.max() + 1]))
+        part = np.asarray(numbers % _FOLDS)[group[row]]
+        square = columns**2
+        least = _LEARNED * np.sum(square, axis=0)
+        learnt = [np.sum(square[part != k], axis=0) for k in range(part.max() + 1)]
+        if np.all(learnt >= least):
+            return part, "group"
+    return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
+
+
+def blocks_of(chain: Wholes, time: Array) -> Wholes:
+    """Number the fold in which each row is held out with those that it follows: whole series where
+    there are as many as folds, else as many stretches of all series together.
+    """
+    many = int(chain.max()) + 1
+    if many >= _FOLDS:
+        return chain % _FOLDS
+    place = np.empty(len(chain), np.int64)
+    place[np.lexsort((time, chain))] = np.arange(len(chain))
+    return place * _FOLDS // len(chain)
+
+
+def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bool:
+    """Tell whether the residual of held-out rows is likelier after than before, what a fold has in
+    common being noise.
+
+    Far readings decide no more than others: where noise is estimated they scatter more.
+    """
+    left = np.column_stack([before, after])
+    ratio = noise.tail_ratios[-1]
+    square = np.sum(
+        [noise.take(fold == k).square(left[fold == k], ratio) for k in np.unique(fold)], axis=0
+    )
+    return bool(square[1] < square[0])
+
+
+def held_out_part(
+    noise: NoiseModel,
+    columns: Array,
+    data: Array,
+    fold: Wholes,
+    known: tuple[Array, Array] | None,
+) -> Array:
+    """What a model explains of each row that was fitted to the rows of the other folds alone. [in]
+
+    known: further effects, shape (n, k), and the covariance of their sizes that is known
+    beforehand.
+    """
+    explained = np.zeros(len(data))
+    for k in np.unique(fold):
+        train = fold != k
+        test = fold == k
+        used = np.any(columns[train] != 0.0, axis=0)
+        held = columns[:, used]
+        part = noise.take(train)
+        if not train.any():
+            continue
+        if known is not None:
+            values, _covariance = shrunk(part, held[train], known[0][train], known[1], data[train])
+            explained[test] = np.hstack([held, known[0]])[test] @ values
+        elif used.any():
+            explained[test] = held[test] @ fit(part, held[train], data[train]).values
+    return explained

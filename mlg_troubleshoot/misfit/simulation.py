@@ -3,17 +3,27 @@
 The simulation is linearised where the likeliest of its suspects fit best; all else is the inference
 of any misfit. Smooth discrepancies that no suspect makes are its contexts: a cause must explain the
 data better than they do (Kennedy and O'Hagan 2001).
+
+What a caller can get wrong, refused with words before anything is computed.
+
+A simulation that is asked for readings: what it predicts, how its parameters move that, and the
+values with which it comes nearest to the readings.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC
 from functools import cached_property
+from inspect import signature
+from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cholesky, orth
+from scipy.optimize import least_squares
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import cdist
 from scipy.special import stdtrit
@@ -21,21 +31,311 @@ from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Wholes, numbered, rms
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.misfit import simulation_inputs as inputs
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.conclusion import Conclusion
-from mlg_troubleshoot.misfit.covariance import FAR, NoiseModel
-from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
-from mlg_troubleshoot.misfit.fitting import Fit, blocks_of, fit, folds_of, held_out_part, likelier
-from mlg_troubleshoot.misfit.posterior import posterior
-from mlg_troubleshoot.misfit.runner import Predict, Runner
+from mlg_troubleshoot.misfit.columns import (
+    FAR,
+    Fit,
+    NoiseModel,
+    blocks_of,
+    fit,
+    folds_of,
+    held_out_part,
+    likelier,
+)
+from mlg_troubleshoot.misfit.posterior import (
+    UNLISTED,
+    Context,
+    Effects,
+    Explanation,
+    Key,
+    posterior,
+)
 from mlg_troubleshoot.misfit.simulation_result import (
+    Conclusion,
     HeldOutGain,
     SimulationDiagnosis,
     Suspect,
     SuspectFound,
 )
-from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
+from mlg_troubleshoot.misfit.simulation_result import MisfitVerdict as Verdict
+
+
+def read_numbers(values: Any, name: str) -> Array:
+    """A copy of an array of numbers, NaN where it is masked."""
+    try:
+        return np.array(np.ma.array(values, float).filled(np.nan))
+    except (TypeError, ValueError) as error:
+        raise UsageError(
+            f"{name} is not an array of numbers: {error}", "give numbers, NaN where not read"
+        ) from error
+
+
+def read_measured(measured: Any) -> tuple[Array, list[str]]:
+    """Readings as (n, m), and names of their outputs if they have any."""
+    names = list(measured) if isinstance(measured, Mapping) or hasattr(measured, "columns") else []
+    data = read_numbers([measured[name] for name in names] if names else measured, "measured")
+    data = data.T if names else data[:, None] if data.ndim == 1 else data
+    if data.ndim != 2 or not data.size or np.isinf(data).any():
+        raise UsageError(
+            f"measured has shape {data.shape}, infinite readings: {np.sum(np.isinf(data))}",
+            "give one row for each row read, one column for each output, NaN where not read",
+        )
+    return data, names
+
+
+def read_covariates(covariates: Any, n: int) -> dict[str, Array]:
+    """Each covariate as a column, shape (n, 1)."""
+    columns = {name: read_numbers(covariates[name], name) for name in covariates or ()}
+    for name, values in columns.items():
+        if values.shape != (n,) or not np.isfinite(values).all():
+            raise UsageError(
+                f"covariate {name!r} has shape {values.shape} for {n} rows, or values that are not"
+                " finite",
+                "give one number for each row",
+            )
+    return {str(name): values[:, None] for name, values in columns.items()}
+
+
+def read_labels(labels: ArrayLike | None, n: int, name: str) -> Wholes:
+    """One number for each different label; one for all where there are no labels."""
+    given = np.zeros(n) if labels is None else np.asarray(labels)
+    if given.shape != (n,):
+        raise UsageError(
+            f"{name} has shape {given.shape}, there are {n} rows", "give one label for each row"
+        )
+    return numbered(given.astype(str))
+
+
+def read_times(time: ArrayLike | None, chain: Wholes) -> Array:
+    """When each row was read, in usual steps of a series; without time in the order given."""
+    given = np.arange(len(chain)) if time is None else np.asarray(time)
+    if given.dtype == object:
+        given = np.array([_without_zone(moment) for moment in given])
+    if given.dtype.kind == "M":
+        given = np.divide(given - given.min(), np.timedelta64(1, "s"))
+    when = read_numbers(given, "time")
+    if when.shape != chain.shape or not np.isfinite(when).all():
+        raise UsageError(
+            f"time has shape {when.shape} for {len(chain)} rows, or values that are not finite",
+            "give one number or one date for each row",
+        )
+    order = np.lexsort((when, chain))
+    step = np.diff(when[order])[np.diff(chain[order]) == 0]
+    if np.any(step <= 0.0):
+        raise UsageError(
+            "two rows of one series were read at the same time",
+            "give each a time of its own, or a series of its own",
+        )
+    return when / (np.median(step) if len(step) else 1.0)
+
+
+def _without_zone(moment: Any) -> Any:
+    """A date with a time zone as NumPy's in UTC."""
+    if getattr(moment, "tzinfo", None) is not None:
+        moment = moment.astimezone(UTC).replace(tzinfo=None)
+    return np.datetime64(moment) if hasattr(moment, "tzinfo") else moment
+
+
+def check_predict(predict: Callable[..., Any]) -> None:
+    """Refuse a simulation that does not take its parameters in one mapping."""
+    try:
+        signature(predict).bind({})
+    except TypeError as error:
+        raise UsageError(
+            f"the simulation cannot be called with one mapping of parameters: {error}",
+            "let it take one argument, the parameters by name: predict(p) with p['name']",
+        ) from error
+    except ValueError:
+        # What is written in C may have no signature.
+        return
+
+
+def read_declared(reading_u: ArrayLike | None, data: Array) -> Array | None:
+    """Standard uncertainty of each reading."""
+    if reading_u is None:
+        return None
+    declared = read_numbers(reading_u, "reading_u")
+    if declared.shape not in {(), data.shape[1:], data.shape} or not np.all(declared > 0.0):
+        raise UsageError(
+            f"reading_u has shape {declared.shape}, the readings have shape {data.shape};"
+            f" least value: {np.min(declared)}, not above 0",
+            "give a positive number for each output, or for each reading",
+        )
+    return np.broadcast_to(declared, data.shape)[np.isfinite(data)]
+
+
+def check_suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect], data: Array) -> None:
+    """Refuse parameters that cannot be, and more of them than readings could tell."""
+    if not suspects:
+        raise UsageError("No suspects were given", "name at least one parameter that may be wrong")
+    every = [*suspects, *nuisance]
+    for s in every:
+        if not isinstance(s, Suspect):
+            raise UsageError(
+                f"{s!r} is not a Suspect", "write Suspect(name, nominal, trial) for each parameter"
+            )
+    names = [s.name for s in every]
+    for s in every:
+        if not all(isinstance(value, Real) for value in (s.nominal, s.trial)):
+            raise UsageError(
+                f"{s.name}: nominal {s.nominal!r}, trial {s.trial!r}", "both must be numbers"
+            )
+        low, high = (-np.inf if s.low is None else s.low, np.inf if s.high is None else s.high)
+        sd = 1.0 if s.prior_sd is None else s.prior_sd
+        finite = np.isfinite([s.nominal, s.trial]).all() and s.trial
+        wrong = {
+            "is named twice": names.count(s.name) > 1,
+            f"nominal {s.nominal}, trial {s.trial}: not finite, or a trial of 0": not finite,
+            f"nominal {s.nominal} is not between low {low} and high {high}": not (
+                low <= s.nominal <= high and low < high
+            ),
+            f"prior_sd {sd} is not above 0": not sd > 0.0,
+        }
+        if any(wrong.values()):
+            says = next(text for text, is_wrong in wrong.items() if is_wrong)
+            raise UsageError(f"{s.name} {says}", "correct this suspect or nuisance parameter")
+    if np.sum(np.isfinite(data)) < len(nuisance) + 3:
+        raise UsageError(
+            f"too few readings: {np.sum(np.isfinite(data))}, nuisance parameters: {len(nuisance)}",
+            f"measure {len(nuisance) + 3} at least",
+        )
+
+
+Predict = Callable[[Mapping[str, float]], Any]
+
+# Shares of a trial by which a derivative is taken: the next one where one does nothing or fails.
+_STEPS = (0.1, 1, 0.01)
+# Central difference over forward one below which the effect is even about the value, as of a play:
+# then the forward difference stands for it.
+_EVEN = 1e-3
+
+
+class Runner:
+    """The simulation with its parameters: suspects first, then nuisance parameters.
+
+    row, output, shape (N,): place of each reading. failures: calls without a number for each
+    reading.
+    """
+
+    def __init__(
+        self,
+        predict: Predict,
+        measured: Array,
+        suspects: Sequence[Suspect],
+        channels: Sequence[str],
+    ) -> None:
+        self.predict = predict
+        self.channels = channels
+        self.shape = measured.shape
+        self.row, self.output = np.nonzero(np.isfinite(measured))
+        self.reading = measured[self.row, self.output]
+        self.suspects = suspects
+        self.names = [s.name for s in suspects]
+        numbers = [(s.nominal, s.trial, s.low, s.high) for s in suspects]
+        self.nominal, self.trial, self.low, self.high = np.array(numbers, float).T
+        self.low = np.nan_to_num(self.low, nan=-np.inf)
+        self.high = np.nan_to_num(self.high, nan=np.inf)
+        self.calls = 0
+        self.failures: list[str] = []
+        self._known: dict[bytes, Array] = {}
+
+    def call(self, values: Array) -> Array:
+        """Predict all rows and outputs, shape (n, m); NaN where the simulation has no answer.
+
+        What it raises there is an ArithmeticError, a ValueError or a RuntimeError. All else is a
+        fault in its code, or in how it is called, and is passed on.
+        """
+        parameters = dict(zip(self.names, values.tolist(), strict=True))
+        self.calls += 1
+        try:
+            predicted = self.predict(parameters)
+        except (ArithmeticError, ValueError, RuntimeError) as error:
+            self.failures.append(f"{parameters}: {error!r}")
+            return np.full(self.shape, np.nan)
+        except LookupError as error:
+            error.add_note(f"The simulation is given: {', '.join(self.names)}.")
+            raise
+        if self.channels and hasattr(predicted, "keys"):
+            for name in self.channels:
+                if name not in predicted:
+                    raise UsageError(
+                        f"The simulation returned no channel {name!r}",
+                        "name the channels of the simulation as those of the readings",
+                    )
+            predicted = np.transpose([predicted[name] for name in self.channels])
+        rows = np.array(predicted, float)
+        if rows.ndim == 1:
+            rows = rows[:, None]
+        if rows.shape != self.shape:
+            raise UsageError(
+                f"The simulation returned an array of shape {rows.shape}, the readings have"
+                f" shape {self.shape}",
+                "predict must return one row for each row read and one column for each output",
+            )
+        if not np.isfinite(rows[self.row, self.output]).all():
+            self.failures.append(f"{parameters}: not finite")
+        return rows
+
+    def at(self, values: Array) -> Array:
+        """Predict the readings, shape (N,). The same values are asked once."""
+        key = values.tobytes()
+        if key not in self._known:
+            self._known[key] = self.call(values)[self.row, self.output]
+        return self._known[key]
+
+    def columns(self, values: Array, which: Iterable[int]) -> Array:
+        """Change of the readings for a change of some parameters by their trials, shape (N, k)."""
+        return np.array([self._column(values, k) for k in which]).reshape(-1, len(self.row)).T
+
+    def _column(self, values: Array, k: int) -> Array:
+        for step in _STEPS:
+            usable = []
+            for change in (step, -step):
+                moved = values.copy()
+                moved[k] += change * self.trial[k]
+                if self.low[k] <= moved[k] <= self.high[k]:
+                    usable.append((self.at(moved) - self.at(values)) / change)
+            usable = [slope for slope in usable if np.isfinite(slope).all()]
+            if usable:
+                both = np.mean(usable, axis=0)
+                even = np.linalg.norm(both) < _EVEN * np.linalg.norm(usable[0])
+                if np.any(usable):
+                    return usable[0] if even else both
+        return np.zeros(len(self.row))
+
+    def fit(self, values: Array, chosen: list[int], white: Callable[[Array], Array]) -> Array:
+        """Fit some parameters within their bounds by least squares: all values.
+
+        white: makes columns of readings independent and of unit scatter.
+        """
+
+        def there(some: Array) -> Array:
+            moved = values.copy()
+            moved[chosen] = some
+            return moved
+
+        if not chosen:
+            return values
+        low, high, trial = (own[chosen] for own in (self.low, self.high, self.trial))
+
+        def residual(some: Array) -> Array:
+            return white(self.reading - self.at(there(some)))
+
+        def slopes(some: Array) -> Array:
+            return np.asarray(-white(self.columns(there(some), chosen)) / trial)
+
+        found = least_squares(
+            residual,
+            values[chosen],
+            slopes,
+            (low, high),
+            x_scale=np.abs(trial),
+            ftol=1e-6,
+            max_nfev=30,
+        )
+        at_bound = np.where(found.active_mask < 0, low, high)
+        return there(np.where(found.active_mask, at_bound, found.x))
+
 
 # What is tried of a size that nobody knows, over the usual one.
 _SIZES = 3.0 ** np.arange(-1, 5)
@@ -127,13 +427,13 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
         If the arrays do not fit together, a name stands twice, a trial is 0, or the simulation
         gives no number.
     """
-    inputs.check_predict(predict)
-    data, channels = inputs.read_measured(measured)
-    inputs.check_suspects(suspects, nuisance, data)
-    declared = inputs.read_declared(reading_u, data)
-    group = inputs.read_labels(groups, len(data), "groups")
-    chain = inputs.read_labels(series, len(data), "series")
-    when = inputs.read_times(time, chain)
+    check_predict(predict)
+    data, channels = read_measured(measured)
+    check_suspects(suspects, nuisance, data)
+    declared = read_declared(reading_u, data)
+    group = read_labels(groups, len(data), "groups")
+    chain = read_labels(series, len(data), "series")
+    when = read_times(time, chain)
     if series is None and time is not None:
         raise UsageError(
             "time was given without series", "say with series= which rows follow each other"
@@ -150,7 +450,7 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     # The matrices are small: threads that wait for each other cost several times what they save.
     with threadpool_limits(1, "blas"):
         follow = None if series is None else (chain, when)
-        known = inputs.read_covariates(covariates, len(data))
+        known = read_covariates(covariates, len(data))
         study = _Study(run, len(suspects), group, follow, declared, beliefs or Beliefs(), known)
         return study.diagnosis()
 

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from mlg_troubleshoot.notebook.pictures import plot
 from mlg_troubleshoot.notebook.tables import html, store_frame, to_dict, to_frame
-from mlg_troubleshoot.reporting.picture import Picture
+from mlg_troubleshoot.reporting.publish import Picture
 
-__all__ = ["Picture", "html", "plot", "store_frame", "to_dict", "to_frame"]
+__all__ = [
+    "Picture",
+    "html",
+    "plot",
+    "store_frame",
+    "to_dict",
+    "to_frame",
+]

@@ -12,10 +12,10 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.reporting import diagnosis_figures
-from mlg_troubleshoot.reporting.fleet_figures import wear_figure
-from mlg_troubleshoot.reporting.formats import Lengths
-from mlg_troubleshoot.reporting.picture import Picture
-from mlg_troubleshoot.reporting.schematic import blank_schematic, joint_key, schematic
+from mlg_troubleshoot.reporting.figures import Lengths
+from mlg_troubleshoot.reporting.fleet_report import wear_figure
+from mlg_troubleshoot.reporting.inspection_figures import blank_schematic, joint_key, schematic
+from mlg_troubleshoot.reporting.publish import Picture
 from mlg_troubleshoot.reporting.study_figures import indices_figure
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.check import CheckResult

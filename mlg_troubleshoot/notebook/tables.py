@@ -14,9 +14,9 @@ from mlg_troubleshoot.diagnosis import Diagnosis, SimulationDiagnosis
 from mlg_troubleshoot.diagnosis.causes import Catalogue
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.gear.linkage import WorstCase
 from mlg_troubleshoot.life.folding import lives
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.records.frames import frame_of, label_of

@@ -1,8 +1,6 @@
 """What the paper prints, reproduced: its designs, statements and numbers."""
 
 __all__ = [
-    "statements",
     "study",
-    "targets",
     "verification",
 ]

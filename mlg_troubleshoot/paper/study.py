@@ -1,46 +1,405 @@
-"""The study of one gear: a design, indices of every joint, and their spread over the ensemble."""
+"""The study of one gear: a design, indices of every joint, and their spread over the ensemble.
+
+First-order indices as the paper estimates them: replicated designs, averages of ten iterations.
+
+A modified Latin hypercube (section 2.2) has n1 replicates of n2 levels. Sorted by the level of one
+joint, the n1 samples of a level share that joint's clearance while the others vary (Fig. 5a);
+exchanging one joint's clearance among them lets that joint vary while the others are fixed (Fig.
+5b).
+
+A group mean over n1 samples still carries 1/n1 of the variance within the group, so that the
+variance of the group means is too large: the plain index exceeds the true one by (1 − S)/n1 on
+average. Both columns are given. The total-order study of Fig. 5b is in
+:mod:`~mlg_troubleshoot.paper.study`.
+
+The paper-size total-order study (Fig. 5b), in blocks for any executor.
+
+Each of the n1 · n2 samples of a modified Latin hypercube keeps all joints but one while that joint
+takes the n1 clearances of its level: n1² · n2 solutions per joint. A block is a range of levels of
+one iteration. It depends on nothing but the study and its number, so that blocks computed anywhere
+and in any order add up to the same bits.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from functools import partial
+from functools import lru_cache, partial
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, Wholes, count_failed
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.amplification import Amplification, amplification
-from mlg_troubleshoot.indices.estimators import (
-    GroupIndices,
-    Indices,
-    failed_note,
-    group_indices,
-    student_half,
-)
+from mlg_troubleshoot.geometry.kernel import numba_is_installed
 from mlg_troubleshoot.indices.index_table import (
+    Amplification,
     IndexTable,
     JointIndices,
     TableGear,
+    amplification,
     rank_ranges,
     ranks,
 )
-from mlg_troubleshoot.indices.inputs import worst_directions
-from mlg_troubleshoot.indices.tensor import CORNERS, TensorIndices, order_for, tensor_indices
-from mlg_troubleshoot.outputs import SCHEMA_VERSION
-from mlg_troubleshoot.paper.replicated import (
-    ITERATIONS,
-    PAPER_DESIGNS,
-    PaperDesign,
-    central_composite,
-    replicated_first_order,
+from mlg_troubleshoot.indices.variance import (
+    CORNERS,
+    GroupIndices,
+    HeldDirections,
+    Indices,
+    Response,
+    TensorIndices,
+    failed_note,
+    group_indices,
+    order_for,
+    student_half,
+    tensor_indices,
+    worst_directions,
 )
-from mlg_troubleshoot.paper.total_order import TotalOrderStudy, total_order
-from mlg_troubleshoot.parallel import StageProgress
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
+from mlg_troubleshoot.parallel import StageProgress, map_blocks
 from mlg_troubleshoot.results import Result
+
+# Resolution V fractions of the two-level factorial: the columns whose product each further column
+# is. No word of their defining relations is shorter than five letters.
+_FRACTIONS: dict[int, tuple[int, tuple[tuple[int, ...], ...]]] = {
+    8: (6, ((0, 1, 2, 3), (0, 1, 4, 5))),
+    9: (7, ((0, 2, 3, 5, 6), (1, 2, 4, 5, 6))),
+    10: (7, ((0, 1, 2, 6), (1, 2, 3, 4), (0, 2, 3, 5))),
+}
+_FULL = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Replicated:
+    """Levels and points of a replicated design.
+
+    points, shape (n1, n_rows, n): points of the unit cube, replicate by replicate. [1] places,
+    shape (n1, n_rows, n): group of each row for each variable: rows of one group share the
+    variable's value
+      (Fig. 5a). [1]
+    """
+
+    points: Array
+    places: Wholes
+
+
+def central_composite(n: int) -> Array:
+    """Corners and axial points of the range.
+
+    The paper has 138 points in ten joints and does not say how they are made up. 128 corners are
+    the resolution V fraction 2^(10−3) of the two-level factorial; the ten points that remain are
+    taken as one axial point per joint, all others in mid-range: the first joint at its limit, the
+    second at zero, and so on. (With all ten at their limits a joint in mid-range would go with high
+    values of the others, which adds 0.004 to every first-order index.)
+
+    Returns, shape (n_corners + n, n): points of the unit cube. [1]
+    Raises `UsageError` for a number of variables without a design.
+    """
+    if not 2 <= n <= max(_FRACTIONS):
+        raise UsageError(
+            f"a central composite design in {n} variables", f"It has 2 to {max(_FRACTIONS)}."
+        )
+    base, words = (n, ()) if n <= _FULL else _FRACTIONS[n]
+    signs = np.array(list(product((-1, 1), repeat=base)))
+    generated = [np.prod(signs[:, list(word)], axis=1) for word in words]
+    corners = (np.column_stack([signs, *generated]) + 1) / 2.0
+    face = np.arange(1, n + 1) % 2
+    axial = np.where(np.eye(n, dtype=bool), face, 0.5)
+    return np.concatenate([corners, axial])
+
+
+def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> Wholes:
+    """Levels of a modified Latin hypercube: every level once in every replicate.
+
+    Returns, shape (n1, n2, n): levels from 0. [1]
+    """
+    levels = np.tile(np.arange(n2, dtype=np.int64), (n1, n, 1))
+    permuted = rng.permuted(levels, axis=2)
+    return np.ascontiguousarray(permuted.transpose(0, 2, 1))
+
+
+def middle_of_level(levels: Wholes, n2: int) -> Array:
+    """Point of the unit interval in the middle of a level. [1]"""
+    return (levels + 0.5) / n2
+
+
+def first_order_design(n: int, n1: int, n2: int, ccd: Array | None, rng: Generator) -> Replicated:
+    """Samples for the first-order index (Fig. 5a): Latin hypercube levels, composite points, or
+    both.
+
+    Every replicate holds all composite points. Points that share a joint's clearance are put in its
+    groups in an order of their own in every replicate, so that the others vary within a group.
+
+    ccd, shape (n_ccd, n): composite points added to every replicate. [1]
+    """
+    levels = replicated_levels(n, n1, n2, rng)
+    points = middle_of_level(levels, max(n2, 1))
+    places = levels
+    if ccd is not None:
+        tie = rng.random((n1, len(ccd), n))
+        composite = np.broadcast_to(ccd, tie.shape)
+        order = np.lexsort((tie, composite), axis=1)
+        groups = np.empty_like(order)
+        ranks = np.arange(len(ccd))[None, :, None]
+        np.put_along_axis(groups, order, ranks, axis=1)
+        points = np.concatenate([points, composite], axis=1)
+        places = np.concatenate([places, groups + n2], axis=1)
+    return Replicated(points, places)
+
+
+@dataclass(frozen=True, slots=True)
+class PaperDesign:
+    """A replicated design of section 4.3.
+
+    n1: repetitions at each level.
+    n2: latin hypercube levels.
+    n_ccd: composite points.
+    """
+
+    name: str
+    n1: int
+    n2: int
+    n_ccd: int
+
+
+PAPER_DESIGNS: dict[str, PaperDesign] = {
+    "lhs": PaperDesign("lhs", 100, 1000, 0),
+    "lhs+ccd": PaperDesign("lhs+ccd", 100, 862, 138),
+    "ccd": PaperDesign("ccd", 100, 0, 138),
+}
+ITERATIONS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class ReplicatedIndices:
+    """First-order indices of a replicated design, averaged over iterations.
+
+    plain, corrected, shape (n,): mean index over the iterations, as the paper has it and freed of
+    its bias. [1] scatter, shape (n,): standard deviation of one iteration's index. [1] evaluations,
+    failed: solutions of the linkage, and those that did not close: one makes its iteration NaN.
+    """
+
+    design: PaperDesign
+    seed: int
+    plain: Array
+    corrected: Array
+    scatter: Array
+    evaluations: int
+    failed: int
+
+
+def bias_corrected(plain: Array, n1: int) -> Array:
+    """Free a plain replicated-design index of its bias (1 − S)/n1.
+
+    n1: samples in a group.
+    """
+    return (plain - 1.0 / n1) / (1.0 - 1.0 / n1)
+
+
+def replicated_first_order(
+    response: Response,
+    n: int,
+    design: PaperDesign,
+    seed: int,
+    iterations: int = ITERATIONS,
+    progress: Callable[[int, int], None] | None = None,
+) -> ReplicatedIndices:
+    """Estimate first-order indices (Eq. 1) with a replicated design.
+
+    response: unit cube, shape (n_points, n), to values, shape (n_points,). progress: called with
+    the iterations done and their number.
+    Raises `UsageError` if the design has fewer than two repetitions or no points.
+    """
+    if design.n1 < 2 or design.n2 + design.n_ccd < 2 or iterations < 1:
+        raise UsageError(
+            f"{iterations} iterations of a replicated design of {design.n1} × ({design.n2} +"
+            f" {design.n_ccd}) points",
+            "It has at least two repetitions, two points in each, and one iteration.",
+        )
+    ccd = central_composite(n) if design.n_ccd else None
+    found: list[Array] = []
+    evaluations = failed = 0
+    for stream in np.random.SeedSequence(seed).spawn(iterations):
+        rng = np.random.default_rng(stream)
+        rows = first_order_design(n, design.n1, design.n2, ccd, rng)
+        values = response(rows.points.reshape(-1, n))
+        values = values.reshape(design.n1, -1)
+        evaluations += values.size
+        failed += count_failed(values)
+        found.append(_group_shares(values, rows.places))
+        if progress is not None:
+            progress(len(found), iterations)
+    plain = np.array(found)
+    mean = plain.mean(axis=0)
+    scatter = plain.std(axis=0, ddof=1) if iterations > 1 else np.full(n, np.nan)
+    return ReplicatedIndices(
+        design, seed, mean, bias_corrected(mean, design.n1), scatter, evaluations, failed
+    )
+
+
+def _group_shares(values: Array, places: Wholes) -> Array:
+    """Variance of group means over the whole variance, for every variable."""
+    n1, rows, n = places.shape
+    centred = values - values.mean()
+    variance = float((centred**2).mean())
+    shares = np.empty(n)
+    for i in range(n):
+        sums = np.bincount(places[:, :, i].ravel(), centred.ravel(), rows)
+        shares[i] = (sums / n1).var() / variance
+    return shares
+
+
+# Levels of one block. Indices depend on it in their last digits: their sums are those of blocks.
+LEVELS_PER_BLOCK = 50
+
+
+class StudyBlock(NamedTuple):
+    """A range of levels of one iteration: the first and the one after the last."""
+
+    iteration: int
+    start: int
+    stop: int
+
+
+class BlockSums(NamedTuple):
+    """What a block contributes.
+
+    within, shape (n,): sum over the base samples of the variance when one joint varies. [in²]
+    total, squares: sum and sum of squares of the base samples. [in, in²]
+    """
+
+    within: Array
+    total: float
+    squares: float
+    samples: int
+    evaluations: int
+    failed: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TotalOrderStudy:
+    """Everything that a block depends on; it travels to other processes.
+
+    n1, n2: repetitions and levels; `iterations` of them are averaged.
+    """
+
+    response: HeldDirections
+    limits_in: Array
+    seed: int
+    n1: int = 100
+    n2: int = 1000
+    iterations: int = 10
+
+    def __post_init__(self) -> None:
+        if self.n1 < 2 or self.n2 < 1 or self.iterations < 1:
+            raise UsageError(
+                f"a total-order study of {self.n1} repetitions, {self.n2} levels, {self.iterations}"
+                " iterations",
+                "It has at least 2 repetitions, 1 level and 1 iteration.",
+            )
+
+    @property
+    def n(self) -> int:
+        return len(self.limits_in)
+
+    @property
+    def evaluations(self) -> int:
+        """Solutions of the linkage in the whole study: every joint's, and the base samples."""
+        return self.iterations * self.n1 * self.n2 * (self.n1 * self.n + 1)
+
+    @property
+    def blocks(self) -> tuple[StudyBlock, ...]:
+        starts = range(0, self.n2, LEVELS_PER_BLOCK)
+        return tuple(
+            StudyBlock(i, start, min(start + LEVELS_PER_BLOCK, self.n2))
+            for i in range(self.iterations)
+            for start in starts
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class TotalOrder:
+    """Total-order indices.
+
+    total_order, shape (n,): mean of the iterations. [1]
+    scatter, shape (n,): standard deviation of one iteration's index; NaN with fewer than two. [1]
+    """
+
+    total_order: Array
+    scatter: Array
+    evaluations: int
+    failed: int
+
+
+def compute_block(study: TotalOrderStudy, block: StudyBlock) -> BlockSums:
+    response = replace(study.response, compiled=numba_is_installed())
+    n = study.n
+    n1 = study.n1
+    n2 = study.n2
+    levels = _levels(n, n1, n2, study.seed, block.iteration)
+    within = np.zeros(n)
+    total = squares = 0.0
+    failed = 0
+    wide = np.empty((n, n1, n1))
+    for level in range(block.start, block.stop):
+        clearance = middle_of_level(levels[:, level, :], n2) * study.limits_in
+        base = response(clearance)
+        total += float(base.sum())
+        squares += float((base * base).sum())
+        failed += count_failed(base)
+        columns = clearance.T
+        wide[:] = columns[:, :, None]
+        for i in range(n):
+            wide[i] = columns[i][None, :]
+            values = response.by_rows(wide.reshape(n, -1)).reshape(n1, n1)
+            wide[i] = columns[i][:, None]
+            spread = values - values.mean(axis=1, keepdims=True)
+            variance = float(np.einsum("ij,ij->", spread, spread)) / (n1 - 1)
+            within[i] += variance
+            if not np.isfinite(variance):
+                failed += count_failed(values)
+    count = (block.stop - block.start) * n1
+    evaluations = count * (n1 * n + 1)
+    return BlockSums(within, total, squares, count, evaluations, failed)
+
+
+@lru_cache(maxsize=2)
+def _levels(n: int, n1: int, n2: int, seed: int, iteration: int) -> Wholes:
+    stream = np.random.SeedSequence(seed, spawn_key=(iteration,))
+    return replicated_levels(n, n1, n2, np.random.default_rng(stream))
+
+
+def total_order(
+    study: TotalOrderStudy,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> TotalOrder:
+    """Estimate total-order indices (Eq. 2) with a study of this size, here or by an executor."""
+    blocks = study.blocks
+    sums: list[BlockSums] = []
+    for block in map_blocks(partial(compute_block, study), blocks, executor):
+        sums.append(block)
+        if progress is not None:
+            progress(len(sums), len(blocks))
+    size = len(blocks) // study.iterations
+    each = np.array([_index(sums[at : at + size]) for at in range(0, len(sums), size)])
+    scatter = each.std(axis=0, ddof=1) if len(each) > 1 else np.full(study.n, np.nan)
+    evaluations = sum(block.evaluations for block in sums)
+    failed = sum(block.failed for block in sums)
+    return TotalOrder(each.mean(axis=0), scatter, evaluations, failed)
+
+
+def _index(sums: Sequence[BlockSums]) -> Array:
+    """Total-order indices of one iteration, shape (n,). [1]"""
+    within = np.sum([block.within for block in sums], axis=0)
+    total, squares, samples = np.sum([block[1:4] for block in sums], axis=0)
+    index: Array = within / samples / (squares / samples - (total / samples) ** 2)
+    return index
 
 
 class StudyDesign(StrEnum):

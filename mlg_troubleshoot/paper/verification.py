@@ -1,22 +1,157 @@
-"""Every number that the paper prints, with the value of the model."""
+"""Every number that the paper prints, with the value of the model.
+
+Printed numbers as data: what a source says about a gear, and how far the model may be from
+it.
+
+Which statements of the source hold, in which reading, and on how many of the linkages.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
+from typing import Annotated, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.datafile import (
+    LARGEST,
+    Number,
+    RefusedValueError,
+    Table,
+    Whole,
+    read_toml,
+)
 from mlg_troubleshoot.errors import GearFileError
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.indices.amplification import Amplification, amplification
-from mlg_troubleshoot.indices.inputs import HeldDirections, worst_directions
-from mlg_troubleshoot.indices.tensor import CORNERS, TensorIndices, tensor_indices
-from mlg_troubleshoot.paper.targets import Computed, Target, load_targets, targets_file
+from mlg_troubleshoot.gear.linkage import LinkageModel, worst_case
+from mlg_troubleshoot.indices.index_table import Amplification, amplification
+from mlg_troubleshoot.indices.variance import (
+    CORNERS,
+    HeldDirections,
+    TensorIndices,
+    tensor_indices,
+    worst_directions,
+)
+
+JointKey = Annotated[int, Meta(ge=0, le=LARGEST, description="the number of a joint")]
+
+
+class Target(Table):
+    """One printed number or statement: a value with its tolerance, or a limit.
+
+    measure: name of the computation that gives it.
+    over: how several joints become one number.
+    clearance_in: clearances by joint, for a case; the others are 0. [in]
+    reading: which of two readings of a statement.
+    expected: false if it is known not to hold.
+    search: true if the linkage was searched for it.
+    claim: the statement of the source that this number bears on; empty if it is a number only.
+    """
+
+    quantity: str
+    measure: str
+    printed: str
+    section: str
+    kind: Literal["fitted", "calibrated", "reproduced", "not reproduced"]
+    unit: str = ""
+    value: Number | None = None
+    tolerance: Number | None = None
+    at_least: Number | None = None
+    at_most: Number | None = None
+    joints: tuple[Whole, ...] = ()
+    over: Literal["min", "max", "sum"] = "min"
+    clearance_in: dict[JointKey, Annotated[float, Meta(ge=0, le=1)]] = msgspec.field(
+        default_factory=dict
+    )
+    reading: str = "maximum"
+    expected: bool = True
+    search: bool = False
+    claim: str = ""
+    why: str = ""
+
+    def __post_init__(self) -> None:
+        stated = [limit is not None for limit in (self.value, self.at_least, self.at_most)]
+        if sum(stated) != 1:
+            raise RefusedValueError("value", "one of value with tolerance, at_least, at_most")
+        if (self.tolerance is None) == stated[0]:
+            raise RefusedValueError(
+                "tolerance", "a number" if stated[0] else "it with a value only"
+            )
+        if not self.low < self.high:
+            raise RefusedValueError(
+                "tolerance", "a number above 0 that the value can be distinguished from"
+            )
+
+    @property
+    def low(self) -> float:
+        """The least accepted number. [unit]"""
+        if self.value is not None and self.tolerance is not None:
+            return self.value - self.tolerance
+        return -np.inf if self.at_least is None else self.at_least
+
+    @property
+    def high(self) -> float:
+        """The greatest accepted number. [unit]"""
+        if self.value is not None and self.tolerance is not None:
+            return self.value + self.tolerance
+        return np.inf if self.at_most is None else self.at_most
+
+    @property
+    def accepted(self) -> str:
+        """The accepted range in words."""
+        if self.tolerance is not None:
+            return f"± {self.tolerance:g}"
+        return f"≤ {self.at_most:g}" if self.at_least is None else f"≥ {self.at_least:g}"
+
+    def holds(self, computed: float) -> bool:
+        return self.low <= computed <= self.high
+
+
+class TargetsFile(Table):
+    """What a source says about a gear."""
+
+    schema: Literal[1]
+    gear: str
+    source: str
+    targets: tuple[Target, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Computed:
+    """A printed number and the computed one. [unit of the target]"""
+
+    target: Target
+    computed: float
+
+    @property
+    def holds(self) -> bool:
+        return self.target.holds(self.computed)
+
+    @property
+    def status(self) -> str:
+        """Fitted, calibrated, reproduced or not reproduced, as it turned out."""
+        kind = "reproduced" if self.target.kind == "not reproduced" else self.target.kind
+        return kind if self.holds else "not reproduced"
+
+
+def targets_file(gear: Gear) -> Path:
+    """Return where the targets of a gear stand: next to its gear file."""
+    return gear.path.with_name(f"{gear.path.stem}-targets.toml")
+
+
+def load_targets(path: Path) -> tuple[Target, ...]:
+    remedy = "Write one like hawker-800xp-targets.toml next to the gear file."
+    if not path.exists():
+        raise GearFileError(f"{path.name}: no printed numbers to compare with", remedy)
+    return read_toml(path, TargetsFile).content.targets
+
 
 # Strokes of a curve. [1]
 _CURVE = 401
@@ -175,3 +310,102 @@ _MEASURES: dict[str, Callable[[Facts, Target], float]] = {
     "interaction_order": _interaction_order,
     "interaction_size": lambda f, t: float(f.of(_interaction(f), t.joints).max()),
 }
+
+
+class ClaimOutcome(StrEnum):
+    HOLDS = "holds"
+    READING = "holds only under a reading"
+    SOME = "holds on some linkages"
+    FAILS = "does not hold"
+
+
+@dataclass(frozen=True, slots=True)
+class ClaimEvidence:
+    """One computed number that bears on a statement, on every linkage.
+
+    values: the number on each linkage, the reference first. [unit]
+    """
+
+    quantity: str
+    accepted: str
+    unit: str
+    values: tuple[float, ...]
+    holds: tuple[bool, ...]
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A statement of the source and what the linkages say to it.
+
+    evidence: the numbers; several if the statement has parts or readings.
+    """
+
+    claim: str
+    section: str
+    outcome: ClaimOutcome
+    linkages: tuple[str, ...]
+    evidence: tuple[ClaimEvidence, ...]
+
+    @property
+    def numbers(self) -> str:
+        """What the linkages say, in sentences: each number, where it is accepted and why it is
+        so.
+        """
+        parts = []
+        for each in self.evidence:
+            low = min(each.values)
+            high = max(each.values)
+            unit = f" {each.unit}" if each.unit else ""
+            parts.append(
+                f"{each.quantity[0].upper()}{each.quantity[1:]}: {each.values[0]:.4g}{unit} on"
+                f" {self.linkages[0]}, {low:.4g} to {high:.4g} over {len(each.values)} linkages;"
+                f" {each.accepted} on {sum(each.holds)}. {each.why}"
+            )
+        return " ".join(parts)
+
+    @property
+    def paragraph(self) -> str:
+        return f"{self.claim} (section {self.section}): {self.outcome}. {self.numbers}"
+
+
+def check_statements(
+    gear: Gear, progress: Callable[[int, int], None] | None = None
+) -> tuple[Statement, ...]:
+    """Check every statement of the targets of a gear on the reference and the whole ensemble."""
+    entries = load_targets(targets_file(gear))
+    columns: list[list[float]] = []
+    for model in gear.ensemble_models:
+        facts = Facts(gear, model)
+        columns.append([facts.measure(target) for target in entries])
+        if progress is not None:
+            progress(len(columns), len(gear.ensemble))
+    by_claim: dict[str, list[int]] = {}
+    for i, target in enumerate(entries):
+        if target.claim:
+            by_claim.setdefault(target.claim, []).append(i)
+    names = tuple(linkage.name for linkage in gear.ensemble)
+    found = []
+    for claim, places in by_claim.items():
+        evidence = tuple(
+            _evidence(entries[i], tuple(column[i] for column in columns)) for i in places
+        )
+        readings = {entries[i].reading for i in places}
+        outcome = _outcome(evidence, by_reading=len(readings) > 1)
+        section = entries[places[0]].section
+        found.append(Statement(claim, section, outcome, names, evidence))
+    return tuple(found)
+
+
+def _evidence(t: Target, values: tuple[float, ...]) -> ClaimEvidence:
+    holds = tuple(map(t.holds, values))
+    return ClaimEvidence(t.quantity, t.accepted, t.unit, values, holds, t.why)
+
+
+def _outcome(evidence: tuple[ClaimEvidence, ...], *, by_reading: bool) -> ClaimOutcome:
+    everywhere = [all(each.holds) for each in evidence]
+    if all(everywhere):
+        return ClaimOutcome.HOLDS
+    if by_reading and any(everywhere):
+        return ClaimOutcome.READING
+    return ClaimOutcome.SOME if any(any(each.holds) for each in evidence) else ClaimOutcome.FAILS

@@ -5,14 +5,14 @@ workbooks.
 from __future__ import annotations
 
 from mlg_troubleshoot.records.gate import admit, judge_again, judge_length, made_record_id
-from mlg_troubleshoot.records.model import (
+from mlg_troubleshoot.records.read import expand, read_many
+from mlg_troubleshoot.records.rows import (
     ColumnReading,
     FileRead,
     ReadOptions,
     ReadResult,
     SheetLayout,
 )
-from mlg_troubleshoot.records.read import expand, read_many
 
 __all__ = [
     "ColumnReading",
@@ -30,10 +30,8 @@ __all__ = [
     "judge_again",
     "judge_length",
     "made_record_id",
-    "model",
     "read",
     "read_many",
     "rows",
-    "template",
     "values",
 ]

@@ -26,12 +26,11 @@ from mlg_troubleshoot.decision.inspection import (
     RowSource,
 )
 from mlg_troubleshoot.errors import Problem, UsageError
-from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
+from mlg_troubleshoot.gear.gear import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.records.cells import typed
 from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.records.layout import Columns, Header
-from mlg_troubleshoot.records.model import ReadOptions, TableInHand
-from mlg_troubleshoot.records.rows import Row, RowReader
+from mlg_troubleshoot.records.rows import ReadOptions, Row, RowReader, TableInHand
 from mlg_troubleshoot.records.values import CellFaultError, read_text
 from mlg_troubleshoot.units import LengthUnit
 

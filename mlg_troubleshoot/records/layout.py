@@ -18,7 +18,16 @@ from mlg_troubleshoot.decision.columns import (
     TAIL_NO,
     Column,
 )
-from mlg_troubleshoot.records.cells import Cell, Cells, column_letters, show, writable
+from mlg_troubleshoot.records.cells import (
+    HEADER_SEARCH_ROWS,
+    Cell,
+    Cells,
+    MergedRange,
+    NumberedRow,
+    column_letters,
+    show,
+    writable,
+)
 from mlg_troubleshoot.records.headers import (
     UNKNOWN,
     Field,
@@ -31,14 +40,15 @@ from mlg_troubleshoot.records.headers import (
     suspect,
     tidy,
 )
-from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
-from mlg_troubleshoot.records.rows import PlacedField
-from mlg_troubleshoot.records.source import HEADER_SEARCH_ROWS, MergedRange, NumberedRow
-from mlg_troubleshoot.records.visits import (
+from mlg_troubleshoot.records.rows import (
     ONE_VISIT,
+    CellPlace,
     Heading,
     Kind,
     Occasion,
+    PlacedField,
+    ReadOptions,
+    TableInHand,
     take_apart,
     visits_of,
 )

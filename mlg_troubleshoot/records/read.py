@@ -14,20 +14,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, cast
 
 from mlg_troubleshoot.parallel import Progress
-from mlg_troubleshoot.records.cells import show, writable
+from mlg_troubleshoot.records.cells import (
+    FileRefusedError,
+    NumberedRow,
+    Sheet,
+    Workbook,
+    show,
+    writable,
+)
 from mlg_troubleshoot.records.csvfile import csv_book
-from mlg_troubleshoot.records.forms import Form, find_form
 from mlg_troubleshoot.records.frames import FRAME, FrameSheet, as_frame, in_frame, is_frame
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
-from mlg_troubleshoot.records.model import FileRead, ReadOptions, ReadResult
 from mlg_troubleshoot.records.row_consistency import (
     copies,
     one_aircraft,
     order_warnings,
     settle_duplicates,
 )
-from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
-from mlg_troubleshoot.records.tables import Collected, read_form, read_table
+from mlg_troubleshoot.records.rows import FileRead, ReadOptions, ReadResult
+from mlg_troubleshoot.records.tables import Collected, Form, find_form, read_form, read_table
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.records.frames import Frame

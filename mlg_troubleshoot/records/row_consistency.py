@@ -15,10 +15,9 @@ from mlg_troubleshoot.decision.inspection import (
     plain_tail,
 )
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.life.chronology import Moment, contradictions
-from mlg_troubleshoot.life.state import GearVisit
+from mlg_troubleshoot.life.state import GearVisit, Moment, contradictions
 from mlg_troubleshoot.records.cells import column_letters, quote
-from mlg_troubleshoot.records.model import SheetLayout
+from mlg_troubleshoot.records.rows import SheetLayout
 
 
 def settle_duplicates(

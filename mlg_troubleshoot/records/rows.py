@@ -1,4 +1,17 @@
-"""One data row read and checked: an inspection, or a row that says what to correct."""
+"""One data row read and checked: an inspection, or a row that says what to correct.
+
+Several columns of numbers for one joint: which hold what was found, and of which visit.
+
+A heading such as ``found``, ``actual`` or ``today`` names a reading; ``nominal``, ``limit`` or
+``last year`` a number that is given next to it. A side, a day, or ``as left`` names the visit.
+
+What goes into reading a table, and what comes out of it.
+
+Readings whose size fits another unit better: a pin hardly has less play than in new parts.
+
+A row is compared with the play of new parts that the gear file states, by the mean ratio of its
+non-zero readings. What each number costs and catches: `python -m tests.records.unit_confusions`.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +19,14 @@ import math
 import re
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import date, timedelta
-from functools import lru_cache
+from enum import StrEnum
+from functools import cache, lru_cache
 from operator import itemgetter
 from pathlib import PurePath
-from typing import Any
+from typing import Any, NamedTuple
 
 from mlg_troubleshoot.decision.columns import (
     AXIAL_FLOAT,
@@ -41,11 +55,12 @@ from mlg_troubleshoot.decision.inspection import (
     RowSource,
     Side,
 )
-from mlg_troubleshoot.gear.gauges import DEFAULT_GAUGE_U_IN
-from mlg_troubleshoot.gear.gear import ROUNDING_IN
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.gear.gear import DEFAULT_GAUGE_U_IN, ROUNDING_IN, Gear
 from mlg_troubleshoot.records.cells import (
     Cell,
     Cells,
+    FileRefusedError,
     Filled,
     OddCell,
     column_letters,
@@ -54,16 +69,15 @@ from mlg_troubleshoot.records.cells import (
     show,
     writable,
 )
-from mlg_troubleshoot.records.dates import DateOrder, readings
-from mlg_troubleshoot.records.headers import UNKNOWN, Field, Recognition, asks_outcome, suspect
-from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand
-from mlg_troubleshoot.records.source import FileRefusedError
-from mlg_troubleshoot.records.unit_fit import (
-    RowUnit,
-    UnitFit,
-    judge_unit,
-    plunger_question,
-    scale_slip,
+from mlg_troubleshoot.records.dates import DateOrder, find_day, readings
+from mlg_troubleshoot.records.headers import (
+    UNKNOWN,
+    Field,
+    Joints,
+    Recognition,
+    asks_outcome,
+    suspect,
+    tidy,
 )
 from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
@@ -81,14 +95,630 @@ from mlg_troubleshoot.records.values import (
     says_failed,
     written_number,
 )
-from mlg_troubleshoot.records.visits import ONE_VISIT, Occasion
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import (
+    MM_PER_IN,
+    SLIPS,
+    THOU_PER_IN,
     UNIT_SPELLINGS,
     ClearanceConvention,
     Length,
     LengthUnit,
     Sentence,
 )
+
+
+class Kind(StrEnum):
+    """What a heading says of the numbers below it."""
+
+    READING = "reading"
+    REFERENCE = "reference"
+    UNSAID = "unsaid"
+
+
+@dataclass(frozen=True, slots=True)
+class Occasion:
+    """Whose readings they are, as far as a heading says; the day as it is written."""
+
+    side: Side | None = None
+    day: str = ""
+    is_left: bool = False
+
+    def __str__(self) -> str:
+        """As it stands in a record id."""
+        return " ".join(filter(None, (self.side, self.day, "as left" * self.is_left)))
+
+
+ONE_VISIT = Occasion()
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """A heading taken apart; `rest` is what the words of readings and visits leave of it."""
+
+    kind: Kind
+    visit: Occasion = ONE_VISIT
+    rest: str = ""
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether nothing but a unit is left."""
+        return {*re.findall(r"[^\W_]+", self.rest)} <= _NO_MATTER
+
+    @property
+    def is_said(self) -> bool:
+        return self.kind is not Kind.UNSAID or self.visit != ONE_VISIT
+
+
+_FILLERS = "value|values|gear|side|mlg|at|on|the|of|wert|column"
+_NO_MATTER = {*UNIT_SPELLINGS, *_FILLERS.split("|")}
+
+
+def _phrases(text: str) -> re.Pattern[str]:
+    return re.compile(rf"\b(?:{text})\b")
+
+
+_LEFT = _phrases("as[ -]?left|after(?: (?:repair|work|overhaul|restoration))?|nachher")
+_READING = _phrases(
+    "(?:as[ -])?found(?: today| now)?|actual|today|now|current(?:ly)?|(?:as )?measured"
+    "|measurements?|readings?|before(?: (?:repair|work))?|ist|istwert|gefunden|gemessen|heute"
+    "|vorher|mesurée?s?|relevée?s?|results?"
+)
+# The largest of several readings is not a limit.
+_MOST = "(?:max|min)(?:imum)?"
+_REFERENCE = _phrases(
+    "(?:last|previous|prior|prev)(?: (?:year|month|time|visit|inspection|check|reading))?"
+    "|new (?:parts?|clearance|bush(?:ing)?)|(?:as|when) new|nom|nominal|neuteile?|vorjahr|ref"
+    "|reference|soll|sollwert|sollmaß|grenzwert|grenzmaß|dev|deviation|diff|difference|delta"
+    rf"|(?:{_MOST} )?(?:(?:wear|repair|service|drawing|upper|lower) )?limits?(?: {_MOST})?"
+    rf"|(?:{_MOST} )?(?:drawing|dwg|tol|tolerance|spec|specification|allow(?:ed|able)|permitted"
+    rf"|permissible)(?: {_MOST})?"
+)
+_SIDE = re.compile(r"\b(?:[lr]/?h|left|right|port|stbd|starboard)\b|^[lr]$")
+
+
+def take_apart(text: str) -> Heading:
+    """What a heading says of the numbers below it; two words that contradict say nothing."""
+    rest = re.sub(r"\s*_+\s*", " ", tidy(text))
+    day = find_day(rest)
+    rest = rest.replace(day.casefold(), " ") if day else rest
+    is_left = _LEFT.search(rest) is not None
+    rest = _LEFT.sub(" ", rest)
+    # "Reading" is part of "last reading".
+    is_reference = _REFERENCE.search(rest) is not None
+    rest = _REFERENCE.sub(" ", rest)
+    is_reading = _READING.search(rest) is not None
+    rest = _READING.sub(" ", rest)
+    sides = {Side.spelt(word) for word in _SIDE.findall(rest)}
+    rest = re.sub(
+        r"[\s(\[,;:/-]+$|^[\s)\],;:/-]+|\(\s*\)", "", " ".join(_SIDE.sub(" ", rest).split())
+    )
+    if len(sides) > 1 or is_reference + is_reading + is_left > 1:
+        return Heading(Kind.UNSAID, rest=rest)
+    kind = Kind.UNSAID
+    if is_reference:
+        kind = Kind.REFERENCE
+    elif is_reading or is_left:
+        kind = Kind.READING
+    return Heading(kind, Occasion(next(iter(sides), None), day, is_left), rest)
+
+
+def visits_of(headings: Sequence[Heading]) -> list[Occasion | None]:
+    """The visit that each of several columns of one quantity is a reading of, None for a number
+    that is only given next to it; empty where that cannot be decided.
+    """
+    read = [each for each in headings if each.kind is not Kind.REFERENCE]
+    visits = {each.visit for each in read}
+    sides = {visit.side for visit in visits}
+    is_clear = len(headings) == 1 or all(each.is_said for each in read)
+    if not read or not is_clear or len(visits) < len(read) or (None in sides and len(sides) > 1):
+        return []
+    return [None if each.kind is Kind.REFERENCE else each.visit for each in headings]
+
+
+_WORDS: Mapping[str, Callable[[str], object]] = {
+    "unit": LengthUnit.parse,
+    "convention": ClearanceConvention.parse,
+    "dates": DateOrder,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableOptions:
+    """What the user declares about tables.
+
+    Parameters
+    ----------
+    unit : LengthUnit or None
+        Unit of lengths that do not say one.
+    convention : ClearanceConvention or None
+        Convention of rows that do not say one.
+    sheet : str or None
+        Worksheet to read; ``*`` reads every sheet that holds inspections, None takes the only one.
+    column_map : mapping of str to str
+        Column by header (or by letter), for headers that are not understood: ``{"Spiel 3":
+        "clearance_3_mm"}``; the target ``carry`` lets a column travel to the report unread.
+    shared_map : mapping of str to str
+        The same for several tables: a header that is absent is not reported.
+    decimal_comma : bool
+        True if ``0,013`` means 0.013.
+    small_readings_true : bool
+        True if readings below the play of new parts were checked: they were read in the unit that
+        is stated.
+    dates : DateOrder or None
+        Order of day, month and year in dates that are written as numbers; None takes it from the
+        column.
+    side : Side or None
+        Side of every row of a table without a column of sides; None takes it from the name of the
+        sheet or the file.
+    """
+
+    unit: LengthUnit | None = None
+    convention: ClearanceConvention | None = None
+    sheet: str | None = None
+    column_map: Mapping[str, str] = field(default_factory=dict)
+    shared_map: Mapping[str, str] = field(default_factory=dict)
+    decimal_comma: bool = False
+    small_readings_true: bool = False
+    dates: DateOrder | None = None
+    side: Side | None = None
+
+    def __post_init__(self) -> None:
+        """Take a unit, a convention and an order of dates as people write them."""
+        for name, read in _WORDS.items():
+            said = getattr(self, name)
+            if isinstance(said, str):
+                object.__setattr__(self, name, read(said))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class TableResult(Result):
+    """What a task tells of the tables that it read.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    problems : tuple of Problem
+        What is wrong with the input.
+    notes : tuple of str
+        Notes on the input as a whole.
+    unread : tuple of str
+        Those of the notes that say what of the input was not read.
+    unread_files : tuple of str
+        Files that were given and hold no row that could be read.
+    inputs_sha256 : mapping of str to str
+        Hash of each input file by name.
+    """
+
+    gear: Gear
+    problems: tuple[Problem, ...] = ()
+    notes: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
+    unread_files: tuple[str, ...] = ()
+    inputs_sha256: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions(TableOptions):
+    """What is declared about tables, and what the gear says of the values in them.
+
+    joints: numbers and names of the joints, by which headers are understood.
+    clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above the one is refused,
+    above the other accepted with a warning. [in]
+    plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
+    new_part_in, limit_in: radial clearance of a new part, and the largest one allowed, by joint;
+    empty where no gear says them. [in]
+    margin_in: largest displacement that the gear allows; infinite where no gear says it. [in]
+    asks: a person is there to confirm what is unusual.
+    """
+
+    joints: Joints = field(default_factory=Joints)
+    clearance_hard_max_in: float = 0.050
+    clearance_confirm_above_in: float = 0.015
+    plunger_hard_max_in: float = 0.5
+    new_part_in: Mapping[int, float] = field(default_factory=dict)
+    limit_in: Mapping[int, float] = field(default_factory=dict)
+    margin_in: float = math.inf
+    asks: bool = False
+
+    def range_in(self, column: Column) -> tuple[float, float]:
+        """Least and largest length that a column can hold, radial. [in]"""
+        high = {
+            CLEARANCE: self.clearance_hard_max_in,
+            PLUNGER_DISPLACEMENT: self.plunger_hard_max_in,
+        }.get(column, column.high)
+        return max(column.low, -high), high
+
+    @classmethod
+    def of(cls, gear: Gear, tables: TableOptions | None = None, **declared: Any) -> ReadOptions:
+        given = (
+            {}
+            if tables is None
+            else {each.name: getattr(tables, each.name) for each in fields(TableOptions)}
+        )
+        return cls(
+            **given,
+            **declared,
+            joints=Joints.of(gear),
+            new_part_in={joint.number: joint.new_part.value for joint in gear.joints},
+            margin_in=gear.margin.value,
+            limit_in={joint.number: joint.limit.value for joint in gear.joints},
+            clearance_hard_max_in=gear.hard_limit.value,
+            clearance_confirm_above_in=gear.confirm_above.value,
+        )
+
+
+class CellPlace(NamedTuple):
+    """Where a problem stands, as far as it has a place."""
+
+    row: int | None = None
+    header: str | None = None
+    cell: str | None = None
+
+    @classmethod
+    def at(cls, row: int, index: int, header: str) -> CellPlace:
+        return cls(row, header, f"{column_letters(index)}{row}")
+
+
+NOWHERE = CellPlace()
+
+
+@dataclass(frozen=True, slots=True)
+class TableInHand:
+    """The table or form that is being read: how, where it stands, and who receives its
+    problems.
+
+    side: of every row of a table that has no column of sides.
+    """
+
+    options: ReadOptions
+    file: str | None
+    sheet: str | None
+    report: Callable[[Problem], None]
+    decimal_comma: bool
+    side: Side | None = None
+
+    def tell(
+        self, code: str, value: str | None, expected: str, remedy: str, place: CellPlace
+    ) -> None:
+        self.report(Problem(code, self.file, self.sheet, *place, value, expected, remedy))
+
+    def tell_fault(self, fault: CellFaultError, raw: Cell, place: CellPlace) -> None:
+        found = None if raw is None else quote(raw)
+        self.tell(fault.code, found, fault.expected, fault.remedy, place)
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnReading:
+    """How one column (or one line of a form) was read.
+
+    index: column, counted from 0.
+    read_as: canonical column; None for a column that is only carried.
+    row: of the value in a form; None in a table.
+    """
+
+    index: int
+    header: str
+    read_as: str | None
+    row: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SheetLayout:
+    """Where the parts of a table were found.
+
+    header_row: the lower row of the header, counted from 1.
+    """
+
+    file: str | None
+    sheet: str | None
+    kind: str
+    header_row: int
+    width: int
+    columns: tuple[ColumnReading, ...]
+
+    def index_of(self, column: str) -> int | None:
+        """Return the index of a canonical column, counted from 0; None if the table does not have
+        it.
+        """
+        return next((c.index for c in self.columns if c.read_as == column), None)
+
+
+@dataclass(frozen=True, slots=True)
+class FileRead:
+    """One file as read; a DataFrame has the labels of its rows, whatever they are."""
+
+    name: str
+    kind: str
+    sha256: str | None
+    rows: int
+    labels: Sequence[object] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ReadResult:
+    """Everything that came out of one or more files, in their order: no row is lost, each problem
+    stands once.
+
+    unread: those of the notes that say what was not read.
+    """
+
+    rows: tuple[Inspection | InvalidRow, ...]
+    problems: tuple[Problem, ...]
+    notes: tuple[str, ...] = ()
+    layouts: tuple[SheetLayout, ...] = ()
+    files: tuple[FileRead, ...] = ()
+    unread: tuple[str, ...] = ()
+    unread_sheets: tuple[str, ...] = ()
+
+    @property
+    def inputs_sha256(self) -> dict[str, str]:
+        """Hash of each file that could be opened, by its name."""
+        return {file.name: file.sha256 for file in self.files if file.sha256 is not None}
+
+    @property
+    def unread_files(self) -> tuple[str, ...]:
+        """The files that no row came from, and the sheets of others that hold inspections and were
+        left out.
+        """
+        return (*(file.name for file in self.files if not file.rows), *self.unread_sheets)
+
+    @property
+    def of_tables(self) -> dict[str, Any]:
+        """What a `TableResult` tells of what was read, by its fields."""
+        told = ("problems", "notes", "unread", "unread_files", "inputs_sha256")
+        return {name: getattr(self, name) for name in told}
+
+    @property
+    def inspections(self) -> tuple[Inspection, ...]:
+        return tuple(row for row in self.rows if isinstance(row, Inspection))
+
+
+# Below this ratio to new parts a reading is clearly too small. Inches taken for millimetres stay
+# below it unless the joints are worn beyond their limits on average (0.6 x 25.4 x 0.0005 in =
+# 0.0076 in). A row whose mean lies between this and new parts may be of a new gear, or of a gear
+# with its joints worn out on average that was read in another unit: it is asked about.
+_TOO_SMALL = 0.6
+# Fewer readings than this do not show what the others of the row were read in.
+_FEWEST = 3
+# A plunger reading in thou is asked about as one in millimetres only up to this size: above it
+# both are usual. [in]
+_PLUNGER_NEAR_ZERO_IN = 0.0025
+# No reading of a clearance is smaller. [in]
+_SMALLEST_IN = 0.0001
+CONFIRM_SMALL = "Correct the unit, or confirm the readings: yes in a column small_readings_true."
+
+
+class UnitFit(StrEnum):
+    """How the readings of a row fit the unit that is stated: what matters most stands last."""
+
+    FITS = "fits"
+    LARGE = "large"
+    DOUBTFUL = "doubtful"
+    TOO_SMALL = "too small"
+
+
+_SEVERITY = tuple(UnitFit)
+
+
+@dataclass(frozen=True, slots=True)
+class RowUnit:
+    """How the readings of a row fit their unit, the joints whose readings do not, and what to ask
+    about them.
+    """
+
+    scale: UnitFit = UnitFit.FITS
+    joints: tuple[int, ...] = ()
+    question: str = ""
+
+
+def judge_unit(
+    radial_in: Mapping[int, float],
+    entered: Mapping[int, EnteredClearance],
+    convention: ClearanceConvention,
+    options: ReadOptions,
+) -> RowUnit:
+    """Judge whether the readings of a row can have been read in the unit that is stated. [in]"""
+    read = {
+        joint: value
+        for joint, value in radial_in.items()
+        if value > 0.0 and options.new_part_in.get(joint, 0.0) > 0.0
+    }
+    units = {joint: entered[joint].unit for joint in read}
+    fits = [
+        _judge_stated(
+            {joint: value for joint, value in read.items() if units[joint] is unit},
+            unit,
+            [other for other in units.values() if other.per_inch < unit.per_inch],
+            convention,
+            options,
+            several=len(radial_in) >= _FEWEST,
+        )
+        for unit in dict.fromkeys(units.values())
+    ]
+    return max(
+        fits, key=lambda fit: (_SEVERITY.index(fit.scale), len(fit.joints)), default=RowUnit()
+    )
+
+
+def _judge_stated(
+    read: Mapping[int, float],
+    stated: LengthUnit,
+    larger: Sequence[LengthUnit],
+    convention: ClearanceConvention,
+    options: ReadOptions,
+    *,
+    several: bool,
+) -> RowUnit:
+    """Judge the readings of a row that state one unit; others of the row state larger ones. [in]
+
+    several: True if the row has enough readings, zeros included, to be asked about as a whole.
+    """
+    ratios = {joint: value / options.new_part_in[joint] for joint, value in read.items()}
+    mean = sum(ratios.values()) / len(ratios)
+    enough = len(read) >= _FEWEST
+    small = tuple(joint for joint, ratio in ratios.items() if ratio < _TOO_SMALL)
+    scale = UnitFit.FITS
+    if stated is LengthUnit.INCH:
+        # No unit is larger: single readings say nothing, a row of them may be of another
+        # convention.
+        small = small if enough and mean < _TOO_SMALL else ()
+    elif mean < _TOO_SMALL:
+        scale = UnitFit.TOO_SMALL if enough else UnitFit.DOUBTFUL
+    elif any(_plausible(tuple(read), read, stated, unit, options) for unit in larger):
+        scale = UnitFit.DOUBTFUL
+        small = tuple(read)
+    elif several and mean < 1.0 - ROUNDING_IN:
+        scale = UnitFit.DOUBTFUL
+        small = tuple(joint for joint, ratio in ratios.items() if ratio < 1.0)
+    if small:
+        return RowUnit(scale, small, _small_question(small, read, stated, convention, options))
+    over = tuple(joint for joint, value in read.items() if value > options.limit_in[joint])
+    mostly_over = sum(read.values()) > sum(options.limit_in[joint] for joint in read)
+    if stated is LengthUnit.THOU or not enough or not mostly_over:
+        return RowUnit()
+    other = LengthUnit.MILLIMETRE if stated is LengthUnit.INCH else LengthUnit.THOU
+    question = (
+        f"{_readings(over, read)} above the limit: {_asked(over)} read in {other.words}, not in"
+        f" {stated.words}?"
+    )
+    if convention is ClearanceConvention.RADIAL:
+        question += " Or is it a diametral clearance or total play, not radial (factor 2)?"
+    return RowUnit(UnitFit.LARGE, over, question)
+
+
+def plunger_question(displacement_in: float, stated: LengthUnit, options: ReadOptions) -> str:
+    """Ask about a plunger reading that would be outside the margin in a larger unit. [in]"""
+    number = stated.from_inches(displacement_in)
+    others = [
+        unit.words
+        for unit in _larger(stated)
+        if (unit is LengthUnit.INCH or abs(displacement_in) <= _PLUNGER_NEAR_ZERO_IN)
+        and options.margin_in < abs(unit.to_inches(number)) <= options.plunger_hard_max_in
+    ]
+    if not others:
+        return ""
+    confirm = "" if options.asks else f" {CONFIRM_SMALL}"
+    read = f"read in {' or '.join(others)}, not in {stated.words}"
+    return Sentence.of(
+        "the plunger reading of {} {} is {}: was it {}?{}",
+        f"{number:g}",
+        stated,
+        Length(displacement_in),
+        read,
+        confirm,
+    )
+
+
+@cache
+def _larger(stated: LengthUnit) -> list[LengthUnit]:
+    return [unit for unit in LengthUnit if unit.per_inch < stated.per_inch]
+
+
+def _small_question(
+    joints: tuple[int, ...],
+    read: Mapping[int, float],
+    stated: LengthUnit,
+    convention: ClearanceConvention,
+    options: ReadOptions,
+) -> str:
+    new_in = options.new_part_in[joints[0]] * convention.per_radial
+    below = all(read[joint] < options.new_part_in[joint] for joint in joints)
+    kind = convention.value.lower().replace("_", " ")
+    said = (
+        f"{_readings(joints, read)} {'below' if below else 'near'} the play of new parts "
+        f"({stated.from_inches(new_in):.4g} {stated} {kind})"
+    )
+    larger = _larger(stated)
+    others = [unit for unit in larger if _plausible(joints, read, stated, unit, options)] or larger
+    if others:
+        names = " or ".join(unit.words for unit in others)
+        confirm = "" if options.asks else f" {CONFIRM_SMALL}"
+        return f"{said}: {_asked(joints)} read in {names}, not in {stated.words}?{confirm}"
+    is_radial = convention is ClearanceConvention.RADIAL
+    factor = "" if is_radial else ", or is it a radial clearance (factor 2)"
+    return f"{said}: is the decimal point misplaced{factor}?"
+
+
+def _plausible(
+    joints: tuple[int, ...],
+    read: Mapping[int, float],
+    stated: LengthUnit,
+    other: LengthUnit,
+    options: ReadOptions,
+) -> bool:
+    """Whether the readings would be those of a gear, had they been read in the other unit."""
+    mean_in = other.to_inches(
+        stated.from_inches(sum(read[joint] for joint in joints) / len(joints))
+    )
+    return (
+        options.new_part_in[joints[0]] * _TOO_SMALL <= mean_in <= options.clearance_confirm_above_in
+    )
+
+
+def _readings(joints: tuple[int, ...], read: Mapping[int, float]) -> str:
+    named = ", ".join(f"#{joint}" for joint in joints)
+    if len(read) == 1:
+        return f"the reading of joint {joints[0]} is"
+    return f"{len(joints)} of {len(read)} readings ({named}) {'are' if len(joints) > 1 else 'is'}"
+
+
+def _asked(joints: tuple[int, ...]) -> str:
+    return "were they" if len(joints) > 1 else "was it"
+
+
+def scale_slip(
+    value_in: float,
+    unit: LengthUnit,
+    convention: ClearanceConvention,
+    plausible_max_in: float,
+    *,
+    halves: bool = True,
+) -> str:
+    """Name the slip of unit, decimal point or convention that would bring a value into the usual
+    range.
+    """
+    entered = unit.from_inches(value_in * convention.per_radial)
+    inches = unit is LengthUnit.INCH
+    thou = entered / THOU_PER_IN
+    ten = SLIPS["point"].factor
+    slips = (
+        (
+            inches and entered >= 1.0,
+            THOU_PER_IN,
+            f"{entered:.4g} thou would be {thou:.4g} in: was it read in thou (factor 1000)?",
+        ),
+        (
+            inches,
+            MM_PER_IN,
+            f"{entered:.4g} mm would be {entered / MM_PER_IN:.4g} in: was it read in millimetres"
+            " (factor 25.4)?",
+        ),
+        (
+            unit is LengthUnit.MILLIMETRE and entered >= 1.0,
+            THOU_PER_IN / MM_PER_IN,
+            f"{entered:.4g} thou would be {thou * MM_PER_IN:.4g} mm: was it read in thou?",
+        ),
+        (
+            halves and convention is ClearanceConvention.RADIAL,
+            SLIPS["convention"].factor,
+            "Is it a diametral clearance or total play (factor 2)? Then say so in"
+            " clearance_convention.",
+        ),
+        (
+            True,
+            ten,
+            f"Is the decimal point misplaced (factor {ten:g})? It would be {entered / ten:.4g}"
+            f" {unit.value}.",
+        ),
+    )
+    return " ".join(
+        question
+        for may_be, factor, question in slips
+        if may_be and _SMALLEST_IN <= value_in / factor <= plausible_max_in
+    )
+
 
 _REMEMBERED = 20_000
 _MISSING_CONVENTION = (

@@ -14,24 +14,22 @@ from functools import lru_cache
 import xlrd
 
 from mlg_troubleshoot.records.cells import (
+    COPY_THE_TABLE,
+    MACROS,
     MAX_COLUMNS,
     MAX_ROWS,
     Cell,
-    NumberFormat,
-    OddCell,
-    OddKind,
-    date_cell,
-)
-from mlg_troubleshoot.records.source import (
-    COPY_THE_TABLE,
-    MACROS,
     FileRefusedError,
     MergedRange,
     NumberedRow,
+    NumberFormat,
+    OddCell,
+    OddKind,
     Sheet,
     Workbook,
+    date_cell,
 )
-from mlg_troubleshoot.records.zipguard import damage, damaged, outside_limits, password_protected
+from mlg_troubleshoot.records.csvfile import damage, damaged, outside_limits, password_protected
 
 MAX_BYTES = 20_000_000
 _UTF16 = "utf-16-le"

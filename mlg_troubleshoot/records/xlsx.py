@@ -31,23 +31,21 @@ from openpyxl.worksheet._reader import (
 from openpyxl.xml.constants import SHEET_MAIN_NS
 
 from mlg_troubleshoot.records.cells import (
+    MACROS,
     MAX_COLUMNS,
     MAX_ROWS,
     NO_VALUE_TEXT,
     Cell,
+    MergedRange,
+    NumberedRow,
     NumberFormat,
     OddCell,
     OddKind,
-    iso_date_cell,
-)
-from mlg_troubleshoot.records.source import (
-    MACROS,
-    MergedRange,
-    NumberedRow,
     Sheet,
     Workbook,
+    iso_date_cell,
 )
-from mlg_troubleshoot.records.zipguard import (
+from mlg_troubleshoot.records.csvfile import (
     MAX_ITEMS,
     GuardedZip,
     Stream,

@@ -2,20 +2,15 @@
 
 __all__ = [
     "diagnosis_figures",
-    "diagnosis_lines",
     "diagnosis_report",
-    "fleet_figures",
+    "figures",
     "fleet_report",
-    "formats",
     "html",
+    "inspection_figures",
     "inspection_report",
     "json_form",
     "life_json",
     "model_json",
-    "picture",
-    "provenance",
     "publish",
-    "schematic",
     "study_figures",
-    "witness",
 ]

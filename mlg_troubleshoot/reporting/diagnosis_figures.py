@@ -1,10 +1,14 @@
 """Figures of the diagnosis report: its sign, residuals before and after, measured against
 predicted, tails.
+
+The seven lines of a diagnosis, as a person reads them on the terminal and on paper.
+
+Figures of the data of a diagnosis: the values that each technician wrote, and what is blank.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +16,198 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask
-from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, CLEARANCE, COVARIATES, TAIL_NO
-from mlg_troubleshoot.diagnosis import Candidate, Diagnosis
-from mlg_troubleshoot.reporting.diagnosis_lines import column_words
-from mlg_troubleshoot.reporting.figures import ACCENT, INK, PALE, PAPER, SOFT, Axis, Canvas, Plot
-from mlg_troubleshoot.reporting.formats import short
+from mlg_troubleshoot.decision.columns import (
+    AXIAL_FLOAT,
+    BY_NAME,
+    CLEARANCE,
+    COVARIATES,
+    LANDINGS,
+    TAIL_NO,
+    TECHNICIAN_ID,
+)
+from mlg_troubleshoot.diagnosis import Candidate, Diagnosis, NamedCause
+from mlg_troubleshoot.diagnosis.faults import DataFault
+from mlg_troubleshoot.reporting.figures import (
+    ACCENT,
+    INK,
+    PALE,
+    PAPER,
+    SOFT,
+    Axis,
+    Canvas,
+    Lengths,
+    Plot,
+    short,
+)
+from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.units import LengthUnit
+
+_WORDS = ("DATA", "MISFIT", "CAUSE", "MODEL", "GAIN", "LEFT", "DO")
+_KINDS = {
+    "mm_as_in": "millimetres entered as inches",
+    "factor_10": "misplaced decimal point",
+    "swapped_joints": "two joints swapped",
+    "implausible": "implausible",
+    "restored_joint": "joint restored between its reading and the plunger's",
+    "other_convention": "the other convention",
+}
+_CONDITIONS = {
+    "rounded": "Rounded values",
+    "censored": "Values at an end",
+    "blank_not_at_random": "Blanks not at random",
+    "copied": "Copied from the inspection before",
+    "duplicate": "Written twice",
+    "limit_written": "Limits in place of readings",
+    "selected": "Selected gears",
+    "landings_fall": "Landings that fall",
+    "identical_cells": "Identical cells",
+}
+_VARIABLES = {c.variable: c.said for c in (*COVARIATES, AXIAL_FLOAT)}
+
+
+# What is less likely than this is not worth a word, and more than so many are not read.
+_LEAST_SAID = 0.01
+_MOST_SAID = 3
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosisLine:
+    """One of the seven lines: its number, what it is about in one word, and what it says."""
+
+    number: int
+    word: str
+    text: str
+
+
+def kind_words(kind: str) -> str:
+    return _KINDS.get(kind, kind.replace("_", " "))
+
+
+def condition_words(kind: str) -> str:
+    return _CONDITIONS[kind]
+
+
+def column_words(name: str) -> str:
+    kind, _, joint = name.rpartition("_")
+    if joint.isdigit() and kind in (CLEARANCE.name, AXIAL_FLOAT.name):
+        return f"{BY_NAME[kind].said} of joint {joint}"
+    if name == "predicted":
+        return "predicted displacement"
+    return _VARIABLES.get(name, name.replace("_", " "))
+
+
+def chance_words(chance: float) -> str:
+    """Write a probability in percent, as far as it means something."""
+    if chance < 0.0005:
+        return "< 0.1 %"
+    if chance > 0.9995:
+        return "> 99.9 %"
+    return (
+        f"{100.0 * chance:.1f} %"
+        if min(chance, 1.0 - chance) < 0.0995
+        else f"{chance:.0%}".replace("%", " %")
+    )
+
+
+def name_words(cause: str) -> str:
+    """Name a cause as a person would: its identifier is for files."""
+    return cause.replace("_", " ")
+
+
+def target_words(candidate: Candidate) -> str:
+    """Name a cause with its target."""
+    return " ".join(filter(None, (name_words(candidate.cause.name), candidate.target)))
+
+
+def cause_words(cause: NamedCause) -> str:
+    candidate = cause.candidate
+    words = candidate.cause.words(candidate.target)
+    if not candidate.stands_in:
+        return words
+    needed = " and ".join(map(column_words, candidate.cause.needs)) or "every joint as read"
+    return f"{words} (not testable without {needed})"
+
+
+def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[DiagnosisLine, ...]:
+    """Say what a diagnosis found: data, misfit, cause, model, gain, residual, what to do."""
+    # Blanks of every kind break a line of the terminal, and long words where they must.
+    texts = [" ".join(text.split()) for text in _said(d, unit, *_WORDS)]
+    return tuple(
+        DiagnosisLine(k, word, text)
+        for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1)
+    )
+
+
+def headline(d: Diagnosis, unit: LengthUnit) -> str:
+    """Say the verdict of a diagnosis in one or two sentences."""
+    return next(_said(d, unit, "HEADLINE")).strip()
+
+
+def _said(d: Diagnosis, unit: LengthUnit, *parts: str) -> Iterator[str]:
+    words = {
+        "kind_words": kind_words,
+        "fitted_numbers": fitted_numbers,
+    }
+    context = {
+        **words,
+        "d": d,
+        "by_slip": by_slip,
+        "likeliest": likeliest(d),
+        "lengths": Lengths(unit),
+    }
+    said = environment().get_template("diagnosis.txt.j2").make_module(context)
+    return (str(getattr(said, part)).replace("\u200b", "") for part in parts)
+
+
+def likeliest(d: Diagnosis) -> list[tuple[str, float]]:
+    """What may be wrong and is not said already, likeliest first, each with its probability."""
+    said = {c.candidate.key for c in (*d.causes, *d.also_possible, *d.beside)}
+    found = [
+        (f"{name_words(cause)}{f' {target}' if target else ''}", chance)
+        for (cause, target), chance in d.probabilities.items()
+        if (cause, target) not in said and chance >= _LEAST_SAID
+    ]
+    return found[:_MOST_SAID]
+
+
+def by_slip(faults: Sequence[DataFault]) -> list[list[DataFault]]:
+    """Gather the cells of one entry error in a row."""
+    slips: dict[tuple[int, str], list[DataFault]] = {}
+    for fault in faults:
+        slips.setdefault((fault.row, fault.kind), []).append(fault)
+    return list(slips.values())
+
+
+def fitted_numbers(d: Diagnosis, lengths: Lengths) -> tuple[str, ...]:
+    """Write the fitted parameters of the named causes with their intervals, lengths in the reader's
+    unit.
+    """
+    parts = []
+    for c in d.causes:
+        for name, value in c.parameters.items():
+            words, _, per = name.partition("_in_per_")
+            is_length = name.endswith("_in") and not isinstance(value, str)
+
+            def said(number: float, is_length: bool = is_length) -> str:
+                return lengths.bare(number, fine=1) if is_length else f"{number:.4g}"
+
+            interval = c.interval_shown.get(name)
+            band = "" if interval is None else f" (95 % {said(interval[0])} to {said(interval[1])})"
+            unit = f" {lengths.unit}" if is_length else f" in per {per}" if per else ""
+            shown = value if isinstance(value, str) else said(value) + unit
+            parts.append(f"{name_words(words.removesuffix('_in'))} {shown}{band}")
+    return tuple(parts)
+
+
+environment().filters.update(
+    chance_words=chance_words,
+    name_words=name_words,
+    cause_words=cause_words,
+    target_words=target_words,
+    column_words=column_words,
+    condition_words=condition_words,
+)
+
 
 Texts = NDArray[np.str_]
 
@@ -360,3 +550,86 @@ def measured_against_predicted(residuals: Residuals) -> Markup:
             _point(canvas, x, 10, after=is_after)
             canvas.text(x + 7, 13.5, label, size=10)
     return canvas.svg()
+
+
+# Lines of technicians that are drawn, those who wrote most; cells of a row of blanks. [1]
+_MOST = 8
+_CELLS = 24
+
+
+def data_figures(residuals: Residuals) -> list[tuple[Markup, str]]:
+    """Draw what was written: by whom and in what steps, and which joints were not read.
+
+    Returns
+    -------
+    list of (Markup, str)
+        Figures, each with what to look for in it.
+    """
+    table = residuals.diagnosis.used
+    if not np.isfinite(table.clearance_in).any():
+        return []
+    figures = [
+        (
+            _values(residuals),
+            "How often each value was written. A comb is a step of rounding; a tall line among low"
+            " ones a limit gauge, or the end of a gauge.",
+        )
+    ]
+    if np.isnan(table.clearance_in).any():
+        figures.append(
+            (
+                _blanks(residuals),
+                "Dark: the share of clearances that are blank. Darker on the left, or from joint to"
+                " joint: blanks that depend on wear.",
+            )
+        )
+    return figures
+
+
+def _people(residuals: Residuals) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Technicians with their rows, those who wrote most; all rows where none is named."""
+    table = residuals.diagnosis.used
+    texts = table.factors.get(TECHNICIAN_ID.variable)
+    every = [("all", np.ones(len(table), bool))]
+    if texts is None:
+        return every
+    names, counts = np.unique(texts[texts != ""], return_counts=True)
+    most = sorted(names[np.argsort(-counts, kind="stable")][:_MOST].tolist())
+    return [(name, texts == name) for name in most] or every
+
+
+def _values(residuals: Residuals) -> Markup:
+    table = residuals.diagnosis.used
+    written = residuals.drawn(table.clearance_in)
+    people = _people(residuals)
+    across = Axis(f"clearance, {residuals.unit}", 0.0, float(np.nanmax(written)) or 1.0)
+    plot = lanes("Clearances as they were written", across, [name for name, _rows in people])
+    for place, (_name, rows) in enumerate(people):
+        values = written[rows]
+        found, counts = np.unique(np.round(values[np.isfinite(values)], 6), return_counts=True)
+        tops = place + 1 - 0.9 * counts / counts.max(initial=1)
+        for value, top in zip(found.tolist(), tops.tolist(), strict=True):
+            plot.canvas.line(*plot.at(value, place + 1), *plot.at(value, top))
+    return plot.canvas.svg()
+
+
+def _blanks(residuals: Residuals) -> Markup:
+    """Share of blanks of each joint, rows in the order of their landings, else as they stand."""
+    table = residuals.diagnosis.used
+    landings = table.quantities.get(LANDINGS.variable, np.full(len(table), np.nan))
+    known = bool(np.isfinite(landings).any())
+    order = np.argsort(landings, kind="stable")
+    parts = np.array_split(order, min(_CELLS, len(order)))
+    label = "rows, few landings to many" if known else "rows as they stand"
+    names = [f"#{joint}" for joint in residuals.joints]
+    plot = lanes("Blank clearances", Axis(f"{label}, %", 0.0, 100.0), names)
+    for joint in range(len(names)):
+        for place, rows in enumerate(parts):
+            share = float(np.mean(np.isnan(table.clearance_in[rows, joint])))
+            if share > 0.0:
+                grey = round(255 - 215 * share)
+                x, y = plot.at(100.0 * place / len(parts), joint + 0.1)
+                right, low = plot.at(100.0 * (place + 1) / len(parts), joint + 0.95)
+                fill = f"#{grey:02x}{grey:02x}{grey:02x}"
+                plot.canvas.rectangle(x, y, right - x, low - y, fill=fill)
+    return plot.canvas.svg()

@@ -15,20 +15,19 @@ from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import diagnosis_figures as drawn
-from mlg_troubleshoot.reporting.data_figures import data_figures
-from mlg_troubleshoot.reporting.diagnosis_figures import Residuals
-from mlg_troubleshoot.reporting.diagnosis_lines import (
+from mlg_troubleshoot.reporting.diagnosis_figures import (
+    Residuals,
     cause_words,
     column_words,
+    data_figures,
     fitted_numbers,
     headline,
     kind_words,
     name_words,
     seven_lines,
 )
-from mlg_troubleshoot.reporting.formats import Lengths, short
-from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
+from mlg_troubleshoot.reporting.figures import Lengths, short
+from mlg_troubleshoot.reporting.html import Document, ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
 

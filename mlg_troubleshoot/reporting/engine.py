@@ -1,7 +1,7 @@
 """Child process that turns HTML into PDF, and what it does to the PDF; it imports the two PDF
 libraries only.
 
-It is started by its path (see :mod:`~mlg_troubleshoot.reporting.pdf`), reads jobs from standard
+It is started by its path (see :mod:`~mlg_troubleshoot.reporting.publish`), reads jobs from standard
 input and answers each on standard output: a line of JSON, then the bytes it announces. Its
 arguments are the fonts that a document may name.
 """

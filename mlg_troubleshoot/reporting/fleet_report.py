@@ -1,29 +1,128 @@
 """The page of a fleet to hang up, and the page of one gear's life with before and after side by
 side.
+
+The figure of one gear's life: how each joint wears.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
-from mlg_troubleshoot.gear.gear import Gear
+import numpy as np
+from markupsafe import Markup
+
+from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.gear.gear import Gear, JointSpec
 from mlg_troubleshoot.life.folding import GearLife
-from mlg_troubleshoot.life.forecast import Forecast
-from mlg_troubleshoot.life.landings_left import (
+from mlg_troubleshoot.life.forecast import (
     FleetLine,
+    Forecast,
     most_urgent_first,
     outlook_sentence,
     work_sentence,
 )
 from mlg_troubleshoot.life.logbook import as_found_as_left, log_of, shortened
 from mlg_troubleshoot.life.urgency import repair_sentence
-from mlg_troubleshoot.reporting.fleet_figures import wear_figure
-from mlg_troubleshoot.reporting.formats import Lengths
-from mlg_troubleshoot.reporting.html import Document
+from mlg_troubleshoot.reporting.figures import (
+    ACCENT,
+    PALE,
+    SOFT,
+    Axis,
+    Canvas,
+    Lengths,
+    Plot,
+    Series,
+)
+from mlg_troubleshoot.reporting.html import Document, ReportProvenance, head
 from mlg_troubleshoot.reporting.life_json import life_as_json
-from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.life.folding import GearLife
+    from mlg_troubleshoot.life.forecast import Forecast, Stretch
+
+
+_RED = "#a3131a"
+_LEGEND = "● reading  ■ over its limit  ▲ restored  - - limit  ··· forecast, median; grey: 90 %"
+_PANEL_WIDE = 350
+_PANEL_HIGH = 132
+
+
+def wear_figure(life: GearLife, ahead: Forecast, gear: Gear, lengths: Lengths) -> Markup:
+    """Draw the clearance of each joint over the landings: readings, limit, restorations and, from
+    the last inspection on, the forecast with its 90 % band.
+    """
+    from mlg_troubleshoot.life.forecast import landings_of_bands, stretches
+
+    known = stretches(life, gear.joint_numbers)
+    joints = {n: own for n, own in known.items() if any(each.placed for each in own)}
+    if not joints:
+        return Markup("")
+    read = [at for own in joints.values() for each in own for at, *_ in each.placed]
+    begun = [each.begun for own in joints.values() for each in own[1:]]
+    last = max(read)
+    due = ahead.next_inspection_landings or 0.0
+    end = max(last * 1.4, last + 2.0 * due, 1.0, *begun)
+    landings = Axis("landings", min(0.0, *read, *begun), end)
+    passed = np.linspace(0.0, min(end - last, gear.horizon.value), 25)
+    canvas = Canvas(
+        2 * _PANEL_WIDE,
+        -(-len(joints) // 2) * _PANEL_HIGH + 18,
+        f"Clearance of each joint of {life.name} over landings",
+    )
+    for place, (number, between) in enumerate(joints.items()):
+        edges = ahead.bands.get(number, ())
+        expected = [np.interp(passed, landings_of_bands(gear), edge) for edge in edges]
+        forecast = np.array([last + passed, *expected])
+        _panel(canvas, place, gear.joint(number), landings, between, forecast, lengths)
+    canvas.text(52, canvas.height - 4, _LEGEND, size=9.5)
+    return canvas.svg()
+
+
+def _panel(
+    canvas: Canvas,
+    place: int,
+    joint: JointSpec,
+    landings: Axis,
+    between: Sequence[Stretch],
+    forecast: Array,
+    lengths: Lengths,
+) -> None:
+    """Draw one joint; `forecast`: landings and, where there is one, the 5, 50 and 95 % quantiles at
+    each. [landings, in]
+    """
+    shown = lengths.unit.from_inches
+    limit = shown(joint.limit.value)
+    most = max(shown(value) for each in between for _at, value, _u in each.placed)
+    x = _PANEL_WIDE * (place % 2)
+    y = _PANEL_HIGH * (place // 2)
+    plot = Plot(canvas, landings, Axis("", 0.0, 1.15 * max(limit, most)))
+    plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
+    canvas.text(x + 52, y + 13, f"{joint.label}, {lengths.unit}", bold=True)
+    at, *expected = forecast
+    if expected:
+        low, middle, high = np.minimum(np.array(expected) * shown(1.0), plot.y.high)
+        around = [*zip(at, low, strict=True), *zip(at[::-1], high[::-1], strict=True)]
+        edges = [plot.at(float(a), float(v)) for a, v in around]
+        canvas.polyline(edges, fill=PALE, colour=None, closed=True)
+        plot.draw(Series("", tuple(at), tuple(middle), "2 2", ACCENT))
+    plot.draw_axes(5)
+    plot.draw(Series("", (landings.low, landings.high), (limit, limit), "5 3", _RED))
+    new, *others = between
+    for begun in sorted({each.begun for each in others} - {new.begun}):
+        base = plot.at(begun, 0.0)
+        top_y = plot.at(begun, plot.y.high)
+        canvas.line(*base, *top_y, colour=SOFT, dash="1 3")
+        canvas.marker("triangle", *base, 4.5)
+    for each in between:
+        placed = [(at, shown(value)) for at, value, _u in each.placed]
+        usage = tuple(at for at, _ in placed)
+        values = tuple(value for _, value in placed)
+        plot.draw(Series("", usage, values))
+        for at, value in placed:
+            canvas.marker("square" if value > limit else "circle", *plot.at(at, value), 3.2)
 
 
 def fleet_document(

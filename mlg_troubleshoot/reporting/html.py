@@ -1,27 +1,184 @@
-"""Templates to HTML: one self-contained file, every value escaped."""
+"""Templates to HTML: one self-contained file, every value escaped.
+
+What a report states of the log that it was made from: paper on which a later change shows.
+
+What every document has: title, footer, disclaimer, assumptions, and where it comes from.
+"""
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import os
 import re
+import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from functools import cache, partial
+from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
 
+import msgspec
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context, select_autoescape
 from jinja2.runtime import Context
 from markupsafe import Markup
 
-from mlg_troubleshoot.errors import OutputError, grouped
-from mlg_troubleshoot.reporting import formats
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.errors import OutputError, UsageError, grouped
+from mlg_troubleshoot.gear.gear import Gear, SourceKind
+from mlg_troubleshoot.reporting import figures as formats
+from mlg_troubleshoot.reporting.figures import Lengths
 from mlg_troubleshoot.visible import unbroken, visible
+
+# A token is letters and digits alone: it stands in HTML and in PDF as it is.
+_TOKEN = re.compile(rb"mlgwitness([0-9a-f]+)")
+# A report and what its token says. [bytes]
+_MOST_BYTES = 100_000_000
+_MOST_SAID = 10_000_000
+
+
+class ReportedGear(msgspec.Struct, frozen=True):
+    """A gear in a report: its newest record and, where the report is about what stands of it, the
+    verdict.
+    """
+
+    tail_no: str
+    side: str
+    record: str
+    verdict: str | None = None
+
+
+class Witness(msgspec.Struct, frozen=True):
+    """The log behind a report: how many records, the hash of the last one, and the gears.
+
+    extension: what a verdict of the model with an extension rests on, which the log does not hold.
+    """
+
+    count: int
+    head: str
+    program: str
+    geometry: str
+    gears: tuple[ReportedGear, ...]
+    extension: str | None = None
+
+    @property
+    def token(self) -> Markup:
+        return Markup("mlgwitness" + zlib.compress(msgspec.json.encode(self), 9).hex())
+
+
+def read_witness(file: Path) -> Witness:
+    """Read what a report in HTML or PDF states of its log."""
+    try:
+        with file.open("rb") as report:
+            found = _TOKEN.search(report.read(_MOST_BYTES))
+        if found is None:
+            raise ValueError
+        press = zlib.decompressobj()
+        said = press.decompress(bytes.fromhex(found[1].decode()), _MOST_SAID)
+        return msgspec.json.decode(said, type=Witness)
+    except OSError as error:
+        raise UsageError(
+            f"{file} cannot be read: {error.strerror}", "Give a report that mlg wrote."
+        ) from None
+    except (ValueError, zlib.error, msgspec.MsgspecError):
+        raise UsageError(
+            f"{file} states no log",
+            "Give a report of a gear that was kept: mlg check --keep --report, or mlg history"
+            " TAIL SIDE --report DIR.",
+        ) from None
+
+
+Facts = list[tuple[str, str]]
+DISCLAIMER = (
+    "Troubleshooting aid, not maintenance data.",
+    "Does not replace the maintenance manual's limits.",
+    "Within margin is not an approval for return to service.",
+    "In-plane joint clearance only: not hydraulics, friction, doors, switches or structure.",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ReportProvenance:
+    """Program, inputs and moment behind a report.
+
+    input_sha256: hash of the bytes of each input file by its name; empty for prompts and the
+    command line.
+    witness: the log that holds what is reported; None where nothing was kept.
+    """
+
+    program_version: str
+    created: datetime
+    geometry_sha256: str
+    input_sha256: Mapping[str, str] = field(default_factory=dict)
+    seed: int | None = None
+    extension: str | None = None
+    witness: Witness | None = None
+
+    def about(self, *gear: str | None) -> ReportProvenance:
+        """The provenance of the report of one gear, by tail and side, among others."""
+        if self.witness is None:
+            return self
+        own = [each for each in self.witness.gears if (each.tail_no, each.side) == gear]
+        return replace(self, witness=msgspec.structs.replace(self.witness, gears=tuple(own)))
+
+
+def provenance_of(
+    gear: Gear,
+    input_sha256: Mapping[str, str],
+    *,
+    seed: int | None = None,
+    extension: str | None = None,
+    witness: Witness | None = None,
+) -> ReportProvenance:
+    made = program_version(), moment_of_report(), gear.geometry_sha256
+    return ReportProvenance(*made, dict(input_sha256), seed, extension, witness)
+
+
+@cache
+def program_version() -> str:
+    return version("mlg-troubleshoot")
+
+
+def moment_of_report() -> datetime:
+    """Return the present moment, or the one of ``SOURCE_DATE_EPOCH`` where a report must be the
+    same bytes again.
+    """
+    given = os.environ.get("SOURCE_DATE_EPOCH")
+    if given is None:
+        return datetime.now(UTC).astimezone()
+    try:
+        return datetime.fromtimestamp(int(given), UTC)
+    except (ValueError, OverflowError, OSError):
+        raise UsageError(
+            f"SOURCE_DATE_EPOCH is {given!r}",
+            "Set it to seconds since 1970-01-01 UTC, or leave it out.",
+        ) from None
+
+
+def head(
+    title: str, footer: str, gear: Gear, provenance: ReportProvenance, lengths: Lengths
+) -> dict[str, Any]:
+    """Return what the base template shows; the caller adds its own and may replace any of it."""
+    return {
+        "title": title,
+        "footer_left": footer,
+        "disclaimer": DISCLAIMER,
+        "source_counts": [
+            (sum(n.kind is kind for n in gear.numbers), kind.value) for kind in SourceKind
+        ],
+        "limits_of": sorted({(j.limit.value, j.limit.kind, j.limit.source) for j in gear.joints}),
+        "alike": [
+            " = ".join(map("#{}".format, pair)) for pair in gear.link_groups if len(pair) > 1
+        ],
+        "made": provenance,
+        "lengths": lengths,
+        "unit": lengths.unit.value,
+        "gear": gear,
+    }
+
 
 FONT_FILES = {"normal": "fonts/DejaVuSans.ttf", "bold": "fonts/DejaVuSans-Bold.ttf"}
 _LONGEST_WORD = 64

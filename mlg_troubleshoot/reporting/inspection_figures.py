@@ -1,15 +1,344 @@
-"""The figure of the inspection report: the margin gauge."""
+"""The figure of the inspection report: the margin gauge.
+
+The linkage drawn in its planes: joints numbered in place, distinguished by shape, clearances
+exaggerated; a table next to the drawing names them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import cmath
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal, Unpack
 
+import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.decision.assessment import Assessment
+from mlg_troubleshoot.gear.gear import Gear, JointSpec
+from mlg_troubleshoot.geometry.mechanism import (
+    Dyad,
+    Lever,
+    Mechanism,
+    Slot,
+    needs,
+)
 from mlg_troubleshoot.reporting import figures
-from mlg_troubleshoot.reporting.figures import INK, PALE, SOFT, Canvas, Marker
-from mlg_troubleshoot.reporting.formats import Lengths
+from mlg_troubleshoot.reporting.figures import (
+    INK,
+    PALE,
+    PAPER,
+    RULE,
+    SOFT,
+    TEXT_SIZE,
+    Anchor,
+    Canvas,
+    Lengths,
+    Marker,
+    Stroke,
+    text_width,
+)
+
+JointState = Literal["over", "fine", "missing"]
+JOINT_STATES: dict[JointState, str] = {
+    "over": "over its limit",
+    "fine": "within its limit",
+    "missing": "not measured",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Schematic:
+    """The linkage drawn in its planes, all at one scale.
+
+    panels: name of each plane, its drawing and the drawing's width [canvas units]. exaggeration:
+    how many times larger than life the virtual links are drawn; None without any.
+    """
+
+    panels: tuple[tuple[str, Markup, float], ...]
+    exaggeration: int | None
+
+
+# Lengths of the drawing: its width, half of a joint's marker, the longest and the shortest arrow of
+# a virtual link. [px]
+_WIDTH = 690
+_MARKER = 9.5
+_LONGEST_ARROW = 42
+_SHORTEST_ARROW = 2.5
+# One scale for most reports, so that their drawings compare.
+_LARGEST_EXAGGERATION = 100
+# Room for supports and the slot above and below the linkage. [px]
+_ABOVE = 44
+_BELOW = 40
+
+# Points and directions of a drawing are complex numbers: x to the right, y downward. [canvas units]
+
+
+def schematic(gear: Gear, assessment: Assessment, width: float = _WIDTH) -> Schematic:
+    """Draw the linkage at mid-position, its joints numbered in place and their clearances
+    exaggerated.
+    """
+    over = (assessment.over_travel_in or 0.0) >= -(assessment.under_travel_in or 0.0)
+    directions = assessment.over_directions_rad if over else assessment.under_directions_rad
+    return _drawn(gear, assessment.inspection.clearance_in, directions, width)
+
+
+def blank_schematic(gear: Gear) -> Schematic:
+    """Draw the linkage with its joints numbered, none of them measured yet."""
+    return _drawn(gear, {}, (), _WIDTH)
+
+
+def joint_key(gear: Gear, clearance_in: Mapping[int, float], lengths: Lengths) -> Markup:
+    """List the joints by their marks with names and clearances, for a drawing without a table."""
+    lines = []
+    for joint in gear.joints:
+        clearance = clearance_in.get(joint.number)
+        state = joint_state(joint, clearance)
+        said = "" if clearance is None else f", {lengths.full(clearance)}"
+        over = ", OVER LIMIT" if state == "over" else ""
+        lines.append((joint, state, joint.name + said + over))
+    width = 34 + max(text_width(line, TEXT_SIZE) for _, _, line in lines)
+    canvas = Canvas(width, 4 + 21 * len(lines), "Joints")
+    for row, (joint, state, line) in enumerate(lines):
+        y = 12 + 21 * row
+        _mark(canvas, complex(12, y), str(joint.number), state)
+        canvas.text(28, y + 4, line, bold=state == "over")
+    return canvas.svg("figure")
+
+
+def _drawn(
+    gear: Gear, clearance_in: Mapping[int, float], directions: Sequence[float], width: float
+) -> Schematic:
+    planes = (_PlaneDrawing(gear, plane.name) for plane in gear.reference.mechanism.planes)
+    drawings = [drawing for drawing in planes if drawing.points]
+    gap = 6.0
+    side = 74.0
+    free = width - gap * (len(drawings) - 1) - 2 * side * len(drawings)
+    scale = free / sum(drawing.size.real for drawing in drawings)
+    largest = max(clearance_in.values(), default=0.0)
+    exaggeration = None
+    links: dict[int, complex] = {}
+    if largest > 0.0 and directions:
+        exaggeration = min(_LARGEST_EXAGGERATION, _one_digit(_LONGEST_ARROW / (largest * scale)))
+        for joint, angle in zip(gear.joint_numbers, directions, strict=True):
+            length = clearance_in.get(joint, 0.0) * exaggeration * scale
+            if length > _SHORTEST_ARROW:
+                links[joint] = cmath.rect(length, -angle)
+    height = max(drawing.size.imag for drawing in drawings) * scale + _ABOVE + _BELOW
+    states = {j.number: joint_state(j, clearance_in.get(j.number)) for j in gear.joints}
+    panels = (drawing.draw(scale, side, height, states, links) for drawing in drawings)
+    return Schematic(tuple(panels), exaggeration)
+
+
+def _one_digit(value: float) -> int:
+    """Round down to one significant digit, at least 1."""
+    if value < 1.0:
+        return 1
+    power = 10 ** math.floor(math.log10(value))
+    return int(value // power * power)
+
+
+class _PlaneDrawing:
+    """One plane of the mechanism: its points, the links between them, and how they are drawn."""
+
+    def __init__(self, gear: Gear, plane: str) -> None:
+        self.gear = gear
+        self.plane = plane
+        self.mechanism: Mechanism = gear.reference.mechanism
+        steps = self.mechanism.steps
+        self.steps = [s for s in steps if self.mechanism.point(s.joint).plane == plane]
+        # Points of another plane are drawn where they stand above this one.
+        origin, axes = self.mechanism.frame(plane)
+        self.points: dict[str, complex] = {}
+        names = {name for step in self.steps for name in (step.joint, *needs(step))}
+        for name in sorted(names):
+            offset = self.mechanism.reference_in_space(name) - origin
+            self.points[name] = complex(offset @ axes[0], offset @ axes[1])
+        driven = [s for s in self.steps if isinstance(s, Dyad) and s.driven]
+        self.cut = {s.upstream: s.joint for s in driven}
+        self._shorten()
+        places = self.points.values()
+        if places:
+            low, high = (
+                complex(end(p.real for p in places), end(p.imag for p in places))
+                for end in (min, max)
+            )
+            self.low = low
+            self.size = high - low
+
+    def _shorten(self) -> None:
+        """Draw only the near end of the actuator: its anchor lies far from everything else."""
+        others = np.array([p for name, p in self.points.items() if name not in self.cut])
+        if not others.size:
+            return
+        span = max(np.ptp(others.real), np.ptp(others.imag))
+        for anchor, joint in self.cut.items():
+            run = self.points[anchor] - self.points[joint]
+            share = min(1.0, 0.34 * span / abs(run))
+            self.points[anchor] = self.points[joint] + share * run
+
+    def draw(
+        self,
+        scale: float,
+        side: float,
+        height: float,
+        states: Mapping[int, JointState],
+        links: Mapping[int, complex],
+    ) -> tuple[str, Markup, float]:
+        """Draw the plane: rigid parts and supports, then joints with their virtual links [canvas
+        units].
+        """
+        width = self.size.real * scale + 2 * side
+        name = self.plane.replace("_", " ") + " plane"
+        joints = [j for j in self.gear.joints if j.point in self.points]
+        said = ", ".join(f"joint {j.number} {JOINT_STATES[states[j.number]]}" for j in joints)
+        canvas = Canvas(width, height, f"Linkage schematic, {name}", said)
+        # Upward in the plane is to lower numbers on the canvas.
+        corner = complex(side, (height + _ABOVE - _BELOW + self.size.imag * scale) / 2)
+        at = {
+            name: corner + scale * (point - self.low).conjugate()
+            for name, point in self.points.items()
+        }
+
+        canvas.text(2, 11, name, size=10.5, bold=True, colour=SOFT)
+        self._parts(canvas, at)
+        for point, place in at.items():
+            if self.mechanism.point(point).fixed and point not in self.cut:
+                _polygon(canvas, place, place + (12 + 19j), place + (-12 + 19j), fill=PAPER)
+            if all(joint.point != point for joint in joints):
+                canvas.marker("circle", place.real, place.imag, 3.0)
+        markers = _without_overlap({j.number: at[j.point] for j in joints})
+        # Those of another plane first: nothing of theirs may cover this one's.
+        for joint in sorted(joints, key=self._stands_here):
+            number = joint.number
+            place = at[joint.point]
+            marker = markers[number]
+            here = self._stands_here(joint)
+            if here and number in links:
+                along = links[number]
+                start = place + _MARKER * _unit(along)
+                _arrow(canvas, start, start + along)
+            if here and marker != place:
+                _line(canvas, place, marker, colour=SOFT, width=1.2)
+                canvas.marker("circle", place.real, place.imag, 2.5)
+            _mark(canvas, marker, str(number), states[number], faded=not here)
+        return name, canvas.svg("figure panel"), width
+
+    def _stands_here(self, joint: JointSpec) -> bool:
+        return self.mechanism.point(joint.point).plane == self.plane
+
+    def _parts(self, canvas: Canvas, at: Mapping[str, complex]) -> None:
+        """Draw rigid parts as plates, links as bars above them; name what moves the linkage and
+        what it moves.
+        """
+        plates: list[set[str]] = []
+        for step in sorted(self.steps, key=lambda step: not isinstance(step, (Lever, Slot))):
+            place = at[step.joint]
+            if isinstance(step, (Lever, Slot)):
+                plates.append({step.joint, *needs(step)})
+                _polygon(
+                    canvas,
+                    place,
+                    *map(at.__getitem__, needs(step)),
+                    fill=PALE,
+                    colour=RULE,
+                    width=3,
+                )
+                continue
+            for name in needs(step):
+                # Two points of a plate need no bar.
+                if not any({step.joint, name} <= plate for plate in plates):
+                    _line(canvas, place, at[name], width=6, cap="round")
+                    _line(canvas, place, at[name], width=3, cap="round", colour=PAPER)
+        named = dict.fromkeys(self.cut, "actuator") | {self.mechanism.output.joint: "output"}
+        for point, name in named.items():
+            if point in at:
+                left = at[point].real < canvas.width / 2
+                x = at[point].real + (-14 if left else 14)
+                end: Anchor = "end" if left else "start"
+                canvas.text(x, at[point].imag + 4, name, size=9, colour=SOFT, anchor=end)
+
+
+def _without_overlap(markers: Mapping[int, complex]) -> dict[int, complex]:
+    """Places of the joints' markers: at the joints, or next to them where two would overlap."""
+    places = dict(markers)
+    least = 2.0 * _MARKER + 2.0
+    for _ in range(30):
+        moved = False
+        for one, other in combinations(sorted(places), 2):
+            apart = places[other] - places[one]
+            if abs(apart) < least - 1e-6:
+                direction = _unit(apart) if abs(apart) > 1e-6 else 1.0
+                push = (least - abs(apart)) / 2 * direction
+                places[one] -= push
+                places[other] += push
+                moved = True
+        if not moved:
+            break
+    return places
+
+
+def _unit(run: complex) -> complex:
+    return run / (abs(run) or 1.0)
+
+
+def _line(canvas: Canvas, start: complex, end: complex, **stroke: Unpack[Stroke]) -> None:
+    canvas.line(start.real, start.imag, end.real, end.imag, **stroke)
+
+
+def _polygon(canvas: Canvas, *corners: complex, fill: str, **stroke: Unpack[Stroke]) -> None:
+    canvas.polyline([(p.real, p.imag) for p in corners], fill=fill, closed=True, **stroke)
+
+
+def joint_state(joint: JointSpec, clearance_in: float | None) -> JointState:
+    if clearance_in is None:
+        return "missing"
+    return "over" if joint.is_over_limit(clearance_in) else "fine"
+
+
+def _mark(canvas: Canvas, at: complex, text: str, state: str, faded: bool = False) -> None:
+    missing = state == "missing"
+    pale = missing or faded
+    colour = SOFT if pale else INK
+    if state == "over":
+        canvas.marker("square", at.real, at.imag, _MARKER, colour=colour)
+    else:
+        canvas.add(
+            "circle",
+            cx=at.real,
+            cy=at.imag,
+            r=_MARKER,
+            fill=PAPER,
+            stroke=colour,
+            stroke_width=1.3 if pale else 2.2,
+            stroke_dasharray="3 2.2" if missing else None,
+        )
+    ink = PAPER if state == "over" else colour
+    canvas.text(at.real, at.imag + 4, text, bold=not missing, colour=ink, anchor="middle")
+
+
+def joint_mark(text: str, state: JointState) -> Markup:
+    words = JOINT_STATES[state]
+    canvas = Canvas(22, 22, f"joint {text}, {words}" if text else words)
+    _mark(canvas, 11 + 11j, text, state)
+    return canvas.svg("mark")
+
+
+def _arrow(canvas: Canvas, start: complex, end: complex) -> None:
+    along = _unit(end - start)
+    base = end - min(8.0, abs(end - start)) * along
+    _line(canvas, start, end, colour=PAPER, width=5.5)
+    _line(canvas, start, base, width=2.4)
+    _polygon(
+        canvas,
+        end,
+        base + 4.2j * along,
+        base - 4.2j * along,
+        fill=INK,
+        width=0.5,
+    )
 
 
 def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:

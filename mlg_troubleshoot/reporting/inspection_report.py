@@ -11,10 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected, Step
 from mlg_troubleshoot.decision.inspection import Outcome, RowSource, Side
-from mlg_troubleshoot.decision.plan import Step
-from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear, listed
+from mlg_troubleshoot.decision.judge_rows import WORST_FIRST, latest_of_each_gear, listed
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
     no_repair_set,
@@ -23,19 +22,24 @@ from mlg_troubleshoot.decision.sentences import (
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.reporting.formats import Lengths, short
-from mlg_troubleshoot.reporting.html import Document, render
-from mlg_troubleshoot.reporting.inspection_figures import margin_gauge
-from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
-from mlg_troubleshoot.reporting.provenance import Facts, ReportProvenance, head, provenance_of
-from mlg_troubleshoot.reporting.publish import safe_stem
-from mlg_troubleshoot.reporting.schematic import (
+from mlg_troubleshoot.reporting.figures import Lengths, short
+from mlg_troubleshoot.reporting.html import (
+    Document,
+    Facts,
+    ReportProvenance,
+    head,
+    provenance_of,
+    render,
+)
+from mlg_troubleshoot.reporting.inspection_figures import (
     JOINT_STATES,
     blank_schematic,
     joint_mark,
     joint_state,
+    margin_gauge,
     schematic,
 )
+from mlg_troubleshoot.reporting.publish import PdfEngine, PdfError, safe_stem
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:

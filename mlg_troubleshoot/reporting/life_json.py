@@ -10,15 +10,15 @@ from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.json_outputs import FleetGear, FleetOutput, LifeEvent, LifeOutput
 from mlg_troubleshoot.life.folding import GearLife
-from mlg_troubleshoot.life.forecast import Forecast
-from mlg_troubleshoot.life.landings_left import (
+from mlg_troubleshoot.life.forecast import (
     FleetLine,
+    Forecast,
     most_urgent_first,
     parts_within,
+    stretches,
     work_sentence,
 )
 from mlg_troubleshoot.life.logbook import log_of
-from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.reporting.json_form import filled, written
 
 

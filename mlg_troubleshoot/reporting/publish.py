@@ -1,21 +1,140 @@
-"""Documents to files: HTML always, PDF where the engine can."""
+"""Documents to files: HTML always, PDF where the engine can.
+
+HTML to PDF in a child process with a time limit, with a check that the fonts are inside.
+
+A figure of the reports as an object of its own: shown in a notebook, saved as a file.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import html as html_text
+import importlib.util
+import json
 import os
 import re
+import subprocess
+import sys
+import threading
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
-from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.reporting.html import Document, render
-from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
+from markupsafe import Markup, escape
+
+from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.outputs import write_bytes, write_text
+from mlg_troubleshoot.reporting.html import FONT_FILES, Document, render, templates_folder
+
+# A page takes 0.03 to 0.1 s: what takes longer than this does not end. [s]
+TIME_LIMIT_S = 30
+
+
+class PdfError(Exception):
+    """A PDF that could not be made, or that must not be handed out; its text is meant for the
+    user.
+    """
+
+
+def engine_is_installed() -> bool:
+    return importlib.util.find_spec("plutoprint") is not None
+
+
+class PdfEngine:
+    """One child process that makes PDFs, started at the first job and again after it had to be
+    stopped.
+    """
+
+    def __init__(self, time_limit_s: float = TIME_LIMIT_S) -> None:
+        self.time_limit_s = time_limit_s
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def close(self) -> None:
+        process = self._process
+        self._process = None
+        if process is None:
+            return
+        process.kill()
+        process.communicate()
+
+    def start(self) -> subprocess.Popen[bytes]:
+        """Start the child process if it is not running, so that it is ready when the first job
+        comes.
+        """
+        if not engine_is_installed():
+            raise PdfError("the PDF engine plutoprint is not installed")
+        if self._process is None or self._process.poll() is not None:
+            fonts = [str(templates_folder() / name) for name in FONT_FILES.values()]
+            # -P keeps this folder off the child's module path: html.py here would shadow the
+            # standard library's.
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", str(Path(__file__).with_name("engine.py")), *fonts],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+            )
+        return self._process
+
+    def convert(self, html: str, page: str, created: datetime) -> tuple[bytes, bool]:
+        """Make one PDF; also tell whether it shows the box that stands for a character that no font
+        has.
+        """
+        body = html.encode("utf-8")
+        dated = created.astimezone(UTC).strftime("D:%Y%m%d%H%M%SZ")
+        about = {
+            "title": _found(_TITLE, html),
+            "created": dated,
+            "keywords": _found(_KEYWORDS, html),
+        }
+        job = {"length": len(body), "page": page, **about}
+        process = self.start()
+        if process.stdin is None or process.stdout is None:
+            raise PdfError("the PDF engine has no pipes")
+        stopped = threading.Event()
+
+        def stop() -> None:
+            stopped.set()
+            process.kill()
+
+        timer = threading.Timer(self.time_limit_s, stop)
+        timer.start()
+        try:
+            process.stdin.write(json.dumps(job).encode("ascii") + b"\n" + body)
+            process.stdin.flush()
+            line = process.stdout.readline()
+            answer: dict[str, Any] = (
+                json.loads(line) if line else {"error": "it ended without an answer", "length": 0}
+            )
+            made = process.stdout.read(answer["length"])
+        except (BrokenPipeError, ConnectionResetError, OSError) as error:
+            answer = {"error": str(error), "length": 0}
+            made = b""
+        finally:
+            timer.cancel()
+        if stopped.is_set():
+            self.close()
+            raise PdfError(
+                f"the PDF engine was stopped: it took longer than {self.time_limit_s:g} s"
+            )
+        if answer["error"] is not None:
+            self.close()
+            raise PdfError(f"the PDF engine failed: {answer['error']}")
+        return made, bool(answer["boxes"])
+
+
+_TITLE = re.compile(r"<title>(.*?)</title>", re.DOTALL)
+_KEYWORDS = re.compile(r'<meta name="keywords" content="(\w+)">')
+
+
+def _found(pattern: re.Pattern[str], html: str) -> str:
+    found = pattern.search(html)
+    return html_text.unescape(found[1]).strip() if found else ""
+
 
 FORMATS = ("html", "pdf")
 PAGES = ("A4", "Letter")
@@ -129,3 +248,83 @@ def _written(
         return WrittenReport(None, paper, ())
     write_bytes(web, render(document, page).encode("utf-8"))
     return WrittenReport(web, paper, tuple(notes))
+
+
+_FONT = "DejaVu Sans, Verdana, sans-serif"
+# Between two drawings of one picture. [px]
+_GAP = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture, as text of an SVG file.
+
+    Parameters
+    ----------
+    title : str
+        What it shows.
+    svg : str
+        The text of the file.
+    width, height : float
+        Its size. [px]
+    """
+
+    title: str
+    svg: str
+    width: float
+    height: float
+
+    @classmethod
+    def of(cls, title: str, *drawings: Markup) -> Picture:
+        """Put figures of a report side by side."""
+        x = height = 0.0
+        placed = []
+        for drawing in drawings:
+            wide, high = (float(_attribute(drawing, name)) for name in ("width", "height"))
+            placed.append(drawing.replace("<svg ", Markup(f'<svg x="{x:g}" '), 1))
+            x = x + wide + _GAP
+            height = max(height, high)
+        width = x - _GAP
+        svg = (
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
+            f'width="{width:g}" height="{height:g}" font-family="{_FONT}" role="img">'
+            f"<title>{escape(title)}</title>{''.join(placed)}</svg>"
+        )
+        return cls(title, svg, width, height)
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+    def __repr__(self) -> str:
+        return f"Picture({self.title!r}, {self.width:.0f} × {self.height:.0f})"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the picture as SVG.
+
+        Parameters
+        ----------
+        file : str or Path
+            A name that ends in .svg.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written, or the name ends otherwise.
+        """
+        path = Path(file)
+        if path.suffix.lower() != ".svg":
+            raise OutputError(
+                f"a picture cannot be written as {path.name!r}",
+                "Give a name that ends in .svg; a browser prints it.",
+            )
+        write_text(path, self.svg)
+        return path
+
+
+def _attribute(drawing: str, name: str) -> str:
+    return drawing.partition(f' {name}="')[2].partition('"')[0]

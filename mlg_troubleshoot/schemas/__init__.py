@@ -72,8 +72,8 @@ def _kinds(name: str) -> list[Any]:
         from mlg_troubleshoot.diagnosis.extension import ExtensionFile
         from mlg_troubleshoot.gear.gear_tables import EnsembleFile, GearFile
         from mlg_troubleshoot.indices.index_table import IndexTable
-        from mlg_troubleshoot.paper.targets import TargetsFile
-        from mlg_troubleshoot.workflows.beliefs_file import BeliefsFile
+        from mlg_troubleshoot.paper.verification import TargetsFile
+        from mlg_troubleshoot.workflows.diagnose import BeliefsFile
         from mlg_troubleshoot.workflows.header_file import HeaderFile
 
         files = (

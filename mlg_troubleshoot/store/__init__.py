@@ -12,10 +12,11 @@ from mlg_troubleshoot.store.database import (
     login,
     packed,
 )
-from mlg_troubleshoot.store.drafts import Draft, Drafts
 from mlg_troubleshoot.store.inspections import (
     NOT_CONTENT,
     RETIRED,
+    Draft,
+    Drafts,
     content_of,
     inspection_from,
     inspection_record,

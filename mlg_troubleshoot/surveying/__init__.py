@@ -2,4 +2,7 @@
 
 from mlg_troubleshoot.surveying.survey import SurveyResult, survey
 
-__all__ = ["SurveyResult", "survey"]
+__all__ = [
+    "SurveyResult",
+    "survey",
+]

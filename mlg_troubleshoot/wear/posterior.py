@@ -16,8 +16,7 @@ from scipy.optimize import minimize
 from scipy.special import gammaln, logsumexp
 
 from mlg_troubleshoot.arrays import Array, central_slopes, central_steps
-from mlg_troubleshoot.wear.filtering import Draws, follow
-from mlg_troubleshoot.wear.paths import Scale, Steps
+from mlg_troubleshoot.wear.model import Draws, Scale, Steps, follow
 
 # Mean and standard deviation of the normal prior of each parameter: weak on purpose, and the same
 # for all kinds so that evidence compares. A scale by its logarithm, in units of the whole usage and

@@ -1,9 +1,13 @@
-"""Judge inspections: tables, single gears, and what is written of them."""
+"""Judge inspections: tables, single gears, and what is written of them.
+
+The table of indices of a gear, computed where the one in its file does not fit.
+"""
 
 from __future__ import annotations
 
 import gc
 import pickle
+import warnings
 import zlib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -19,14 +23,20 @@ from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
-from mlg_troubleshoot.decision.judge_rows import AT_ONCE, assess
+from mlg_troubleshoot.decision.judge_rows import (
+    AT_ONCE,
+    Listed,
+    assess,
+    latest_of_each_gear,
+    listed,
+)
 from mlg_troubleshoot.decision.prediction import Extension
-from mlg_troubleshoot.decision.ranking import Listed, latest_of_each_gear, listed
 from mlg_troubleshoot.errors import ExitCode, OutputError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.gear.linkage import WorstCase, worst_case
+from mlg_troubleshoot.indices.index_table import IndexTable, StaleTableError, read_index_table
 from mlg_troubleshoot.life.state import (
     GearKey,
     GearState,
@@ -37,9 +47,8 @@ from mlg_troubleshoot.life.state import (
 )
 from mlg_troubleshoot.outputs import csv_lines, write_text
 from mlg_troubleshoot.parallel import Progress, map_blocks
-from mlg_troubleshoot.records.model import TableOptions, TableResult
+from mlg_troubleshoot.records.rows import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -52,9 +61,49 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.records.frames import Frame
     from mlg_troubleshoot.records.read import Source
+    from mlg_troubleshoot.reporting.html import Witness
     from mlg_troubleshoot.reporting.publish import WrittenReport
-    from mlg_troubleshoot.reporting.witness import Witness
     from mlg_troubleshoot.store import Store
+
+
+# Tables that were computed by this process: nothing is written that nobody asked for.
+_COMPUTED: dict[Gear, IndexTable] = {}
+
+
+def load_index_table(gear: Gear, say: Callable[[str], object] | None = None) -> IndexTable:
+    """Load the table of indices of a gear; where there is none of its geometry it is computed, and
+    not written.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    say : callable or None
+        Takes what is said of a table that was computed; None warns.
+
+    Returns
+    -------
+    IndexTable
+        Its table.
+
+    Raises
+    ------
+    GearFileError
+        If the table is not one.
+    """
+    try:
+        return read_index_table(gear)
+    except StaleTableError as stale:
+        if gear not in _COMPUTED:
+            from mlg_troubleshoot.paper.study import StudyOptions, run_study
+
+            _COMPUTED[gear] = run_study(gear, StudyOptions()).table
+            said = f"{stale.message}. It was computed for this run. {stale.remedy}"
+            if say is None:
+                warnings.warn(said, stacklevel=2)
+            else:
+                say(said)
+        return _COMPUTED[gear]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -405,7 +454,7 @@ def _judge(
         gc.collect()
     fleet = None
     if store is not None:
-        from mlg_troubleshoot.life.looking_back import expected_of
+        from mlg_troubleshoot.life.forecast import expected_of
 
         fleet = expected_of(store, found.gear)
     if options.extension is not None:
@@ -477,7 +526,7 @@ def attention_of_kept(seen: Counter[GearKey], store: Store, gear: Gear) -> list[
     """Say which of some gears need attention with all that is kept of them, where more is kept
     than the visits that were just seen.
     """
-    from mlg_troubleshoot.life.judged import judge_lives
+    from mlg_troubleshoot.life.folding import judge_lives
 
     kept = _kept_lives(seen, store).items()
     more = [life for key, life in kept if len(life.visits) > seen[key]]
@@ -577,8 +626,8 @@ def write_reports(  # noqa: PLR0913 - each stands for one choice of the user
         raise OutputError(
             f"{directory} is a file, not a folder", "Give a folder that you may write to."
         )
+    from mlg_troubleshoot.reporting.html import provenance_of
     from mlg_troubleshoot.reporting.inspection_report import batch_document, inspection_document
-    from mlg_troubleshoot.reporting.provenance import provenance_of
     from mlg_troubleshoot.reporting.publish import publish
 
     gear = result.gear
@@ -669,7 +718,7 @@ def write_template(
 
         write_form(file, loaded, page=page, unit=unit, convention=convention)
         return
-    from mlg_troubleshoot.records.template import write_template as write
+    from mlg_troubleshoot.records.annotate import write_template as write
 
     write(file, loaded, unit=unit or LengthUnit.INCH, every_column=every_column)
 

@@ -1,24 +1,32 @@
-"""Measured against predicted: diagnose tables, write and load extensions of the model."""
+"""Measured against predicted: diagnose tables, write and load extensions of the model.
+
+A file of what is believed before a measured value is looked at, where that differs from the
+program's own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from mlg_troubleshoot.arrays import Mask
+from mlg_troubleshoot.datafile import AboveZero, Name, Table, read_toml
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import InconclusiveDataError, Problem
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.records.model import TableOptions, TableResult
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.records.rows import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
@@ -30,8 +38,8 @@ if TYPE_CHECKING:
     )
     from mlg_troubleshoot.diagnosis.faults import DataFault
     from mlg_troubleshoot.misfit.beliefs import Beliefs
-    from mlg_troubleshoot.records.model import ReadResult
     from mlg_troubleshoot.records.read import Source
+    from mlg_troubleshoot.records.rows import ReadResult
     from mlg_troubleshoot.reporting.publish import WrittenReport
 
 
@@ -75,7 +83,7 @@ class DiagnoseResult(TableResult):
 
     def summary(self, unit: str = "in") -> str:
         """Say what was found, in the seven lines of the terminal."""
-        from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
+        from mlg_troubleshoot.reporting.diagnosis_figures import seven_lines
 
         lines = seven_lines(self.diagnosis, LengthUnit.parse(unit))
         return "\n".join(f"{line.number} {line.word:7}{line.text}" for line in lines)
@@ -125,7 +133,6 @@ def diagnose_files(
     from mlg_troubleshoot.diagnosis.causes import in_own_cause, with_own
     from mlg_troubleshoot.misfit.beliefs import Beliefs
     from mlg_troubleshoot.records import ReadOptions, read_many
-    from mlg_troubleshoot.workflows.beliefs_file import load_beliefs
 
     options = options or DiagnoseOptions()
     gear = load_gear(options.gear)
@@ -212,7 +219,7 @@ def _unused(
     read: ReadResult, whole: DiagnosisTable, condition: Sequence[DataCondition], aside: Mask
 ) -> Iterator[str]:
     """Which rows a table that is refused has that could not be used."""
-    from mlg_troubleshoot.reporting.diagnosis_lines import condition_words
+    from mlg_troubleshoot.reporting.diagnosis_figures import condition_words
 
     unmeasured = np.count_nonzero(np.isnan(whole.measured_in))
     unread = np.count_nonzero(np.isnan(whole.clearance_in).all(axis=1))
@@ -266,7 +273,7 @@ def diagnose(
 
 def _about(gear: Gear, beliefs: Beliefs) -> Beliefs:
     """What is believed of a gear: another linkage is rarer where the drawn one was measured."""
-    from mlg_troubleshoot.diagnosis.causes.together import OtherGeometry
+    from mlg_troubleshoot.diagnosis.causes.linkage import OtherGeometry
 
     if not gear.linkage_known:
         return beliefs
@@ -319,7 +326,7 @@ def write_diagnosis_report(
     replace_files: bool = True,
 ) -> WrittenReport:
     from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
-    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.html import provenance_of
     from mlg_troubleshoot.reporting.publish import publish
 
     made = provenance_of(result.gear, result.inputs_sha256)
@@ -354,3 +361,44 @@ def load_model_extension(
 
     own = tuple(cause for file in cause_files for cause in load_causes(Path(file)))
     return load_extension([*map(Path, files)], load_gear(gear), own)
+
+
+_OWN = Beliefs()
+_Share = Annotated[float, Meta(gt=0, lt=1)]
+
+
+class BeliefsFile(Table):
+    """What a fleet is known to be like; a key that is not there is as in :class:`Beliefs`."""
+
+    schema: Literal[1]
+    expected: AboveZero = _OWN.expected
+    unlisted: _Share = _OWN.unlisted
+    slips: AboveZero = _OWN.slips
+    slip_size: AboveZero = _OWN.slip_size
+    shape_size: AboveZero = _OWN.shape_size
+    sizes: Annotated[tuple[AboveZero, ...], Meta(min_length=1, max_length=9)] = _OWN.sizes
+    form: AboveZero = _OWN.form
+    exact: AboveZero = _OWN.exact
+    alike: _Share = _OWN.alike
+    surveyed: AboveZero = _OWN.surveyed
+    rarer: dict[Name, AboveZero] = msgspec.field(default_factory=dict)
+    plausible: dict[Name, AboveZero] = msgspec.field(default_factory=dict)
+
+
+def load_beliefs(
+    path: Path, sure: float, causes: Collection[str], sized: Collection[str]
+) -> Beliefs:
+    """Read what is believed; a name that is not of a cause is refused, and the size of one that has
+    no single parameter, or one value of it only.
+    """
+    remedy = (
+        "Give a TOML file with schema = 1. Its keys are listed in docs/explanation/diagnosis.md."
+    )
+    file = read_toml(path, BeliefsFile, remedy)
+    for key, known in (("rarer", causes), ("plausible", sized)):
+        for name in getattr(file.content, key):
+            if name not in known:
+                raise file.fail((key, name), f"one of {', '.join(sorted(known))}")
+    values = msgspec.structs.asdict(file.content)
+    del values["schema"]
+    return Beliefs(**values, sure=sure)

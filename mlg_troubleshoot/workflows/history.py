@@ -1,5 +1,7 @@
 """The history of gears: show it with its forecasts, add what was done and found, verify and import
 the chain.
+
+Landings that gears have left, from a table of their inspections or from a store.
 """
 
 from __future__ import annotations
@@ -11,10 +13,13 @@ from dataclasses import dataclass, replace
 from datetime import date, datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, TextIO
 
 from mlg_troubleshoot.errors import Problem, UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import (
     LEAST_OF_A_HASH,
     GearLife,
@@ -24,7 +29,7 @@ from mlg_troubleshoot.life.folding import (
     life_of,
     lives_of,
 )
-from mlg_troubleshoot.life.landings_left import Asked, FleetLine
+from mlg_troubleshoot.life.forecast import Asked, FleetLine
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.parallel import Progress, StageProgress
@@ -33,13 +38,15 @@ from mlg_troubleshoot.records.gate import NOBODY, judge_text
 from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.store import Added, Broken, Record, RecordKind, Store, StoreError, packed
 from mlg_troubleshoot.units import LengthUnit
-from mlg_troubleshoot.workflows.index_tables import load_index_table
-from mlg_troubleshoot.workflows.keep import move, voids
+from mlg_troubleshoot.workflows.check import CheckOptions, check_files, load_index_table
+from mlg_troubleshoot.workflows.keep import keep, move, told_by, voids
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
+    from mlg_troubleshoot.records.read import Source
     from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.wear import WearModel
+
 
 # Gears that are read, judged and forecast together: their unpacked contents are 5 MB. [1]
 _AT_ONCE = 100
@@ -113,8 +120,8 @@ def show_fleet(
     `whole`, with all of its records, each judged as it was found; with what changed since a day,
     and the readings of one joint.
     """
+    from mlg_troubleshoot.life.folding import judge_lives
     from mlg_troubleshoot.life.forecast import forecast
-    from mlg_troubleshoot.life.judged import judge_lives
 
     progress("Reading the store", 0, None)
     asked = Asked(gear, since, joint)
@@ -187,7 +194,7 @@ def write_pages(
 ) -> list[WrittenReport]:
     """Write the page of each gear's life and, for a fleet, the page that links them."""
     from mlg_troubleshoot.reporting import fleet_report
-    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.html import provenance_of
     from mlg_troubleshoot.reporting.publish import publish
     from mlg_troubleshoot.workflows.witness import witness_of
 
@@ -350,3 +357,34 @@ def verify(
     return Verified(
         count, last, broken, expected, (*store.departures(), *wrong.values()), (*clocks,)
     )
+
+
+def forecast(
+    inspections: Source | Store, gear: Gear | str | Path = DEFAULT_GEAR, **declared: Any
+) -> Lives:
+    """Forecast the landings that each gear has left.
+
+    Parameters
+    ----------
+    inspections : DataFrame, file or Store
+        Inspections of gears over time, with ``gear_landings``; rows that cannot be judged are left
+        out.
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
+    **declared
+        What `CheckOptions` declares about a table: ``convention="RADIAL"``.
+
+    Returns
+    -------
+    Lives
+        One life per gear with its forecast; ``problems`` of the table. [landings]
+    """
+    known = load_gear(gear)
+    if isinstance(inspections, Store):
+        return show_fleet(inspections, known, ahead=True)
+    options = CheckOptions(gear=known, advice=False, **declared)
+    checked = check_files([inspections], options)
+    with TemporaryDirectory() as folder:
+        store = Store(Path(folder) / "inspections.sqlite")
+        keep(told_by(checked.judgements), store)
+        return replace(show_fleet(store, known, ahead=True), problems=checked.problems)

@@ -66,7 +66,7 @@ def write_study_table(findings: StudyFindings) -> None:
 
 def write_study_figure(findings: StudyFindings, file: Path) -> None:
     """Draw the indices of all joints with their intervals, as SVG."""
-    from mlg_troubleshoot.reporting.picture import Picture
+    from mlg_troubleshoot.reporting.publish import Picture
     from mlg_troubleshoot.reporting.study_figures import indices_figure
 
     title = f"Sensitivity indices of {findings.gear.name}"

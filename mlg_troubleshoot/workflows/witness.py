@@ -8,14 +8,12 @@ from enum import StrEnum
 from pathlib import Path
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import lives_of
-from mlg_troubleshoot.life.judged import judge_lives
+from mlg_troubleshoot.life.folding import judge_lives, lives_of
 from mlg_troubleshoot.life.state import GearKey
-from mlg_troubleshoot.reporting.provenance import program_version
-from mlg_troubleshoot.reporting.witness import ReportedGear, Witness, read_witness
+from mlg_troubleshoot.reporting.html import ReportedGear, Witness, program_version, read_witness
 from mlg_troubleshoot.store import Record, Store
+from mlg_troubleshoot.workflows.check import load_index_table
 from mlg_troubleshoot.workflows.history import verify
-from mlg_troubleshoot.workflows.index_tables import load_index_table
 
 
 class Standing(StrEnum):

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.workflows.check import check
-from mlg_troubleshoot.workflows.index_tables import load_index_table
+from mlg_troubleshoot.workflows.check import check, load_index_table
 from tests.cli.conftest import FAILURE, mlg
 from tests.decision.conftest import inspected
 

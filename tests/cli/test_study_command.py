@@ -10,7 +10,7 @@ import pytest
 from typer.main import get_command
 
 from mlg_troubleshoot.cli.study import app
-from mlg_troubleshoot.reporting.formats import MINUS
+from mlg_troubleshoot.reporting.figures import MINUS
 
 from .conftest import mlg
 

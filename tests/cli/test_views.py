@@ -8,7 +8,7 @@ import re
 import pytest
 
 from mlg_troubleshoot.cli import output
-from mlg_troubleshoot.cli.views.notes import show_notes
+from mlg_troubleshoot.cli.views.batch import show_notes
 from tests.cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 
 JOINTS = {

@@ -13,8 +13,7 @@ from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.prediction import Extension
-from mlg_troubleshoot.gear.adjustment import Adjustment
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Adjustment, Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import ClearanceConvention
 

@@ -15,10 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mlg_troubleshoot.decision.belief import Belief
-from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.likely_worn import explain
-from mlg_troubleshoot.life.looking_back import expected_of
+from mlg_troubleshoot.decision.belief import Belief, explain
+from mlg_troubleshoot.decision.prediction import Cases
+from mlg_troubleshoot.life.forecast import expected_of
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from tests.benchmarks.worn_gears import LIMIT_IN, displacement, worst
 from tests.decision.technician import (

@@ -6,9 +6,8 @@ from datetime import date, datetime
 
 import pytest
 
-from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.assessment import Action, Basis, End, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck, surely_later
-from mlg_troubleshoot.decision.plan import Action, Basis, End
 from tests.decision.conftest import Judge, every_joint
 
 EARLY, MORNING, NOON = (datetime(2026, 3, 4, hour, 0) for hour in (7, 8, 12))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from mlg_troubleshoot.decision.case import Cases, exact_chance
-from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.decision.prediction import Cases, exact_chance
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.linkage import worst_case
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Posterior
-from mlg_troubleshoot.decision.belief import Belief
-from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.belief import Belief, explain
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
-from mlg_troubleshoot.decision.likely_worn import explain
+from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.gear.gear import Gear
 from tests.benchmarks import worn_gears
 from tests.decision.conftest import Judge, every_joint, inspected

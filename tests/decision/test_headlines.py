@@ -9,11 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.assessment import Assessment, Verdict, VerdictTone
+from mlg_troubleshoot.decision.assessment import (
+    Action,
+    Assessment,
+    Basis,
+    End,
+    Verdict,
+    VerdictTone,
+)
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
-from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.plan import Action, Basis, End
-from mlg_troubleshoot.decision.ranking import Listed
+from mlg_troubleshoot.decision.judge_rows import Listed, assess
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import LengthUnit, said_in

@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.assessment import Assessment, Verdict
+from mlg_troubleshoot.decision.assessment import Action, Assessment, Basis, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome
-from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.plan import Action, Basis
-from mlg_troubleshoot.decision.ranking import Listed
+from mlg_troubleshoot.decision.judge_rows import Listed, assess
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.benchmarks.worn_gears import LIMIT_IN, displacement

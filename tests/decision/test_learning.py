@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.belief import SHARES, WEAR, Belief, given_readings
-from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.fleet import Fleet
-from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.inspection import Fleet, Inspection
 from mlg_troubleshoot.decision.learning import learned
+from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.looking_back import expected_of
+from mlg_troubleshoot.life.forecast import expected_of
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from mlg_troubleshoot.workflows.keep import keep, told_by

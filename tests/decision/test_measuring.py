@@ -10,17 +10,14 @@ import pytest
 from scipy.stats import norm
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.assessment import Verdict, minutes_of
 from mlg_troubleshoot.decision.belief import SHARES, WEAR, Belief, given_readings
-from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Outcome
-from mlg_troubleshoot.decision.plan import minutes_of
+from mlg_troubleshoot.decision.prediction import Cases, expand, responses
 from mlg_troubleshoot.decision.priors import PRIORS
-from mlg_troubleshoot.decision.second_order import expand, responses
 from mlg_troubleshoot.decision.verdict_rule import normal_cdf, tabled_normal_cdf
-from mlg_troubleshoot.gear.directions import random_directions, worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.model import links_from
+from mlg_troubleshoot.gear.linkage import links_from, random_directions, worst_case
 from tests.decision.conftest import Judge, every_joint, inspected
 
 MARGIN_IN = 0.03

@@ -15,10 +15,9 @@ import pytest
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.belief import Belief
-from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.prediction import Cases, responses
 from mlg_troubleshoot.decision.priors import PRIORS
-from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
 from tests.decision.conftest import inspected
 

@@ -6,10 +6,9 @@ import math
 
 import pytest
 
-from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.assessment import Action, Basis, End, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
-from mlg_troubleshoot.decision.plan import Action, Basis, End
+from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
 from tests.decision.conftest import Judge, every_joint, inspected

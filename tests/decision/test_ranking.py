@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.ranking import rank_joints
-from mlg_troubleshoot.decision.second_order import responses
+from mlg_troubleshoot.decision.judge_rows import rank_joints
+from mlg_troubleshoot.decision.prediction import responses
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import Judge, every_joint

@@ -7,16 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision import repair
-from mlg_troubleshoot.decision.assessment import RepairSet
+from mlg_troubleshoot.decision import planner as repair
+from mlg_troubleshoot.decision.assessment import RepairSet, minutes_of
 from mlg_troubleshoot.decision.belief import Belief
-from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import allowances
-from mlg_troubleshoot.decision.plan import minutes_of
-from mlg_troubleshoot.decision.prediction import Prediction, predict
-from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.decision.prediction import Cases, Prediction, predict
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.linkage import worst_case
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 FAILURE = {3: 0.013, 5: 0.007}

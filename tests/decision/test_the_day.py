@@ -6,8 +6,8 @@ from datetime import datetime
 
 import pytest
 
+from mlg_troubleshoot.decision.assessment import Action, End
 from mlg_troubleshoot.decision.inspection import Outcome
-from mlg_troubleshoot.decision.plan import Action, End
 from tests.decision.conftest import Judge, every_joint
 
 FAILED = {"outcome": Outcome.FAILED, "readings_in": (0.036,), "plunger_gauge_u_in": 0.001}

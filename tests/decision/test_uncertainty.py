@@ -14,17 +14,16 @@ from mlg_troubleshoot.decision.assessment import (
     UncertaintyBudget,
     Verdict,
 )
-from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.prediction import (
     PROVISIONAL_U_IN,
     PROVISIONAL_U_SHARE,
+    Cases,
     predict,
 )
-from mlg_troubleshoot.gear.adjustment import Adjustment
-from mlg_troubleshoot.gear.directions import worst_case
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Adjustment, Gear
+from mlg_troubleshoot.gear.linkage import worst_case
 from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 

@@ -16,10 +16,9 @@ from hypothesis import strategies as st
 from scipy.stats import norm, qmc
 
 from mlg_troubleshoot.decision.assessment import Assessment, Rejected, Verdict
-from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
 from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.prediction import predict
+from mlg_troubleshoot.decision.prediction import Cases, predict
 from mlg_troubleshoot.decision.verdict_rule import verdict, zone
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable

@@ -6,12 +6,10 @@ from __future__ import annotations
 
 import pytest
 
-from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.case import plunger_u
+from mlg_troubleshoot.decision.assessment import Action, Basis, End, Verdict
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RiggingCheck
-from mlg_troubleshoot.decision.plan import Action, Basis, End
-from mlg_troubleshoot.decision.plunger_reading import disagreement
-from mlg_troubleshoot.decision.ranking import Listed
+from mlg_troubleshoot.decision.judge_rows import Listed
+from mlg_troubleshoot.decision.prediction import disagreement, plunger_u
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.decision.conftest import Judge, every_joint, inspected
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.belief import Belief
-from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import RiggingCheck
+from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.gear.gear import Gear
 from tests.decision.conftest import every_joint, inspected

@@ -13,12 +13,11 @@ import pytest
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis import Candidate, Cause, Scene
-from mlg_troubleshoot.diagnosis.scene import build_scene
+from mlg_troubleshoot.diagnosis.extension import build_scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies, Gear
-from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.gear.linkage import LinkageModel, worst_case
+from mlg_troubleshoot.misfit.columns import NoiseModel
 
 Array = NDArray[np.float64]
 Shift = Callable[[DiagnosisTable, Array], Array]

@@ -15,8 +15,12 @@ from mlg_troubleshoot import load_gear
 from mlg_troubleshoot.cli.app import app
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.workflows.beliefs_file import BeliefsFile, load_beliefs
-from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
+from mlg_troubleshoot.workflows.diagnose import (
+    BeliefsFile,
+    DiagnoseOptions,
+    diagnose_files,
+    load_beliefs,
+)
 
 ROOT = Path(__file__).parents[2]
 NAMES = {"geometry", "rigging_offset"}

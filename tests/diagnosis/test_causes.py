@@ -12,10 +12,9 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Cause, Scene, diagnose
 from mlg_troubleshoot.diagnosis.causes import JointContact, OutOfPlaneTilt, RiggingOffset
-from mlg_troubleshoot.diagnosis.scene import effects_of
+from mlg_troubleshoot.diagnosis.extension import effects_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Gear, adjusted_worst_case
 
 from .conftest import Array, fleet, only, scene_of
 

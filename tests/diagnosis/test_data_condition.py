@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.diagnosis import diagnose
 from mlg_troubleshoot.diagnosis.causes import RiggingOffset
-from mlg_troubleshoot.diagnosis.data_condition import data_condition, doubt_of
+from mlg_troubleshoot.diagnosis.faults import data_condition, doubt_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.diagnosis.wear import fleet_history, gears_of
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.linkage import worst_case
 from mlg_troubleshoot.records import ReadOptions, read_many
 from tests.cli.conftest import mlg
 from tests.diagnosis.conftest import scene_of

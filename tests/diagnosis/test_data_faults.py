@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis import DiagnosisTable, diagnose
 from mlg_troubleshoot.diagnosis.faults import screen_faults
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
+from mlg_troubleshoot.gear.linkage import worst_case
+from mlg_troubleshoot.reporting.diagnosis_figures import seven_lines
 
 from .conftest import fleet
 

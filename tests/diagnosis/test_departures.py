@@ -20,18 +20,15 @@ from mlg_troubleshoot.diagnosis import (
     write_extension,
 )
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
-from mlg_troubleshoot.diagnosis.causes.linkage import OutOfPlaneTilt
-from mlg_troubleshoot.diagnosis.causes.together import LoadDirections, OtherGeometry
-from mlg_troubleshoot.diagnosis.scene import build_scene, scene_at
+from mlg_troubleshoot.diagnosis.causes.linkage import LoadDirections, OtherGeometry, OutOfPlaneTilt
+from mlg_troubleshoot.diagnosis.extension import build_scene, scene_at
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import visits
 from mlg_troubleshoot.errors import InconclusiveDataError
-from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
-from mlg_troubleshoot.gear.directions import worst_case, worst_of_sense
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.model import links_from
+from mlg_troubleshoot.gear.gear import Adjustment, Gear, adjusted_worst_case
+from mlg_troubleshoot.gear.linkage import links_from, worst_case, worst_of_sense
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
+from mlg_troubleshoot.reporting.diagnosis_figures import seven_lines
 
 from .conftest import Array, fleet
 

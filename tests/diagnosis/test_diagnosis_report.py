@@ -14,16 +14,18 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.data_figures import data_figures
 from mlg_troubleshoot.reporting.diagnosis_figures import (
     Residuals,
+    cause_words,
+    data_figures,
+    headline,
     measured_against_predicted,
+    seven_lines,
     tail_strips,
 )
-from mlg_troubleshoot.reporting.diagnosis_lines import cause_words, headline, seven_lines
 from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
 from mlg_troubleshoot.reporting.figures import INK
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.html import ReportProvenance
 from mlg_troubleshoot.reporting.publish import publish
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files

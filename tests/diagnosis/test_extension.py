@@ -25,8 +25,7 @@ from mlg_troubleshoot.diagnosis import (
 from mlg_troubleshoot.diagnosis.diagnose import NamedCause
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.errors import GearFileError, OutputError, TroubleshootError
-from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Gear, adjusted_worst_case
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult, check_inspection
 

@@ -12,7 +12,7 @@ from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.reporting.diagnosis_lines import headline, seven_lines
+from mlg_troubleshoot.reporting.diagnosis_figures import headline, seven_lines
 from mlg_troubleshoot.units import LengthUnit
 
 from .conftest import Array, Shift, fleet

@@ -7,12 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
+from mlg_troubleshoot.diagnosis.diagnose import Gain, measure_gain
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.misfit.columns import EffectColumns
-from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.fitting import blocks_of, fit, shrunk
+from mlg_troubleshoot.misfit.columns import EffectColumns, NoiseModel, blocks_of, fit, shrunk
 
 from .conftest import Array, covariance_of
 

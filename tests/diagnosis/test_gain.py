@@ -10,7 +10,7 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import Diagnosis, diagnose
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.misfit import fitting
+from mlg_troubleshoot.misfit import columns as fitting
 from mlg_troubleshoot.reporting.json_form import diagnosis_as_json
 
 from .conftest import Array, DiagnosisTable, fleet

@@ -10,7 +10,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.diagnosis import CATALOGUE, Scene, diagnose
-from mlg_troubleshoot.diagnosis.bank import build_bank
+from mlg_troubleshoot.diagnosis.explain import build_bank
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.misfit.columns import EffectColumns

@@ -20,8 +20,7 @@ from mlg_troubleshoot.diagnosis import (
 )
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.errors import GearFileError
-from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Gear, adjusted_worst_case
 from mlg_troubleshoot.gear.gear_file import load_gear
 
 Array = NDArray[np.float64]
@@ -139,7 +138,7 @@ def test_an_output_in_radians_works_as_well() -> None:
     four_bar = load_gear(str(DATA / "four-bar.toml"))
     rng = np.random.default_rng(3)
     clearance = rng.uniform(0.001, 0.02, (ROWS, 4))
-    from mlg_troubleshoot.gear.directions import worst_case
+    from mlg_troubleshoot.gear.linkage import worst_case
 
     true = 0.85 * worst_case(four_bar.model, clearance).over_in
     table = replace(

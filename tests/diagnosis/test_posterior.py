@@ -15,20 +15,26 @@ import pytest
 from scipy.stats import multivariate_normal, norm
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
-from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
-from mlg_troubleshoot.diagnosis.causes.linkage import CalibrationRate, JointContact
+from mlg_troubleshoot.diagnosis.causes.linkage import CalibrationRate, JointContact, JointFactors
 from mlg_troubleshoot.diagnosis.causes.reading import GaugeBias
-from mlg_troubleshoot.diagnosis.causes.together import JointFactors
-from mlg_troubleshoot.diagnosis.explain import MisfitProblem
+from mlg_troubleshoot.diagnosis.explain import Bank, MisfitProblem
 from mlg_troubleshoot.diagnosis.noise import Rows
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.columns import EffectColumns
-from mlg_troubleshoot.misfit.conclusion import Conclusion
-from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
-from mlg_troubleshoot.misfit.marginal import Marginal, Products
-from mlg_troubleshoot.misfit.posterior import MisfitPosterior, more_than_slips, posterior
+from mlg_troubleshoot.misfit.columns import EffectColumns, NoiseModel
+from mlg_troubleshoot.misfit.posterior import (
+    UNLISTED,
+    Context,
+    Effects,
+    Explanation,
+    Key,
+    Marginal,
+    MisfitPosterior,
+    Products,
+    more_than_slips,
+    posterior,
+)
+from mlg_troubleshoot.misfit.simulation_result import Conclusion
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions
 
 from .conftest import covariance_of

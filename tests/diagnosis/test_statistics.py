@@ -10,19 +10,17 @@ import pytest
 from scipy.stats import norm
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Scene, Term
-from mlg_troubleshoot.diagnosis.causes.convention import as_meant
-from mlg_troubleshoot.diagnosis.causes.together import Block, LoadDirections, OtherGeometry
-from mlg_troubleshoot.diagnosis.diagnose import _expected_scatter, _single_slips
+from mlg_troubleshoot.diagnosis.causes.linkage import Block, LoadDirections, OtherGeometry
+from mlg_troubleshoot.diagnosis.causes.reading import as_meant
+from mlg_troubleshoot.diagnosis.diagnose import _expected_scatter, _interval, _single_slips
 from mlg_troubleshoot.diagnosis.diagnose import _interval as interval_of
-from mlg_troubleshoot.diagnosis.extension import adjustment_of
+from mlg_troubleshoot.diagnosis.extension import adjustment_of, build_scene
 from mlg_troubleshoot.diagnosis.faults import DataFault
-from mlg_troubleshoot.diagnosis.gain import _interval
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, measured_uncertainty, robust_scale
-from mlg_troubleshoot.diagnosis.scene import build_scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.linkage import worst_case
 
 from .conftest import fleet
 

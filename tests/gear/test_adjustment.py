@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
-from mlg_troubleshoot.gear.directions import chance_beyond, worst_case
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Adjustment, Gear, adjusted_worst_case
+from mlg_troubleshoot.gear.linkage import chance_beyond, worst_case
 
 CLEARANCE = np.tile(np.linspace(0.001, 0.005, 10), (3, 1))
 LINK = "length.3-5"

@@ -12,12 +12,12 @@ import pytest
 import tomli_w
 
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
-from mlg_troubleshoot.gear.design import DesignSpace
-from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.assembly import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.gear.linkage import worst_case
 from mlg_troubleshoot.geometry.mechanism import Dyad, Guided, Lever, Slider, Slot, needs
-from mlg_troubleshoot.indices.amplification import amplification
+from mlg_troubleshoot.indices.index_table import amplification
 
 
 def limits(*points: str, limit: float = 0.01) -> dict[str, Any]:

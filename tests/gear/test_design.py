@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from mlg_troubleshoot.gear.design import DesignSpace, member_values
+from mlg_troubleshoot.gear.assembly import DesignSpace, member_values
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.geometry.program import write_program

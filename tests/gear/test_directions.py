@@ -11,10 +11,15 @@ from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.gear.directions import chance_beyond, random_directions, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
-from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.gear.linkage import (
+    LinkageModel,
+    chance_beyond,
+    links_from,
+    random_directions,
+    worst_case,
+)
 
 FAILURE = np.array([[0, 0, 0.013, 0, 0.007, 0, 0, 0, 0, 0]])
 MARGIN_IN = 0.03

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.gear.model import Calibration, LinkageModel
+from mlg_troubleshoot.gear.linkage import Calibration, LinkageModel, worst_case
 
 HERE = Path(__file__).parent
 CLEARANCE, OVERSHOOT = 0.005, 2.1e-7

@@ -25,10 +25,9 @@ from mlg_troubleshoot.gear.gear_tables import GearFile
 from mlg_troubleshoot.geometry.mechanism import Crank, Mechanism, Output, Plane, Point
 from mlg_troubleshoot.geometry.program import write_program
 from mlg_troubleshoot.indices.index_table import IndexTable, TableGear
-from mlg_troubleshoot.paper.targets import load_targets, targets_file
-from mlg_troubleshoot.reporting.html import render
+from mlg_troubleshoot.paper.verification import load_targets, targets_file
+from mlg_troubleshoot.reporting.html import ReportProvenance, render
 from mlg_troubleshoot.reporting.inspection_report import inspection_document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.machine import SLOWER
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.gear.linkage import LinkageModel
 from tests.gear.independent_solver import LoopClosure, read_linkages
 
 SAMPLES_A, SAMPLES_OTHERS = 200, 20

@@ -10,9 +10,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.gear.linkage import LinkageModel, worst_case
 
 ACHIEVED = {
     "A": (0.48717, 0.01379, 0.04722, -0.04286, 0.10532, -0.09195),

@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 import tomli_w
 
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.gear.model import Calibration, LinkageModel
+from mlg_troubleshoot.gear.linkage import Calibration, LinkageModel, worst_case
 
 CRANK, ROD, CLEARANCE = 0.153, 0.306, 0.001
 FILE = Path(__file__).parent / "data" / "slider-crank-loose-guide.csv"

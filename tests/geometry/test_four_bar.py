@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.gear.linkage import LinkageModel, links_from, worst_case
 
 CRANK_RAD = math.pi / 6
 COUPLER, ROCKER = 7.0, 9.0

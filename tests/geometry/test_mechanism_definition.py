@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mlg_troubleshoot.errors import MechanismError
-from mlg_troubleshoot.gear.model import Calibration, LinkageModel
+from mlg_troubleshoot.gear.linkage import Calibration, LinkageModel
 from mlg_troubleshoot.geometry.mechanism import (
     Crank,
     Dyad,

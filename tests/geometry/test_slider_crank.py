@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.gear.linkage import LinkageModel, worst_case
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Crank, Mechanism, Output, Plane, Point, Slider
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mlg_troubleshoot.gear.gear import Gear, Linkage
-from mlg_troubleshoot.gear.model import links_from
+from mlg_troubleshoot.gear.linkage import links_from
 from mlg_troubleshoot.geometry.kernel import CHUNK, Kernel, numba_is_installed
 from mlg_troubleshoot.geometry.mechanism import Mechanism
 

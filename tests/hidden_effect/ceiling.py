@@ -31,8 +31,8 @@ from mlg_troubleshoot import load_gear
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis import diagnose
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
-from mlg_troubleshoot.diagnosis.causes.together import JointFactors
-from mlg_troubleshoot.diagnosis.scene import build_scene, effects_of
+from mlg_troubleshoot.diagnosis.causes.linkage import JointFactors
+from mlg_troubleshoot.diagnosis.extension import build_scene, effects_of
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from tests.hidden_effect import calibration, simulator, study
 from tests.hidden_effect.as_table import as_table

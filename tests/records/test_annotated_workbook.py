@@ -200,7 +200,7 @@ def test_macros_are_kept_in_a_macro_workbook(tmp_path, xlsx):
 
 def test_a_form_gets_its_verdict_beside_it(tmp_path):
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.records.template import write_template
+    from mlg_troubleshoot.records.annotate import write_template
 
     path, out = tmp_path / "t.xlsx", tmp_path / "o.xlsx"
     write_template(path, load_gear())

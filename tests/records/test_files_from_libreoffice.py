@@ -10,7 +10,7 @@ import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions
-from mlg_troubleshoot.records.template import write_template
+from mlg_troubleshoot.records.annotate import write_template
 from tests.records.reading import read_inspections
 
 

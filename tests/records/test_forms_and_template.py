@@ -12,8 +12,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions
-from mlg_troubleshoot.records.annotate import annotate_workbook
-from mlg_troubleshoot.records.template import write_template
+from mlg_troubleshoot.records.annotate import annotate_workbook, write_template
 from mlg_troubleshoot.units import LengthUnit
 from tests.cli.conftest import mlg
 from tests.records.reading import read_inspections

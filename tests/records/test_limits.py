@@ -18,18 +18,10 @@ import pytest
 
 from mlg_troubleshoot import datafile
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.records import (
-    ReadOptions,
-    cells,
-    csvfile,
-    read,
-    read_many,
-    tables,
-    xls,
-    zipguard,
-)
+from mlg_troubleshoot.records import ReadOptions, cells, csvfile, read, read_many, tables, xls
+from mlg_troubleshoot.records import csvfile as zipguard
 from mlg_troubleshoot.records.annotate import annotate_workbook
-from mlg_troubleshoot.reporting import pdf
+from mlg_troubleshoot.reporting import publish as pdf
 from tests.machine import SLOWER
 from tests.records.reading import read_inspections
 

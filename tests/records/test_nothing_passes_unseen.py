@@ -11,7 +11,7 @@ from mlg_troubleshoot.decision.inspection import InvalidRow
 from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions, ReadResult, read_many
-from mlg_troubleshoot.records.template import write_template
+from mlg_troubleshoot.records.annotate import write_template
 from mlg_troubleshoot.units import parse_length
 from mlg_troubleshoot.workflows.check import check
 from tests.cli.conftest import HAND, mlg

@@ -39,11 +39,11 @@ from mlg_troubleshoot import load_gear
 from mlg_troubleshoot.diagnosis.table import table_from_inspections
 from mlg_troubleshoot.records import ReadOptions, read_many
 from mlg_troubleshoot.records.gate import judge_again
-from mlg_troubleshoot.records.template import write_template
-from mlg_troubleshoot.reporting.diagnosis_lines import column_words
+from mlg_troubleshoot.records.annotate import write_template
+from mlg_troubleshoot.reporting.diagnosis_figures import column_words
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files, write_reports
 from mlg_troubleshoot.store.inspections import inspection_from, inspection_record
-from mlg_troubleshoot.workflows.kept import KeptGate
+from mlg_troubleshoot.workflows.keep import KeptGate
 from tests.docs_examples import columns_table
 
 NAME = "air_humidity_percent"

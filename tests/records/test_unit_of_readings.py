@@ -8,9 +8,8 @@ from dataclasses import replace
 import pytest
 
 from mlg_troubleshoot import check
-from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.assessment import Action, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
-from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions, read_many
 from mlg_troubleshoot.records.gate import judge_row

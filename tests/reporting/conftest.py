@@ -27,8 +27,8 @@ from mlg_troubleshoot.decision.planner import correct
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.reporting.html import ReportProvenance
 from mlg_troubleshoot.reporting.inspection_report import inspection_document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import WrittenReport, publish
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from mlg_troubleshoot.workflows import check as task

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
-from mlg_troubleshoot.decision.ranking import latest_of_each_gear, listed, worst_first
+from mlg_troubleshoot.decision.judge_rows import latest_of_each_gear, listed, worst_first
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting.html import ReportProvenance
 from mlg_troubleshoot.reporting.inspection_report import batch_document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import WrittenReport, publish
 
 from .conftest import FAILURE, SOUND, WORN, Judge, readable, write_reports

@@ -13,10 +13,9 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.html import render
+from mlg_troubleshoot.reporting.html import ReportProvenance, render
 from mlg_troubleshoot.reporting.inspection_report import inspection_document
-from mlg_troubleshoot.reporting.pdf import PdfEngine
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.publish import PdfEngine
 from mlg_troubleshoot.units import ClearanceConvention
 
 from .conftest import FAILURE, SOUND, WORN, Judge

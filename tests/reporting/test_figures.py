@@ -14,15 +14,14 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.figures import (
     Axis,
     Canvas,
+    Lengths,
     Plot,
     Series,
     nice_ticks,
     text_width,
 )
-from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import environment
-from mlg_troubleshoot.reporting.inspection_figures import margin_gauge
-from mlg_troubleshoot.reporting.schematic import joint_key, schematic
+from mlg_troubleshoot.reporting.inspection_figures import joint_key, margin_gauge, schematic
 
 from .conftest import FAILURE, SOUND, WORN, Judge
 

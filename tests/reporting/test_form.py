@@ -10,7 +10,7 @@ import pytest
 from mlg_troubleshoot.cli.prompts.entry import FIRST, LAST
 from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import pdf
+from mlg_troubleshoot.reporting import publish as pdf
 from mlg_troubleshoot.reporting.inspection_report import write_form
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 

@@ -10,8 +10,8 @@ import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.engine import check_fonts
-from mlg_troubleshoot.reporting.pdf import PdfEngine
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.html import ReportProvenance
+from mlg_troubleshoot.reporting.publish import PdfEngine
 
 from .conftest import FAILURE, Judge, Made, write_inspection_report
 from .test_pdf import NOW, opened, page_of

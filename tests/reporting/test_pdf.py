@@ -21,12 +21,11 @@ import pytest
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import pdf
+from mlg_troubleshoot.reporting import publish as pdf
 from mlg_troubleshoot.reporting.engine import check_fonts
-from mlg_troubleshoot.reporting.html import font_faces, render
+from mlg_troubleshoot.reporting.html import ReportProvenance, font_faces, provenance_of, render
 from mlg_troubleshoot.reporting.inspection_report import inspection_document
-from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
-from mlg_troubleshoot.reporting.provenance import ReportProvenance, provenance_of
+from mlg_troubleshoot.reporting.publish import PdfEngine, PdfError
 
 from .conftest import FAILURE, Judge, Made, write_inspection_report
 

@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.conclusion import Conclusion
-from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
-from mlg_troubleshoot.misfit.posterior import MisfitPosterior
-from mlg_troubleshoot.misfit.verdict import MisfitVerdict
+from mlg_troubleshoot.misfit.posterior import (
+    UNLISTED,
+    Context,
+    Effects,
+    Explanation,
+    Key,
+    MisfitPosterior,
+)
+from mlg_troubleshoot.misfit.simulation_result import Conclusion, MisfitVerdict
 
 A: Key = ("a", None)
 B: Key = ("b", None)

@@ -15,7 +15,7 @@ from mlg_troubleshoot.diagnosis import (
     diagnose_simulation,
 )
 from mlg_troubleshoot.errors import TroubleshootError
-from mlg_troubleshoot.misfit.runner import Predict
+from mlg_troubleshoot.misfit.simulation import Predict
 from tests.simulation.rigs import RIGS, Rig, readings, slider_crank, thermal, two_link
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import SimulationDiagnosis, Suspect, Verdict, diagnose_simulation
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.columns import NoiseModel
 
 N = 120
 T = np.linspace(0.0, 1.0, N)

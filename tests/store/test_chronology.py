@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order
+from mlg_troubleshoot.life.state import Moment, contradictions, in_order
 
 # Months, and landings in hundreds; None is not stated.
 PLACES = some.tuples(some.integers(1, 6), some.integers(0, 6))

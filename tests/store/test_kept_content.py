@@ -26,7 +26,7 @@ from mlg_troubleshoot.store import (
     inspection_record,
     packed,
 )
-from mlg_troubleshoot.workflows.kept import KeptGate
+from mlg_troubleshoot.workflows.keep import KeptGate
 from tests.cli.conftest import Run, mlg, row
 
 from . import places

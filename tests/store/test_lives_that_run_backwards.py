@@ -16,16 +16,19 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.life.folding import life_of, lives
-from mlg_troubleshoot.life.forecast import fit_fleet, forecast
-from mlg_troubleshoot.life.judged import judge_lives
-from mlg_troubleshoot.life.landings_left import Asked, FleetLine
-from mlg_troubleshoot.life.unrecorded_work import suggestion
-from mlg_troubleshoot.life.wear_paths import wear_paths
+from mlg_troubleshoot.life.folding import judge_lives, life_of, lives
+from mlg_troubleshoot.life.forecast import (
+    Asked,
+    FleetLine,
+    fit_fleet,
+    forecast,
+    suggestion,
+    wear_paths,
+)
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
 from mlg_troubleshoot.store import Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
-from mlg_troubleshoot.workflows.index_tables import load_index_table
+from mlg_troubleshoot.workflows.check import load_index_table
 from tests.cli.conftest import Run, mlg, row
 
 from .places import table

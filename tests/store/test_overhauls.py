@@ -10,10 +10,9 @@ from typing import Any
 import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.life.chronology import Moment, contradictions, overhauls
 from mlg_troubleshoot.life.folding import GearLife, life_of
-from mlg_troubleshoot.life.state import GearVisit
-from mlg_troubleshoot.life.wear_paths import placed_in_time, stretches
+from mlg_troubleshoot.life.forecast import placed_in_time, stretches
+from mlg_troubleshoot.life.state import GearVisit, Moment, contradictions, overhauls
 from mlg_troubleshoot.store import Store
 from tests.cli.conftest import mlg, row
 from tests.decision.conftest import inspected
@@ -182,8 +181,8 @@ def test_history_says_from_where_landings_count(kept: GearLife) -> None:
 
 def test_the_plot_begins_before_the_overhaul_and_marks_it(kept: GearLife) -> None:
     from mlg_troubleshoot.life.forecast import Forecast
-    from mlg_troubleshoot.reporting.fleet_figures import wear_figure
-    from mlg_troubleshoot.reporting.formats import Lengths
+    from mlg_troubleshoot.reporting.figures import Lengths
+    from mlg_troubleshoot.reporting.fleet_report import wear_figure
 
     svg = str(wear_figure(kept, Forecast(), load_gear(), Lengths()))
     marked = {

@@ -11,8 +11,13 @@ import pytest
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.inputs import HeldDirections, Response, worst_directions
-from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.indices.variance import (
+    HeldDirections,
+    Response,
+    TensorIndices,
+    tensor_indices,
+    worst_directions,
+)
 
 Array = NDArray[np.float64]
 

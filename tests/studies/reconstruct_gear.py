@@ -25,14 +25,13 @@ from scipy.optimize import least_squares
 
 from mlg_troubleshoot.arrays import Array, central_slopes, central_steps
 from mlg_troubleshoot.errors import MechanismError
-from mlg_troubleshoot.gear.design import DesignSpace, member_values
+from mlg_troubleshoot.gear.assembly import DesignSpace, member_values
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.geometry.mechanism import Dyad
-from mlg_troubleshoot.indices.amplification import Amplification, amplification
-from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
-from mlg_troubleshoot.paper.targets import Computed, Target, load_targets, targets_file
-from mlg_troubleshoot.paper.verification import Facts
+from mlg_troubleshoot.indices.index_table import Amplification, amplification
+from mlg_troubleshoot.indices.variance import TensorIndices, tensor_indices
+from mlg_troubleshoot.paper.verification import Computed, Facts, Target, load_targets, targets_file
 
 # Stands for the miss of a target that a linkage has no value for, in its tolerances. [1]
 _FAR = 50

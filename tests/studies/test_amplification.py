@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.amplification import Amplification, amplification, csc
+from mlg_troubleshoot.indices.index_table import Amplification, amplification, csc
 
 # Largest stage-wise indices of the ten linkages, found by their authors with other code.
 KNOWN = {

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.indices.estimators import student_half
-from mlg_troubleshoot.paper.replicated import (
+from mlg_troubleshoot.indices.variance import student_half
+from mlg_troubleshoot.paper.study import (
     central_composite,
     first_order_design,
     replicated_levels,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.indices.inputs import Response
-from mlg_troubleshoot.indices.tensor import TensorIndices
+from mlg_troubleshoot.indices.variance import Response, TensorIndices
 
 
 def test_scipy_agrees(on_cube: Response, exact: TensorIndices) -> None:

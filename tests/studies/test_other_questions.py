@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.estimators import group_indices
-from mlg_troubleshoot.indices.inputs import HeldDirections
-from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
-from mlg_troubleshoot.paper.statements import ClaimOutcome, Statement, check_statements
+from mlg_troubleshoot.gear.linkage import worst_case
+from mlg_troubleshoot.indices.variance import (
+    HeldDirections,
+    TensorIndices,
+    group_indices,
+    tensor_indices,
+)
+from mlg_troubleshoot.paper.verification import ClaimOutcome, Statement, check_statements
 
 
 def test_the_groups_are_the_links_of_the_linkage(gear: Gear) -> None:

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.indices.inputs import Response
-from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
-from mlg_troubleshoot.paper.replicated import (
+from mlg_troubleshoot.indices.variance import Response, TensorIndices, tensor_indices
+from mlg_troubleshoot.paper.study import (
     PAPER_DESIGNS,
     PaperDesign,
     bias_corrected,

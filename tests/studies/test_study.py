@@ -16,7 +16,7 @@ from mlg_troubleshoot.paper.study import StudyDesign, StudyOptions, run_study
 def test_a_gear_with_too_many_joints_for_three_gauss_points_takes_two(
     gear: Gear, table: IndexTable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mlg_troubleshoot.indices.tensor._MOST_POINTS", 3**9)
+    monkeypatch.setattr("mlg_troubleshoot.indices.variance._MOST_POINTS", 3**9)
     found = run_study(replace(gear, ensemble=gear.ensemble[:1]), StudyOptions()).table
     assert found.design == "tensor of 2 Gauss points per joint"
     assert found.first_order == pytest.approx(table.first_order, abs=2e-5)

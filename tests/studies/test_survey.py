@@ -14,7 +14,7 @@ import pytest
 from mlg_troubleshoot import SurveyResult, predict, survey
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
+from mlg_troubleshoot.surveying.survey import ReadingKind, SurveyedLinkage, SurveyReading
 
 FOUR_BAR = Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml"
 CRANK, COUPLER, ROCKER, GROUND, TURN, LATER = 2.1, 7.15, 9.1, 6.05, np.radians(12.0), 0.4

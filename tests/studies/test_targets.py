@@ -9,7 +9,7 @@ import pytest
 
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.paper.targets import load_targets, targets_file
+from mlg_troubleshoot.paper.verification import load_targets, targets_file
 
 
 @pytest.mark.parametrize("width", ["0.0", "-0.1", "1e-30"])

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.inputs import HeldDirections
-from mlg_troubleshoot.indices.tensor import TensorIndices
-from mlg_troubleshoot.paper.total_order import TotalOrderStudy, compute_block, total_order
+from mlg_troubleshoot.indices.variance import HeldDirections, TensorIndices
+from mlg_troubleshoot.paper.study import TotalOrderStudy, compute_block, total_order
 
 
 @pytest.fixture

@@ -8,9 +8,8 @@ import pytest
 
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.paper.targets import Computed, load_targets, targets_file
-from mlg_troubleshoot.paper.verification import verify
-from mlg_troubleshoot.workflows.index_tables import load_index_table
+from mlg_troubleshoot.paper.verification import Computed, load_targets, targets_file, verify
+from mlg_troubleshoot.workflows.check import load_index_table
 
 
 @pytest.fixture(scope="module")

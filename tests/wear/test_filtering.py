@@ -7,9 +7,16 @@ import pytest
 from scipy import stats
 
 from mlg_troubleshoot.wear import Samples, WearPath, first_passage
-from mlg_troubleshoot.wear.filtering import Draws, FilterState, follow
-from mlg_troubleshoot.wear.model import _Ends, _Streams
-from mlg_troubleshoot.wear.paths import Scale, grid_step, lay_out
+from mlg_troubleshoot.wear.model import (
+    Draws,
+    FilterState,
+    Scale,
+    _Ends,
+    _Streams,
+    follow,
+    grid_step,
+    lay_out,
+)
 from mlg_troubleshoot.wear.posterior import members
 
 AS_IT_IS = Scale(usage=1.0, value=1.0, start=0.0, resolution=0.0)

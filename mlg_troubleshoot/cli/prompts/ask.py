@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from mlg_troubleshoot.cli.prompts.drafts import SavedEntries
 from mlg_troubleshoot.cli.prompts.entry import (
     FIRST,
     HEADING,
@@ -23,8 +22,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     label_of,
     split_words,
 )
-from mlg_troubleshoot.cli.prompts.terminal import Terminal
-from mlg_troubleshoot.cli.prompts.visit import Visit
+from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,
@@ -39,8 +37,8 @@ from mlg_troubleshoot.decision.columns import (
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.linkage import worst_case
 from mlg_troubleshoot.records.values import is_no_name
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, with_unit
 

@@ -1,32 +1,48 @@
-"""What is kept of a gear when somebody comes back to it."""
+"""What is kept of a gear when somebody comes back to it.
+
+Entries of the prompts in the store: every answer is saved at once, and offered again until its
+result was kept.
+
+The terminal: asks on standard input, writes everything to standard error.
+"""
 
 from __future__ import annotations
 
+import secrets
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
-from mlg_troubleshoot.cli.prompts.entry import PLUNGER, Entry
+import msgspec
+from rich.padding import Padding
+
+from mlg_troubleshoot.cli.output import console, word
+from mlg_troubleshoot.cli.output import text as data_text
+from mlg_troubleshoot.cli.prompts.entry import LAST, PLUNGER, Entry
+from mlg_troubleshoot.decision.assessment import Action, Step
 from mlg_troubleshoot.decision.columns import (
     BY_NAME,
     CLEARANCE,
+    CONVENTION,
     LANDINGS,
     MARGIN,
     MARGIN_U,
     OUTCOME,
     RESTORED_JOINTS,
     RIGGING_CHECKED,
+    UNIT,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.plan import Action, Step
+from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import as_spelt, lives_of
 from mlg_troubleshoot.life.logbook import shortened, visit_lines
 from mlg_troubleshoot.life.state import GearState, state_now
-from mlg_troubleshoot.store import Record, Store
+from mlg_troubleshoot.store import Draft, Drafts, Record, Store, login
 from mlg_troubleshoot.units import said_in
-from mlg_troubleshoot.workflows.check import CheckResult
-from mlg_troubleshoot.workflows.index_tables import load_index_table
+from mlg_troubleshoot.workflows.check import CheckResult, load_index_table
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
 _ASKS = {
@@ -118,3 +134,138 @@ def reading_order(gear: Gear, entry: Entry) -> tuple[int, ...]:
     (judged,) = assess([entry.inspection(gear)], gear, load_index_table(gear))
     step = next((s for s in judged.plan.steps if s.action is Action.MEASURE), None)
     return () if step is None else step.joints
+
+
+# How long an answer waits for another writer before the next question comes. [s]
+_PATIENCE_S = 3
+# Characters of an entry that cannot be read: enough for all its answers. [1]
+_MOST_SHOWN = 1500
+
+
+class SavedEntries:
+    """The entries of a user."""
+
+    def __init__(self, place: str | Path | None = None) -> None:
+        self.drafts = Drafts(Store(place, patience_s=_PATIENCE_S))
+        self.owner = login()
+        self._run = secrets.token_hex(4)
+        self._writers = {self._run}
+
+    def save(self, entry: Entry, *, complete: bool = False) -> str:
+        """Write an entry whole; what went wrong is returned."""
+        content = msgspec.json.encode(entry).decode()
+        try:
+            draft = Draft(entry.id, self.owner, self._run, complete, content)
+            if self.drafts.save(draft, self._writers):
+                return ""
+            taken = entry.id
+            entry.id = f"{entry.started:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
+            return f"Another window has continued {taken}. This is a separate entry now."
+        except OutputError as error:
+            return f"Answers cannot be saved: {error.message}. {error.remedy} You can continue."
+
+    def finish(self, entry: Entry) -> None:
+        """Close an entry whose result was kept; the last one says what Enter offers next time."""
+        self.save(entry, complete=True)
+        for draft in [each for each in self._all() if each.complete][1:]:
+            self.discard(draft.id)
+
+    def discard(self, entry_id: str) -> None:
+        try:
+            self.drafts.discard(entry_id)
+        except OutputError:
+            return
+
+    def unfinished(self, gear_id: str) -> tuple[list[Entry], list[str]]:
+        """The unfinished entries with answers of a gear type, the last one first, and what could
+        not be read on the way.
+        """
+        found = []
+        damaged = []
+        try:
+            for draft in self._all():
+                if draft.complete:
+                    continue
+                entry = _entry_of(draft)
+                if entry is None:
+                    self.drafts.save(replace(draft, complete=True), {draft.writer})
+                    damaged.append(
+                        f"The saved entry {draft.id} cannot be read and is not offered again. It"
+                        f" holds: {draft.content[:_MOST_SHOWN]}"
+                    )
+                elif entry.gear == gear_id:
+                    self._writers.add(draft.writer)
+                    found.append(entry)
+        except OutputError as error:
+            damaged.append(f"{error.message}. {error.remedy}")
+        return found, damaged
+
+    def offered(self) -> dict[str, str]:
+        """Unit, convention, name and gauge of the user's last entry."""
+        try:
+            entries = [_entry_of(draft) for draft in self._all() if draft.complete]
+        except OutputError:
+            entries = []
+        cells = next((entry.cells for entry in entries if entry), {})
+        names = (UNIT.name, CONVENTION.name, *LAST)
+        return {name: cells[name] for name in names if cells.get(name)}
+
+    def _all(self) -> list[Draft]:
+        return self.drafts.newest_first(self.owner)
+
+
+def _entry_of(draft: Draft) -> Entry | None:
+    """The entry of a draft; None where it is damaged."""
+    try:
+        entry = msgspec.json.decode(draft.content, type=Entry)
+        entry.require_columns()
+    except (msgspec.MsgspecError, KeyError, ValueError):
+        return None
+    return entry
+
+
+_WIDEST = 80
+
+
+class Terminal:
+    """Standard input and standard error; standard output is left to the results."""
+
+    def __init__(self) -> None:
+        self._console = console(to_stderr=True)
+        self._edits = sys.stdout.isatty() and _edits_lines()
+
+    def say(self, text: str, style: str = "") -> None:
+        """Show lines; long ones are wrapped below their own beginning."""
+        width = min(self._console.width, _WIDEST)
+        for each in text.split("\n"):
+            indent = len(each) - len(each.lstrip())
+            shown = Padding(data_text(each.strip(), style), (0, 0, 0, indent), expand=False)
+            self._console.print(shown, width=width)
+
+    def ask(self, prompt: str) -> str:
+        """Ask for one line, with the arrow keys where the terminal and the library can."""
+        shown = word(prompt, "bold")
+        try:
+            if self._edits:
+                # The library must know the prompt: it draws the line again.
+                return input(shown.plain)
+            self._console.print(shown, end="", soft_wrap=True)
+            self._console.file.flush()
+            return input()
+        except UnicodeDecodeError:
+            return "\ufffd"
+
+
+def _edits_lines() -> bool:
+    """Switch on editing of the typed line; nothing that is typed is kept or changed."""
+    try:
+        import readline
+    except ImportError:
+        return False
+    readline.set_auto_history(False)
+    for setting in ("enable-bracketed-paste", "convert-meta"):
+        readline.parse_and_bind(f"set {setting} off")
+    for setting in ("input-meta", "output-meta"):
+        readline.parse_and_bind(f"set {setting} on")
+    readline.parse_and_bind("tab: self-insert")
+    return True

@@ -7,14 +7,13 @@ from collections.abc import Callable, Sequence
 from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, show_page, text, word
-from mlg_troubleshoot.cli.views.tables import (
+from mlg_troubleshoot.cli.views.batch import (
     MARKS,
     TONES,
     next_words,
     what_follows,
 )
-from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
-from mlg_troubleshoot.decision.plan import Action
+from mlg_troubleshoot.decision.assessment import Action, Assessment, JointFinding, Judgement
 from mlg_troubleshoot.decision.sentences import chance_wrong_sentence, rigging_sentence
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention

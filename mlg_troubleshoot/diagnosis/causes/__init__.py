@@ -9,12 +9,13 @@ from pathlib import Path
 from traceback import walk_tb
 
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
-from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip
 from mlg_troubleshoot.diagnosis.causes.linkage import (
     CalibrationRate,
     DirectionNotWorstCase,
     ElasticCompliance,
     JointContact,
+    LoadDirections,
+    OtherGeometry,
     OutOfPlaneTilt,
     OvalWear,
     ThermalGrowth,
@@ -22,6 +23,7 @@ from mlg_troubleshoot.diagnosis.causes.linkage import (
 )
 from mlg_troubleshoot.diagnosis.causes.reading import (
     ApproachHysteresis,
+    ConventionSlip,
     DateStep,
     GaugeBias,
     GaugeScale,
@@ -31,7 +33,6 @@ from mlg_troubleshoot.diagnosis.causes.reading import (
     SideDifference,
     TechnicianBias,
 )
-from mlg_troubleshoot.diagnosis.causes.together import LoadDirections, OtherGeometry
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.results import Result
 

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.gear.adjustment import Adjustment
-from mlg_troubleshoot.gear.gear import Discrepancies
-from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.gear.gear import Adjustment, Discrepancies
+from mlg_troubleshoot.gear.linkage import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 
 
