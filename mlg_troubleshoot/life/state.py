@@ -278,7 +278,10 @@ class _Known:
         """Let go what is replaced by what is later by its date, at every visit that follows."""
         self.readings = {joint: _last(events) for joint, events in self.readings.items()}
         self.plunger = _last(self.plunger)
-        self.failed = [e for e in self.failed if not _is_settled(e, self.repairs, self.retracted)]
+        self.failed = _first_and_last(
+            [e for e in self.failed if not _is_settled(e, self.repairs, self.retracted)]
+        )
+        self.checked = _last(self.checked)
         self.retracted = _last(self.retracted)
         self.repairs = _last(self.repairs, lambda new, old: new.joints >= old.joints)
 
@@ -293,6 +296,18 @@ def _last(
         e
         for e in events
         if not any(surely_later(other.at, e.at) and replaces(other, e) for other in events)
+    ]
+
+
+def _first_and_last(failed: Sequence[_Event]) -> list[_Event]:
+    """Of failures that stand, those that are not surely between two others: the first one says
+    since when the rigging counts as looked at, the last one what has to be repaired.
+    """
+    return [
+        e
+        for e in failed
+        if not any(surely_later(e.at, other.at) for other in failed)
+        or not any(surely_later(other.at, e.at) for other in failed)
     ]
 
 

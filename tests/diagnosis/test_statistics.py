@@ -12,7 +12,11 @@ from scipy.stats import norm
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Scene, Term
 from mlg_troubleshoot.diagnosis.causes.linkage import Block, LoadDirections, OtherGeometry
 from mlg_troubleshoot.diagnosis.causes.reading import as_meant
-from mlg_troubleshoot.diagnosis.diagnose import _expected_scatter, _interval, _single_slips
+from mlg_troubleshoot.diagnosis.diagnose import (
+    _expected_scatter,
+    _interval_of_gain,
+    _single_slips,
+)
 from mlg_troubleshoot.diagnosis.diagnose import _interval as interval_of
 from mlg_troubleshoot.diagnosis.extension import adjustment_of, build_scene
 from mlg_troubleshoot.diagnosis.faults import DataFault
@@ -94,7 +98,7 @@ def test_the_share_removed_has_an_interval_of_95_percent_over_tails() -> None:
     after = before * rng.uniform(0.2, 0.6, 400)
     share = np.sum(after**2) / np.sum(before**2)
     error = float(np.std(after**2 - share * before**2) / np.sqrt(400) / np.mean(before**2))
-    low, high = _interval(before, after, tails)
+    low, high = _interval_of_gain(before, after, tails)
     assert (low, high) == pytest.approx(norm.interval(0.95, 1.0 - share, error), abs=0.3 * error)
 
 

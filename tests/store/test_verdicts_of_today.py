@@ -72,11 +72,11 @@ def test_a_corrected_date_puts_no_verdict_on_another_inspection(place: Path) -> 
     keep(place, first)
     keep(place, visit("R1", "2026-02-04", gear_landings="900", **FAR))
     wrong = next(each for each in events() if each["date"] == "2026-01-04")
-    values = ("date=2026-02-04", "landings=101")
+    values = ("date=2026-02-03", "landings=899")
     assert mlg("history", "amend", wrong["hash"], *values).code == 0
     assert line()["verdict"] == "OUTSIDE_MARGIN"
     said = {each["gear_landings"]: each["verdict"] for each in events() if each["verdict"]}
-    assert said == {101.0: "WITHIN_MARGIN", 900.0: "OUTSIDE_MARGIN"}
+    assert said == {899.0: "WITHIN_MARGIN", 900.0: "OUTSIDE_MARGIN"}
 
 
 def test_nothing_is_written_beside_the_store(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
