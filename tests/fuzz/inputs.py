@@ -28,7 +28,7 @@ TIGHT = OUTSIDE.replace("0.05,FAILED", "0.004,")
 ASKED = (
     *(("Status", word) for word in ("F", "x", "0", "intermittent", "FAILED", "not ok")),
     *((header, "0.06") for header in ("VI", "six", "Plgr", "reading", "X")),
-    *((header, "12 thou") for header in ("note", "joint six", "?")),
+    *((header, "12 thou") for header in ("extra", "joint six", "?")),
     *(("remarks", text) for text in ("failed last week", "did not retract")),
 )
 FAILURE = str(DATA / "failure_case.csv")
