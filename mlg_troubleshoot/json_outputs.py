@@ -25,7 +25,7 @@ from mlg_troubleshoot.decision.inspection import FactKind, Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Sourced
 
-Version = Literal[1]
+Version = Literal[2]
 Probability = Annotated[float, Meta(ge=0, le=1)]
 Size = Annotated[float, Meta(ge=0)]
 Positive = Annotated[float, Meta(gt=0)]

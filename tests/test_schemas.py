@@ -289,7 +289,7 @@ def put(key: str, value: object) -> Change:
         lambda d: d["inspections"][0]["joints"][2].update(rank=None),
         lambda d: d["inspections"][0]["next_action"].update(action="WAIT"),
         lambda d: d["gear"].pop("provenance"),
-        lambda d: d.update(schema_version=2),
+        lambda d: d.update(schema_version=1),
         lambda d: d["problems"].append({"code": "negative"}),
     ],
 )

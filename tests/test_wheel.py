@@ -152,5 +152,5 @@ def test_the_installed_command_verifies_its_gear(scripts: Path, elsewhere: Path)
 def test_the_installed_package_gives_its_schemas(scripts: Path, elsewhere: Path) -> None:
     code = "import mlg_troubleshoot as m; print(m.schema('check')['$id'])"
     assert (
-        run([scripts / "python", "-c", code], elsewhere).stdout == "urn:mlg-troubleshoot:check:1\n"
+        run([scripts / "python", "-c", code], elsewhere).stdout == "urn:mlg-troubleshoot:check:2\n"
     )

@@ -119,7 +119,7 @@ class TableGear(Table):
 class IndexTable(Result, Table):
     """Precomputed indices of a gear, as the file holds them."""
 
-    schema_version: Literal[1]
+    schema_version: Literal[2]
     gear: TableGear
     seed: Count
     design: str

@@ -20,7 +20,7 @@ needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs pipes of
 
 
 def test_json_is_all_of_stdout(failure_json: Run) -> None:
-    assert json.loads(failure_json.out)["schema_version"] == 1
+    assert json.loads(failure_json.out)["schema_version"] == 2
 
 
 def test_problems_do_not_stand_on_stdout(table: Table) -> None:

@@ -63,7 +63,7 @@ def form(gear: Gear, table: IndexTable, judge: Judge) -> dict:
 
 def test_the_top_level_has_every_key_of_the_contract(form: dict) -> None:
     assert form.keys() >= {"schema_version", "gear", "inspections", "problems"}
-    assert form["schema_version"] == 1
+    assert form["schema_version"] == 2
 
 
 def test_the_gear_carries_its_provenance_and_hash(form: dict, gear: Gear) -> None:

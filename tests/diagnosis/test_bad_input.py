@@ -240,7 +240,7 @@ def test_the_json_of_a_diagnosis_holds_no_invalid_number(tmp_path: Path) -> None
         str(write(tmp_path / "t.csv", rows, "plunger_displacement_in")),
         "--json",
     )
-    assert json.loads(found.out)["schema_version"] == 1
+    assert json.loads(found.out)["schema_version"] == 2
     assert not {"NaN", "Infinity"} & set(found.out.split())
 
 
