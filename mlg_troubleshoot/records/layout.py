@@ -161,6 +161,10 @@ def find_header(
             return replace(header, units=units, row=number, rows_used=used)
         # What names the gear stands in front, and says nothing in a row of headings.
         words = [] if cells[0] is not None else [*map(_text, cells)]
+        for text, word in zip(header.texts, words, strict=False):
+            field = recognise(text, options.joints).field if word else None
+            if field is not None and field.column in IDENTITY:
+                words = []
         headings = [take_apart(text) for text in words if text]
         if headings and all(each.is_said and each.is_bare for each in headings):
             joined = []

@@ -9,7 +9,7 @@ import random
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
@@ -168,6 +168,7 @@ ANY_CELL = st.one_of(
 
 
 @settings(max_examples=150, deadline=None)
+@example(rows=[[None, "LH"]], sep=",")
 @given(
     rows=st.lists(st.lists(ANY_CELL, min_size=1, max_size=8), max_size=6),
     sep=st.sampled_from((",", ";", "\t")),
