@@ -15,8 +15,6 @@ from mlg_troubleshoot.gear.gear import Gear
 from tests.decision.conftest import every_joint, inspected
 
 WORN = every_joint(0.004)
-# The third reading may be the total play: with a probability of about 5 %.
-IN_DOUBT = {2: 0.0017, 3: 0.0115, 5: 0.0038}
 
 
 def causes_of(gear: Gear, clearance_in: dict[int, float], **more: Any) -> Belief:

@@ -37,7 +37,6 @@ GIVEN = (
     "Soll",
 )
 JOINTS = ("Joint {n} (in)", "J{n} (in)", "clearance_{n}_in", "Clearance #{n} (in)")
-LABELS = ("#{n} {name}", "Joint {n}", "J{n}", "Jt {n}", "Clearance {n}")
 CORNERS = ("Item", "Location", "Pos.", "No.", "Bearing", "Joint", "Jt", "")
 UNKNOWN = ("Trial1", "A", "1st", "x", "")
 NAMES = (

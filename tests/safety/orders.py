@@ -41,7 +41,6 @@ class When:
 
 UNKNOWN = When("")
 # The widest difference between two clocks that state no zone.
-_ANY_ZONE = timedelta(hours=14)
 
 
 def day(of: datetime) -> When:
