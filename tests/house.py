@@ -70,7 +70,7 @@ BUDGETS: dict[str, int] = {
     "misfit": 18323,
     "notebook": 2134,
     "paper": 6266,
-    "records": 42529,
+    "records": 42642,
     "reporting": 22749,
     "schemas": 771,
     "store": 7690,

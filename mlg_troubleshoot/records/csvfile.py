@@ -190,7 +190,9 @@ def csv_book(data: bytes, header_score: Callable[[Cells], int]) -> Workbook:
 
 
 def _find_delimiter(head: str, header_score: Callable[[Cells], int]) -> str:
-    """Take the separator under which one of the first rows makes most sense as a header."""
+    """Take the separator under which one of the first rows makes most sense as a header; where
+    none does, as in a form, the one that most rows have.
+    """
     lines = head.splitlines()[:20]
 
     def best_score(delimiter: str) -> int:
@@ -203,7 +205,10 @@ def _find_delimiter(head: str, header_score: Callable[[Cells], int]) -> str:
             (header_score([f or None for f in fields[:MAX_COLUMNS]]) for fields in rows), default=0
         )
 
-    return max(_DELIMITERS, key=best_score)
+    scores = {delimiter: best_score(delimiter) for delimiter in _DELIMITERS}
+    if not any(scores.values()):
+        scores = {each: sum(each in line for line in lines) for each in _DELIMITERS}
+    return max(scores, key=lambda delimiter: scores[delimiter])
 
 
 MAX_EXPANDED_BYTES = 200_000_000

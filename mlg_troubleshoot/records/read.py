@@ -295,7 +295,9 @@ def _read_book(book: Workbook, options: ReadOptions, label: str, found: Collecte
         if header is None:
             raise _no_header([candidate])
         if isinstance(header, Form):
-            part = read_form(header, options, file=label, sheet=sheet.name)
+            part = read_form(
+                header, options, file=label, sheet=sheet.name, delimiter=book.delimiter
+            )
         else:
             rows = candidate.rows
             part = read_table(sheet, header, rows, options, file=label, delimiter=book.delimiter)

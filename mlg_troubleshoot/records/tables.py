@@ -206,6 +206,12 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     kinds = {line.row: line.column for line in lines if line.column is not JOINT}
     above = [(row, cells) for row, cells in reversed(rows) if row < joints[0].row]
     headings = dict(takewhile(lambda each: not kinds.get(each[0]), above[:3]))
+    # So does a row that says joint, wherever the plunger's line stands.
+    headings |= {
+        line.row: line.cells
+        for line in lines
+        if line.column is JOINT and not any(map(_is_number, line.cells[at + 1 :]))
+    }
     lines = [line for line in lines if line.row not in headings and _is_line(line, at, options)]
     # Lines of a side or a day that several columns fill also head them.
     told_apart = [
@@ -479,12 +485,18 @@ def read_table(
 
 
 def read_form(
-    form: Form, options: ReadOptions, *, file: str | None, sheet: str | None
+    form: Form,
+    options: ReadOptions,
+    *,
+    file: str | None,
+    sheet: str | None,
+    delimiter: str | None = None,
 ) -> Collected:
     out = Collected()
     visits = form.visits(sheet)
     column, visit = next(iter(visits.items()))
-    table = TableInHand(options, file, sheet, out.tell, options.decimal_comma, visit.side)
+    comma = options.decimal_comma or delimiter == ";"
+    table = TableInHand(options, file, sheet, out.tell, comma, visit.side)
     columns = Columns(form, table)
     is_several = len(visits) > 1
     reader = RowReader(columns.placed, table, is_several=is_several)

@@ -206,6 +206,18 @@ def test_a_form_of_another_maker_is_read_and_its_labels_shown(read):
     assert any('"Joint 3 (in):" clearance_3_in' in note for note in result.notes)
 
 
+@pytest.mark.parametrize(("separator", "mark"), [(",", "."), (";", ","), (";", "."), ("\t", ".")])
+def test_a_form_is_read_from_csv_with_its_joints_below_the_plunger(separator, mark):
+    said = ("Tail,N1", "Side,LH", "Convention,radial", "Unit,mm", "Outcome,FAILED", "Plunger,1.04")
+    joints = ("Joint,Found (mm)", *(f"{joint},0.{joint}5" for joint in range(1, 6)))
+    rows = [line.split(",") for line in (*said, *joints)]
+    text = "\n".join(separator.join(cell.replace(".", mark) for cell in row) for row in rows)
+    (row,) = read_inspections(io.BytesIO(text.encode()), ReadOptions()).rows
+    assert isinstance(row, Inspection)
+    assert row.measured_displacement_in == pytest.approx(1.04 / 25.4)
+    assert row.clearance_in == pytest.approx({n: (n / 10 + 0.05) / 25.4 for n in range(1, 6)})
+
+
 def test_a_form_of_two_gears_side_by_side_is_two_inspections(read, xlsx):
     lines = [("Tail", "N1", "N2"), ("Side", "LH", "RH"), ("J3 (in)", 0.001, 0.013)]
     result = read(xlsx(lines), "f.xlsx", convention="RADIAL")
