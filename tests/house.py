@@ -61,7 +61,7 @@ WAYS = {
 BUDGETS: dict[str, int] = {
     "(top)": 9625,
     "cli": 28035,
-    "decision": 28162,
+    "decision": 28175,
     "diagnosis": 33493,
     "gear": 11193,
     "geometry": 5881,

@@ -16,6 +16,7 @@ from functools import cached_property, lru_cache
 from statistics import NormalDist
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, frozen
 from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
@@ -124,7 +125,7 @@ def _by_wear(gear: Gear) -> Array:
     return _characteristic(reach[:, None] * SHARES, bend[:, None] * SHARES**2).view(float)
 
 
-def _density(transform: Array) -> Array:
+def _density(transform: Array | NDArray[np.complex128]) -> Array:
     """Chance of each cell from a transform. [1]"""
     found = np.fft.irfft(transform, _CELLS)
     # Less is what the frequencies that are left out would take away.
