@@ -4,16 +4,10 @@ A gear that failed is followed by what is believed of it (`belief`): the joints,
 something else. A gear without a complaint is read until there is a verdict, and what is over its
 limit is restored, nothing else. What comes after the first step is the expected course.
 
-What to do next on a gear that failed: the action with the fewest expected minutes to an end.
-
-One step ahead over the states of its belief, by (13) to (16) of docs/reference/models.md.
-
-What to restore: all subsets of a gear by the expansion, the best checked exactly; and what
-re-rigging would do.
-
-What follows each outcome of the next action: IF … THEN …, by the same rule that gave it.
-
-Each outcome is a typical reading, entered in the inspection and judged again.
+`choose`: the next action on a gear that failed has the fewest expected minutes to an end, one step
+ahead over the states of its belief, by (13) to (16) of docs/reference/models.md. Repair sets: all
+subsets by the expansion, the best checked exactly; and what re-rigging would do. Consequences, IF …
+THEN …: each outcome is a typical reading, entered in the inspection and judged by the same rule.
 """
 
 from __future__ import annotations

@@ -1,16 +1,13 @@
 """Predictions for a batch of inspections, and their uncertainty (decision rule, "Prediction").
 
-The displacement to second order in the clearances: fast enough for thousands of imagined gears.
-
-To second order the plunger moves by g·x + ½ xᵀHx, x being the components of all virtual links.
+To second order, which is fast enough for thousands of imagined gears, the plunger moves by
+g·x + ½ xᵀHx, x being the components of all virtual links.
 Along the worst directions of small clearances, dᵢ = ±gᵢ/|gᵢ|, this gives the worst case as a
 quadratic form of the clearances; that the directions themselves turn as clearances grow enters only
 at third order (envelope theorem).
 
-A batch of gears under judgement as one object of arrays: what is known of each, held once and
-handed on.
-
-A measured plunger displacement compared with the prediction.
+`Cases` is a batch of gears under judgement as arrays: what is known of each, held once and handed
+on. A measured plunger displacement is compared with the prediction at the end of the file.
 """
 
 from __future__ import annotations

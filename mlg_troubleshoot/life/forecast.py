@@ -1,13 +1,8 @@
 """How many landings gears have left: to a joint's limit, to the margin, to the next inspection.
 
-What was read of each joint between its restorations, as paths of wear over landings.
-
-Last inspections that wear does not explain: a restoration without a record.
-
-What a forecast says about tomorrow: landings left, the day of the next inspection, which gear
-comes first.
-
-What the records say about the past: how worn gears usually are.
+From the readings of each joint between its restorations, as paths of wear over landings, follow:
+landings left, the day of the next inspection, and which gear comes first; last inspections that
+wear does not explain (a restoration without a record); and how worn gears usually are.
 """
 
 from __future__ import annotations

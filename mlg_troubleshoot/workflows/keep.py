@@ -231,7 +231,7 @@ def keep(
                 records.append(inspection_record(row, kind, supersedes=other.record.key))
         known.add(each)
         new += other is None or bool(amend)
-    # Two rows of one call that contradict each other are no correction of what is kept.
+    # Two rows of one call that contradict each other do not correct what is kept.
     if any(amend is None or (amend and not old.record.key) for old, _new in changed):
         raise _kept_otherwise(changed)
     store.add(records)
