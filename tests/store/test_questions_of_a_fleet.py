@@ -1,5 +1,5 @@
-"""The questions of a fleet engineer, over a year of 80 gears, answered as the truth says that the
-test draws.
+"""The questions of a fleet engineer, over a year of 80 gears in five workbooks that were corrected
+and two stores that were merged, answered as the truth says that the test draws.
 """
 
 from __future__ import annotations
@@ -117,13 +117,23 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[tuple[st
     rows = sorted((r for t in truth.values() for r in t.rows), key=lambda r: r["inspection_date"])
     parts = 5
     for n in range(parts):
-        book = folder / f"part{n}.csv"
-        with book.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, HEADER)
-            writer.writeheader()
-            writer.writerows(rows[n * len(rows) // parts : (n + 1) * len(rows) // parts])
-        run = mlg("check", book, "--keep", "--store", folder / "s.sqlite", "-q")
-        assert run.code in (0, 1), run.err
+        # Each workbook is first kept with slips, in one of two stores that are merged at the end.
+        store = folder / ("s.sqlite", "other.sqlite")[n % 2]
+        own = rows[n * len(rows) // parts : (n + 1) * len(rows) // parts]
+        slips = {rng.randrange(len(own)): f"clearance_{rng.randrange(1, 11)}_in" for _ in range(6)}
+        wrong = [row | {slips[i]: "0.0091"} if i in slips else row for i, row in enumerate(own)]
+        for written, *amend in (wrong,), (own, "--amend"):
+            with (folder / f"part{n}.csv").open("w", encoding="utf-8", newline="") as file:
+                writer = csv.DictWriter(file, HEADER)
+                writer.writeheader()
+                writer.writerows(written)
+            run = mlg("check", file.name, "--keep", "--store", store, "-q", *amend)
+            assert run.code in (0, 1), run.err
+    chain = folder / "chain.jsonl"
+    assert mlg("history", "export", chain, "--store", folder / "other.sqlite").code == 0
+    for _ in range(2):
+        run = mlg("history", "import", chain, "--store", folder / "s.sqlite")
+        assert run.code == 0, run.err
     return folder, truth
 
 
@@ -170,6 +180,12 @@ def test_the_most_urgent_gears_stand_first_with_the_reason(fleet) -> None:
         ]
         span = own.landings_failed[runs[-1]] - own.landings_failed[0]
         assert f"FAILED in {span} landings after" in gear["why"]
+
+
+def test_each_repair_counts_once_though_its_row_was_corrected_and_merged(fleet) -> None:
+    folder, truth = fleet
+    found = {key(gear): gear["repairs"] for gear in asked(folder)}
+    assert found == {k: len(t.restored) for k, t in truth.items()}
 
 
 def test_the_gears_that_failed_are_those_that_did(fleet) -> None:
