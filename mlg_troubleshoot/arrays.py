@@ -44,6 +44,17 @@ def numbered(labels: NDArray[Any]) -> Wholes:
     return np.unique(labels, return_inverse=True)[1].astype(np.int64)
 
 
+def lasting_falls(values: Array) -> Places:
+    """Places from which values are lower than before: the two in front of one are above the two
+    from it on, so that a single wrong value begins nothing.
+    """
+    padded = np.r_[np.inf, values, -np.inf]
+    before = np.minimum(padded[:-3], padded[1:-2])
+    after = np.maximum(padded[2:-1], padded[3:])
+    found: Places = 1 + np.flatnonzero(before > after)
+    return found
+
+
 def count_failed(values: Array) -> int:
     """Number of evaluations without a finite result."""
     return int(np.count_nonzero(~np.isfinite(values)))

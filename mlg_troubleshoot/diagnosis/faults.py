@@ -744,7 +744,6 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
             "landings_fall",
             f"gear{'s' * (len(fell) > 1)} {first_few(fell)}",
             len(fell) / len(visits(table)),
-            "a slip (mlg check names the cells), or an overhaul that cannot be recognised: the wear"
-            " before and after is taken as one",
+            "a slip or an overhaul that cannot be recognised: wear before and after is one",
             "landings since overhaul, and the date of the overhaul",
         )

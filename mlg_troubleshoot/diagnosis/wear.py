@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from mlg_troubleshoot.arrays import Array, Mask, Places, numbered
+from mlg_troubleshoot.arrays import Array, Mask, Places, lasting_falls, numbered
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.columns import FAR
 from mlg_troubleshoot.units import MM_PER_IN
@@ -159,7 +159,8 @@ def gears_of(table: DiagnosisTable) -> Places:
             known = rows[np.isfinite(landings[rows])]
             fall = int(np.sum(np.diff(landings[known]) < 0.0))
             if fall:
-                begun[known] = _overhauls(landings[known])
+                starts = lasting_falls(landings[known])
+                begun[known] = np.searchsorted(starts, np.arange(len(known)), "right")
                 falls += fall
         if falls > _MOST_FALLS * max(len(table) - len(order), 1):
             begun[:] = 0
@@ -174,16 +175,6 @@ def visits(table: DiagnosisTable) -> dict[str, Places]:
     order = np.lexsort((np.arange(len(table)), day, gears))
     starts = np.flatnonzero(np.r_[True, gears[order][1:] != gears[order][:-1]])
     return {str(gears[rows[0]]): rows for rows in np.split(order, starts[1:])}
-
-
-def _overhauls(landings: Array) -> Places:
-    """How often landings began anew: the two before a fall are above the two after it, so that a
-    single mistyped number begins nothing.
-    """
-    padded = np.r_[np.inf, landings, -np.inf]
-    low = np.minimum(padded[:-3], padded[1:-2])
-    after = np.maximum(padded[2:-1], padded[3:])
-    return np.concatenate([np.zeros(1, np.intp), np.cumsum(low > after, dtype=np.intp)])
 
 
 def landings_of(landings: Array, gears: Places) -> tuple[Array, Mask]:

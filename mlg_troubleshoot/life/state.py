@@ -20,6 +20,9 @@ from itertools import groupby, pairwise
 from math import hypot, inf
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from mlg_troubleshoot.arrays import lasting_falls
 from mlg_troubleshoot.decision.inspection import (
     Fact,
     FactKind,
@@ -659,16 +662,14 @@ def overhauls(moments: Sequence[Moment]) -> dict[int, frozenset[int]]:
     and no other joint wider.
     """
     placed = _placed(moments)
-    landings = [moments[i].landings or 0.0 for i in placed]
-    falls = [n for n in range(1, len(placed)) if landings[n] < landings[n - 1]]
+    landings = np.array([moments[i].landings for i in placed], float)
     found = {}
     begun = 0
-    for n, end in pairwise([*falls, len(placed)]):
-        if min(landings[max(begun, n - 2) : n]) > max(landings[n : min(end, n + 2)]):
-            restored = _restored(moments, placed[begun:n], placed[n:end])
-            if len(restored) >= _SEVERAL:
-                found[placed[n]] = restored
-                begun = n
+    for n, end in pairwise([*lasting_falls(landings).tolist(), len(placed)]):
+        restored = _restored(moments, placed[begun:n], placed[n:end])
+        if len(restored) >= _SEVERAL:
+            found[placed[n]] = restored
+            begun = n
     return found
 
 
