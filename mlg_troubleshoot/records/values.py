@@ -374,8 +374,8 @@ _OUTCOME_WORDS = {
     **_each(
         "failed|fail|fails|failure|failed to retract|did not retract|not retracted|ng|nok|not ok"
         "|nicht ok|nio|nicht in ordnung|u s|unserviceable|defekt|ausfall|did not lock"
-        "|did not lock up|no good|reject|rejected|stuck|jammed|hung up|unretracted|no retraction"
-        "|kaputt|nicht eingefahren|échec|échoué|fallo|falló|fallito|mislukt",
+        "|did not lock up|no good|reject|rejected|stuck|jammed|hung|hung up|unretracted"
+        "|no retraction|kaputt|nicht eingefahren|échec|échoué|fallo|falló|fallito|mislukt",
         Outcome.FAILED,
     ),
 }
@@ -388,7 +388,9 @@ def in_words(text: str) -> str:
 
 _TELLS_FAILURE = re.compile(
     r"(?<!no )(?<!not )(?<!never )(?<!without )"
-    r"\b(?:failed|did not retract|not retracted|retracted no|no retraction|nicht eingefahren)\b"
+    r"\b(?:failed|(?:did|does|would|could|can)(?:not| not|n t| t) (?:retract|lock up|come up)"
+    r"|(?:unable|refused) to retract|(?:gear|leg|mlg|lh|rh) (?:is |was |got )?(?:hung|stuck|jammed)"
+    r"|not retracted|retracted no|no retraction|nicht eingefahren)\b"
 )
 
 

@@ -505,12 +505,13 @@ class Store:
             if self.is_new and not writing:
                 engine = sql.create_engine("sqlite://", poolclass=sql.NullPool)
             with _held_interrupt(hold=writing) as end, engine.connect() as connection:
-                if self._postgres and writing:
+                if self._postgres:
                     limit = sql.func.set_config("lock_timeout", f"{self._patience_s}s", True)
                     connection.execute(sql.select(limit))
-                    lock = sql.func.pg_advisory_xact_lock(_ADVISORY_LOCK)
-                    connection.execute(sql.select(lock))
-                elif not self._postgres:
+                    if writing:
+                        lock = sql.func.pg_advisory_xact_lock(_ADVISORY_LOCK)
+                        connection.execute(sql.select(lock))
+                else:
                     connection.exec_driver_sql("BEGIN IMMEDIATE" if writing else "BEGIN")
                 self._prepare(connection, writing=writing)
                 yield connection

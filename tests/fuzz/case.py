@@ -218,7 +218,7 @@ def _in_the_child(
             setattr(
                 sys, name, io.TextIOWrapper(io.FileIO(number, "w", closefd=False), encoding="utf-8")
             )
-        code = _called(line) if case.action is None else case.action()
+        code = called(line) if case.action is None else case.action()
         sys.stdout.flush()
         sys.stderr.flush()
     except BaseException:  # noqa: BLE001 - a child says what happened and never goes on as its parent
@@ -227,7 +227,7 @@ def _in_the_child(
         os._exit(code)
 
 
-def _called(line: Sequence[str]) -> int:
+def called(line: Sequence[str]) -> int:
     from mlg_troubleshoot.cli.app import app
     from mlg_troubleshoot.cli.output import prepare_streams
 
@@ -241,7 +241,6 @@ def _called(line: Sequence[str]) -> int:
 
 def preload() -> None:
     """Import what commands import late, so that each child has it already."""
-    import gc
     import importlib
     import pkgutil
 
@@ -250,4 +249,3 @@ def preload() -> None:
     for module in pkgutil.walk_packages(mlg_troubleshoot.__path__, "mlg_troubleshoot."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
-    gc.freeze()

@@ -14,6 +14,7 @@ import zlib
 from collections.abc import Callable, Sequence
 from contextlib import closing, suppress
 from copy import deepcopy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,12 @@ def pressed(content: bytes) -> bytes:
     return press.compress(content) + press.flush()
 
 
+@cache
+def _bomb() -> bytes:
+    """600 MB of JSON, pressed."""
+    return pressed(b" " * 600_000_000 + b"1")
+
+
 def canonical(content: Any) -> bytes:
     return json.dumps(content, sort_keys=True, separators=(",", ":")).encode()
 
@@ -194,9 +201,7 @@ def _a_cell(place: Path, desk: Desk) -> None:
 
 
 def _a_huge_body(place: Path, desk: Desk) -> None:
-    big = desk.rng.choice(
-        (pressed(b" " * 600_000_000 + b"1"), pressed(b"[" * 2_000_000), 99999999999)
-    )
+    big = desk.rng.choice((_bomb(), pressed(b"[" * 2_000_000), 99999999999))
     _by_hand(place, "UPDATE mlg_records SET body = ? WHERE seq = 2", values=(big,))
 
 
@@ -313,7 +318,7 @@ def _large(path: Path, desk: Desk) -> None:
             desk.rng.choice((deep, f'{{"seq": {deep}', f'{{"content": {deep}')), encoding="utf-8"
         )
     elif what < 0.8:
-        big[0]["body"] = pressed(b" " * 600_000_000 + b"1")
+        big[0]["body"] = _bomb()
         path.write_text("".join(line + "\n" for line in _lines(in_a_chain(big))), encoding="utf-8")
     else:
         path.touch()

@@ -76,7 +76,12 @@ def test_an_answer_under_a_question_that_is_not_understood_is_asked_about(
 
 
 @pytest.mark.parametrize(
-    "word", ["FAILED", "fail", "failed!", "did not retract", "failed last week, repaired"]
+    "word",
+    [
+        *("FAILED", "fail", "failed!", "did not retract", "failed last week, repaired", "Hung."),
+        *("LH gear hung at mid travel", "wouldn't retract", "leg was stuck, freed by hand"),
+        *("gear cannot lock up", "Refused to retract when cold", "MLG jammed"),
+    ],
 )
 @pytest.mark.parametrize("header", CARRIED)
 def test_a_failure_is_seen_whatever_the_header_is(header: str, word: str) -> None:
@@ -102,6 +107,13 @@ def test_a_row_that_says_something_only_where_nobody_reads_is_not_set_aside(
     assert [each.verdict for each in result.judgements][1:] == [Verdict.INCOMPLETE]
 
 
+# Remarks of every day, which nobody has to answer for.
+ORDINARY = (
+    *("stuck bolt replaced", "pin jammed in bush, pressed out", "placard hung at the door"),
+    *("gear swing OK", "gear could retract slower when cold", "landing gear lubricated"),
+    *("no gear hung or stuck", "jam nut tightened", "retracts slowly", "did not measure #9"),
+    *("gear jacked", "did not lock the door", "LH tyre worn", "cannot find the log book"),
+)
 UNCLEAR = ("F", "x", "0", "3", "intermittent", "hung", "partial", "FAULT", "slow", "OK?")
 
 
@@ -257,6 +269,8 @@ def test_an_outcome_that_is_in_doubt_is_not_taken_as_sure(word: str) -> None:
         (["photo taken"], ["yes"]),
         (["status"], ["OK"]),
         (["notes"], ["not failed"]),
+        *((["remarks"], [text]) for text in ORDINARY),
+        (["VI"], ["60"]),
         (["outcome", "notes"], ["RETRACTED", "bush replaced; no failed part found"]),
         (["outcome", "Locked up"], ["RETRACTED", "yes"]),
     ],

@@ -92,12 +92,17 @@ def test_a_clock_at_the_end_of_all_days_ends_no_command(
 
 @pytest.mark.slow
 def test_a_lock_that_somebody_holds_on_a_server_is_waited_for_no_longer_than_patience() -> None:
+    locks = {
+        f"SELECT pg_advisory_lock({_ADVISORY_LOCK})": lambda store: store.add(places.records(2, 3)),
+        "LOCK TABLE mlg_records": Store.all,
+    }
     with places.server() as url:
         Store(url).add(places.records(1, 2))
         engine = sql.create_engine(url, poolclass=sql.NullPool)
-        with engine.connect() as other:
-            other.execute(sql.select(sql.func.pg_advisory_lock(_ADVISORY_LOCK)))
-            began = time.monotonic()
-            with pytest.raises(StoreError, match="lock timeout"):
-                Store(url, patience_s=1).add(places.records(2, 3))
-            assert time.monotonic() - began < 20.0
+        for lock, ask in locks.items():
+            with engine.connect() as other:
+                other.exec_driver_sql(lock)
+                began = time.monotonic()
+                with pytest.raises(StoreError, match="lock timeout"):
+                    ask(Store(url, patience_s=1))
+                assert time.monotonic() - began < 20.0
