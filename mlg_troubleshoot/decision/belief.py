@@ -32,6 +32,7 @@ from mlg_troubleshoot.gear.linkage import random_directions
 # joints worn out together stay inside. [1, in]
 _CELLS = 256
 _CELL_IN = 0.00125
+_PLACES = np.arange(_CELLS)
 _AT = np.asarray(np.fft.fftfreq(_CELLS) * _CELLS * _CELL_IN, np.float64)
 _ENDS_IN = np.array([_AT - 0.5 * _CELL_IN, _AT + 0.5 * _CELL_IN], np.float64)
 _FREQUENCIES = 2.0 * np.pi * np.fft.rfftfreq(_CELLS, _CELL_IN)
@@ -52,9 +53,9 @@ _OTHERS = 64
 # weights, and what stands for where its pin rests. [1]
 _LEFT = (np.arange(32)[::-1] + 0.5) / 32
 _QUANTILES = 1.0 - _LEFT**2
-_SUMS = np.tri(32) * _LEFT
-_TURNS = np.mod(np.arange(1, 33) * 0.5 * np.sqrt(5.0), 1.0)[:, None]
-_SCORES = np.array([[NormalDist().inv_cdf(turn)] for turn in _TURNS[:, 0].tolist()])
+_SUMS = (np.tri(32) * _LEFT).T
+_TURNS = np.mod(np.arange(1, 33) * 0.5 * np.sqrt(5.0), 1.0)
+_SCORES = np.array([NormalDist().inv_cdf(turn) for turn in _TURNS.tolist()])
 
 
 def _wear() -> Array:
@@ -72,6 +73,7 @@ WEAR = _wear()
 LEVELS = np.append(np.full(6, PRIORS.alike / 6), 1.0 - PRIORS.alike)
 
 
+@lru_cache(maxsize=2)
 def given_readings(cases: Cases) -> tuple[Array, Array]:
     """Chances of the levels of each gear given its readings (1) to (3), (n, levels), and of each
     cell of wear at each level, (n, joints, levels, wear). [1]
@@ -171,18 +173,18 @@ class Belief:
         How much likelier the plunger's reading is with held pins than with free ones. [1]
     """
 
-    def __init__(self, one: Cases) -> None:
-        levels, wear = (each[0] for each in given_readings(one))
-        gear, fleet = one.gear, one.fleet
+    def __init__(self, cases: Cases, row: int = 0) -> None:
+        levels, wear = (each[row] for each in given_readings(cases))
+        gear, fleet = cases.gear, cases.fleet
         self.gear = gear
-        self.margin_in = margin = float(one.margin_in[0])
-        self.looked = one.inspections[0].rigging_checked not in (None, RiggingCheck.NO)
+        self.margin_in = margin = float(cases.margin_in[row])
+        self.looked = cases.inspections[row].rigging_checked not in (None, RiggingCheck.NO)
         self._wear = wear
         # By pins, joints and levels.
         self._transforms = (wear @ _by_wear(gear)).view(complex)
         self._before = _products_before(self._transforms)
         self._stands = _density(self._before[:, -1] * self._transforms[:, -1] * _LINKAGE)
-        y, u = float(one.plunger_in[0]), float(np.hypot(one.plunger_u_in[0], 1e-4))
+        y, u = float(cases.plunger_in[row]), float(np.hypot(cases.plunger_u_in[row], 1e-4))
         seen, of_rigging = np.ones(_CELLS), 1.0
         if np.isfinite(y):
             # (6), and (7) of a wrong rigging.
@@ -275,55 +277,60 @@ class Belief:
         """Drawn failures, the same ones whoever else is judged: where the plunger stands, then what
         each joint moved, one after another, as in a hidden Markov chain.
         """
-        rng = np.random.default_rng(1)
-        cause = np.repeat([0, 1], [STATES, _OTHERS])
-        n, joints = len(cause), len(self.gear.joints)
-        even = _even(joints + 3, n)
-        weights = self._weights.reshape(2, -1)[cause]
-        used, context = np.unique(
-            _drawn(even[0], np.cumsum(weights.T, axis=0)), return_inverse=True
-        )
-        pins, levels = np.divmod(used, len(WEAR))
-        likely = self._stands[pins, levels][context] * self._seen_at[cause, pins[context]] + 1e-300
-        place = _drawn(even[1], np.cumsum(likely, axis=1).T)
+        causes = np.repeat([0, 1], [STATES, _OTHERS])
+        n, joints, half = len(causes), len(self.gear.joints), _CELLS // 2
+        even, turns, misrigged = _even(joints + 3, n), *_random(joints)
+        # A context is a cause with pins and a level.
+        shape = self._weights.shape
+        drawn = _drawn(self._weights.reshape(2, -1), causes, even[0])
+        drawn += causes * shape[1] * shape[2]
+        is_used = np.bincount(drawn, minlength=self._weights.size) > 0
+        context = np.cumsum(is_used)[drawn] - 1
+        cause, pins, levels = np.unravel_index(np.flatnonzero(is_used), shape)
+        likely = self._stands[pins, levels] * self._seen_at[cause, pins] + 1e-300
+        place = _drawn(likely, context, even[1])
         stands = _AT[place] + _CELL_IN * (even[2] - 0.5)
         before = _density(self._before[pins, :, levels] * _LINKAGE)
+        before = before.swapaxes(0, 1)
+        before = np.concatenate([before[..., half:], before, before[..., :half]], axis=2)
         is_worn, at_in = self._points(pins, levels)
-        cell = np.rint(at_in / _CELL_IN).astype(int)
-        moved = np.empty((n, joints))
-        worn = np.empty(moved.shape, bool)
+        # The cells go round: from half of them below to half above.
+        cell = (np.rint(at_in / _CELL_IN).astype(int) + half) % _CELLS - half
+        first = 2 * _CELLS * context + half
+        chosen = np.empty((joints, n), int)
         for j in range(joints - 1, -1, -1):
-            left = (place - cell[j].take(context, axis=1)) & (_CELLS - 1)
-            of = _drawn(even[3 + j], _SUMS @ before[:, j].take(_CELLS * context + left))
-            place = left[of, np.arange(n)]
-            moved[:, j] = at_in[j, of, context]
-            worn[:, j] = is_worn[j, of, context]
-        level = _drawn(rng.random(_OTHERS), np.cumsum(self._rigging_levels)[:, None])
-        rigging = rng.random((_OTHERS, joints)) < self._left_worn[:, level].T
-        mean, spread = PRIORS.cosine
-        loaded = mean + spread * rng.standard_normal((STATES, joints))
-        free = np.cos(2.0 * np.pi * rng.random((STATES, joints)))
-        turns = np.where(pins[context[:STATES], None] == 1, loaded, free)
+            left = (first + place)[:, None] - cell[j].take(context, axis=0)
+            steps = before[j].take(left) @ _SUMS
+            below = steps < even[3 + j, :, None] * steps[:, -1:]
+            chosen[j] = below.view(np.int8).sum(axis=1, dtype=np.int8)
+            place = (place - cell[j, context, chosen[j]]) % _CELLS
+        at = np.arange(joints)[:, None], context, chosen
+        moved, worn = at_in[at].T, is_worn[at].T
+        of_level, of_joint = misrigged
+        level = _drawn(self._rigging_levels[None], np.zeros(_OTHERS, int), of_level)
+        rigging = of_joint < self._left_worn[:, level].T
+        fresh = turns[pins[context[:STATES]], np.arange(STATES)]
         reach = responses(self.gear)[0].amplification * self.gear.new_parts_in
         counts = [STATES, _OTHERS, _OTHERS]
         return States(
             np.repeat(np.diag(np.divide(self.chances, counts)), counts, axis=1),
             np.vstack([worn[:STATES], rigging, worn[STATES:]]),
-            moved[:STATES] - reach * turns,
+            moved[:STATES] - reach * fresh,
             stands[:STATES],
             self.margin_in,
         )
 
     def _points(self, pins: Places, levels: Places) -> tuple[Mask, Array]:
-        """Points that stand for each joint in some contexts, (joints, points, contexts): whether it
+        """Points that stand for each joint in some contexts, (joints, contexts, points): whether it
         is worn, and what it moves the plunger by. [in]
         """
-        steps = np.cumsum(self._wear[:, levels], axis=2)[:, None, :, :-1]
-        share = SHARES[(steps < _QUANTILES[:, None, None]).sum(axis=3)]
+        wear = self._wear.reshape(-1, len(SHARES))
+        cells = _drawn(wear, np.arange(len(wear))[:, None], _QUANTILES)
+        share = SHARES[cells].reshape(*self._wear.shape[:2], -1)[:, levels]
         reach, bend = (each[:, None, None] for each in _reach(self.gear))
         mean, spread = PRIORS.cosine
-        turned = np.where(pins == 1, mean + spread * _SCORES, np.cos(2.0 * np.pi * _TURNS))
-        return share > 1.0, reach * share * turned + (pins == 0) * bend * share**2
+        turned = np.array([np.cos(2.0 * np.pi * _TURNS), mean + spread * _SCORES])[pins]
+        return share > 1.0, reach * share * turned + (pins == 0)[:, None] * bend * share**2
 
 
 @lru_cache(maxsize=4)
@@ -339,16 +346,34 @@ def _even(dimensions: int, n: int) -> Array:
     return frozen(random_directions(dimensions, n).T / (2.0 * np.pi))
 
 
+@lru_cache(maxsize=4)
+def _random(joints: int) -> tuple[Array, tuple[Array, Array]]:
+    """Random numbers that every gear has in common: cosines of the pins of new joints, free and
+    held (4), (2, STATES, joints); and what draws the level and the worn joints of a wrong rigging.
+    [1]
+    """
+    rng = np.random.default_rng(1)
+    misrigged = rng.random(_OTHERS), rng.random((_OTHERS, joints))
+    mean, spread = PRIORS.cosine
+    held = mean + spread * rng.standard_normal((STATES, joints))
+    free = np.cos(2.0 * np.pi * rng.random((STATES, joints)))
+    return np.array([free, held]), misrigged
+
+
 def _both_senses(likelihood: Array) -> Array:
     """A likelihood with free pins, and with held ones, which may rest with either sign; shape
     (2, cells). [1]
     """
-    return np.array([likelihood, 0.5 * (likelihood + np.roll(likelihood[::-1], 1))])
+    return np.array([likelihood, 0.5 * (likelihood + likelihood[-_PLACES])])
 
 
-def _drawn(even: Array, steps: Array) -> Places:
-    """One place of each column, by the sums of its weights."""
-    return np.asarray((steps < even * steps[-1]).sum(axis=0))
+def _drawn(weights: Array, rows: Places, share: Array) -> Places:
+    """Where a share of the sum of a row of weights is reached."""
+    steps = np.cumsum(weights, axis=1)
+    steps = steps / np.maximum(steps[:, -1:], 1e-300) + np.arange(len(steps))[:, None]
+    width = weights.shape[1]
+    found = np.searchsorted(steps.ravel(), rows + share) - width * rows
+    return np.asarray(found.clip(0, width - 1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -404,16 +429,17 @@ def _imagined(gear: Gear) -> tuple[Array, Array, Array]:
     return per_clearance[:, None] * turned, bend / gear.limits_in**2, moved
 
 
-def chance_random(cases: Cases) -> Array:
-    """Chance of leaving the margin with random directions (12): joints that were read as they are,
-    the others by their usual wear, weighed by where the plunger was read. [1]
+def chance_random(cases: Cases, rows: Places) -> Array:
+    """Chance of leaving the margin with random directions (12) of some gears: joints that were read
+    as they are, the others by their usual wear, weighed by where the plunger was read. [1]
     """
+    levels = given_readings(cases)[0][rows]
+    cases = cases.take(rows)
     linear, bend, moved = _imagined(cases.gear)
     read = cases.filled(0.0)
     base = read @ linear + (read**2 @ bend)[:, None]
     y, u = cases.plunger_in[:, None], np.hypot(cases.plunger_u_in, PRIORS.linkage_u_in)[:, None]
     is_read = np.isfinite(y[:, 0])
-    levels = given_readings(cases)[0]
     beyond = np.empty_like(levels)
     for k, each in enumerate(moved):
         at = base + (~cases.measured).astype(float) @ each

@@ -404,7 +404,7 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
     chance = known.copy()
     unread = np.flatnonzero(~cases.measured.all(axis=1))
     if len(unread) and cases.extension is None:
-        chance[unread] = chance_random(cases.take(unread))
+        chance[unread] = chance_random(cases, unread)
     verdicts = _verdicts(cases, p_lower, p_upper, known)
     found = [verdict for verdict, _basis in verdicts]
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes
@@ -426,7 +426,7 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
         p_lower,
         lower.standard_uncertainty(cases.margin_u_in),
     )
-    belief = cache(lambda row: Belief(cases.take([row])))
+    belief = cache(partial(Belief, cases))
     planned, tried = plans(cases, judged, belief)
     sets = repair_sets(cases, upper, np.flatnonzero(wanted), tried, belief)
     asked = belief if advice else None

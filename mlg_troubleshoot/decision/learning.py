@@ -53,7 +53,7 @@ def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:
     share = betaincinv(PRIORS.loaded, 1.0 - PRIORS.loaded, _QUANTILES)
     likely = np.zeros(len(share))
     if len(whole):
-        ratio = np.array([Belief(known.take([i])).held for i in whole.tolist()])
+        ratio = np.array([Belief(known, i).held for i in whole.tolist()])
         likely = np.log1p(share[:, None] * (ratio - 1.0)).sum(axis=1)
     weight = np.exp(likely - likely.max())
     loaded = float(np.sum(share * weight) / np.sum(weight))

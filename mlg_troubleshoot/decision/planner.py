@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from functools import cached_property, lru_cache
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -90,8 +91,10 @@ def choose(
     # A row is one pattern of what is worn of one group.
     asked, found = _patterns(groups, len(over))
     rows = np.arange(len(asked))
-    differs = states.worn @ (asked & ~found).T | ~states.worn @ (asked & found).T
-    matches = (~differs).T.astype(float)
+    code = 1 << np.arange(len(over))
+    matches = (states.worn @ code & (asked @ code)[:, None] == (found @ code)[:, None]).astype(
+        float
+    )
     causes = matches @ states.causes.T
 
     fixed = over & ~doubted
@@ -111,7 +114,7 @@ def choose(
     check = gear.rigging_check.value
     after = gear.plunger_reading.value + gear.retraction.value
     # (13)
-    second = np.median([joint.restore.value for joint in gear.joints])
+    second = median(joint.restore.value for joint in gear.joints)
     second /= THRESHOLDS.one_repair * gear.second_repair_chance.value
 
     def ends(causes: Array, late: float = 0.0) -> tuple[Array, int]:
