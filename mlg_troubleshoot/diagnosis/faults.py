@@ -23,7 +23,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import gammaln, logsumexp
 
-from mlg_troubleshoot.arrays import Array, Mask, log_sum, numbered
+from mlg_troubleshoot.arrays import Array, Mask, Places, log_sum, numbered
 from mlg_troubleshoot.decision.columns import LANDINGS
 from mlg_troubleshoot.decision.sentences import LEAST_ALIKE
 from mlg_troubleshoot.diagnosis.causes.base import Scene
@@ -415,11 +415,11 @@ LEAST_ROWS = 5
 BY_CHANCE = 0.001
 # What rows that are set aside hold, and what to record next time.
 _ASIDE = {
+    "duplicate": ("the rows stand twice: each counts once", "each inspection once"),
     "copied": (
         "all clearances are those of the gear's inspection before: the rows are not used",
         "every joint anew at each inspection; blank what was not read",
     ),
-    "duplicate": ("the rows stand twice: each counts once", "each inspection once"),
     "limit_written": (
         "every cell holds the joint's limit, not a reading: the rows are not used",
         "the value read; <0.004 where only a limit gauge was tried",
@@ -475,16 +475,15 @@ def data_condition(table: DiagnosisTable, gear: Gear) -> tuple[tuple[DataConditi
     tuple of DataCondition, ndarray of bool of shape (n,)
         What was seen, and the rows that tell nothing further.
     """
-    values = table.clearance_in
     twice = _duplicates(table)
     equal = _identical(table)
-    limits = equal & ~np.any(np.abs(values - gear.limits_in) > 1e-7, axis=1)
+    limits = equal & np.all(np.abs(table.clearance_in - gear.limits_in) < 1e-7, axis=1)
     # Where most rows are like that it is how the gears are, not how one was written.
-    doubtful = equal & ~limits & ~twice & bool(2 * equal.sum() < len(table))
-    each = (_copies(table) & ~twice & ~equal, twice, limits & ~twice, doubtful)
+    doubtful = equal & ~limits & (2 * equal.sum() < len(table))
+    each = (twice, *(rows & ~twice for rows in (_copies(table) & ~equal, limits, doubtful)))
     aside = np.any(each, axis=0)
     found = (
-        *_rounded(table, ~aside),
+        *_rounded(table.take(~aside)),
         *_ends(table.take(~equal)),
         *_blanks(table),
         *(
@@ -518,10 +517,9 @@ def doubt_of(found: tuple[DataCondition, ...]) -> str:
 
 
 def _listed(table: DiagnosisTable, rows: Mask) -> str:
-    """Name rows: by who wrote them if one did, and by their numbers."""
-    people = {*table.people[rows]} - {""}
-    whose = f" of technician {people.pop()}" if len(people) == 1 and rows.sum() > 1 else ""
-    return f"row{'s' * bool(rows.sum() > 1)} {first_few([*map(str, table.row[rows])])}{whose}"
+    """Name rows by their numbers, and by whose they are where it is one's."""
+    numbers = first_few([*map(str, table.row[rows])])
+    return f"row{'s' * bool(rows.sum() > 1)} {numbers}{_whose(table, rows)}"
 
 
 def first_few(names: list[str]) -> str:
@@ -535,50 +533,47 @@ def _duplicates(table: DiagnosisTable) -> Mask:
     texts = [numbered(t) for t in table.factors.values()]
     parts = [table.clearance_in, table.readings_in, *table.quantities.values(), *texts]
     whole = np.nan_to_num(np.column_stack(parts), nan=-1.0)
-    again = np.ones(len(table), bool)
-    again[np.unique(whole, axis=0, return_index=True)[1]] = False
+    again = ~np.isin(np.arange(len(whole)), np.unique(whole, axis=0, return_index=True)[1])
     # A row that says hardly anything is not known to stand twice.
-    read = np.isfinite(np.hstack([table.clearance_in, table.readings_in])).sum(axis=1)
-    return np.asarray(again & (read >= LEAST_ALIKE))
+    said = np.isfinite(table.clearance_in).sum(axis=1) >= LEAST_ALIKE - 1
+    return np.asarray(again & said)
 
 
 def _copies(table: DiagnosisTable) -> Mask:
-    """Rows whose clearances are those of the gear's inspection before, more than chance allows."""
+    """Rows whose clearances are those of the gear's inspection before."""
     values = np.nan_to_num(table.clearance_in)
     before = np.full(values.shape, np.inf)
     for rows in visits(table).values():
         before[rows[1:]] = values[rows[:-1]]
     # The least value may stand for all that are smaller.
     read = (values > np.min(values[values > 0.0], initial=np.inf)) & np.isfinite(before)
-    same = (values == before).all(axis=1) & (read.sum(axis=1) >= LEAST_ALIKE)
-    others = read & ~same[:, None]
-    alike = float(np.sum(others & (values == before)) / max(int(others.sum()), 1))
-    return _beyond_chance(same, alike, read)
+    return _repeated(values, before, read)
 
 
 def _identical(table: DiagnosisTable) -> Mask:
-    """Rows in which many joints were read and all have one value that is not zero, more than chance
-    allows of the values of the other rows.
-    """
+    """Rows in which many joints were read and all have one value that is not zero."""
     values = read_in(table)
     read = np.isfinite(values)
-    first = np.nanmax(values, axis=1, initial=0.0)
-    same = ~np.any(values != first[:, None], axis=1, where=read)
-    same &= (first > 0.0) & (read.sum(axis=1) >= LEAST_ALIKE)
-    others = values[~same]
-    often = np.unique(others[np.isfinite(others)], return_counts=True)[1]
-    alike = float(np.sum(often**2) / max(int(often.sum()) ** 2, 1))
-    return _beyond_chance(same, alike, read[:, 1:])
+    first = np.max(values, axis=1, initial=0.0, where=read, keepdims=True)
+    values = np.where(read, values, first)
+    pairs = read[:, 1:] & read[:, :-1] & (first > 0.0)
+    return _repeated(values[:, 1:], values[:, :-1], pairs)
 
 
-def _beyond_chance(same: Mask, alike: float, read: Mask) -> Mask:
-    """Rows of which all values that were read are the same, if two are alike by such a chance."""
-    return np.asarray(same & (len(same) * alike ** read.sum(axis=1) < BY_CHANCE))
+def _repeated(values: Array, given: Array, read: Mask) -> Mask:
+    """Rows whose values are those given, several of them read, and more than chance allows of the
+    values of the other rows.
+    """
+    equal = values == given
+    count = read.sum(axis=1)
+    same = equal.all(axis=1) & (count >= LEAST_ALIKE - 1)
+    others = read & ~same[:, None]
+    alike = np.sum(others & equal) / max(others.sum(), 1)
+    return np.asarray(same & (len(same) * alike**count < BY_CHANCE))
 
 
-def _rounded(table: DiagnosisTable, rows: Mask) -> Iterator[DataCondition]:
+def _rounded(used: DiagnosisTable) -> Iterator[DataCondition]:
     """Values on a step of twice their standard uncertainty or more: half a step is as large."""
-    used = table.take(rows)
     declared = used.plunger_gauge_u_in
     u = DEFAULT_PLUNGER_U_IN if declared is None else np.nanmedian(declared)
     for what, values, gauge_u, record in (
@@ -626,23 +621,23 @@ def _ends(table: DiagnosisTable) -> Iterator[DataCondition]:
             "the value, with a gauge that reaches further",
             share > _MANY_CUT,
         )
-    found, counts = np.unique(np.round(values[np.isfinite(values)], 7), return_counts=True)
-    small = np.any(found < 2.0 * np.median(table.gauge_u_in))
-    for place, way, sign, beyond in ((0, -1, "<", "less"), (-1, 1, ">", "more")):
-        if (way < 0 and small) or not _piled_up(counts[::way].astype(float)):
-            continue
-        share = float(counts[place] / counts.sum())
-        yield DataCondition(
-            "censored",
-            f"clearances of {found[place]:.4g} in",
-            share,
-            f"some of them are {beyond} than this: it is where the gauge or the sheet ends",
-            f"{sign}{found[place]:.4g} where no value was read",
-            share > _MANY_CUT,
-        )
+    values = np.round(values[np.isfinite(values)], 7)
+    small = np.any(values < 2.0 * np.median(table.gauge_u_in))
+    for way, sign, beyond in ((-1.0, "<", "less"), (1.0, ">", "more"))[bool(small) :]:
+        found, counts = np.unique(way * values, return_counts=True)
+        if _piled_up(counts):
+            share = float(counts[-1] / len(values))
+            yield DataCondition(
+                "censored",
+                f"clearances of {abs(found[-1]):.4g} in",
+                share,
+                f"some of them are {beyond} than this: it is where the gauge or the sheet ends",
+                f"{sign}{abs(found[-1]):.4g} where no value was read",
+                share > _MANY_CUT,
+            )
 
 
-def _piled_up(counts: Array) -> bool:
+def _piled_up(counts: Places) -> bool:
     """Tell whether the last of successive values is more frequent than those before it lead to.
 
     The logarithm of the counts of a unimodal distribution bends downwards, so the line through the
@@ -650,12 +645,9 @@ def _piled_up(counts: Array) -> bool:
     """
     if len(counts) < LEAST_ROWS or counts[-1] < LEAST_VALUES:
         return False
-    before = counts[-4:-1]
-    line, covariance = np.polyfit(
-        (-3.0, -2.0, -1.0), np.log(before), 1, w=np.sqrt(before), cov="unscaled"
-    )
-    error = np.sqrt(1.0 / counts[-1] + covariance[1, 1])
-    return bool(np.log(counts[-1]) - line[1] > 2.0 * error)
+    ahead = np.array([-2.0, 1.0, 4.0, -3.0]) / 3.0
+    error = np.sqrt(ahead**2 @ (1.0 / counts[-4:]))
+    return bool(ahead @ np.log(counts[-4:]) < -2.0 * error)
 
 
 def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
@@ -663,48 +655,48 @@ def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
     technicians.
     """
     people = table.people
-    whole = [*_habit(table, "", np.ones(len(table), bool))]
     own = np.unique(people[people != ""]).tolist()
-    yield from whole or (c for one in own for c in _habit(table, one, people == one))
+    yield from [*_habit(table)] or (
+        c for one in own for c in _habit(table.take(people == one), f" of technician {one}")
+    )
 
 
-def _habit(table: DiagnosisTable, whose: str, rows: Mask) -> Iterator[DataCondition]:
-    known = np.isfinite(table.clearance_in)
-    read = rows & known.any(axis=1)
-    seen = known[read].any(axis=0)
-    values = table.clearance_in[read][:, seen]
+def _habit(table: DiagnosisTable, whose: str = "") -> Iterator[DataCondition]:
+    read = np.isfinite(table.clearance_in)
+    blanks = np.sum(~read, axis=1)
+    values = table.clearance_in[read.any(axis=1)][:, read.any(axis=0)]
     blank = np.isnan(values)
     partly = blank.any(axis=1)
     if partly.sum() < LEAST_ROWS:
         return
     # Read in order until one is worn: that one is the largest.
     last = np.sum(~blank, axis=1) - 1
-    stopped = partly & ~np.any(np.diff(blank.astype(int), axis=1) < 0, axis=1)
-    stopped &= values[np.arange(len(values)), last] >= np.nanmax(values, axis=1)
-    share = float(blank.sum() / (known.sum() + blank.sum()))
+    stopped = (np.sort(blank) == blank).all(axis=1) & (np.nanargmax(values, axis=1) == last)
     least = np.nanmin(values)
-    landings = table.numbers(LANDINGS.variable)[rows]
-    blanks = np.isnan(table.clearance_in[rows]).sum(axis=1)
-    if stopped.sum() >= (1.0 - 2.0 * EXCEPTIONS) * partly.sum():
+    if np.mean(stopped[partly]) >= 1.0 - 2.0 * EXCEPTIONS:
         what = "joints were read until the first that is worn"
         effect = "what the blanks add is estimated from the wear of other gears"
         record = "every joint, also after a worn one"
-    elif least > 2.0 * np.median(table.gauge_u_in) and _rank_correlation(landings, blanks) < 0.0:
+    elif (
+        least > 2.0 * np.median(table.gauge_u_in)
+        and _rank_correlation(table.numbers(LANDINGS.variable), blanks) < 0.0
+    ):
         what = "worn joints were written, sound ones were not"
         effect = f"each blank stands for less than {least:.4g} in"
         record = "every joint that was read, also the sound ones"
     else:
         return
-    where = f"blank clearances{f' of technician {whose}' * bool(whose)}: {what}"
+    share = float(np.mean(blank))
     # What others read of the same joints says what the blanks hide.
     doubtful = not whose and share > _MANY_CUT
+    where = f"blank clearances{whose}: {what}"
     yield DataCondition("blank_not_at_random", where, share, effect, record, doubtful)
 
 
 def _rank_correlation(x: Array, y: Array) -> float:
     """Rank correlation beyond chance of what is known of two columns, else 0. [1]"""
     known = np.isfinite(x)
-    if not known.any() or not np.ptp(x[known]) or not np.ptp(y[known]):
+    if min(len({*x[known]}), len({*y[known]})) < 2:
         return 0.0
     # Only where it is needed: the import of scipy.stats takes as long as a diagnosis.
     from scipy.stats import spearmanr
@@ -718,7 +710,7 @@ def _selected(table: DiagnosisTable) -> Iterator[DataCondition]:
     read = np.isfinite(table.readings_in).any(axis=1).astype(float)
     known = np.isfinite(table.clearance_in)
     count = known.sum(axis=1)
-    worn = np.nan_to_num(table.clearance_in).sum(axis=1) / np.where(count > 0, count, np.nan)
+    worn = np.nansum(table.clearance_in, axis=1) / np.where(count > 0, count, np.nan)
     correlation = _rank_correlation(worn, read)
     if correlation:
         yield DataCondition(
