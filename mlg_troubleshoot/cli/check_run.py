@@ -306,7 +306,10 @@ class Run:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""
             output.say(f"{added.new} {noun} kept in {self._place.place}{known}.")
-        seen = Counter((each.record.tail_no, each.record.side) for each in found)
+        gears = [(each.record.tail_no, each.record.side) for each in found]
+        # After --amend or --keep-old what is kept of a visit is not what its row says.
+        is_settled = self._wanted.amend is not None
+        seen = Counter(dict.fromkeys(gears, 0)) if is_settled else Counter(gears)
         against = task.attention_of_kept(seen, self._place, load_gear(self.asked.gear))
         for warning in (*added.warnings, *against):
             output.say(f"Warning: {warning}")

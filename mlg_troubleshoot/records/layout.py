@@ -289,15 +289,16 @@ class Columns:
         return "; ".join(read), unread if carried else ""
 
     def left_unread(self) -> list[str]:
-        """Say which columns that bear a verdict the caller leaves unread."""
-        joints = self._options.joints
-        declared = [p.header for p in self.placed if p.is_settled and p.found == UNKNOWN]
-        known = [(header, recognise(header, joints).field) for header in declared]
-        return [
-            f'"{header}" is left unread, as --map says: no verdict counts what it holds'
-            for header, field in known
-            if field is not None and field.column.bears_verdict
-        ]
+        """Say which columns that bear a verdict the caller leaves unread, or reads as others."""
+        said = []
+        for p in self.placed:
+            named = recognise(p.header, self._options.joints).field
+            is_declared = mapped_to(self._options, p.header, p.index) is not None
+            column = None if p.field is None else p.field.column
+            if is_declared and named and named.column.bears_verdict and column != named.column:
+                meaning = "left unread" if column is None else f"read as {column.name}"
+                said.append(f'"{p.header}" is {meaning}, as --map says')
+        return said
 
     def _doubt_readings(self) -> None:
         """Refuse the headers that may name readings where no clearance surely is named."""

@@ -749,22 +749,23 @@ _END = re.compile(r"(?:(?P<below><=?|≤|no[ -]?go)|(?:>=?|≥|go))\s*(?=[\d.,])
 _NO_END = "Measure with a gauge that reaches further, or leave it blank if it was not measured."
 
 
-def _is_code(cell: Filled) -> bool:
-    """Whether a cell is one word with a digit; a sentence may have one, a single one may answer."""
-    return isinstance(cell, str) and _CODE.fullmatch(cell) is not None
+@lru_cache(4096)
+def _tells_failure(header: str, cell: Filled) -> bool:
+    """Whether a cell says that the gear failed, or answers whether it did. One word with a digit is
+    a code; a sentence may have one, a single one may answer.
+    """
+    text = cell if isinstance(cell, str) else ""
+    if _CODE.fullmatch(text):
+        return False
+    # The rows of a long table are carried together.
+    return any(map(says_failed, text.split("; "))) or answers_outcome(header, cell)
 
 
 @lru_cache(4096)
-def _spoken(
-    header: str, cell: Filled
-) -> tuple[bool, ClearanceConvention | None, LengthUnit | None]:
-    """Whether a cell says that the gear failed or answers whether it did, and the convention or the
-    unit that it is.
-    """
-    text = cell if isinstance(cell, str) else ""
-    # The rows of a long table are carried together.
-    failed = any(map(says_failed, text.split("; "))) or answers_outcome(header, cell)
-    return failed, convention_word(text), UNIT_SPELLINGS.get(plain_text(text).lower())
+def _spoken(cell: Filled) -> tuple[ClearanceConvention | None, LengthUnit | None]:
+    """The convention or the unit that a cell is."""
+    text = plain_text(cell).lower() if isinstance(cell, str) else ""
+    return convention_word(text), UNIT_SPELLINGS.get(text)
 
 
 @dataclass(slots=True)
@@ -1131,7 +1132,7 @@ class RowReader:
             is_named = nearest or is_sure or of_joint
             smallest = 0.0 if is_named else min(self._options.limit_in.values(), default=0.0)
             any_number = is_sure or units == {LengthUnit.THOU}
-            _failed, said, unit = _spoken(placed.header, cell)
+            said, unit = _spoken(cell)
             if is_unread and self._may_be_length(cell, smallest, is_sure=any_number):
                 target = nearest or CLEARANCE.name
                 meant = f'a reading, pass --map "{header}={target}" (a length with its unit)'
@@ -1155,7 +1156,7 @@ class RowReader:
         """
         if outcome is Outcome.FAILED:
             return False
-        if not _is_code(cell) and _spoken(placed.header, cell)[0]:
+        if _tells_failure(placed.header, cell):
             return True
         is_open = outcome is None and placed.field is None
         return is_open and may_be_outcome(cell, asked=asks_outcome(placed.header))

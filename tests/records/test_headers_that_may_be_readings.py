@@ -185,13 +185,17 @@ def test_carry_answers_the_question(header: str) -> None:
     assert judged([header], ["0.0121"], **declared).verdict is Verdict.WITHIN_MARGIN
 
 
+@pytest.mark.parametrize("meaning", ["carry", "work_order"])
 @pytest.mark.parametrize(
     ("header", "value"), [("plunger_displacement_in", "0.06"), ("Outcome", "FAILED")]
 )
-def test_what_bears_the_verdict_and_is_left_unread_is_said(header: str, value: str) -> None:
+def test_what_bears_the_verdict_and_is_not_read_as_it_is_said(
+    header: str, value: str, meaning: str
+) -> None:
     text = ",".join([*ALL, header]) + "\n" + ",".join([*GOOD, value]) + "\n"
-    result = check(Named(text.encode(), "t.csv"), advice=False, column_map={header: "carry"})
-    assert [note for note in result.unread if f'"{header}" is left unread' in note]
+    result = check(Named(text.encode(), "t.csv"), advice=False, column_map={header: meaning})
+    said = "is left unread" if meaning == "carry" else f"is read as {meaning}"
+    assert [note for note in result.unread if f'"{header}" {said}' in note]
 
 
 @pytest.mark.parametrize(
