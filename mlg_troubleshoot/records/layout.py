@@ -244,8 +244,11 @@ class Columns:
             if known is not None:
                 known = replace(known, unit=known.unit or unit)
             refused = bool(found.reason)
+            named = recognise(text, self._options.joints).field if is_settled else None
+            meant = None if known is None else known.column
+            misread = named is not None and named.column.bears_verdict and named.column != meant
             self.placed.append(
-                PlacedField(index, text, known, refused, place, is_settled, found=found)
+                PlacedField(index, text, known, refused, place, is_settled, misread, found=found)
             )
         if any(p.field is None and not p.is_settled for p in self.placed):
             self._settle_visits(header.units)
@@ -290,15 +293,13 @@ class Columns:
 
     def left_unread(self) -> list[str]:
         """Say which columns that bear a verdict the caller leaves unread, or reads as others."""
-        said = []
-        for p in self.placed:
-            named = recognise(p.header, self._options.joints).field
-            is_declared = mapped_to(self._options, p.header, p.index) is not None
-            column = None if p.field is None else p.field.column
-            if is_declared and named and named.column.bears_verdict and column != named.column:
-                meaning = "left unread" if column is None else f"read as {column.name}"
-                said.append(f'"{p.header}" is {meaning}, as --map says')
-        return said
+        meanings = [
+            (p, "left unread" if p.field is None else f"read as {p.field.name}")
+            for p in self.placed
+        ]
+        return [
+            f'"{p.header}" is {meaning}, as --map says' for p, meaning in meanings if p.is_misread
+        ]
 
     def _doubt_readings(self) -> None:
         """Refuse the headers that may name readings where no clearance surely is named."""

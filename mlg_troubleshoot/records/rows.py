@@ -772,7 +772,8 @@ def _spoken(cell: Filled) -> tuple[ClearanceConvention | None, LengthUnit | None
 class PlacedField:
     """A column of a table in hand, or a line of a form: its header, and what that means.
 
-    is_settled: what it means was declared, or follows from the columns next to it. visit: whose
+    is_settled: what it means was declared, or follows from the columns next to it. is_misread: its
+    header names a column that bears a verdict, and it was declared to be another. visit: whose
     readings it holds, where a table holds those of several visits. found: what its header was
     understood as by itself.
     """
@@ -783,6 +784,7 @@ class PlacedField:
     refused: bool = False
     place: CellPlace = NOWHERE
     is_settled: bool = False
+    is_misread: bool = False
     visit: Occasion | None = None
     found: Recognition = UNKNOWN
 
@@ -895,7 +897,8 @@ class RowReader:
         for p in placed:
             self._placed[p.index] = p
             column = None if p.field is None else p.field.column
-            if (column is None or column.carried) and not (p.refused or p.is_settled):
+            is_unread = column is None or column.carried
+            if p.is_misread or (is_unread and not (p.refused or p.is_settled)):
                 nearest, is_sure = suspect(p.header, self._options.joints)
                 # A column without a header may only number the rows if it is the first one.
                 is_sure = is_sure or (not p.header and p.index > 0)
@@ -1128,6 +1131,7 @@ class RowReader:
                 continue
             header = placed.header or column_letters(placed.index)
             is_unread = placed.field is None and (nearest is not None or of_joint)
+            is_unread = is_unread or placed.is_misread
             # Under a header that names nothing only a number that may decide is asked about.
             is_named = nearest or is_sure or of_joint
             smallest = 0.0 if is_named else min(self._options.limit_in.values(), default=0.0)
@@ -1144,9 +1148,10 @@ class RowReader:
                 meant = f'the unit, pass --map "{header}={UNIT.name}"'
             else:
                 continue
+            other = "rename the column" if placed.is_misread else f'"{header}=carry"'
             asked.append(
                 f"{header!r} is not read and says {quote(cell, 40)}: if it is {meant}; else"
-                f' "{header}=carry".'
+                f" {other}."
             )
         return asked
 
@@ -1158,7 +1163,7 @@ class RowReader:
             return False
         if _tells_failure(placed.header, cell):
             return True
-        is_open = outcome is None and placed.field is None
+        is_open = outcome is None and placed.field is None and not placed.is_misread
         return is_open and may_be_outcome(cell, asked=asks_outcome(placed.header))
 
     def _may_be_length(self, cell: Filled, above_in: float, *, is_sure: bool) -> bool:

@@ -187,15 +187,21 @@ def test_carry_answers_the_question(header: str) -> None:
 
 @pytest.mark.parametrize("meaning", ["carry", "work_order"])
 @pytest.mark.parametrize(
-    ("header", "value"), [("plunger_displacement_in", "0.06"), ("Outcome", "FAILED")]
+    ("header", "value", "verdict"),
+    [
+        ("plunger_displacement_in", "0.06", Verdict.INCOMPLETE),
+        ("Outcome", "FAILED", Verdict.INCOMPLETE),
+        ("Outcome", "closed", Verdict.WITHIN_MARGIN),
+    ],
 )
-def test_what_bears_the_verdict_and_is_not_read_as_it_is_said(
-    header: str, value: str, meaning: str
+def test_what_bears_the_verdict_is_not_declared_away(
+    header: str, value: str, verdict: Verdict, meaning: str
 ) -> None:
     text = ",".join([*ALL, header]) + "\n" + ",".join([*GOOD, value]) + "\n"
     result = check(Named(text.encode(), "t.csv"), advice=False, column_map={header: meaning})
     said = "is left unread" if meaning == "carry" else f"is read as {meaning}"
     assert [note for note in result.unread if f'"{header}" {said}' in note]
+    assert [judgement.verdict for judgement in result.judgements] == [verdict]
 
 
 @pytest.mark.parametrize(
