@@ -36,23 +36,12 @@ GROUPS = ((1,), (2,), (3, 5), (4,), (6, 7), (8,), (9, 10))
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """Worn gears: what is true and what was read.
+    """Worn gears: what is true and what was read."""
 
-    Parameters
-    ----------
-    true_in : Array
-        Radial clearances, (n, 10) [in].
-    read_in : Array
-        What the gauge read, not below zero, (n, 10) [in].
-    plunger_in : Array
-        What the plunger gauge read at mid-position, (n,) [in].
-    other_cause : Array
-        True where something other than clearance moved the plunger, (n,) [-].
-    """
-
-    true_in: Array
-    read_in: Array
-    plunger_in: Array
+    true_in: Array  # Radial clearances, (n, 10) [in]
+    read_in: Array  # What the gauge read, not below zero, (n, 10) [in]
+    plunger_in: Array  # What the plunger gauge read at mid-position, (n,) [in]
+    # True where something other than clearance moved the plunger, (n,).
     other_cause: NDArray[np.bool_]
 
 

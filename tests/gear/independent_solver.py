@@ -25,17 +25,8 @@ def _norm(vector: np.ndarray) -> complex:
 
 
 class LoopClosure:
-    """One linkage, solved by closing its loops.
-
-    Parameters
-    ----------
-    points : dict of str to tuple of float
-        Coordinates at mid-position, each in its own plane. [in]
-    hinge_deg, dihedral_deg, axis_deg : float
-        Hinge direction in the sidestay plane, dihedral angle, plunger axis in the link-assembly
-        plane. [deg]
-    release : float
-        Actuator extension at mid-position. [in]
+    """One linkage, solved by closing its loops, from its coordinates at mid-position, each in its
+    own plane, and the actuator's extension there. [in]
     """
 
     def __init__(

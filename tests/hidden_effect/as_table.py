@@ -16,18 +16,7 @@ _QUANTITIES = ("temperature_c", "hydraulic_pressure_psi", "gear_landings")
 
 
 def as_table(columns: dict[str, list[Any]]) -> DiagnosisTable:
-    """Turn the columns of a simulated table into a table for the diagnosis.
-
-    Parameters
-    ----------
-    columns : dict of str to list
-        Columns by the names of the inspection table, None where a cell is missing.
-
-    Returns
-    -------
-    DiagnosisTable
-        The same rows.
-    """
+    """Turn the columns of a simulated table into a table for the diagnosis."""
     n = len(columns["record_id"])
 
     def numbers(name: str) -> np.ndarray:

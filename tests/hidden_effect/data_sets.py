@@ -48,20 +48,7 @@ _LATER_ROWS = 40
 
 
 def later_rows(fleet: Fleet, seed: int) -> dict[str, list[Any]]:
-    """Inspect a fleet again, under the circumstances of other rows of its own.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        The fleet.
-    seed : int
-        Seed of the further inspections.
-
-    Returns
-    -------
-    dict of str to list
-        Columns of the further inspections alone.
-    """
+    """Inspect a fleet again, under the circumstances of other rows of its own."""
     rows = len(fleet.table["record_id"])
     again = [{"tail_no": fleet.table["tail_no"][k]} for k in range(0, rows, rows // _LATER_ROWS)]
     more = follow_up(fleet, again, seed).table
@@ -71,11 +58,6 @@ def later_rows(fleet: Fleet, seed: int) -> dict[str, list[Any]]:
 def drag(table: dict[str, list[Any]]) -> None:
     """Take off the readings what frozen grease does: an effect that is on nobody's list but the
     reader's own.
-
-    Parameters
-    ----------
-    table : dict of str to list
-        Inspection table, changed in place.
     """
     for column in (name for name in table if name.startswith("plunger_displacement")):
         for row, temperature in enumerate(table["temperature_c"]):
@@ -85,18 +67,7 @@ def drag(table: dict[str, list[Any]]) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Write every data set into a folder.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        The folder.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
+    """Write every data set into a folder."""
     if len(arguments) != 1 or not Path(arguments[0]).is_dir():
         print(
             "Give the folder to write to: python -m tests.hidden_effect.data_sets inspection_data",

@@ -60,29 +60,15 @@ REFERENCE_SHEETS = 8_000
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """One inspection as it was written down, and what it was read from.
+    """One inspection as it was written down, and what it was read from."""
 
-    Parameters
-    ----------
-    population : str
-        Kind of gear, one of `POPULATIONS`.
-    numbers : tuple of str
-        Readings of joints 1 to 10 as written; empty where not read.
-    read_unit, declared_unit : str
-        Unit of the gauge, and unit that the sheet states.
-    read_as, declared_as : str
-        Convention of the gauge, and convention that the sheet states.
-    route : str
-        Where the unit is stated, one of `ROUTES`.
-    """
-
-    population: str
-    numbers: tuple[str, ...]
-    read_unit: str
-    declared_unit: str
-    read_as: str
-    declared_as: str
-    route: str
+    population: str  # Kind of gear, one of `POPULATIONS`
+    numbers: tuple[str, ...]  # Readings of joints 1 to 10 as written; empty where not read
+    read_unit: str  # Of the gauge
+    declared_unit: str  # Stated on the sheet
+    read_as: str  # Convention of the gauge
+    declared_as: str  # Stated on the sheet
+    route: str  # Where the unit is stated, one of `ROUTES`
 
     @property
     def confusion(self) -> str:
@@ -100,24 +86,13 @@ class Sheet:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A sheet and what became of it.
+    """A sheet and what became of it."""
 
-    Parameters
-    ----------
-    sheet : Sheet
-        What was given.
-    verdict : str
-        Verdict of its row.
-    warned : bool
-        Whether its row or cells are in doubt: another unit is named, or a check asked for.
-    names_unit : bool
-        Whether the unit of the gauge is named in words.
-    """
-
-    sheet: Sheet
-    verdict: str
+    sheet: Sheet  # What was given
+    verdict: str  # Verdict of its row
+    # Whether its row or cells are in doubt: another unit is named, or a check asked for.
     warned: bool
-    names_unit: bool
+    names_unit: bool  # Whether the unit of the gauge is named in words
 
     @property
     def stopped(self) -> bool:

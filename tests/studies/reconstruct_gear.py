@@ -51,25 +51,14 @@ _LARGE_IN = 22
 
 @dataclass(frozen=True, slots=True)
 class Reconstruction:
-    """A linkage that was searched for.
+    """A linkage that was searched for."""
 
-    Attributes
-    ----------
-    linkage : Linkage
-        Its coordinates rounded to 1e-4 in.
-    numbers : int
-        How many numbers of the linkage are free: coordinates, angles, stroke.
-    determined : int
-        How many directions in the space of these numbers the binding targets determine.
-    loosest : tuple of (str, float)
-        Numbers that can change most while every target stays met to first order, with their part.
-        [1]
-    """
-
-    linkage: Linkage
+    linkage: Linkage  # Its coordinates rounded to 1e-4 in
     met: tuple[Computed, ...]
-    numbers: int
+    numbers: int  # How many numbers of the linkage are free: coordinates, angles, stroke
+    # How many directions in the space of these numbers the binding targets determine.
     determined: int
+    # Numbers that can change most while every target stays met to first order, with their part.
     loosest: tuple[tuple[str, float], ...]
     evaluations: int
     seed: int

@@ -50,41 +50,20 @@ _LIMIT_IN = 0.004
 
 @dataclass(slots=True)
 class Scene:
-    """A fleet before and while it is written down, n rows in the order of their dates.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Randomness of the blemish.
-    strong : bool
-        The strong form.
-    design : Design
-        True circumstances of every row.
-    base : NDArray
-        Where each row was read, (n,) [-].
-    bushings : NDArray
-        Which set of bushings each row has, (n,) [-].
-    seen : NDArray
-        Rows that stand in the table, (n,) [-].
-    noise : Array
-        Errors of the plunger readings, (n,) [in].
-    row_noise : float
-        Standard deviation of measured minus predicted in a sound fleet [in].
-    columns : dict
-        Further columns of the table, (n,) each [-].
-    repaired : NDArray
-        Rows whose worst joint was restored between the two readings, (n,) [-].
-    """
+    """A fleet before and while it is written down, n rows in the order of their dates."""
 
     rng: np.random.Generator
     strong: bool
-    design: Design
-    base: NDArray[np.intp]
-    bushings: NDArray[np.intp]
-    seen: Mask
-    noise: Array
+    design: Design  # True circumstances of every row
+    base: NDArray[np.intp]  # Where each row was read, (n,)
+    bushings: NDArray[np.intp]  # Which set of bushings each row has, (n,)
+    seen: Mask  # Rows that stand in the table, (n,)
+    noise: Array  # Errors of the plunger readings, (n,) [in]
+    # Standard deviation of measured minus predicted in a sound fleet [in].
     row_noise: float = PLUNGER_NOISE_IN
+    # Further columns of the table, (n,) each.
     columns: dict[str, list[str]] = field(default_factory=dict)
+    # Rows whose worst joint was restored between the two readings, (n,).
     repaired: Mask = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     def size(self, mild: float, strong: float) -> float:
@@ -109,85 +88,38 @@ Write = Callable[[Scene, Rows], Rows]
 
 @dataclass(frozen=True, slots=True)
 class Blemish:
-    """What is wrong with a table.
+    """What is wrong with a table."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the case.
-    kinds : tuple of str
-        Words for it in the condition of the data, any of them right; empty: none is due.
-    act : callable, optional
-        Changes the gears or the readings; returns the listed causes that this makes true.
-    write : callable, optional
-        Changes the sheet.
-    near : tuple of str
-        Names of causes that are partly true.
-    interval : float
-        Landings between two overhauls, strong form [-].
-    """
-
-    name: str
+    name: str  # Name of the case
+    # Words for it in the condition of the data, any of them right; empty: none is due.
     kinds: tuple[str, ...] = ()
+    # Changes the gears or the readings; returns the listed causes that this makes true.
     act: Act | None = None
-    write: Write | None = None
-    near: tuple[str, ...] = ()
-    interval: float = OVERHAUL
+    write: Write | None = None  # Changes the sheet
+    near: tuple[str, ...] = ()  # Names of causes that are partly true
+    interval: float = OVERHAUL  # Landings between two overhauls, strong form
 
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What is true of a table, and nobody who reads it knows.
-
-    Parameters
-    ----------
-    case, form : str
-        Blemish and its form.
-    kinds : tuple of str
-        Words for it, any of them right.
-    causes : tuple
-        Listed causes with their targets.
-    near : tuple of str
-        Names of causes that are partly true.
-    unseen : list of dict
-        Further rows of the same tails: clearances properly read, the plunger without noise.
-    seed : int
-        Seed of the fleet.
-    repaired : tuple of str
-        Records whose worst joint was restored after its reading and before that of the plunger.
-    """
+    """What is true of a table, and nobody who reads it knows."""
 
     case: str
     form: str
-    kinds: tuple[str, ...]
-    causes: Hidden
-    near: tuple[str, ...]
+    kinds: tuple[str, ...]  # Words for it, any of them right
+    causes: Hidden  # Listed causes with their targets
+    near: tuple[str, ...]  # Names of causes that are partly true
+    # Further rows of the same tails: clearances properly read, the plunger without noise.
     unseen: Rows
     seed: int
+    # Records whose worst joint was restored after its reading and before that of the plunger.
     repaired: tuple[str, ...] = ()
 
 
 def draw_history(
     rng: np.random.Generator, rows: int, tails: int, interval: float = OVERHAUL
 ) -> tuple[Design, NDArray[np.intp], NDArray[np.intp]]:
-    """Draw visits of a fleet over three years.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of randomness.
-    rows : int
-        Number of inspections, even: both sides are read at a visit [-].
-    tails : int
-        Number of aircraft [-].
-    interval : float
-        Landings between two overhauls [-].
-
-    Returns
-    -------
-    tuple
-        True circumstances, the base and the set of bushings of every row.
-    """
+    """Draw visits of a fleet over three years."""
     first = datetime.date(2021, 1, 1).toordinal() + int(rng.integers(0, 700))
     numbers = np.sort(rng.choice(np.arange(100, 999), tails, replace=False))
     names = np.array([f"N{number}" for number in numbers], dtype=object)
@@ -668,26 +600,7 @@ BLEMISHES = {blemish.name: blemish for blemish in (*LISTED, *FURTHER, *ADDED)}
 def blemished_fleet(
     case: str, form: str, seed: int, *, beside: str | None = None, rows: int | None = None
 ) -> tuple[Rows, Truth]:
-    """Draw a fleet with one blemish.
-
-    Parameters
-    ----------
-    case : str
-        One of ``BLEMISHES``.
-    form : str
-        One of ``FORMS``.
-    seed : int
-        Seed; the same case, form and seed give the same fleet.
-    beside : str, optional
-        A listed cause that is hidden in addition to the blemish, at S = 14.
-    rows : int, optional
-        Rows of the table before the blemish, even; drawn from 60 to 400 if None [-].
-
-    Returns
-    -------
-    tuple
-        The rows of the table, texts where a cell is a text, and what is true.
-    """
+    """Draw a fleet with one blemish."""
     if form not in FORMS:
         raise ValueError(f"Unknown form {form!r}: expected one of {', '.join(FORMS)}.")
     blemish = BLEMISHES[case]
@@ -781,15 +694,7 @@ def _sheet(scene: Scene, clearance: Array, plunger: Array, which: Mask) -> Rows:
 
 
 def write_rows(rows: Rows, path: Path) -> None:
-    """Write rows as CSV, blanks as empty cells.
-
-    Parameters
-    ----------
-    rows : list of dict
-        Rows of a table.
-    path : Path
-        File to write.
-    """
+    """Write rows as CSV, blanks as empty cells."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()

@@ -36,65 +36,33 @@ PISTON_AREA_IN2 = 1.1
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """A cause with its target and parameters.
+    """A cause with its target and parameters."""
 
-    Parameters
-    ----------
-    target : str, optional
-        Target in words, as it is reported.
-    where : object
-        The same for the program: a joint's number, a pair, a name or None.
-    knob : str
-        Name of the parameter that sets the size.
-    parameters : dict
-        All parameters, units in their names.
-    variables : tuple of str
-        Columns of the table in which the effect can be seen.
-    """
-
-    target: str | None
-    where: Any
-    knob: str
-    parameters: Parameters
-    variables: tuple[str, ...] = ()
+    target: str | None  # Target in words, as it is reported
+    where: Any  # The same for the program: a joint's number, a pair, a name or None
+    knob: str  # Name of the parameter that sets the size
+    parameters: Parameters  # All parameters, units in their names
+    variables: tuple[str, ...] = ()  # Columns of the table in which the effect can be seen
 
 
 @dataclass(frozen=True, slots=True)
 class Knob:
-    """Range of a physical parameter.
+    """Range of a physical parameter."""
 
-    Parameters
-    ----------
-    exponent : float
-        Power with which the effect grows, roughly [-].
-    low, high : float
-        Range in which the parameter may be set [unit of the parameter].
-    """
-
-    exponent: float
-    low: float
-    high: float
+    exponent: float  # Power with which the effect grows, roughly
+    low: float  # Smallest value it may be set to [unit of the parameter]
+    high: float  # And the largest
 
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """One physical cause.
-
-    Parameters
-    ----------
-    name : str
-        Name under which it is reported.
-    draw : callable
-        Draws target and parameters from a generator and a design.
-    apply : callable
-        Changes a state.
-    columns : tuple of str
-        Columns without which the cause cannot be tested (empty: none that can be missing).
-    """
+    """One physical cause."""
 
     name: str
+    # Draws target and parameters from a generator and a design.
     draw: Callable[[np.random.Generator, Design], Draft]
     apply: Callable[[Design, State, Draft], None]
+    # Columns without which the cause cannot be tested (empty: none that can be missing).
     columns: tuple[str, ...] = ()
 
 
@@ -269,20 +237,7 @@ def _apply_rigging(design: Design, state: State, draft: Draft) -> None:
 
 
 def rigged_rows(design: Design, draft: Draft) -> NDArray[np.bool_]:
-    """Rows that a re-rigged rod touches.
-
-    Parameters
-    ----------
-    design : Design
-        Circumstances of every row.
-    draft : Draft
-        The cause ``rigging_offset``.
-
-    Returns
-    -------
-    NDArray
-        Whether each row is touched, (n,) [-].
-    """
+    """Rows that a re-rigged rod touches."""
     tail, side = draft.where
     rows = design.tail == tail
     if side is not None:

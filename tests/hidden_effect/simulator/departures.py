@@ -96,18 +96,7 @@ DEPARTURES: dict[str, Cause] = {
 
 
 def find(name: str) -> Cause:
-    """A cause of any list by name.
-
-    Parameters
-    ----------
-    name : str
-        Name of the cause.
-
-    Returns
-    -------
-    Cause
-        The cause.
-    """
+    """A cause of any list by name."""
     every = {**CATALOGUE, **OFF_CATALOGUE, **DEPARTURES}
     if name not in every:
         raise KeyError(f"No cause {name!r}; there are {', '.join(every)}.")

@@ -29,45 +29,22 @@ _MAX_FLOAT_IN = 0.06
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """True circumstances of every inspection, n rows in the order of their dates.
-
-    Parameters
-    ----------
-    tail, side, gauge, technician, approach : Texts
-        Identities of every row, each (n,) [-].
-    day : Array
-        Date as proleptic ordinal, (n,) [d].
-    landings : Array
-        Landings since overhaul, (n,) [-].
-    temperature : Array
-        Temperature of the gear, (n,) [degC].
-    pressure : Array
-        Hydraulic pressure during the reading, (n,) [psi].
-    clearance : Array
-        True radial clearances, (n, 10) [in].
-    floats : Array
-        True end floats, (n, 10) [in].
-    margin : Array
-        Margin found at rigging, (n,) [in].
-    alias_day : float
-        Day on which the gauges changed, NaN unless so arranged [d].
-    alias_names : tuple of str
-        The two identities that an aliased arrangement ties together [-].
-    """
+    """True circumstances of every inspection, n rows in the order of their dates."""
 
     tail: Texts
     side: Texts
     gauge: Texts
     technician: Texts
     approach: Texts
-    day: Array
-    landings: Array
-    temperature: Array
-    pressure: Array
-    clearance: Array
-    floats: Array
-    margin: Array
-    alias_day: float = float("nan")
+    day: Array  # Date as proleptic ordinal, (n,) [d]
+    landings: Array  # Landings since overhaul, (n,)
+    temperature: Array  # Temperature of the gear, (n,) [degC]
+    pressure: Array  # Hydraulic pressure during the reading, (n,) [psi]
+    clearance: Array  # True radial clearances, (n, 10) [in]
+    floats: Array  # True end floats, (n, 10) [in]
+    margin: Array  # Margin found at rigging, (n,) [in]
+    alias_day: float = float("nan")  # Day on which the gauges changed, NaN unless so arranged [d]
+    # The two identities that an aliased arrangement ties together.
     alias_names: tuple[str, ...] = ()
 
     @property
@@ -76,18 +53,7 @@ class Design:
         return len(self.tail)
 
     def take(self, index: NDArray[np.intp]) -> Design:
-        """The same fleet with the given rows.
-
-        Parameters
-        ----------
-        index : NDArray
-            Row numbers, repeats allowed, (m,) [-].
-
-        Returns
-        -------
-        Design
-            Copies of those rows.
-        """
+        """The same fleet with the given rows."""
         arrays = {
             field.name: getattr(self, field.name)[index].copy()
             for field in fields(self)
@@ -97,18 +63,7 @@ class Design:
 
 
 def date_text(day: float) -> str:
-    """ISO date of an ordinal.
-
-    Parameters
-    ----------
-    day : float
-        Proleptic ordinal [d].
-
-    Returns
-    -------
-    str
-        ISO 8601 date.
-    """
+    """ISO date of an ordinal."""
     return datetime.date.fromordinal(int(day)).isoformat()
 
 
@@ -119,25 +74,8 @@ def draw_design(
     alias: str | None = None,
     hand_pump: bool = True,
 ) -> Design:
-    """Draw a fleet.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of randomness.
-    rows : int
-        Number of inspections [-].
-    arrangement : str
-        One of ``ARRANGEMENTS``.
-    alias : str, optional
-        One of ``ALIASES``.
-    hand_pump : bool
-        Some readings are taken on the hand pump, at any pressure below the system's.
-
-    Returns
-    -------
-    Design
-        The true circumstances of every inspection.
+    """Draw a fleet in one of ``ARRANGEMENTS``, with two identities tied together by one of
+    ``ALIASES``; on the ``hand_pump`` some readings are taken at any pressure below the system's.
     """
     fleet = _identities(rng, rows, arrangement)
     if alias is not None:

@@ -59,195 +59,90 @@ _CLOSE_ENOUGH = 0.01
 
 @dataclass(frozen=True, slots=True)
 class EffectSpec:
-    """One effect that is to be hidden.
+    """One effect that is to be hidden."""
 
-    Parameters
-    ----------
-    cause : str
-        Name in ``causes.CATALOGUE`` or ``causes.OFF_CATALOGUE``.
-    target : str, optional
-        Target in words, for example ``joint 4``; drawn if None.
-    strength : float, optional
-        Requested S = effect rms / noise rms x sqrt(rows); if None the physical parameter stays as
-        drawn [-].
-    parameters : dict
-        Physical parameters that are not to be drawn.
-    """
-
-    cause: str
-    target: str | None = None
+    cause: str  # Name in ``causes.CATALOGUE`` or ``causes.OFF_CATALOGUE``
+    target: str | None = None  # Target in words, for example ``joint 4``; drawn if None
+    # Requested S = effect rms / noise rms x sqrt(rows); if None the physical parameter stays as
+    # drawn.
     strength: float | None = None
+    # Physical parameters that are not to be drawn.
     parameters: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class FleetSpec:
-    """What kind of fleet is wanted.
+    """What kind of fleet is wanted."""
 
-    Parameters
-    ----------
-    kind : str
-        Word that the label carries.
-    rows : int
-        Number of inspections [-].
-    effects : tuple of EffectSpec
-        What is hidden.
-    arrangement : str
-        How gauges and technicians hang on the bases: ``bases``, ``iid`` or ``confounded``.
-    alias : str, optional
-        Two causes that the fleet cannot separate, one of ``fleet.ALIASES``.
-    hand_pump : bool
-        Some readings are taken on the hand pump.
-    geometry : str
-        Letter of the linkage, or two letters and the share of the second as in ``A-C:0.5``.
-    reading_noise : float, optional
-        Standard deviation of one plunger reading; drawn between 0.0015 and 0.0020 if None [in].
-    tail_share : float
-        Standard deviation between tails, as a share of the reading's [-].
-    clearance_noise : float
-        Standard deviation of one clearance reading [in].
-    heavy, growing : bool
-        Form of the errors.
-    repeats : int, optional
-        Plunger readings in each row, 1 to 3; two or three if None [-].
-    blank_share : float
-        Share of blank cells [-].
-    unread_share : float
-        Share of clearances that were not read, beyond that [-].
-    drop_columns : tuple of str
-        Columns that the table does not have.
-    faults : tuple of str
-        Kinds of slips, one row each.
-    """
-
-    kind: str = "null"
-    rows: int = 200
+    kind: str = "null"  # Word that the label carries
+    rows: int = 200  # Number of inspections
     effects: tuple[EffectSpec, ...] = ()
+    # How gauges and technicians hang on the bases: ``bases``, ``iid`` or ``confounded``.
     arrangement: str = "bases"
-    alias: str | None = None
-    hand_pump: bool = True
+    alias: str | None = None  # Two causes that the fleet cannot separate, one of ``fleet.ALIASES``
+    hand_pump: bool = True  # Some readings are taken on the hand pump
+    # Letter of the linkage, or two letters and the share of the second as in ``A-C:0.5``.
     geometry: str = "A"
+    # Standard deviation of one plunger reading; drawn between 0.0015 and 0.0020 if None [in].
     reading_noise: float | None = None
-    tail_share: float = 0.5
-    clearance_noise: float = 0.0005
-    heavy: bool = False
-    growing: bool = False
-    repeats: int | None = None
-    blank_share: float = 0.01
-    unread_share: float = 0.0
-    drop_columns: tuple[str, ...] = ()
-    faults: tuple[str, ...] = ()
+    tail_share: float = 0.5  # Standard deviation between tails, as a share of the reading's
+    clearance_noise: float = 0.0005  # Standard deviation of one clearance reading [in]
+    heavy: bool = False  # Errors with heavy tails
+    growing: bool = False  # Errors in proportion to the displacement
+    repeats: int | None = None  # Plunger readings in each row, 1 to 3; two or three if None
+    blank_share: float = 0.01  # Share of blank cells
+    unread_share: float = 0.0  # Share of clearances that were not read, beyond that
+    drop_columns: tuple[str, ...] = ()  # Columns that the table does not have
+    faults: tuple[str, ...] = ()  # Kinds of slips, one row each
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One hidden effect as it came out.
-
-    Parameters
-    ----------
-    cause : str
-        Name of the cause.
-    target : str, optional
-        Target in words.
-    knob : str
-        Physical parameter that set the size.
-    parameters : dict
-        All physical parameters, units in their names.
-    variables : tuple of str
-        Columns in which the effect can be seen.
-    rms_in : float
-        Root mean square of the effect over the rows [in].
-    strength : float
-        rms / noise rms x sqrt(rows) [-].
-    requested : float, optional
-        The strength that was asked for [-].
-    truth : Array
-        The effect alone on every row, (n,) [in].
-    """
+    """One hidden effect as it came out."""
 
     cause: str
     target: str | None
-    knob: str
-    parameters: dict[str, Any]
-    variables: tuple[str, ...]
-    rms_in: float
-    strength: float
-    requested: float | None
-    truth: Array
+    knob: str  # Physical parameter that set the size
+    parameters: dict[str, Any]  # All physical parameters, units in their names
+    variables: tuple[str, ...]  # Columns in which the effect can be seen
+    rms_in: float  # Root mean square of the effect over the rows [in]
+    strength: float  # rms / noise rms x sqrt(rows)
+    requested: float | None  # The strength that was asked for
+    truth: Array  # The effect alone on every row, (n,) [in]
 
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """What is hidden in a fleet. Nothing of it is in the table.
-
-    Parameters
-    ----------
-    kind : str
-        Kind of the fleet.
-    causes : tuple
-        (cause, target) of every hidden effect.
-    effects : tuple of Effect
-        The same with sizes and parameters.
-    aliases : tuple
-        (cause, target) of the causes that touch exactly the same rows as the hidden one, itself
-        included.
-    complements : tuple
-        Those that touch exactly the other rows.
-    effect_rms_in : float
-        Root mean square of all effects together [in].
-    effect_sd_in : float
-        The same about its mean [in].
-    noise_rms_in : float
-        Root mean square of mean reading minus worst case at the recorded clearances with nothing
-        wrong [in].
-    noise_sd_in : float
-        The same about its mean [in].
-    repeatability_in : float
-        True standard deviation of one reading about the mean of its row [in].
-    strength : float
-        S of all effects together [-].
-    variables : tuple of str
-        Columns in which the effects can be seen.
-    removed_columns : tuple of str
-        Columns that the table does not have.
-    faults : tuple of Fault
-        Slips in the table.
-    truth_term : Array
-        All effects together on every row, before rounding: what has to be added to a prediction
-        from the recorded clearances, (n,) [in].
-    noise_term : Array
-        Mean reading minus worst case of every row with nothing wrong, NaN without readings, (n,)
-        [in].
-    seed : int
-        Seed of the fleet.
-    """
+    """What is hidden in a fleet. Nothing of it is in the table."""
 
     kind: str
-    causes: tuple[tuple[str, str | None], ...]
-    effects: tuple[Effect, ...]
+    causes: tuple[tuple[str, str | None], ...]  # (cause, target) of every hidden effect
+    effects: tuple[Effect, ...]  # The same with sizes and parameters
+    # (cause, target) of the causes that touch exactly the same rows as the hidden one, itself
+    # included.
     aliases: tuple[tuple[str, str | None], ...]
-    complements: tuple[tuple[str, str | None], ...]
-    effect_rms_in: float
-    effect_sd_in: float
+    complements: tuple[tuple[str, str | None], ...]  # Those that touch exactly the other rows
+    effect_rms_in: float  # Root mean square of all effects together [in]
+    effect_sd_in: float  # The same about its mean [in]
+    # Root mean square of mean reading minus worst case at the recorded clearances with nothing
+    # wrong [in].
     noise_rms_in: float
-    noise_sd_in: float
-    repeatability_in: float
-    strength: float
-    variables: tuple[str, ...]
-    removed_columns: tuple[str, ...]
+    noise_sd_in: float  # The same about its mean [in]
+    repeatability_in: float  # True standard deviation of one reading about the mean of its row [in]
+    strength: float  # S of all effects together
+    variables: tuple[str, ...]  # Columns in which the effects can be seen
+    removed_columns: tuple[str, ...]  # Columns that the table does not have
     faults: tuple[records.Fault, ...]
+    # All effects together on every row, before rounding: what has to be added to a prediction from
+    # the recorded clearances, (n,) [in].
     truth_term: Array
+    # Mean reading minus worst case of every row with nothing wrong, NaN without readings, (n,)
+    # [in].
     noise_term: Array
     seed: int
 
     def as_dict(self) -> dict[str, Any]:
-        """The label as plain values, ready for JSON.
-
-        Returns
-        -------
-        dict
-            Every field; arrays as lists, missing noise as None.
-        """
+        """The label as plain values, ready for JSON."""
         plain = asdict(self)
         plain["truth_term"] = self.truth_term.tolist()
         plain["noise_term"] = [None if np.isnan(v) else float(v) for v in self.noise_term]
@@ -271,17 +166,7 @@ class _World:
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """An inspection table and what is hidden in it.
-
-    Parameters
-    ----------
-    table : dict
-        Columns of the inspection table.
-    label : Label
-        What is hidden.
-    spec : FleetSpec
-        What was asked for.
-    """
+    """An inspection table and what is hidden in it."""
 
     table: records.Table
     label: Label
@@ -457,20 +342,7 @@ def _same_rows(
 
 
 def simulate_fleet(spec: FleetSpec, seed: int) -> Fleet:
-    """Simulate a fleet.
-
-    Parameters
-    ----------
-    spec : FleetSpec
-        What is wanted.
-    seed : int
-        Seed; the same seed and specification give the same fleet.
-
-    Returns
-    -------
-    Fleet
-        Table and label.
-    """
+    """Simulate a fleet; the same seed and specification give the same one."""
     geometry = linkage.load(spec.geometry)
     design = draw_design(
         _stream(seed, "design"), spec.rows, spec.arrangement, spec.alias, spec.hand_pump
@@ -611,35 +483,7 @@ def draw_spec(
     faults: bool = True,
     geometry: str = "A",
 ) -> FleetSpec:
-    """Draw what is to be hidden.
-
-    Parameters
-    ----------
-    seed : int
-        Seed.
-    kind : str
-        One of ``KINDS``, or ``mix``.
-    strength : float, optional
-        Requested S of every effect; drawn from 5, 7, 10, 15 and 25 if None (10 and more for several
-        causes) [-].
-    cause : str, optional
-        Name of the (first) cause; drawn if None.
-    target : str, optional
-        Target of the (first) cause; drawn if None.
-    null : str, optional
-        One of ``NULLS`` for a nothing-wrong fleet; drawn if None.
-    rows : int, optional
-        Number of inspections; 200, or 500 for the null ``n500`` [-].
-    faults : bool
-        Sprinkle up to three data faults.
-    geometry : str
-        Letter of the linkage.
-
-    Returns
-    -------
-    FleetSpec
-        The specification.
-    """
+    """Draw what is to be hidden: what is None, and the targets of further causes, is drawn."""
     rng = _stream(seed, "spec")
     if kind == "mix":
         kind = str(rng.choice(KINDS, p=_MIX))
@@ -726,34 +570,7 @@ def draw_fleet(
     faults: bool = True,
     geometry: str = "A",
 ) -> Fleet:
-    """Draw what is to be hidden and simulate the fleet.
-
-    Parameters
-    ----------
-    seed : int
-        Seed.
-    kind : str
-        One of ``KINDS``, or ``mix``.
-    strength : float, optional
-        Requested S of every effect [-].
-    cause : str, optional
-        Name of the (first) cause.
-    target : str, optional
-        Target of the (first) cause.
-    null : str, optional
-        One of ``NULLS`` for a nothing-wrong fleet.
-    rows : int, optional
-        Number of inspections [-].
-    faults : bool
-        Sprinkle up to three data faults.
-    geometry : str
-        Letter of the linkage.
-
-    Returns
-    -------
-    Fleet
-        Table and label.
-    """
+    """Draw what is to be hidden and simulate the fleet."""
     spec = draw_spec(
         seed,
         kind,
@@ -782,23 +599,9 @@ _OVERRIDES = {
 
 
 def follow_up(fleet: Fleet, readings: Sequence[dict[str, Any]], seed: int) -> Fleet:
-    """Inspect the same fleet again, under chosen circumstances.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        The fleet.
-    readings : sequence of dict
-        One further inspection each: the columns that are chosen (dates as proleptic ordinals); the
-        rest comes from a row of the fleet that agrees with the chosen tail and side where there is
-        one.
-    seed : int
-        Seed of the further inspections.
-
-    Returns
-    -------
-    Fleet
-        The old rows followed by the new ones, which carry the same effects; noise and S as before.
+    """Inspect the same fleet again, under chosen circumstances: one further row for each of the
+    readings, of which what is not chosen comes from a row of the same tail and side. Old rows come
+    first; noise and S are as before.
     """
     world, old = fleet._world, fleet._world.design
     rng = _stream(seed, "more")
@@ -844,13 +647,5 @@ def follow_up(fleet: Fleet, readings: Sequence[dict[str, Any]], seed: int) -> Fl
 
 
 def write_csv(fleet: Fleet, path: Path) -> None:
-    """Write the table of a fleet, and nothing of its label.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        The fleet.
-    path : Path
-        File to write.
-    """
+    """Write the table of a fleet, and nothing of its label."""
     records.write_csv(fleet.table, path)

@@ -38,99 +38,44 @@ class ClosureError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """Drawing data of one linkage in space.
+    """Drawing data of one linkage in space."""
 
-    Parameters
-    ----------
-    name : str
-        Letter of the linkage.
-    fixed : dict
-        Fixed points F, E, Q, 4, 8 and 10 (the plunger's mid-position), each (3,) [in].
-    start : Array
-        Unknowns at mid-position, (15,) [in].
-    lengths : Array
-        Nominal distances in the order of ``LENGTHS``, (11,) [in].
-    arm_angles : Array
-        Angle from the first to the last arm of crank, slotted lever, locking lever and bellcrank,
-        (4,) [rad].
-    arms : Array
-        Nominal length of the first arm of each, (4,) [in].
-    along, across : Array
-        Axes of the link-assembly plane, each (3,) [-].
-    eight : Array
-        Joint 8 in the link-assembly plane, (2,) [in].
-    axis : Array
-        Direction of the plunger, (3,) [-].
-    tilt_direction : Array
-        In-plane direction of the locking lever that sinks when the lever tilts, (2,) [-].
-    stroke : float
-        Release stroke of the actuator [in].
-    rate : float
-        Calibrated plunger reading for each inch of the mechanism's plunger travel [-].
-    angles : Array
-        Over-travel directions in the limit of small clearances, (10,) [rad].
-    """
-
-    name: str
+    name: str  # Letter of the linkage
+    # Fixed points F, E, Q, 4, 8 and 10 (the plunger's mid-position), each (3,) [in].
     fixed: dict[str, Array]
-    start: Array
-    lengths: Array
+    start: Array  # Unknowns at mid-position, (15,) [in]
+    lengths: Array  # Nominal distances in the order of ``LENGTHS``, (11,) [in]
+    # Angle from the first to the last arm of crank, slotted lever, locking lever and bellcrank,
+    # (4,) [rad].
     arm_angles: Array
-    arms: Array
-    along: Array
+    arms: Array  # Nominal length of the first arm of each, (4,) [in]
+    along: Array  # Axes of the link-assembly plane, it and the next, (3,)
     across: Array
-    eight: Array
-    axis: Array
+    eight: Array  # Joint 8 in the link-assembly plane, (2,) [in]
+    axis: Array  # Direction of the plunger, (3,)
+    # In-plane direction of the locking lever that sinks when the lever tilts, (2,).
     tilt_direction: Array
-    stroke: float
-    rate: float
-    angles: Array
+    stroke: float  # Release stroke of the actuator [in]
+    rate: float  # Calibrated plunger reading for each inch of the mechanism's plunger travel
+    angles: Array  # Over-travel directions in the limit of small clearances, (10,) [rad]
 
 
 @dataclass(slots=True)
 class Build:
-    """The parts of n assembled gears, each with its own sizes.
+    """The parts of n assembled gears, each with its own sizes."""
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Drawing data.
-    lengths : Array
-        Distances in the order of ``LENGTHS``, (n, 11) [in].
-    spread : Array
-        Strain of the airframe between the fixed points, about joint 4, (n,) [-].
-    link_offset : Array
-        Offset of one end of links 3-5, 6-7 and 9-10 square to the line between their pins, (n, 3)
-        [in].
-    lever_tilt : Array
-        Tangent of the locking lever's tilt, (n,) [-].
-    twist : Array
-        Added to the angle between the locking lever's arms, (n,) [rad].
-    """
-
-    geometry: Geometry
-    lengths: Array
-    spread: Array
+    geometry: Geometry  # Drawing data
+    lengths: Array  # Distances in the order of ``LENGTHS``, (n, 11) [in]
+    spread: Array  # Strain of the airframe between the fixed points, about joint 4, (n,)
+    # Offset of one end of links 3-5, 6-7 and 9-10 square to the line between their pins, (n, 3)
+    # [in].
     link_offset: Array
-    lever_tilt: Array
-    twist: Array
+    lever_tilt: Array  # Tangent of the locking lever's tilt, (n,)
+    twist: Array  # Added to the angle between the locking lever's arms, (n,) [rad]
 
     @classmethod
     def nominal(cls, geometry: Geometry, rows: int) -> Build:
-        """Gears exactly as drawn.
-
-        Parameters
-        ----------
-        geometry : Geometry
-            Drawing data.
-        rows : int
-            Number of gears [-].
-
-        Returns
-        -------
-        Build
-            Nominal sizes for every row.
-        """
+        """Gears exactly as drawn."""
         return cls(
             geometry,
             np.repeat(geometry.lengths[None, :], rows, axis=0),
@@ -141,18 +86,7 @@ class Build:
         )
 
     def length(self, name: str) -> Array:
-        """Distance of one name, as a view that can be changed.
-
-        Parameters
-        ----------
-        name : str
-            One of ``LENGTHS``.
-
-        Returns
-        -------
-        Array
-            The distance of every row, (n,) [in].
-        """
+        """Distance of one name, as a view that can be changed, (n,) [in]."""
         return self.lengths[:, _LENGTH_INDEX[name]]
 
 
@@ -334,39 +268,13 @@ class _Equations:
 
 
 def clearance_vectors(sizes: Array, angles: Array) -> Array:
-    """Virtual links from their lengths and directions.
-
-    Parameters
-    ----------
-    sizes : Array
-        Lengths, (n, 10) [in].
-    angles : Array
-        Directions in the plane of each joint, (n, 10) or (10,) [rad].
-
-    Returns
-    -------
-    Array
-        Vectors in the plane of each joint, (n, 10, 2) [in].
-    """
+    """Virtual links from their lengths and directions, (n, 10, 2) [in]."""
     return np.stack([sizes * np.cos(angles), sizes * np.sin(angles)], axis=-1)
 
 
 def close(build: Build, clearances: Array, start: Array | None = None) -> Array:
-    """Assemble the linkage with the given virtual links.
-
-    Parameters
-    ----------
-    build : Build
-        Sizes of the parts, n rows.
-    clearances : Array
-        Virtual links in the plane of each joint, (n, 10, 2) [in].
-    start : Array, optional
-        Starting positions, (n, 15) [in]; mid-position by default.
-
-    Returns
-    -------
-    Array
-        Positions, (n, 15) [in]; NaN in a row that does not close.
+    """Assemble the linkage with the given virtual links, (n, 10, 2) [in]: its positions, (n, 15)
+    [in], NaN in a row that does not close.
     """
     if start is None:
         start = np.repeat(build.geometry.start[None, :], clearances.shape[0], axis=0)
@@ -374,62 +282,19 @@ def close(build: Build, clearances: Array, start: Array | None = None) -> Array:
 
 
 def closure_error(build: Build, clearances: Array, unknown: Array) -> Array:
-    """Largest closure error of every row.
-
-    Parameters
-    ----------
-    build : Build
-        Sizes of the parts, n rows.
-    clearances : Array
-        Virtual links, (n, 10, 2) [in].
-    unknown : Array
-        Positions, (n, 15) [in].
-
-    Returns
-    -------
-    Array
-        Largest error, (n,) [in].
-    """
+    """Largest closure error of every row, (n,) [in]."""
     equations = _Equations(build, clearances)
     worst: Array = np.abs(equations.residual(unknown, equations.vectors(unknown))).max(axis=1)
     return worst
 
 
 def reading(build: Build, unknown: Array) -> Array:
-    """Calibrated plunger displacement from the nominal mid-position.
-
-    Parameters
-    ----------
-    build : Build
-        Sizes of the parts.
-    unknown : Array
-        Positions, (n, 15) [in].
-
-    Returns
-    -------
-    Array
-        Displacement, over-travel positive, (n,) [in].
-    """
+    """Calibrated plunger displacement from the nominal mid-position, (n,) [in]."""
     return build.geometry.rate * unknown[:, _PLUNGER]
 
 
 def plunger_gradient(build: Build, clearances: Array, unknown: Array) -> Array:
-    """Derivative of the calibrated displacement by every virtual link.
-
-    Parameters
-    ----------
-    build : Build
-        Sizes of the parts.
-    clearances : Array
-        Virtual links, (n, 10, 2) [in].
-    unknown : Array
-        Positions, (n, 15) [in].
-
-    Returns
-    -------
-    Array
-        Derivatives in the plane of each joint, (n, 10, 2) [-].
-    """
+    """Derivative of the calibrated displacement by every virtual link, (n, 10, 2)."""
     return build.geometry.rate * _Equations(build, clearances).plunger_gradient(unknown)
 
 
@@ -440,21 +305,8 @@ def worst_directions(build: Build, sizes: Array, rounds: int = 2) -> tuple[Array
     directions are laid along it, the linkage is closed again, and so on; each round shrinks the
     error by a factor of the order of clearance over link length.
 
-    Parameters
-    ----------
-    build : Build
-        Sizes of the parts, n rows.
-    sizes : Array
-        Clearances, (n, 10) [in].
-    rounds : int
-        Number of re-alignments after the start from the small-clearance directions [-].
-
-    Returns
-    -------
-    angles : Array
-        Directions, (n, 10) [rad].
-    unknown : Array
-        Positions with the last directions, (n, 15) [in].
+    Returns angles: Directions, (n, 10) [rad]; unknown: Positions with the last directions, (n, 15)
+    [in].
     """
     angles = np.repeat(build.geometry.angles[None, :], sizes.shape[0], axis=0)
     vectors = clearance_vectors(sizes, angles)
@@ -508,13 +360,7 @@ def _travel_rate(geometry: Geometry) -> float:
 
 
 def names() -> tuple[str, ...]:
-    """Letters of the stored linkages.
-
-    Returns
-    -------
-    tuple of str
-        The letters; the first is the reference.
-    """
+    """Letters of the stored linkages."""
     return tuple(_stored())
 
 
@@ -546,18 +392,7 @@ def _drawing(name: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def load(name: str = "A") -> Geometry:
-    """Drawing data of one stored linkage, or of one between two, calibrated.
-
-    Parameters
-    ----------
-    name : str
-        Letter of the linkage, or two letters and the share of the second as in ``A-C:0.5``.
-
-    Returns
-    -------
-    Geometry
-        Positions in space, lengths, calibration rate and small-clearance over-travel directions.
-    """
+    """Drawing data of one stored linkage, or of one between two, calibrated."""
     data = _drawing(name)
     mid = data["mid_position_in"]
     tau, delta, beta = (

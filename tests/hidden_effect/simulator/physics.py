@@ -27,67 +27,26 @@ _RESIDUAL_STRETCH = 4e-9
 
 @dataclass(slots=True)
 class State:
-    """What departs from the drawing in each of n rows; causes change it in place.
+    """What departs from the drawing in each of n rows; causes change it in place."""
 
-    Parameters
-    ----------
-    clearance : Array
-        Clearances that the pins can take up, (n, 10) [in].
-    oval : Array
-        Further clearance along the loaded direction of an oval bore, (n, 10) [in].
-    turned : Array
-        Angle between where the pins rest and the worst direction, (n, 10) [rad].
-    airframe : Array
-        Strain between the fixed points, (n,) [-].
-    parts : Array
-        Strain of each distance in the order of ``linkage.LENGTHS``, (n, 11) [-].
-    actuator, short_link, rod : Array
-        Change of length of the actuator, link 3-5 and link 9-10, each (n,) [in].
-    stroke : Array
-        Change of the actuator's extension at which the reading is taken, (n,) [in].
-    tilt : Array
-        Out-of-plane tilt of links 3-5, 6-7, 9-10 and of the locking lever, (n, 4) [rad].
-    twist : Array
-        Turn of the extension lever's arm against the locking lever's, (n,) [rad].
-    rate_error : Array
-        Relative error of the plunger's rate, (n,) [-].
-    offset : Array
-        Added to the plunger reading, (n,) [in].
-    recorded : Array
-        Added to the clearances that are written down, (n, 10) [in].
-    """
-
-    clearance: Array
-    oval: Array
-    turned: Array
-    airframe: Array
-    parts: Array
-    actuator: Array
-    short_link: Array
-    rod: Array
-    stroke: Array
-    tilt: Array
-    twist: Array
-    rate_error: Array
-    offset: Array
-    recorded: Array
+    clearance: Array  # Clearances that the pins can take up, (n, 10) [in]
+    oval: Array  # Further clearance along the loaded direction of an oval bore, (n, 10) [in]
+    turned: Array  # Angle between where the pins rest and the worst direction, (n, 10) [rad]
+    airframe: Array  # Strain between the fixed points, (n,)
+    parts: Array  # Strain of each distance in the order of ``linkage.LENGTHS``, (n, 11)
+    actuator: Array  # Change of its length, (n,) [in]
+    short_link: Array  # Change of the length of link 3-5, (n,) [in]
+    rod: Array  # Change of the length of link 9-10, (n,) [in]
+    stroke: Array  # Change of the actuator's extension at which the reading is taken, (n,) [in]
+    tilt: Array  # Out-of-plane tilt of links 3-5, 6-7, 9-10 and of the locking lever, (n, 4) [rad]
+    twist: Array  # Turn of the extension lever's arm against the locking lever's, (n,) [rad]
+    rate_error: Array  # Relative error of the plunger's rate, (n,)
+    offset: Array  # Added to the plunger reading, (n,) [in]
+    recorded: Array  # Added to the clearances that are written down, (n, 10) [in]
 
     @classmethod
     def sound(cls, design: Design, scatter: Array) -> State:
-        """Gears with worn joints and nothing else wrong.
-
-        Parameters
-        ----------
-        design : Design
-            Circumstances of every row.
-        scatter : Array
-            Angle of every pin from its worst direction, (n, 10) [rad].
-
-        Returns
-        -------
-        State
-            The state without any cause.
-        """
+        """Gears with worn joints and nothing else wrong."""
         n = design.rows
         warmer = design.temperature - RIGGING_TEMPERATURE_C
         parts = np.repeat(STEEL_PER_C * warmer[:, None], len(linkage.LENGTHS), axis=1)
@@ -111,34 +70,15 @@ class State:
 
 
 def scatter_size(design: Design) -> Array:
-    """Standard deviation of the pins' directions: load seats the pins.
-
-    Parameters
-    ----------
-    design : Design
-        Circumstances of every row.
-
-    Returns
-    -------
-    Array
-        Standard deviation, (n,) [rad].
-    """
+    """Standard deviation of the pins' directions: load seats the pins, (n,) [rad]."""
     load = np.clip(design.pressure / CALIBRATION_PRESSURE_PSI, 0.15, 1.1)
     size: Array = np.radians(SCATTER_DEG) * load**-0.15
     return size
 
 
 class Gears:
-    """The n gears of a fleet, with the worst directions of their own clearances.
-
-    Parameters
-    ----------
-    geometry : linkage.Geometry
-        Drawing data.
-    design : Design
-        Circumstances of every row.
-    scatter : Array
-        Angle of every pin from its worst direction, (n, 10) [rad].
+    """The n gears of a fleet, with the worst directions of their own clearances; each pin rests
+    ``scatter`` from its worst direction, (n, 10) [rad].
     """
 
     def __init__(self, geometry: linkage.Geometry, design: Design, scatter: Array) -> None:
@@ -150,28 +90,11 @@ class Gears:
         )
 
     def sound(self) -> State:
-        """State of the gears with nothing wrong.
-
-        Returns
-        -------
-        State
-            A new state, free to change.
-        """
+        """State of the gears with nothing wrong."""
         return State.sound(self.design, self.scatter)
 
     def build(self, state: State) -> linkage.Build:
-        """Sizes of the parts in a state.
-
-        Parameters
-        ----------
-        state : State
-            Departures from the drawing.
-
-        Returns
-        -------
-        linkage.Build
-            The parts of every row.
-        """
+        """Sizes of the parts in a state."""
         build = linkage.Build.nominal(self.geometry, self.design.rows)
         build.lengths *= 1.0 + state.parts
         build.length("F1")[:] += state.actuator + state.stroke
@@ -186,17 +109,7 @@ class Gears:
 
     def clearances(self, state: State) -> Array:
         """Virtual links in a state: the pin lies against an ellipse whose long axis is the loaded
-        direction.
-
-        Parameters
-        ----------
-        state : State
-            Departures from the drawing.
-
-        Returns
-        -------
-        Array
-            Vectors in the plane of each joint, (n, 10, 2) [in].
+        direction, (n, 10, 2) [in].
         """
         sizes = state.clearance
         if state.oval.any():
@@ -206,18 +119,7 @@ class Gears:
         return linkage.clearance_vectors(sizes, self.directions + state.turned)
 
     def read(self, state: State) -> Array:
-        """Plunger displacement of every row before any error of reading.
-
-        Parameters
-        ----------
-        state : State
-            Departures from the drawing.
-
-        Returns
-        -------
-        Array
-            Displacement, over-travel positive, (n,) [in].
-        """
+        """Plunger displacement of every row before any error of reading, (n,) [in]."""
         build = self.build(state)
         unknown = linkage.close(build, self.clearances(state), self._start)
         if not np.isfinite(unknown).all():
@@ -230,19 +132,7 @@ class Gears:
 
 def worst_case(geometry: linkage.Geometry, clearance: Array) -> Array:
     """Over-travel of a rigid, flat, cold linkage with the given clearances in their worst
-    directions.
-
-    Parameters
-    ----------
-    geometry : linkage.Geometry
-        Drawing data.
-    clearance : Array
-        Clearances, (n, 10) [in].
-
-    Returns
-    -------
-    Array
-        Displacement, (n,) [in].
+    directions, (n,) [in].
     """
     build = linkage.Build.nominal(geometry, clearance.shape[0])
     return linkage.reading(build, linkage.worst_directions(build, clearance)[1])

@@ -64,78 +64,36 @@ FAULT_KINDS = ("mm_as_in", "factor_10", "swapped_joints", "swapped_side", "impla
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Size and form of the errors that a sound fleet carries.
+    """Size and form of the errors that a sound fleet carries."""
 
-    Parameters
-    ----------
-    reading : float
-        Standard deviation of one plunger reading [in].
-    set_up : float
-        Standard deviation common to the repeat readings of one inspection [in].
-    tail : float
-        Standard deviation between tails [in].
-    clearance : float
-        Standard deviation of one clearance reading [in].
-    heavy : bool
-        Student errors with three degrees of freedom instead of normal ones.
-    growing : bool
-        Plunger errors in proportion to the displacement.
-    """
-
-    reading: float
-    set_up: float
-    tail: float
-    clearance: float = 0.0005
-    heavy: bool = False
-    growing: bool = False
+    reading: float  # Standard deviation of one plunger reading [in]
+    set_up: float  # Standard deviation common to the repeat readings of one inspection [in]
+    tail: float  # Standard deviation between tails [in]
+    clearance: float = 0.0005  # Standard deviation of one clearance reading [in]
+    heavy: bool = False  # Student errors with three degrees of freedom instead of normal ones
+    growing: bool = False  # Plunger errors in proportion to the displacement
 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Drawn errors of every row, n rows with m readings.
+    """Drawn errors of every row, n rows with m readings."""
 
-    Parameters
-    ----------
-    tails : dict
-        Offset of each tail [in].
-    plunger : Array
-        Errors of the readings without the tail's, (n, m) [in].
-    clearance : Array
-        Errors of the clearances, (n, 10) [in].
-    floats : Array
-        Errors of the end floats, (n, 10) [in].
-    """
-
-    tails: dict[str, float]
-    plunger: Array
-    clearance: Array
-    floats: Array
+    tails: dict[str, float]  # Offset of each tail [in]
+    plunger: Array  # Errors of the readings without the tail's, (n, m) [in]
+    clearance: Array  # Errors of the clearances, (n, 10) [in]
+    floats: Array  # Errors of the end floats, (n, 10) [in]
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One cell that was written down wrongly.
+    """One cell that was written down wrongly."""
 
-    Parameters
-    ----------
-    row : int
-        Row of the table, 0-based, header not counted [-].
-    record_id : str
-        Record of that row.
-    column : str
-        Column of the table.
-    kind : str
-        One of ``FAULT_KINDS``.
-    right, written : object
-        What should stand in the cell and what does.
-    """
-
-    row: int
-    record_id: str
-    column: str
-    kind: str
-    right: Any
-    written: Any
+    row: int  # Row of the table, 0-based, header not counted
+    record_id: str  # Record of that row
+    column: str  # Column of the table
+    kind: str  # One of ``FAULT_KINDS``
+    right: Any  # What should stand in the cell
+    written: Any  # What does
 
 
 def draw_errors(
@@ -147,28 +105,7 @@ def draw_errors(
     repeats: int,
     tails: dict[str, float] | None = None,
 ) -> Errors:
-    """Draw the errors of a fleet.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of randomness.
-    design : Design
-        Circumstances of every row.
-    noise : Noise
-        Size and form of the errors.
-    displacement : Array
-        True displacement, to which growing noise is proportional, (n,) [in].
-    repeats : int
-        Readings of the plunger in each row [-].
-    tails : dict, optional
-        Offsets of the tails if already known [in].
-
-    Returns
-    -------
-    Errors
-        The errors of every row.
-    """
+    """Draw the errors of a fleet."""
 
     def draw(shape: tuple[int, ...]) -> Array:
         return rng.standard_t(3, shape) / np.sqrt(3.0) if noise.heavy else rng.normal(size=shape)
@@ -193,42 +130,12 @@ def _grid(values: Array, step: float) -> Array:
 
 
 def recorded_clearances(design: Design, errors: Errors, bias: Array | float = 0.0) -> Array:
-    """Clearances as they are written down.
-
-    Parameters
-    ----------
-    design : Design
-        Circumstances of every row.
-    errors : Errors
-        Errors of every row.
-    bias : Array or float
-        Added to the true clearances, (n, 10) [in].
-
-    Returns
-    -------
-    Array
-        Recorded clearances, (n, 10) [in].
-    """
+    """Clearances as they are written down, (n, 10) [in]."""
     return _grid(np.maximum(design.clearance + bias + errors.clearance, 0.0), RESOLUTION_IN)
 
 
 def recorded_readings(design: Design, errors: Errors, displacement: Array) -> Array:
-    """Plunger readings as they are written down.
-
-    Parameters
-    ----------
-    design : Design
-        Circumstances of every row.
-    errors : Errors
-        Errors of every row.
-    displacement : Array
-        True displacement, (n,) [in].
-
-    Returns
-    -------
-    Array
-        Recorded readings, (n, m) [in].
-    """
+    """Plunger readings as they are written down, (n, m) [in]."""
     tails = np.array([errors.tails.get(tail, 0.0) for tail in design.tail])
     return _grid((displacement + tails)[:, None] + errors.plunger, RESOLUTION_IN)
 
@@ -236,24 +143,7 @@ def recorded_readings(design: Design, errors: Errors, displacement: Array) -> Ar
 def draw_blanks(
     rng: np.random.Generator, rows: int, share: float, whole: tuple[str, ...] = ()
 ) -> dict[str, NDArray[np.bool_]]:
-    """Draw which cells are blank.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of randomness.
-    rows : int
-        Number of rows [-].
-    share : float
-        Share of blank cells [-].
-    whole : tuple of str
-        Columns that have no blanks.
-
-    Returns
-    -------
-    dict
-        Whether each cell is blank, by column, each (n,) [-].
-    """
+    """Draw which cells are blank."""
     blank = {column: rng.random(rows) < share for column in _MAY_BE_BLANK}
     for column in whole:
         blank[column][:] = False
@@ -270,30 +160,7 @@ def write_table(
     blank: dict[str, NDArray[np.bool_]],
     first_record: int = 1,
 ) -> Table:
-    """The inspection table, without faults.
-
-    Parameters
-    ----------
-    design : Design
-        Circumstances of every row.
-    noise : Noise
-        Size of the errors, of which the gauges' declared uncertainties are written down.
-    clearance : Array
-        Recorded clearances, (n, 10) [in].
-    readings : Array
-        Recorded readings, (n, m) [in].
-    errors : Errors
-        Errors of every row.
-    blank : dict
-        Whether each cell is blank.
-    first_record : int
-        Number of the first record [-].
-
-    Returns
-    -------
-    dict
-        Columns of the inspection table, blanks as None.
-    """
+    """The inspection table, without faults."""
     n = design.rows
     floats = _grid(np.maximum(design.floats + errors.floats, 0.0), 0.0005)
     values: Table = {
@@ -326,26 +193,7 @@ def write_table(
 def add_faults(
     rng: np.random.Generator, table: Table, kinds: tuple[str, ...], weights: Array, noise_rms: float
 ) -> list[Fault]:
-    """Write slips into a table, each in a row of its own.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of randomness.
-    table : dict
-        Inspection table, changed in place.
-    kinds : tuple of str
-        One of ``FAULT_KINDS`` for each slip.
-    weights : Array
-        Amplification of every joint to the plunger, (10,) [-].
-    noise_rms : float
-        Noise of a row; two swapped joints must stand out from it [in].
-
-    Returns
-    -------
-    list of Fault
-        What was written where; a slip that fits no row is left out.
-    """
+    """Write slips into a table, each in a row of its own."""
     faults: list[Fault] = []
     used: set[int] = set()
     for kind in kinds:
@@ -439,15 +287,7 @@ def _swap_joints(
 
 
 def write_csv(table: Table, path: Path) -> None:
-    """Write a table as CSV, blanks as empty cells.
-
-    Parameters
-    ----------
-    table : dict
-        Inspection table.
-    path : Path
-        File to write.
-    """
+    """Write a table as CSV, blanks as empty cells."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(table)
