@@ -74,7 +74,7 @@ def judged(source: Any) -> tuple[list[Any], list[Any]]:
     return verdicts, [(p.code, p.column, p.value, p.expected, p.remedy) for p in found.problems]
 
 
-EVERY_DAY = 40
+EVERY_DAY = 16
 
 
 @pytest.mark.parametrize(

@@ -43,21 +43,27 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, ...], P
     }
 
 
+# With worker processes, with the engine of pages, and as a module; the others start alike.
+EVERY_DAY = [
+    (MLG, "check table.csv --csv verdicts.csv"),
+    (MLG, "check few.csv --report report --keep"),
+    (AS_A_MODULE, "check few.csv --json"),
+    (MLG, "fleet"),
+]
+SLOW = [
+    (AS_A_MODULE, "check table.csv"),
+    (MLG, "history"),
+    (MLG, "diagnose few.csv"),
+    (MLG, "study --design lhs --size 4,60,1 --workers 2"),
+    (MLG, "gear verify"),
+    (MLG, "template form.pdf"),
+    (MLG, "template form.xlsx"),
+]
+
+
 @pytest.mark.parametrize(
     ("program", "arguments"),
-    [
-        (MLG, "check table.csv --csv verdicts.csv"),
-        (AS_A_MODULE, "check table.csv"),
-        (MLG, "check few.csv --report report --keep"),
-        (AS_A_MODULE, "check few.csv --json"),
-        (MLG, "fleet"),
-        (MLG, "history"),
-        (MLG, "diagnose few.csv"),
-        (MLG, "study --design lhs --size 4,60,1 --workers 2"),
-        (MLG, "gear verify"),
-        (MLG, "template form.pdf"),
-        (MLG, "template form.xlsx"),
-    ],
+    [*EVERY_DAY, *(pytest.param(*each, marks=pytest.mark.slow) for each in SLOW)],
 )
 def test_nothing_in_the_folder_runs(
     folders: dict[tuple[str, ...], Path], program: tuple[str, ...], arguments: str

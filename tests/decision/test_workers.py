@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +27,6 @@ BATCH = ROOT / "inspection_data" / "fleet_batch.csv"
 PAGE = ROOT / "docs" / "how-to" / "cluster.md"
 
 
-@pytest.fixture
-def many_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The 46 rows of the batch are judged as a long file is: in three blocks."""
-    monkeypatch.setattr(task, "AT_ONCE", 20)
-
-
-def written(options: CheckOptions) -> str:
-    found = check_files([BATCH], options)
-    return inspection_lines(found.gear, found.judgements)
-
-
 def places_of(judgements: Sequence[Judgement]) -> list[int | None]:
     return [judgement.row.source.row for judgement in judgements]
 
@@ -45,52 +35,68 @@ def process_and_rows(judgements: Sequence[Judgement]) -> tuple[int, int]:
     return os.getpid(), len(judgements)
 
 
-@pytest.mark.usefixtures("many_parts")
-def test_what_is_found_does_not_depend_on_the_number_of_workers() -> None:
-    assert written(CheckOptions(workers=2)) == written(CheckOptions())
+@dataclass
+class Told:
+    """What a check of three blocks on two workers told while it ran."""
+
+    rows: list[int | None] = field(default_factory=list)
+    made: list[tuple[int, int]] = field(default_factory=list)
+    judgements: list[Judgement] = field(default_factory=list)
+    counts: list[tuple[int, int]] = field(default_factory=list)
+    asked: list[int] = field(default_factory=list)
 
 
-@pytest.mark.usefixtures("many_parts")
-def test_any_executor_finds_the_same() -> None:
-    with ThreadPoolExecutor(2) as executor:
-        assert written(CheckOptions(executor=executor)) == written(CheckOptions())
+@pytest.fixture(scope="module")
+def told() -> Told:
+    told = Told()
 
+    def outputs(_read: object, total: int) -> list[BlockOutput]:
+        told.asked.append(total)
+        return [
+            BlockOutput(places_of, told.rows.extend),
+            BlockOutput(process_and_rows, told.made.append),
+            BlockOutput(list, told.judgements.extend),
+        ]
 
-@pytest.mark.usefixtures("many_parts")
-def test_progress_counts_rows_whoever_judges_them() -> None:
-    counts: list[tuple[int, int]] = []
-    options = CheckOptions(workers=2)
-    check_files([BATCH], options, on_judged=lambda done, total: counts.append((done, total)))
-    assert counts == [(20, 46), (40, 46), (46, 46)]
-
-
-@pytest.mark.usefixtures("many_parts")
-def test_outputs_receive_the_rows_in_their_order_and_the_result_holds_none() -> None:
-    rows: list[int | None] = []
-    found = check_files(
-        [BATCH], CheckOptions(workers=2), outputs=lambda *_: [BlockOutput(places_of, rows.extend)]
-    )
-    assert rows == list(range(2, 48))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(task, "AT_ONCE", 20)
+        found = check_files(
+            [BATCH],
+            CheckOptions(workers=2),
+            on_judged=lambda done, total: told.counts.append((done, total)),
+            outputs=outputs,
+        )
     assert found.judgements == ()
+    return told
 
 
-@pytest.mark.usefixtures("many_parts")
-def test_what_is_written_of_a_block_is_made_where_it_is_judged() -> None:
-    made: list[tuple[int, int]] = []
-    check_files(
-        [BATCH],
-        CheckOptions(workers=2),
-        outputs=lambda *_: [BlockOutput(process_and_rows, made.append)],
+def test_what_is_found_does_not_depend_on_the_number_of_workers(told: Told) -> None:
+    alone = check_files([BATCH], CheckOptions())
+    assert inspection_lines(alone.gear, told.judgements) == inspection_lines(
+        alone.gear, alone.judgements
     )
-    assert [count for _process, count in made] == [20, 20, 6]
-    assert os.getpid() not in dict(made)
 
 
-@pytest.mark.usefixtures("many_parts")
-def test_outputs_are_asked_for_once_with_the_number_of_rows() -> None:
-    asked: list[int] = []
-    check_files([BATCH], outputs=lambda _read, total: (asked.append(total), ())[1])
-    assert asked == [46]
+def test_any_executor_finds_the_same(told: Told, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(task, "AT_ONCE", 20)
+    with ThreadPoolExecutor(2) as executor:
+        found = check_files([BATCH], CheckOptions(executor=executor))
+    assert inspection_lines(found.gear, found.judgements) == inspection_lines(
+        found.gear, told.judgements
+    )
+
+
+def test_progress_counts_rows_whoever_judges_them(told: Told) -> None:
+    assert told.counts == [(20, 46), (40, 46), (46, 46)]
+
+
+def test_outputs_are_asked_for_once_and_receive_the_rows_in_their_order(told: Told) -> None:
+    assert (told.asked, told.rows) == ([46], list(range(2, 48)))
+
+
+def test_what_is_written_of_a_block_is_made_where_it_is_judged(told: Told) -> None:
+    assert [count for _process, count in told.made] == [20, 20, 6]
+    assert os.getpid() not in dict(told.made)
 
 
 def slower_the_earlier(block: int) -> int:

@@ -21,7 +21,7 @@ from mlg_troubleshoot.life.forecast import (
 from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
-from mlg_troubleshoot.workflows.history import show_fleet, show_lives
+from mlg_troubleshoot.workflows.history import Lives, show_fleet, show_lives
 from mlg_troubleshoot.workflows.keep import Told, keep, told_by
 
 TAILS = [f"N{n:03d}" for n in range(TEACHERS + 30)]
@@ -52,9 +52,18 @@ def fleet_of(folder: Path, landings_of: Sequence[str] = TAILS) -> Store:
     return store
 
 
-def test_a_gear_has_the_same_forecast_alone_as_in_its_fleet(tmp_path: Path) -> None:
-    store, gear = fleet_of(tmp_path), load_gear()
-    fleet = show_fleet(store, gear, ahead=True)
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    return fleet_of(tmp_path_factory.mktemp("fleet"))
+
+
+@pytest.fixture(scope="module")
+def fleet(store: Store) -> Lives:
+    return show_fleet(store, load_gear(), ahead=True)
+
+
+def test_a_gear_has_the_same_forecast_alone_as_in_its_fleet(store: Store, fleet: Lives) -> None:
+    gear = load_gear()
     taught = teachers_first(fleet.forecasts)[:TEACHERS]
     for key in (taught[0], teachers_first(fleet.forecasts)[-1]):
         alone = show_lives(store, gear, *key, ahead=True).forecasts[key]
@@ -63,10 +72,10 @@ def test_a_gear_has_the_same_forecast_alone_as_in_its_fleet(tmp_path: Path) -> N
         assert alone.due_date == fleet.forecasts[key].due_date
 
 
-def test_the_life_of_one_gear_says_how_far_the_wear_of_its_fleet_is_learnt(tmp_path: Path) -> None:
+def test_the_life_of_one_gear_says_how_far_the_wear_of_its_fleet_is_learnt(store: Store) -> None:
     said: dict[str, list[tuple[int, int | None]]] = {}
     show_lives(
-        fleet_of(tmp_path),
+        store,
         load_gear(),
         TAILS[0],
         "LH",
@@ -82,9 +91,8 @@ def test_the_life_of_one_gear_says_how_far_the_wear_of_its_fleet_is_learnt(tmp_p
 
 
 def test_the_life_of_one_gear_is_shown_without_reading_the_whole_store(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store = fleet_of(tmp_path)
     read: list[str] = []
     found = Store._record
     monkeypatch.setattr(
@@ -149,17 +157,15 @@ def test_the_gears_learnt_from_stay_the_same_when_one_comes_in_behind_them() -> 
     assert [key for key in teachers_first([*keys, ("NEW", "RH")]) if key[0] != "NEW"] == order
 
 
-def test_another_margin_has_another_forecast(tmp_path: Path) -> None:
-    store, gear = fleet_of(tmp_path), load_gear()
-    before = show_fleet(store, gear, ahead=True).forecasts
+def test_another_margin_has_another_forecast(store: Store, fleet: Lives) -> None:
+    gear, before = load_gear(), fleet.forecasts
     wide = replace(gear, margin=replace(gear.margin, value=2.0 * gear.margin.value))
     after = show_fleet(store, wide, ahead=True).forecasts
     key = teachers_first(before)[-1]
     assert after[key].landings_to_margin != before[key].landings_to_margin
 
 
-def test_unpacked_contents_are_judged_by_the_gate_of_their_own_store(tmp_path: Path) -> None:
-    store = fleet_of(tmp_path)
+def test_unpacked_contents_are_judged_by_the_gate_of_their_own_store(store: Store) -> None:
     [life] = lives_of(store, [(TAILS[0], "LH")]).values()
     assert life.inspections[0].inspection.tail_no == TAILS[0]
     strict = Store(store.place, judge=lambda _record, _body: "it is wrong")

@@ -9,6 +9,7 @@ import json
 import random
 from dataclasses import dataclass, field
 from datetime import date, timedelta
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[tuple[st
     return folder, truth
 
 
+@cache
 def asked(folder: Path, *more: str) -> list[dict[str, Any]]:
     kept = ("--store", folder / "s.sqlite", "--json", "-q", "--no-forecast")
     run = mlg("fleet", *kept, *more)

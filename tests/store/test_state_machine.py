@@ -418,7 +418,7 @@ def _with_blanks(visits: Sequence[GearVisit], side: str) -> list[GearVisit]:
 
 
 @pytest.mark.parametrize(
-    ("runs", "steps"), [(25, 10), pytest.param(120, 20, marks=pytest.mark.slow)]
+    ("runs", "steps"), [(12, 10), pytest.param(120, 20, marks=pytest.mark.slow)]
 )
 def test_whatever_happens_to_two_stores_the_truth_stands(runs: int, steps: int) -> None:
     run_state_machine_as_test(
