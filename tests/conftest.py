@@ -24,28 +24,9 @@ settings.load_profile("everyday")
 
 # What a user may have set that the program, or what it shows its pages with, reads.
 OF_THE_USER = (
-    *(
-        "MLG_STORE",
-        "MLG_GEAR",
-        "MLG_UNIT",
-        "MLG_CONVENTION",
-        "MLG_SHOW",
-        "MLG_PAGE",
-        "MLG_DEBUG",
-        "SOURCE_DATE_EPOCH",
-        "XDG_CONFIG_HOME",
-        "XDG_DATA_HOME",
-        "XDG_CACHE_HOME",
-    ),
-    *(
-        "COLUMNS",
-        "LINES",
-        "TERMINAL_WIDTH",
-        "NO_COLOR",
-        "FORCE_COLOR",
-        "TTY_COMPATIBLE",
-        "TTY_INTERACTIVE",
-    ),
+    *("MLG_STORE", "MLG_GEAR", "MLG_UNIT", "MLG_CONVENTION", "MLG_SHOW", "MLG_PAGE", "MLG_DEBUG"),
+    *("SOURCE_DATE_EPOCH", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "COLUMNS"),
+    *("LINES", "TERMINAL_WIDTH", "NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"),
     *("PYTHONIOENCODING", "PYTHONUTF8", "PYTHONWARNINGS", "PYTHONOPTIMIZE"),
 )
 

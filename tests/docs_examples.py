@@ -165,10 +165,7 @@ def commands_table() -> str:
 
 # Who uses each option and how often: by its name, or by command and name where commands differ.
 USERS = {
-    "administrator": {
-        "seldom": "--store; history verify --report",
-        "weekly": "--expect; --quiet",
-    },
+    "administrator": {"seldom": "--store; history verify --report", "weekly": "--expect; --quiet"},
     "analyst": {
         "seldom": "--approve; --causes; --design; --figure; --seed; --size; --workers"
         "; --write-table; diagnose --why; study --csv",
@@ -288,7 +285,7 @@ def pictures() -> dict[str, str]:
             f"{gear.name}, linkage {gear.reference.name} at mid-position: {gear.provenance}."
             f" Arrows: worst-case clearances of the published failure, {drawn.exaggeration} times"
             " larger than life.",
-        ),
+        )
     }
 
 

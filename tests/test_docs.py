@@ -210,12 +210,9 @@ def test_the_python_version_is_that_of_the_project() -> None:
     "said",
     [
         "does not replace the maintenance manual's limits",
-        "not an approval for return to service",
-        "The geometry is synthetic",
-        "The published failure was fitted",
-        "The worst case is a bound",
-        "Both ends of one link act alike",
-        "In-plane joint clearance only",
+        *("not an approval for return to service", "The geometry is synthetic"),
+        *("The published failure was fitted", "The worst case is a bound"),
+        *("Both ends of one link act alike", "In-plane joint clearance only"),
     ],
 )
 def test_what_the_program_cannot_say_is_said(said: str) -> None:
@@ -274,8 +271,7 @@ NAMED_PATHS = sorted(
         for page in PAGES
         if page.name != "changelog.md"
         for path in re.findall(
-            r"`([a-z_]+/[\w./-]*(?:\.py|\.toml|\.md|/))`",
-            page.read_text(encoding="utf-8"),
+            r"`([a-z_]+/[\w./-]*(?:\.py|\.toml|\.md|/))`", page.read_text(encoding="utf-8")
         )
     }
 )

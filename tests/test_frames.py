@@ -261,10 +261,7 @@ def test_a_result_is_a_table_of_which_a_notebook_keeps_two_kilobytes(name: str) 
 
 @pytest.mark.parametrize(
     ("name", "command"),
-    [
-        *((name, name) for name in ("check", "diagnose", "study", "gear")),
-        ("lives", "fleet"),
-    ],
+    [*((name, name) for name in ("check", "diagnose", "study", "gear")), ("lives", "fleet")],
 )
 def test_the_dict_of_a_result_is_the_documented_json(name: str, command: str) -> None:
     jsonschema.validate(result(name).to_dict(), schema(command))

@@ -14,13 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlg_troubleshoot.errors import OutputError, UsageError
-from mlg_troubleshoot.outputs import (
-    claim_outputs,
-    csv_lines,
-    harmless,
-    write_bytes,
-    write_csv,
-)
+from mlg_troubleshoot.outputs import claim_outputs, csv_lines, harmless, write_bytes, write_csv
 
 
 def test_a_file_under_a_file_cannot_be_written(tmp_path: Path) -> None:
@@ -178,20 +172,14 @@ def test_an_output_that_is_the_file_of_an_open_input_is_refused(tmp_path: Path) 
 @pytest.mark.parametrize("second", ["a.csv", "no/../a.csv", "link.csv"])
 def test_two_outputs_are_two_files(tmp_path: Path, second: str) -> None:
     (tmp_path / "link.csv").symlink_to("a.csv")
-    outputs = [
-        ("--csv", tmp_path / "a.csv"),
-        ("--annotate", f"{tmp_path}/{second}"),
-    ]
+    outputs = [("--csv", tmp_path / "a.csv"), ("--annotate", f"{tmp_path}/{second}")]
     with pytest.raises(UsageError, match=r"--annotate .* is the file of --csv as well"):
         claim_outputs([], outputs, force=True)
 
 
 def test_another_output_is_not_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x")
-    outputs = [
-        ("--csv", tmp_path / "b.csv"),
-        ("--annotate", None),
-    ]
+    outputs = [("--csv", tmp_path / "b.csv"), ("--annotate", None)]
     claim_outputs([tmp_path / "a.csv"], outputs)
 
 

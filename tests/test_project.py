@@ -28,12 +28,7 @@ import mlg_troubleshoot
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "mlg_troubleshoot"
 TOP_LEVEL = {
-    "pyproject.toml",
-    "mlg_troubleshoot",
-    "inspection_data",
-    "templates",
-    "tests",
-    "docs",
+    *("pyproject.toml", "mlg_troubleshoot", "inspection_data", "templates", "tests", "docs"),
     "README.md",
 }
 

@@ -55,7 +55,7 @@ def test_every_schema_is_valid_and_allows_no_further_names(name: str) -> None:
 
 def test_the_contract_names_eight_outputs_that_state_the_version_of_their_schema() -> None:
     assert set(schemas.NAMES) == {
-        *["check", "diagnose", "study", "fleet", "history", "life", "gear", "verify"],
+        *["check", "diagnose", "study", "fleet", "history", "life", "gear", "verify"]
     }
     for name in schemas.NAMES:
         kinds = schemas.schema(name)["$defs"].values()
@@ -206,11 +206,7 @@ def test_an_empty_store_fits_its_schema(tmp_path: Path, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize(
     ("name", "arguments"),
-    [
-        ("gear", ("gear",)),
-        ("gear", ("gear", "--gear", FOUR_BAR)),
-        ("verify", ("gear", "verify")),
-    ],
+    [("gear", ("gear",)), ("gear", ("gear", "--gear", FOUR_BAR)), ("verify", ("gear", "verify"))],
 )
 def test_what_is_said_of_the_gear_fits_its_schema(name: str, arguments: tuple[object, ...]) -> None:
     assert complain(name, mlg(*arguments, "--json").json) == []

@@ -8,14 +8,7 @@ import json
 import pytest
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.units import (
-    Length,
-    LengthUnit,
-    Sentence,
-    parse_length,
-    said_in,
-    with_unit,
-)
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence, parse_length, said_in, with_unit
 
 THOU, MM = LengthUnit.THOU, LengthUnit.MILLIMETRE
 

@@ -14,20 +14,11 @@ from mlg_troubleshoot.units import ClearanceConvention
 NUMBERED = [f"{name}_{n}_in" for name in ("clearance", "axial_float") for n in range(1, 11)]
 HEADER = [
     *(
-        "record_id",
-        "tail_no",
-        "side",
-        "clearance_convention",
-        "inspection_date",
-        "gear_landings",
-        "temperature_c",
+        *("record_id", "tail_no", "side", "clearance_convention", "inspection_date"),
+        *("gear_landings", "temperature_c"),
     ),
     *(
-        "hydraulic_pressure_psi",
-        "approach",
-        "gauge_id",
-        "technician_id",
-        "gauge_u_in",
+        *("hydraulic_pressure_psi", "approach", "gauge_id", "technician_id", "gauge_u_in"),
         "plunger_gauge_u_in",
     ),
     *NUMBERED,

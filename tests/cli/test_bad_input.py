@@ -134,8 +134,7 @@ def test_a_joint_given_twice_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "near"),
-    [("outcom", "outcome"), ("plungr", "plunger"), ("clearance3x", "clearance_3")],
+    ("name", "near"), [("outcom", "outcome"), ("plungr", "plunger"), ("clearance3x", "clearance_3")]
 )
 def test_a_name_that_is_not_a_column_is_refused_with_the_nearest(name: str, near: str) -> None:
     found = mlg(*ONE_VALUE, "3=0.001in", "--set", f"{name}=1")

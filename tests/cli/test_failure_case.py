@@ -104,10 +104,7 @@ def test_by_hand_it_is_refused_without_unit_or_convention(
 @pytest.mark.parametrize(
     ("cells", "declared"),
     [
-        (
-            {column.removesuffix("_in"): value for column, value in row().items()},
-            ("--unit", "in"),
-        ),
+        ({column.removesuffix("_in"): value for column, value in row().items()}, ("--unit", "in")),
         (row(clearance_convention=None), ("--convention", "RADIAL")),
     ],
     ids=["unit", "convention"],
@@ -147,7 +144,4 @@ def test_the_shipped_files_carry_the_two_published_clearances_and_no_other() -> 
         n: cells[f"clearance_{n}_in"]
         for n in range(1, 11)
         if cells[f"clearance_{n}_in"] is not None
-    } == {
-        3: 0.013,
-        5: 0.007,
-    }
+    } == {3: 0.013, 5: 0.007}

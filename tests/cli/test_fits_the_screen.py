@@ -30,11 +30,7 @@ SAID = {
     "measured outside": replace(GEAR, clearance_in=MANY, readings_in=(0.036,)),
     "far outside": replace(GEAR, readings_in=(-0.09,), outcome=Outcome.FAILED),
     "no spare": replace(
-        GEAR,
-        clearance_in=MANY,
-        readings_in=(0.004,),
-        outcome=Outcome.FAILED,
-        no_spare=(3,),
+        GEAR, clearance_in=MANY, readings_in=(0.004,), outcome=Outcome.FAILED, no_spare=(3,)
     ),
     "stopped": replace(
         GEAR,
@@ -94,11 +90,7 @@ def test_the_help_of_check_has_twelve_options_and_says_where_the_others_are() ->
 
 @pytest.mark.parametrize(
     ("typed", "same"),
-    [
-        (("help",), ("--help",)),
-        (("help", "fleet"), ("fleet", "--help")),
-        ((), ("--help",)),
-    ],
+    [(("help",), ("--help",)), (("help", "fleet"), ("fleet", "--help")), ((), ("--help",))],
 )
 def test_help_is_understood_as_it_is_asked_for(
     typed: tuple[str, ...], same: tuple[str, ...]

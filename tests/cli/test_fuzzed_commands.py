@@ -43,13 +43,5 @@ def test_no_case_ends_in_an_internal_error_late_large_or_with_another_file_chang
     counted = fuzzed(1200, seed=2)
     reached = set(re.findall(r"^(\w+) +exit [01]:", counted, re.MULTILINE))
     assert reached >= {
-        "table",
-        "gear",
-        "beside",
-        "extension",
-        "draft",
-        "headers",
-        "store",
-        "import",
-        "outputs",
+        *("table", "gear", "beside", "extension", "draft", "headers", "store", "import", "outputs")
     }

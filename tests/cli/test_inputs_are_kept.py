@@ -55,11 +55,8 @@ def kept(found: Run, path: Path, before: bytes, option: str) -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        "check in.csv --csv in.csv",
-        "check in.csv --annotate in.csv",
-        "check . --csv in.csv",
-        "check i*.csv --csv in.csv",
-        "check in.csv --force --csv no/../in.csv",
+        *("check in.csv --csv in.csv", "check in.csv --annotate in.csv", "check . --csv in.csv"),
+        *("check i*.csv --csv in.csv", "check in.csv --force --csv no/../in.csv"),
         "check in.csv --extension other.toml --csv other.toml",
         "check in.csv --causes other.toml --csv other.toml",
         "check in.csv --gear mine.toml --csv mine.toml",

@@ -20,15 +20,7 @@ def written(folder: Path) -> str:
 
 def test_a_report_of_a_check_stands_in_the_unit_to_show(tmp_path: Path) -> None:
     gear = (
-        "--tail",
-        "N1",
-        "--side",
-        "LH",
-        "--convention",
-        "RADIAL",
-        "--set",
-        "3=0.013in",
-        "--set",
+        *("--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--set", "3=0.013in", "--set"),
         "5=0.007in",
     )
     mlg("check", *gear, "--show", "thou", "--report", tmp_path, "--format", "html")

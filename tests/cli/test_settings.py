@@ -88,8 +88,7 @@ def test_a_column_by_its_letter_is_not_named_by_a_file(table: Table, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    "text",
-    ['show = "mm"', "headers = 3", "[headers]\nx = 3", "[", "x = " + "[" * 5000, "", None],
+    "text", ['show = "mm"', "headers = 3", "[headers]\nx = 3", "[", "x = " + "[" * 5000, "", None]
 )
 def test_a_file_of_headers_that_is_not_one_is_refused_with_words(
     text: str | None, tmp_path: Path

@@ -11,15 +11,7 @@ import pytest
 from tests.cli.conftest import FAILURE, mlg
 
 HAND = (
-    "check",
-    "--tail",
-    "N123",
-    "--side",
-    "LH",
-    "--set",
-    "record_id=R1",
-    "--convention",
-    "RADIAL",
+    *("check", "--tail", "N123", "--side", "LH", "--set", "record_id=R1", "--convention", "RADIAL"),
 )
 
 

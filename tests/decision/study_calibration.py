@@ -20,15 +20,7 @@ from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.life.forecast import expected_of
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from tests.benchmarks.worn_gears import LIMIT_IN, displacement, worst
-from tests.decision.technician import (
-    CLEARANCE,
-    MARGIN_IN,
-    MISRIGGED,
-    NONE,
-    OTHER,
-    Hangar,
-    World,
-)
+from tests.decision.technician import CLEARANCE, MARGIN_IN, MISRIGGED, NONE, OTHER, Hangar, World
 
 _TURNS = 150
 _MIX = (3.0, 1.0, 4.0, 1.0)

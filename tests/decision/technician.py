@@ -63,19 +63,14 @@ class World:
 
 
 WORLDS = (
-    World("A uniform"),
-    World("A uniform 1:1:1", mix=(1.0, 1.0, 1.0, 0.0)),
-    World("A mis-rigged", mix=(3.0, 1.0, 4.0, 1.0)),
-    World("B loaded", "B", "loaded"),
+    *(World("A uniform"), World("A uniform 1:1:1", mix=(1.0, 1.0, 1.0, 0.0))),
+    *(World("A mis-rigged", mix=(3.0, 1.0, 4.0, 1.0)), World("B loaded", "B", "loaded")),
     World("C uniform, #3 halved", "C", slips={3: 0.5}),
     World("D gravity, gauge x1.2", "D", "gravity", gauge=1.2),
     World("E axial mixed", "E", "axial mixed"),
-    World("F uniform, #3 doubled", "F", slips={3: 2.0}),
-    World("G axial", "G", "axial"),
-    World("H loaded, gauge x0.8", "H", "loaded", gauge=0.8),
-    World("I gravity", "I", "gravity"),
-    World("J uniform, gauge x0.8", "J", gauge=0.8),
-    World("A one joint shut", shut="joint"),
+    *(World("F uniform, #3 doubled", "F", slips={3: 2.0}), World("G axial", "G", "axial")),
+    *(World("H loaded, gauge x0.8", "H", "loaded", gauge=0.8), World("I gravity", "I", "gravity")),
+    *(World("J uniform, gauge x0.8", "J", gauge=0.8), World("A one joint shut", shut="joint")),
     World("A one area shut", shut="area"),
 )
 

@@ -164,11 +164,7 @@ def test_a_joint_that_reads_little_over_its_limit_is_read_with_another_gauge(jud
 
 
 def test_a_repair_is_to_be_tried_where_fewer_joints_likely_hold(judge: Judge) -> None:
-    found = judge(
-        every_joint(0.003, j3=0.014),
-        outcome=Outcome.FAILED,
-        readings_in=(0.036,),
-    )
+    found = judge(every_joint(0.003, j3=0.014), outcome=Outcome.FAILED, readings_in=(0.036,))
     sets = {s.kind: s for s in found.repair_sets or ()}
     assert found.next_action.joints == sets["try"].joints == (3,)
     assert len(sets["sure"].joints) > 1

@@ -132,9 +132,7 @@ def test_the_chance_of_the_rigging_is_the_one_that_the_plan_follows(gear: Gear) 
     assert found.not_clearance == Belief(one).chances[1]
 
 
-def test_an_unread_joint_is_likelier_worn_on_a_gear_whose_other_joints_are_worn(
-    gear: Gear,
-) -> None:
+def test_an_unread_joint_is_likelier_worn_on_a_gear_whose_other_joints_are_worn(gear: Gear) -> None:
     young = explained(gear, dict.fromkeys(range(2, 11), 0.0007), 0.004)
     old = explained(gear, dict.fromkeys(range(2, 11), 0.006), 0.004)
     assert chance(old, 1) > 2.0 * chance(young, 1)

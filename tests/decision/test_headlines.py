@@ -100,10 +100,7 @@ def test_without_a_complaint_nothing_is_required_and_one_reading_ends_it(
     if within.verdict is Verdict.WITHIN_MARGIN:
         assert (within.next_action.action, within.end) == (Action.DONE, End.DONE)
     assert not within.next_action.required
-    assert (beyond.next_action.action, beyond.end) == (
-        Action.CONTINUE,
-        End.OUTSIDE_NO_COMPLAINT,
-    )
+    assert (beyond.next_action.action, beyond.end) == (Action.CONTINUE, End.OUTSIDE_NO_COMPLAINT)
 
 
 def test_only_joints_over_their_limits_are_restored_without_a_complaint(judge: Judge) -> None:

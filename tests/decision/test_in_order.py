@@ -60,10 +60,7 @@ def test_one_reading_shows_that_a_gear_is_in_order(gear: Gear, table: IndexTable
     assert np.mean(fine) >= 0.97
     for a in judged(gear, table, [inspected(read[k], **retracted) for k in sound]):
         step = a.next_action
-        assert (step.action, step.required) in {
-            (Action.READ_PLUNGER, False),
-            (Action.DONE, False),
-        }
+        assert (step.action, step.required) in {(Action.READ_PLUNGER, False), (Action.DONE, False)}
 
 
 @SIZES

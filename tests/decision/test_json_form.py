@@ -13,41 +13,15 @@ from mlg_troubleshoot.reporting.json_form import check_as_json
 from tests.decision.conftest import Judge, every_joint
 
 INSPECTION = {
-    *(
-        "record_id",
-        "tail_no",
-        "side",
-        "verdict",
-        "predicted_displacement_in",
-        "over_travel_in",
-        "under_travel_in",
-    ),
-    *(
-        "predicted_upper_in",
-        "margin_in",
-        "remaining_in",
-        "standard_uncertainty_in",
-        "probability_within_margin",
-    ),
-    *(
-        "probability_exceed_random_directions",
-        "measured_displacement_in",
-        "geometry_spread_in",
-        "joints",
-    ),
-    *("next_action", "repair_sets", "warnings"),
+    *("record_id", "tail_no", "side", "verdict", "predicted_displacement_in", "over_travel_in"),
+    *("under_travel_in", "predicted_upper_in", "margin_in", "remaining_in"),
+    *("standard_uncertainty_in", "probability_within_margin"),
+    *("probability_exceed_random_directions", "measured_displacement_in", "geometry_spread_in"),
+    *("joints", "next_action", "repair_sets", "warnings"),
 }
 JOINT = {
-    *(
-        "joint",
-        "name",
-        "clearance_in",
-        "over_limit",
-        "contribution_in",
-        "first_order",
-        "total_order",
-    ),
-    *("plunger_amplification", "rank"),
+    *("joint", "name", "clearance_in", "over_limit", "contribution_in", "first_order"),
+    *("total_order", "plunger_amplification", "rank"),
 }
 PROBLEM = Problem(
     "negative", "a.csv", None, 2, "clearance_3_in", "F2", "-1", "0 or more", "Correct the cell."
@@ -88,13 +62,8 @@ def test_every_joint_has_every_key_of_the_contract(form: dict, row: int) -> None
 
 def test_a_repair_set_has_its_seven_keys(gear: Gear, judge: Judge) -> None:
     keys = {
-        "joints",
-        "predicted_displacement_in",
-        "probability_within_margin",
-        "access_minutes",
-        "minutes",
-        "kind",
-        "second_repair_probability",
+        *("joints", "predicted_displacement_in", "probability_within_margin", "access_minutes"),
+        *("minutes", "kind", "second_repair_probability"),
     }
     (row,) = check_as_json(gear, [judge(every_joint(0.004))], [], [])["inspections"]
     assert row["repair_sets"][0].keys() == keys

@@ -57,9 +57,7 @@ def test_the_quick_chance_with_random_directions_is_the_share_of_displacements_b
     )
 
 
-def test_a_gear_whose_measured_joints_are_worn_is_expected_to_be_worn_elsewhere(
-    gear: Gear,
-) -> None:
+def test_a_gear_whose_measured_joints_are_worn_is_expected_to_be_worn_elsewhere(gear: Gear) -> None:
     worn, tight = (levels_of(gear, dict.fromkeys((1, 2, 3), c)) for c in (0.0068, 0.0007))
     assert worn @ WEAR @ SHARES > 1.5 * tight @ WEAR @ SHARES
 

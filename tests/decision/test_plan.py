@@ -174,9 +174,7 @@ def test_no_joint_is_read_that_could_not_spare_the_sound_ones(judge: Judge) -> N
     assert found.next_action.action is Action.RESTORE
 
 
-def test_joints_are_expected_to_be_the_cause_where_the_rigging_is_found_right(
-    judge: Judge,
-) -> None:
+def test_joints_are_expected_to_be_the_cause_where_the_rigging_is_found_right(judge: Judge) -> None:
     found = judge(every_joint(0.0045), readings_in=(0.036,), outcome=Outcome.FAILED)
     assert [step.action for step in found.plan.steps][:2] == [Action.CHECK_RIGGING, Action.RESTORE]
     assert found.end is End.DONE

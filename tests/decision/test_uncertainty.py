@@ -8,12 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.assessment import (
-    Assessment,
-    RigidBound,
-    UncertaintyBudget,
-    Verdict,
-)
+from mlg_troubleshoot.decision.assessment import Assessment, RigidBound, UncertaintyBudget, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.prediction import (

@@ -187,15 +187,9 @@ def test_a_gear_that_does_not_close_is_outside_with_its_numbers_absent_and_a_war
     found = judge(every_joint(0.05))
     assert found.verdict is Verdict.OUTSIDE_MARGIN
     numbers = (
-        found.predicted_displacement_in,
-        found.over_travel_in,
-        found.under_travel_in,
-        found.predicted_upper_in,
-        found.remaining_in,
-        found.standard_uncertainty_in,
-        found.probability_exceed_random_directions,
-        found.geometry_spread_in,
-        found.budget,
+        *(found.predicted_displacement_in, found.over_travel_in, found.under_travel_in),
+        *(found.predicted_upper_in, found.remaining_in, found.standard_uncertainty_in),
+        *(found.probability_exceed_random_directions, found.geometry_spread_in, found.budget),
     )
     assert set(numbers) == {None}
     assert any("does not close" in warning for warning in found.warnings)

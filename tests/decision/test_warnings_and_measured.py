@@ -142,8 +142,7 @@ def test_a_suggested_slip_is_never_applied(judge: Judge) -> None:
 
 
 @pytest.mark.parametrize(
-    ("declared", "readings", "expected"),
-    [(None, 1, 0.002), (None, 4, 0.001), (0.003, 4, 0.0015)],
+    ("declared", "readings", "expected"), [(None, 1, 0.002), (None, 4, 0.001), (0.003, 4, 0.0015)]
 )
 def test_the_mean_of_repeat_readings_is_better_than_one(
     declared: float | None, readings: int, expected: float

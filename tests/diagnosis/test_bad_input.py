@@ -171,12 +171,7 @@ def test_a_column_with_one_value_known_is_not_a_reason_to_fail(
 # At the command line
 
 HEADER = [
-    "record_id",
-    "tail_no",
-    "side",
-    "clearance_convention",
-    "clearance_3_in",
-    "clearance_5_in",
+    *("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
 ]
 
 
@@ -236,10 +231,7 @@ def test_a_file_of_causes_that_is_not_valid_leaves_with_2(text: str, tmp_path: P
 def test_the_json_of_a_diagnosis_holds_no_invalid_number(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     rows = [[*row, 0.02 + rng.normal(0.0, 0.002)] for row in inspections(40)]
-    found = run(
-        str(write(tmp_path / "t.csv", rows, "plunger_displacement_in")),
-        "--json",
-    )
+    found = run(str(write(tmp_path / "t.csv", rows, "plunger_displacement_in")), "--json")
     assert json.loads(found.out)["schema_version"] == 2
     assert not {"NaN", "Infinity"} & set(found.out.split())
 

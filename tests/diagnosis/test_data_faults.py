@@ -83,11 +83,7 @@ def test_a_sound_fleet_has_no_faults(gear: Gear, sound: DiagnosisTable) -> None:
         (readings(10.0, slice(1, 2)), "plunger_displacement_2_in", "factor_10"),
     ],
     ids=[
-        "clearance mm",
-        "clearance x 10",
-        "clearance / 10",
-        "reading mm",
-        "second reading mm",
+        *("clearance mm", "clearance x 10", "clearance / 10", "reading mm", "second reading mm"),
         "reading x 10",
     ],
 )

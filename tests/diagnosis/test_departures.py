@@ -209,10 +209,7 @@ def found(name: str) -> Diagnosis:
     """The diagnosis of one fleet, once for all tests of a worker."""
     gear = load_gear()
     return diagnose(
-        gear.model,
-        FLEETS[name](gear),
-        gear.discrepancies,
-        ensemble=gear.ensemble_models[1:],
+        gear.model, FLEETS[name](gear), gear.discrepancies, ensemble=gear.ensemble_models[1:]
     )
 
 
@@ -296,11 +293,7 @@ def test_a_cause_is_named_from_the_probability_that_is_asked_for(gear: Gear) -> 
     table, ensemble = FLEETS["readings 1.1 times as large"](gear), gear.ensemble_models[1:]
     verdicts = [
         diagnose(
-            gear.model,
-            table,
-            gear.discrepancies,
-            ensemble=ensemble,
-            beliefs=Beliefs(sure=sure),
+            gear.model, table, gear.discrepancies, ensemble=ensemble, beliefs=Beliefs(sure=sure)
         ).verdict
         for sure in (0.8, 0.95)
     ]

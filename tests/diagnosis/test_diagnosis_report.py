@@ -288,19 +288,13 @@ def test_a_fault_stands_with_what_was_written_and_what_was_used(gear: Gear, make
 @pytest.mark.parametrize(
     "words",
     [
-        "Troubleshooting aid, not maintenance data.",
-        "reconstructed from published figures",
-        "does not prove that the part is faulty",
-        "can only be reported as not on the list",
-        "mlg-troubleshoot 9.8.7",
-        "sha256 " + "ab" * 32,
-        "f.csv, sha256 " + "cd" * 32,
-        "nine of ten named causes are right",
-        "Readings by technician T-2 are shifted: ",
+        *("Troubleshooting aid, not maintenance data.", "reconstructed from published figures"),
+        *("does not prove that the part is faulty", "can only be reported as not on the list"),
+        *("mlg-troubleshoot 9.8.7", "sha256 " + "ab" * 32, "f.csv, sha256 " + "cd" * 32),
+        *("nine of ten named causes are right", "Readings by technician T-2 are shifted: "),
         "Approved for use by",
         "Would change the verdict: one gear measured by this technician and by another",
-        "Column 'mood' is not known.",
-        "as the model's standard uncertainty",
+        *("Column 'mood' is not known.", "as the model's standard uncertainty"),
     ],
 )
 def test_the_report_says_what_it_rests_on_what_it_names_and_what_follows(

@@ -218,11 +218,7 @@ def test_a_number_that_cannot_be_is_refused_with_its_key(
 @pytest.mark.parametrize(
     "damaged",
     [
-        "gauge_bias",
-        "rigging_offset",
-        "elastic_compliance",
-        "joint_contact",
-        "oval_wear",
+        *("gauge_bias", "rigging_offset", "elastic_compliance", "joint_contact", "oval_wear"),
         "approach_hysteresis",
     ],
 )

@@ -77,10 +77,7 @@ def effects(columns: Array = COLUMNS, mean: float = 0.0) -> Effects:
 
 
 ROOT = np.array([[0.7, 0.0, 0.0], [0.2, 0.6, 0.0], [-0.1, 0.3, 0.5]])
-CONTEXTS = (
-    Context.none(N),
-    Context(("all", None), -2.0, RNG.standard_normal((N, 3)), root=ROOT),
-)
+CONTEXTS = (Context.none(N), Context(("all", None), -2.0, RNG.standard_normal((N, 3)), root=ROOT))
 DATA = COLUMNS[:, 1] * 0.9 + np.linalg.cholesky(
     1.69 * covariance_of(NOISE, 0.5)
 ) @ RNG.standard_normal(N)

@@ -12,11 +12,7 @@ from scipy.stats import norm
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Scene, Term
 from mlg_troubleshoot.diagnosis.causes.linkage import Block, LoadDirections, OtherGeometry
 from mlg_troubleshoot.diagnosis.causes.reading import as_meant
-from mlg_troubleshoot.diagnosis.diagnose import (
-    _expected_scatter,
-    _interval_of_gain,
-    _single_slips,
-)
+from mlg_troubleshoot.diagnosis.diagnose import _expected_scatter, _interval_of_gain, _single_slips
 from mlg_troubleshoot.diagnosis.diagnose import _interval as interval_of
 from mlg_troubleshoot.diagnosis.extension import adjustment_of, build_scene
 from mlg_troubleshoot.diagnosis.faults import DataFault

@@ -69,35 +69,16 @@ OUTPUTS = (
     ),
     Output(["fleet", "--no-forecast", "-q", "--report"], (), "", folder=True, takes_a_store=True),
     Output(["template"], (), ""),
-    Output(
-        ["diagnose", "far.csv", "-q", "--write-extension"],
-        ("far.csv",),
-        rare=True,
-    ),
+    Output(["diagnose", "far.csv", "-q", "--write-extension"], ("far.csv",), rare=True),
     Output([*SMALL, "--csv"], (), "", rare=True),
 )
 FOREIGN = (
-    "mine.txt",
-    "other.sqlite",
-    "in.xlsx",
-    "in.csv",
-    "far.csv",
-    "old-marked.xlsx",
-    "old-chain.jsonl",
-    "own.toml",
+    *("mine.txt", "other.sqlite", "in.xlsx", "in.csv", "far.csv", "old-marked.xlsx"),
+    *("old-chain.jsonl", "own.toml"),
 )
 NEW = (
-    "new.csv",
-    "new.xlsx",
-    "new.jsonl",
-    "new.html",
-    "new.toml",
-    "new",
-    "a/b/new.csv",
-    "no/../new.csv",
-    "new/",
-    " ",
-    "-x",
+    *("new.csv", "new.xlsx", "new.jsonl", "new.html", "new.toml", "new", "a/b/new.csv"),
+    *("no/../new.csv", "new/", " ", "-x"),
 )
 NOT_FILES = ("-", "pipe", "folder", "/dev/full", "/dev/null", ".", "..", "", "in.csv/x", "x" * 300)
 

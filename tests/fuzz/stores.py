@@ -330,13 +330,8 @@ def _another_form(path: Path, desk: Desk) -> None:
     path.write_bytes(
         desk.rng.choice(
             (
-                b"\xef\xbb\xbf" + whole,
-                whole.decode().encode("utf-16"),
-                whole.replace(b"\n", b"\r\n"),
-                whole + whole,
-                gzip.compress(whole),
-                b"",
-                b"\n\n",
+                *(b"\xef\xbb\xbf" + whole, whole.decode().encode("utf-16")),
+                *(whole.replace(b"\n", b"\r\n"), whole + whole, gzip.compress(whole), b"", b"\n\n"),
                 whole.replace(b"\n", b" "),
             )
         )

@@ -186,10 +186,7 @@ def test_an_assumed_number_is_not_counted_as_a_given_one(tmp_path: Path) -> None
             r"links\.bar.*O2, O4, A, B, found 'X'",
         ),
         ({"links": FOUR_BAR["links"] | {"bar": ["B"]}}, r"links\.bar"),
-        (
-            {"input": {"crank": "rod", "travel": [0, 1]}},
-            r"input\.crank: expected one of the links",
-        ),
+        ({"input": {"crank": "rod", "travel": [0, 1]}}, r"input\.crank: expected one of the links"),
         (
             {"input": {"crank": "coupler", "travel": [0, 1]}},
             r"links\.coupler: expected one point on",
@@ -282,9 +279,7 @@ def test_no_directions_move_a_sliding_rod_beyond_its_worst_case(tmp_path: Path) 
     assert 0.9 * worst.over_in[0] < reached.max() <= worst.over_in[0] + 1e-12
 
 
-def test_the_amplification_of_a_sliding_rod_is_the_derivative_of_its_angle(
-    tmp_path: Path,
-) -> None:
+def test_the_amplification_of_a_sliding_rod_is_the_derivative_of_its_angle(tmp_path: Path) -> None:
     gear = gear_of(changed(**SLIDING_ROD), tmp_path)
     found = amplification(gear)
     assert found.local_plunger == pytest.approx(found.exact, rel=1e-6)

@@ -147,11 +147,7 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
             "drawn_at = 0.687\ndrawn = 1",
             r"input\.drawn: .*did you mean 'drawn_at'",
         ),
-        (
-            'area = "sidestay"\n',
-            'area = "sidestay"\nlimt = 1\n',
-            r"joints\.1\.limt: .*'limit'",
-        ),
+        ('area = "sidestay"\n', 'area = "sidestay"\nlimt = 1\n', r"joints\.1\.limt: .*'limit'"),
         # a source that is missing or unknown
         ('margin = "margin"', 'margin = "hearsay"', r"source_of\.margin: .*'hearsay'"),
         (
@@ -188,11 +184,7 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         ('["F", "1"]', '["F", 1]', r"links\.actuator: expected a list of names"),
         ("10 = 58.73", '10 = "up"', r"guides_deg\.10: expected"),
         ('position_of = "10"', 'speed_of = "10"', r"output\.speed_of: expected .*known key"),
-        (
-            'id = "hawker-800xp"',
-            "id = 800",
-            r"id: expected a name of 1 to 40 .*found 800",
-        ),
+        ('id = "hawker-800xp"', "id = 800", r"id: expected a name of 1 to 40 .*found 800"),
         ("stages = [", "stages = 4\nstates = [", r"cycle\.stages: expected an array of tables"),
         (
             'plunger = "in", flow',
@@ -201,11 +193,7 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         ),
         # what does not fit together
         ("[joints.10]", "[joints.11]", r"joints\.11: expected one of the points"),
-        (
-            "ground = { 8 =",
-            "ground = { 6 = [0, 0], 8 =",
-            r"moving\.6: expected a point that has",
-        ),
+        ("ground = { 8 =", "ground = { 6 = [0, 0], 8 =", r"moving\.6: expected a point that has"),
         ('area = "sidestay"', 'area = "cockpit"', r"joints\.1\.area: .*'cockpit'"),
         ('hinge_point = "6"\n', "", r"planes\.link_assembly\.hinge_point: expected a name"),
         ("dihedral_deg = 48.92\n", "", r"planes\.link_assembly\.dihedral_deg: expected a number"),
@@ -243,17 +231,9 @@ def test_a_linkage_that_cannot_be_assembled_is_a_mechanism_error_that_names_the_
             'dihedral_deg = "flat"',
             ", member B: planes.link_assembly.dihedral_deg: expected a number",
         ),
-        (
-            "drawn_at = 0.576",
-            "drawn = 0.576",
-            ": members.B.input.drawn: expected a key of",
-        ),
+        ("drawn_at = 0.576", "drawn = 0.576", ": members.B.input.drawn: expected a key of"),
         ("F = [-1.243", "Z = [-1.243", ": members.B.ground.Z: expected a key of the gear file"),
-        (
-            "[members.B.ground]",
-            "[members.B.grund]",
-            ": members.B.grund: expected a key of",
-        ),
+        ("[members.B.ground]", "[members.B.grund]", ": members.B.grund: expected a key of"),
         ("source = ", "spurce = ", ": source: expected a text, found nothing"),
     ],
 )

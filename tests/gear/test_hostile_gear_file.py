@@ -33,19 +33,9 @@ from tests.machine import SLOWER
 
 # Printable and short, so that no check of names keeps them from the generators.
 HOSTILE = (
-    "x = __import__('os')._exit(7)",
-    "0;__import__('os')._exit(7)",
-    "a\\nimport os;os._exit(7)",
-    "</text><script>alert(1)</script>",
-    '"onload="alert(1)',
-    "{{7*7}}{%raw%}",
-    "lambda:0",
-    "p0",
-    "t3",
-    "s",
-    "None",
-    "#",
-    "'''",
+    *("x = __import__('os')._exit(7)", "0;__import__('os')._exit(7)", "a\\nimport os;os._exit(7)"),
+    *("</text><script>alert(1)</script>", '"onload="alert(1)', "{{7*7}}{%raw%}", "lambda:0", "p0"),
+    *("t3", "s", "None", "#", "'''"),
 )
 
 
@@ -126,17 +116,8 @@ def test_two_numbers_that_names_make_alike_are_refused() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "",
-        " ",
-        "x" * 41,
-        "a\x00b",
-        "a\x1b[31m",
-        "a\nb",
-        "a\u202eb",
-        "a\u2066b",
-        "a\u200bb",
-        "\ud800",
-        "a\ufffeb",
+        *("", " ", "x" * 41, "a\x00b", "a\x1b[31m", "a\nb", "a\u202eb", "a\u2066b", "a\u200bb"),
+        *("\ud800", "a\ufffeb"),
     ],
 )
 def test_a_name_that_cannot_be_shown_as_it_is_is_refused(name: str) -> None:
@@ -170,11 +151,7 @@ def edited(gear: Gear, tmp_path: Path) -> Edit:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (
-            "F = [-1.8",
-            r'"F\u202e" = [-1.8',
-            r"expected a name of 1 to 40 printable characters",
-        ),
+        ("F = [-1.8", r'"F\u202e" = [-1.8', r"expected a name of 1 to 40 printable characters"),
         (
             'name = "locking pin"',
             f'name = "{"p" * 41}"',

@@ -34,10 +34,7 @@ FORM = {
     "ground": {"O": [0.0, 0.0]},
     "moving": {
         "A": [CRANK * math.cos(DRAWN), CRANK * math.sin(DRAWN)],
-        "C": [
-            CRANK * math.cos(DRAWN) + math.sqrt(ROD**2 - (CRANK * math.sin(DRAWN)) ** 2),
-            0.0,
-        ],
+        "C": [CRANK * math.cos(DRAWN) + math.sqrt(ROD**2 - (CRANK * math.sin(DRAWN)) ** 2), 0.0],
     },
     "links": {"crank": ["O", "A"], "rod": ["A", "C"]},
     "guides_deg": {"C": 0.0},

@@ -180,8 +180,7 @@ def summarise(records: list[Record]) -> dict[str, dict[str, float | int]]:
     return {
         "mild blemish: a cause named that is not there": rate(mild, lambda r: r["wrong"]),
         "mild blemish: any alarm": rate(
-            mild,
-            lambda r: r["verdict"] in ("NAMED", "AMBIGUOUS", "UNLISTED") and not r["in_set"],
+            mild, lambda r: r["verdict"] in ("NAMED", "AMBIGUOUS", "UNLISTED") and not r["in_set"]
         ),
         "strong blemish without a cause: a wrong name": rate(strong, lambda r: r["wrong"]),
         "strong blemish: said in words, of the right kind": rate(worded, _said),

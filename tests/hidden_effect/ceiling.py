@@ -126,11 +126,7 @@ def oracle(task: Task) -> dict[str, float | str]:
         for b in kind.blocks(scene, gear.ensemble_models[1:])
     ]
     effects = np.column_stack(list(effects_of(scene, rivals)))
-    own = whitened(
-        fleet,
-        usable,
-        np.hstack([effects, *(b.independent_in for b in blocks)]),
-    )
+    own = whitened(fleet, usable, np.hstack([effects, *(b.independent_in for b in blocks)]))
     truth, columns, wide = own[:, :1], own[:, 1 : 1 + len(rivals)], own[:, 1 + len(rivals) :]
     noise = np.random.default_rng(task["seed"]).standard_normal((len(truth), 200))
     data = truth + noise

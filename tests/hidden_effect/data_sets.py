@@ -28,8 +28,7 @@ DATA_SETS: dict[str, tuple[FleetSpec, int]] = {
     ),
     "measured_pin_direction": (
         FleetSpec(
-            kind="single",
-            effects=(EffectSpec("direction_not_worst_case", "joint 3", 25.0),),
+            kind="single", effects=(EffectSpec("direction_not_worst_case", "joint 3", 25.0),)
         ),
         41_002,
     ),

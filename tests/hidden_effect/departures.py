@@ -102,12 +102,7 @@ def run(task: tuple[str, int, int]) -> Record:
     table = as_table(fleet.table)
     gear = load_gear()
     try:
-        found = diagnose(
-            gear.model,
-            table,
-            gear.discrepancies,
-            ensemble=gear.ensemble_models[1:],
-        )
+        found = diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:])
     except InconclusiveDataError as error:
         return {
             "group": group,

@@ -58,10 +58,7 @@ def run(task: Task) -> Record:
     start = time.process_time()
     try:
         found: Diagnosis | None = diagnose(
-            gear.model,
-            table,
-            gear.discrepancies,
-            ensemble=gear.ensemble_models[1:],
+            gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:]
         )
     except InconclusiveDataError:
         found = None

@@ -12,12 +12,7 @@ from tests.hidden_effect.departures import run, summarise
 def record(
     group: str, named: list[list[str | None]], truth: list[list[str | None]], **more: Any
 ) -> dict[str, Any]:
-    nothing = {
-        "verdict": "NAMED" if named else "NONE",
-        "also": [],
-        "before": 0.002,
-        "after": 0.001,
-    }
+    nothing = {"verdict": "NAMED" if named else "NONE", "also": [], "before": 0.002, "after": 0.001}
     return {"group": group, "named": named, "truth": truth, "regression": None, **nothing, **more}
 
 

@@ -199,12 +199,7 @@ def test_how_the_effect_of_a_named_cause_bends_is_not_named_as_directions_or_ano
 ):
     fleet, gear = draw_fleet(9_100_836, "double"), load_gear()
     ensemble = gear.ensemble_models[1:]
-    found = diagnose(
-        gear.model,
-        as_table(fleet.table),
-        gear.discrepancies,
-        ensemble=ensemble,
-    )
+    found = diagnose(gear.model, as_table(fleet.table), gear.discrepancies, ensemble=ensemble)
     named = {c.candidate.key for c in found.causes}
     assert named <= set(fleet.label.causes) <= named | {c.candidate.key for c in found.beside}
 
@@ -226,10 +221,7 @@ def test_two_causes_of_single_joints_are_not_taken_for_another_linkage_or_direct
 
 @pytest.mark.parametrize(
     ("unlisted", "part"),
-    [
-        ("lost_motion_under_load", "elastic_compliance"),
-        ("pressure_of_one_gauge", "gauge_bias"),
-    ],
+    [("lost_motion_under_load", "elastic_compliance"), ("pressure_of_one_gauge", "gauge_bias")],
 )
 def test_what_an_unlisted_effect_has_of_a_listed_cause_is_not_put_down_to_that(
     unlisted: str, part: str

@@ -264,10 +264,7 @@ def test_a_cause_of_one_identity_changes_its_rows_only(cause: str, column: str) 
     [
         ("side_difference", lambda table, _: np.array(table["side"]) == "RH"),
         ("approach_hysteresis", lambda table, _: np.array(table["approach"]) == "RETRACTING"),
-        (
-            "date_step",
-            lambda table, step: np.array(table["inspection_date"]) >= step["from_date"],
-        ),
+        ("date_step", lambda table, step: np.array(table["inspection_date"]) >= step["from_date"]),
     ],
 )
 def test_a_cause_of_some_rows_changes_these_and_no_other(cause: str, own: Rows) -> None:

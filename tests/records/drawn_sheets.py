@@ -16,24 +16,11 @@ Rows = list[list[object]]
 Visit = tuple[str, dict[int, float]]
 
 FOUND = (
-    "found",
-    "Found today",
-    "actual",
-    "today",
-    "measured",
-    "As found",
-    "Reading",
-    "Ist",
+    *("found", "Found today", "actual", "today", "measured", "As found", "Reading", "Ist"),
     "Actual",
 )
 GIVEN = (
-    "new part",
-    "Drawing max",
-    "nominal",
-    "last year",
-    "limit",
-    "Wear limit",
-    "Tolerance",
+    *("new part", "Drawing max", "nominal", "last year", "limit", "Wear limit", "Tolerance"),
     "Soll",
 )
 JOINTS = ("Joint {n} (in)", "J{n} (in)", "clearance_{n}_in", "Clearance #{n} (in)")

@@ -9,12 +9,7 @@ from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records import ReadOptions, ReadResult, read_many
 
 HEADER = (
-    "record_id",
-    "tail_no",
-    "side",
-    "clearance_convention",
-    "clearance_3_in",
-    "clearance_5_in",
+    *("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in"),
 )
 GOOD = ("R1", "N100AB", "LH", "RADIAL", 0.013, 0.007)
 

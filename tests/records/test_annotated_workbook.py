@@ -22,12 +22,7 @@ from tests.records.conftest import rows_xml
 from tests.records.reading import read_inspections
 
 HEADER = (
-    "record_id",
-    "tail_no",
-    "side",
-    "clearance_convention",
-    "clearance_3_in",
-    "clearance_5_in",
+    *("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in"),
     "inspection_date",
 )
 ROWS = [

@@ -35,17 +35,8 @@ BAD = {
     "side": ("both", None, "XX", 5),
     "clearance_convention": ("CLEAR", None, 3),
     "clearance": (
-        -0.001,
-        0.33,
-        9,
-        "0,013",
-        "n/a?",
-        "1/8",
-        "0.3 mm",
-        "\u22120.002",
-        "nan",
-        datetime.date(2026, 8, 1),
-        True,
+        *(-0.001, 0.33, 9, "0,013", "n/a?", "1/8", "0.3 mm", "\u22120.002", "nan"),
+        *(datetime.date(2026, 8, 1), True),
     ),
     "inspection_date": ("03/04/2026", 46085, "soon"),
     "gear_landings": (-5, "many"),
@@ -147,20 +138,8 @@ ANY_CELL = st.one_of(
     st.integers(-5, 50),
     st.sampled_from(
         (
-            "LH",
-            "RH",
-            "RADIAL",
-            "0,013",
-            "1/8",
-            ".013",
-            "13 thou",
-            "0.33 mm",
-            '"',
-            "''",
-            "=1",
-            "\0",
-            "–0.1",
-            "NA",
+            *("LH", "RH", "RADIAL", "0,013", "1/8", ".013", "13 thou", "0.33 mm", '"', "''", "=1"),
+            *("\0", "–0.1", "NA"),
         )
     ),
     st.text(max_size=12),
@@ -175,12 +154,7 @@ ANY_CELL = st.one_of(
 )
 def test_no_table_of_any_cells_loses_a_row_or_ends_in_an_exception(rows, sep):
     header = (
-        "record_id",
-        "tail_no",
-        "side",
-        "clearance_convention",
-        "clearance_3_in",
-        "margin_in",
+        *("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "margin_in"),
         "remarks",
     )
     buffer = io.StringIO()

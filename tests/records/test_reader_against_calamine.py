@@ -60,8 +60,7 @@ def test_values_and_places_agree_with_calamine(xlsx):
 
 
 @pytest.mark.parametrize(
-    "name",
-    [f"{n}.{kind}" for n in ("sample", "template_filled") for kind in ("xlsx", "xls")],
+    "name", [f"{n}.{kind}" for n in ("sample", "template_filled") for kind in ("xlsx", "xls")]
 )
 def test_files_of_libreoffice_agree_with_calamine(samples, name):
     data = (samples / name).read_bytes()

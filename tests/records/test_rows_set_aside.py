@@ -110,12 +110,8 @@ def test_a_joint_and_its_reading_are_never_set_aside() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "Signed: J. Smith 12.03.2026",
-        "Notes: gauge 7 at 21.5 C",
-        "Signed: J. Smith",
-        "Page 7",
-        "Key",
-        "-----",
+        *("Signed: J. Smith 12.03.2026", "Notes: gauge 7 at 21.5 C", "Signed: J. Smith", "Page 7"),
+        *("Key", "-----"),
     ],
 )
 def test_words_without_a_reading_are_set_aside(name: str) -> None:

@@ -61,11 +61,7 @@ def test_the_first_sheet_is_understood_as_it_was_meant():
 @pytest.mark.parametrize("side", ["LH", "L"])
 def test_a_row_with_a_tail_a_side_and_a_clearance_is_never_set_aside(side, table, read):
     header = (
-        "record_id",
-        "tail_no",
-        "side",
-        "clearance_convention",
-        "clearance_3_in",
+        *("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in"),
         "clearance_5_in",
     )
     rows = [

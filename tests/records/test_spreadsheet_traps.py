@@ -136,12 +136,7 @@ def test_04_a_declared_decimal_comma_is_read(read, xlsx):
 @pytest.mark.parametrize(
     "text",
     [
-        '.013"',
-        "0.013 in",
-        "0.013\u00a0in",
-        "\u202f0.013\u202finch ",
-        "+0.013",
-        "13e-3",
+        *('.013"', "0.013 in", "0.013\u00a0in", "\u202f0.013\u202finch ", "+0.013", "13e-3"),
         "\ufeff0.013",
     ],
 )

@@ -10,15 +10,8 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.records.cells import NumberFormat, OddCell, OddKind
 
 HEADER = (
-    "record_id",
-    "tail_no",
-    "side",
-    "clearance_convention",
-    "clearance_3_thou",
-    "clearance_5",
-    "temperature_c",
-    "gear_landings",
-    "work_order",
+    *("record_id", "tail_no", "side", "clearance_convention", "clearance_3_thou", "clearance_5"),
+    *("temperature_c", "gear_landings", "work_order"),
 )
 ROW = ("R1", "N1", "LH", "RADIAL", 0.5, 0.33, 10, 1200, 12)
 
@@ -43,15 +36,8 @@ def only(result):
 
 
 MILLIMETRES = [
-    '0.00" mm"',
-    "0.00\\ \\m\\m",
-    "0.00[$ mm]",
-    "0.00[$mm-409]",
-    'General" mm"',
-    '0.00" mm";-0.00" mm"',
-    '0.00" mm";;"nil"',
-    '0.00" mm";@',
-    '[Red]0.0_)" mm"',
+    *('0.00" mm"', "0.00\\ \\m\\m", "0.00[$ mm]", "0.00[$mm-409]", 'General" mm"'),
+    *('0.00" mm";-0.00" mm"', '0.00" mm";;"nil"', '0.00" mm";@', '[Red]0.0_)" mm"'),
     '0.00" millimetres"',
 ]
 
@@ -103,15 +89,8 @@ def test_words_that_are_not_a_unit_are_refused_like_words_in_the_cell(formatted,
 
 
 PLAIN = [
-    "0.000",
-    "#,##0.00",
-    "0.00E+00",
-    '_-* #,##0.00_-;-* #,##0.00_-;_-* "-"??_-;_-@_-',
-    "[Red]0.0;[Blue]-0.0",
-    "# ?/?",
-    "0.00_)",
-    "@",
-    "0.000;-0.000;0.000;@",
+    *("0.000", "#,##0.00", "0.00E+00", '_-* #,##0.00_-;-* #,##0.00_-;_-* "-"??_-;_-@_-'),
+    *("[Red]0.0;[Blue]-0.0", "# ?/?", "0.00_)", "@", "0.000;-0.000;0.000;@"),
 ]
 
 
@@ -180,11 +159,7 @@ def test_units_of_formats_are_seen_in_workbooks_of_libreoffice(read, samples: Pa
     ]
     good = result.rows[1]
     assert isinstance(good, Inspection)
-    assert good.clearance_in == {
-        3: 0.0005,
-        5: 0.0033,
-        7: pytest.approx(0.25 / 25.4),
-    }
+    assert good.clearance_in == {3: 0.0005, 5: 0.0033, 7: pytest.approx(0.25 / 25.4)}
     assert (good.gear_landings, good.carried) == (1200.0, {"work_order": "12"})
 
 

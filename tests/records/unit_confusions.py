@@ -132,11 +132,7 @@ def clearances(population: str, rng: np.random.Generator) -> Array:
 
 
 def written(
-    radial_in: Array,
-    unit: str,
-    convention: str,
-    rng: np.random.Generator,
-    full: bool = False,
+    radial_in: Array, unit: str, convention: str, rng: np.random.Generator, full: bool = False
 ) -> tuple[str, ...]:
     """Read three to ten joints, on every second sheet or if `full` all ten, with one gauge."""
     resolutions = RESOLUTIONS[unit]

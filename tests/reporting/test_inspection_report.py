@@ -25,22 +25,15 @@ Make = Callable[..., Made]
 @pytest.mark.parametrize(
     "words",
     [
-        "COULD BE OUTSIDE",
-        "0.0472 in",
-        "a bound, not a forecast",
-        "8 joints not measured: #1, #2, #4, #6, #7, #8, #9 and #10",
-        "acts like #5",
-        "Which valve port is affected: not stated",
-        "Handover, open for the next shift",
-        "Joint limit 0.0075 in radial: assumed",
-        "Re-rigging alone",
-        "9f2c" + "ab" * 30,
+        *("COULD BE OUTSIDE", "0.0472 in", "a bound, not a forecast"),
+        *("8 joints not measured: #1, #2, #4, #6, #7, #8, #9 and #10", "acts like #5"),
+        *("Which valve port is affected: not stated", "Handover, open for the next shift"),
+        *("Joint limit 0.0075 in radial: assumed", "Re-rigging alone", "9f2c" + "ab" * 30),
         "Troubleshooting aid, not maintenance data.",
         "Does not replace the maintenance manual's limits.",
         "Within margin is not an approval for return to service.",
         "not hydraulics, friction, doors, switches or structure",
-        "reconstructed from published figures, not drawing data",
-        "not a validation set",
+        *("reconstructed from published figures, not drawing data", "not a validation set"),
         "its position cannot distinguish them",
     ],
 )
@@ -51,13 +44,9 @@ def test_the_report_of_the_failure_says(words: str, failure: Made) -> None:
 @pytest.mark.parametrize(
     "markup",
     [
-        '<p class="side" aria-hidden="true">LH</p>',
-        ">−0.0300</text>",
-        ">+0.0300</text>",
-        '<th scope="row">Measured by</th>',
-        '<th scope="row">Independently measured by</th>',
-        '<th scope="row">Rectified by</th>',
-        '<th scope="row">Inspected by</th>',
+        *('<p class="side" aria-hidden="true">LH</p>', ">−0.0300</text>", ">+0.0300</text>"),
+        *('<th scope="row">Measured by</th>', '<th scope="row">Independently measured by</th>'),
+        *('<th scope="row">Rectified by</th>', '<th scope="row">Inspected by</th>'),
     ],
 )
 def test_side_margins_and_lines_to_sign_for_stand_in_the_page(markup: str, failure: Made) -> None:
@@ -135,10 +124,7 @@ def test_the_side_is_also_said_in_words(judge: Judge, make: Make) -> None:
 
 
 def test_the_chance_with_random_directions_stands_beside_the_worst_case(failure: Made) -> None:
-    found = re.search(
-        r"Chance, random directions (\d+) % of leaving the margin",
-        failure.text,
-    )
+    found = re.search(r"Chance, random directions (\d+) % of leaving the margin", failure.text)
     assert found is not None
     # One in four of the two measured joints alone, and what unread joints add by their wear.
     assert 25 <= int(found[1]) <= 40

@@ -77,14 +77,7 @@ def test_text_can_be_searched(words: str, failure: Made) -> None:
 
 def test_the_first_page_answers_everything_a_technician_needs(failure: Made) -> None:
     first = re.sub(r"\s+", " ", opened(failure.pdf).pages[0].extract_text())
-    for words in (
-        "LH",
-        "COULD BE OUTSIDE",
-        "Next",
-        "0.0472",
-        "OVER LIMIT",
-        "not measured",
-    ):
+    for words in (*("LH", "COULD BE OUTSIDE", "Next", "0.0472", "OVER LIMIT", "not measured"),):
         assert words in first
 
 

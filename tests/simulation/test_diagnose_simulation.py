@@ -8,12 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mlg_troubleshoot.diagnosis import (
-    SimulationDiagnosis,
-    Suspect,
-    Verdict,
-    diagnose_simulation,
-)
+from mlg_troubleshoot.diagnosis import SimulationDiagnosis, Suspect, Verdict, diagnose_simulation
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.misfit.simulation import Predict
 from tests.simulation.rigs import RIGS, Rig, readings, slider_crank, thermal, two_link
@@ -278,11 +273,7 @@ def test_groups_scatter_in_the_unit_of_the_readings_however_exact_some_of_these_
     read = (6.0 + rng.standard_normal(12))[groups][:, None] + u * rng.standard_normal((120, 1))
     offset = [Suspect("offset", 0.0, 0.1)]
     found = diagnose_simulation(
-        lambda p: np.full((120, 1), p["offset"]),
-        read,
-        offset,
-        groups=groups,
-        reading_u=u,
+        lambda p: np.full((120, 1), p["offset"]), read, offset, groups=groups, reading_u=u
     )
     low, high = found.causes[0].interval
     assert high - low > 2.0 / np.sqrt(12.0)

@@ -126,11 +126,7 @@ def test_why_a_suspect_cannot_be_tested_is_said() -> None:
     def several(p: Mapping[str, float]) -> np.ndarray:
         return swing(p) + p["shift"] + 0.0 * p["idle"]
 
-    suspects = [
-        *SWING,
-        Suspect("shift", 0.0, 0.1),
-        Suspect("idle", 0.0, 0.1),
-    ]
+    suspects = [*SWING, Suspect("shift", 0.0, 0.1), Suspect("idle", 0.0, 0.1)]
     read = noisy({"shift": 0.0, "idle": 0.0}, predict=several)
     found = diagnose_simulation(several, read, suspects, ZERO)
     assert found.untestable == ("shift", "idle")

@@ -108,8 +108,7 @@ EVERY_DAY = {*OTHERS, "a list", "a clearance below zero"}
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=() if n in EVERY_DAY else pytest.mark.slow) for n in EVIL],
+    "name", [pytest.param(n, marks=() if n in EVERY_DAY else pytest.mark.slow) for n in EVIL]
 )
 def test_wrong_content_that_stands_in_a_store_ends_no_command_with_an_internal_error(
     tmp_path: Path, place: Path, name: str

@@ -13,11 +13,7 @@ import pytest
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import lives, lives_of
-from mlg_troubleshoot.life.forecast import (
-    TEACHERS,
-    fit_fleet,
-    teachers_first,
-)
+from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
 from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files

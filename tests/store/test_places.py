@@ -33,14 +33,8 @@ def keep(folder: Path, where: object) -> Run:
 @pytest.mark.parametrize(
     "where",
     [
-        "",
-        "  ",
-        ":memory:",
-        "sqlite://",
-        "sqlite:///",
-        "sqlite:///:memory:",
-        "sqlite:///x?mode=memory",
-        "sqlite://host/x",
+        *("", "  ", ":memory:", "sqlite://", "sqlite:///", "sqlite:///:memory:"),
+        *("sqlite:///x?mode=memory", "sqlite://host/x"),
     ],
 )
 def test_a_place_where_nothing_would_stay_is_refused(tmp_path: Path, where: str) -> None:

@@ -202,9 +202,7 @@ def test_reading_two_joints_again_hides_no_third_one(tmp_path: Path) -> None:
     blank = dict.fromkeys((f"clearance_{n}_in" for n in range(1, 11)), "")
     again = blank | {"clearance_6_in": "0.001", "clearance_7_in": "0.001"}
     found = kept(
-        tmp_path,
-        [line("2026-01-01", clearance_3_in="0.0121")],
-        [line("2026-02-01", **again)],
+        tmp_path, [line("2026-01-01", clearance_3_in="0.0121")], [line("2026-02-01", **again)]
     )
     assert found.code == 1
     assert found.one["joints"][2]["over_limit"]

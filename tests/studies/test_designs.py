@@ -9,11 +9,7 @@ import pytest
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.indices.variance import student_half
-from mlg_troubleshoot.paper.study import (
-    central_composite,
-    first_order_design,
-    replicated_levels,
-)
+from mlg_troubleshoot.paper.study import central_composite, first_order_design, replicated_levels
 
 
 def test_the_papers_138_points_are_128_corners_and_one_axial_point_a_joint() -> None:

@@ -25,13 +25,7 @@ Array = NDArray[np.float64]
 NULLS = ("iid", "heavy_tails", "tail_scatter", "confounded", "growing_noise", "n500")
 #: Kinds of fleets; ``mix`` draws one of the others.
 KINDS = (
-    "null",
-    "single",
-    "double",
-    "off_catalogue",
-    "aliased",
-    "missing_column",
-    "confounded",
+    *("null", "single", "double", "off_catalogue", "aliased", "missing_column", "confounded"),
     "triple",
 )
 _MIX = (0.22, 0.24, 0.12, 0.22, 0.05, 0.11, 0.04, 0.0)

@@ -207,7 +207,7 @@ def add_faults(
         for row, column, value in cells:
             used.add(row)
             faults.append(
-                Fault(row, table["record_id"][row], column, kind, table[column][row], value),
+                Fault(row, table["record_id"][row], column, kind, table[column][row], value)
             )
             table[column][row] = value
     return faults
