@@ -4,9 +4,15 @@ for properties.
 
 from __future__ import annotations
 
+# ruff: noqa: E402 - what is imported after the first lines is to be kept compiled, or each worker
+# compiles all tests and hypothesis, and each ``mlg`` that a test starts the package.
 import os
-import signal
 import sys
+
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -29,11 +35,6 @@ OF_THE_USER = (
     *("LINES", "TERMINAL_WIDTH", "NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"),
     *("PYTHONIOENCODING", "PYTHONUTF8", "PYTHONWARNINGS", "PYTHONOPTIMIZE"),
 )
-
-# Compiled modules are kept, or else each ``mlg`` that a test starts compiles the package again, and
-# each worker all tests.
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-sys.dont_write_bytecode = False
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -14,8 +14,8 @@ import pytest
 from pytest_examples import CodeExample, EvalExample, find_examples
 
 import mlg_troubleshoot
-from mlg_troubleshoot.decision.columns import COLUMNS, Column
-from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
+from mlg_troubleshoot.decision.columns import COLUMNS
+from mlg_troubleshoot.diagnosis import CATALOGUE
 from tests import docs_examples, numbers_page
 from tests.docs_examples import PAGES, PICTURES, README, ROOT
 
@@ -76,11 +76,11 @@ def test_a_page_shows_what_its_commands_print_today(page: Path, tmp_path: Path) 
     assert docs_examples.refreshed(text, tmp_path) == text, OUT_OF_DATE
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_a_page_says_in_its_first_lines_for_whom_it_is_and_how_long_it_takes(page: Path) -> None:
-    beginning = " ".join(page.read_text(encoding="utf-8").split()[:70])
-    assert re.search(r"\bfor\b|One page", beginning, re.IGNORECASE)
-    assert re.search(r"minute|look up", beginning, re.IGNORECASE)
+def test_a_page_says_in_its_first_lines_for_whom_it_is_and_how_long_it_takes() -> None:
+    for page in PAGES:
+        beginning = " ".join(page.read_text(encoding="utf-8").split()[:70])
+        assert re.search(r"\bfor\b|One page", beginning, re.IGNORECASE), page
+        assert re.search(r"minute|look up", beginning, re.IGNORECASE), page
 
 
 def test_there_are_sessions() -> None:
@@ -176,14 +176,17 @@ def test_every_script_that_is_named_exists() -> None:
 OF_OTHERS = {"--cases", "--no-deps", "--owner", "--pwprompt", "--strict"}
 
 
-@pytest.mark.parametrize(
-    "page", [p for p in PAGES if p.name not in {"changelog.md", "figures.md"}], ids=lambda p: p.name
-)
-def test_every_option_that_a_page_names_exists(page: Path) -> None:
+def test_every_option_that_a_page_names_exists() -> None:
     params = [p for _path, command in docs_examples.all_commands() for p in command.params]
     known = {option for p in params for option in (*p.opts, *p.secondary_opts)}
-    named = set(re.findall(r"(?<![\w-])--[a-z][\w-]+", page.read_text(encoding="utf-8")))
-    assert named - known - OF_OTHERS - {"--version", "--help", "--help-all"} == set()
+    known |= OF_OTHERS | {"--version", "--help", "--help-all"}
+    named = {
+        (page.name, option)
+        for page in PAGES
+        if page.name not in {"changelog.md", "figures.md"}
+        for option in re.findall(r"(?<![\w-])--[a-z][\w-]+", page.read_text(encoding="utf-8"))
+    }
+    assert {(page, option) for page, option in named if option not in known} == set()
 
 
 def test_every_option_and_public_name_has_its_user_and_no_other_one() -> None:
@@ -219,19 +222,18 @@ def test_what_the_program_cannot_say_is_said(said: str) -> None:
     assert said in " ".join(TEXT.split())
 
 
-@pytest.mark.parametrize("cause", CATALOGUE, ids=lambda cause: cause.name)
-def test_every_cause_has_a_line_that_states_the_columns_it_needs(cause: Cause) -> None:
+def test_every_cause_has_a_line_that_states_the_columns_it_needs() -> None:
     page = (ROOT / "docs/explanation/causes.md").read_text(encoding="utf-8")
-    line = re.findall(rf"^\| \[?`{cause.name}`.*", page, re.MULTILINE)[0]
     names = {"axial_float": "axial_float_n_in", "day": "inspection_date"}
-    needs = line.split(" | ")[2]
-    assert [n for n in cause.needs if f"`{names.get(n, n)}`" not in needs] == []
+    for cause in CATALOGUE:
+        line = re.findall(rf"^\| \[?`{cause.name}`.*", page, re.MULTILINE)[0]
+        needs = line.split(" | ")[2]
+        assert [n for n in cause.needs if f"`{names.get(n, n)}`" not in needs] == [], cause.name
 
 
-@pytest.mark.parametrize("column", COLUMNS, ids=lambda column: column.name)
-def test_every_column_is_described(column: Column) -> None:
+def test_every_column_is_described() -> None:
     page = (ROOT / "docs/reference/columns.md").read_text(encoding="utf-8")
-    assert f"`{column.name}" in page
+    assert [column.name for column in COLUMNS if f"`{column.name}" not in page] == []
 
 
 SUMMARY = [
@@ -256,17 +258,16 @@ def test_the_figures_begin_with_the_twenty_numbers_that_matter() -> None:
     assert len(SUMMARY) == 20
 
 
-@pytest.mark.parametrize("row", SUMMARY, ids=lambda row: str(row[1]))
-def test_a_number_that_matters_stands_in_the_section_it_links_to(row: list[str]) -> None:
-    _reader, _what, value, _meaning, link = row
-    anchor = link.partition("(")[2].rstrip(")")
-    details = section(ROOT / "docs/reference/figures.md", anchor)
-    assert [n for n in re.findall(r"\d+(?:\.\d+)?", value) if n not in details] == []
+def test_a_number_that_matters_stands_in_the_section_it_links_to() -> None:
+    for _reader, what, value, _meaning, link in SUMMARY:
+        anchor = link.partition("(")[2].rstrip(")")
+        details = section(ROOT / "docs/reference/figures.md", anchor)
+        assert [n for n in re.findall(r"\d+(?:\.\d+)?", value) if n not in details] == [], what
 
 
-# Files and folders that a page names, from the top or within the package.
-NAMED_PATHS = sorted(
-    {
+def test_a_file_that_a_page_names_exists() -> None:
+    """From the top or within the package."""
+    named = {
         path
         for page in PAGES
         if page.name != "changelog.md"
@@ -274,12 +275,8 @@ NAMED_PATHS = sorted(
             r"`([a-z_]+/[\w./-]*(?:\.py|\.toml|\.md|/))`", page.read_text(encoding="utf-8")
         )
     }
-)
-
-
-@pytest.mark.parametrize("path", NAMED_PATHS)
-def test_a_file_that_a_page_names_exists(path: str) -> None:
-    assert (ROOT / path).exists() or (ROOT / "mlg_troubleshoot" / path).exists()
+    tops = ROOT, ROOT / "mlg_troubleshoot"
+    assert [path for path in named if not any((top / path).exists() for top in tops)] == []
 
 
 def test_the_map_for_contributors_leads_into_every_room_that_holds_a_rule() -> None:

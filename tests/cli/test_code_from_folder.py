@@ -25,7 +25,8 @@ def trapped(folder: Path, spared: set[str]) -> Path:
     header, *rows = FLEET.read_text(encoding="utf-8").splitlines()
     numbered = [f"{k}{row}" for k in range(12) for row in rows]
     (folder / "table.csv").write_text("\n".join([header, *numbered]), encoding="utf-8")
-    (folder / "few.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    for name, some in (("few", rows), ("one", rows[:1])):
+        (folder / f"{name}.csv").write_text("\n".join([header, *some]), encoding="utf-8")
     for name in (sys.stdlib_module_names | packages_distributions().keys()) - OWN - spared:
         (folder / f"{name}.py").write_text(TRAP, encoding="utf-8")
     return folder
@@ -46,7 +47,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, ...], P
 # With worker processes, with the engine of pages, and as a module; the others start alike.
 EVERY_DAY = [
     (MLG, "check table.csv --csv verdicts.csv"),
-    (MLG, "check few.csv --report report --keep"),
+    (MLG, "check one.csv --report report --keep"),
     (AS_A_MODULE, "check few.csv --json"),
     (MLG, "fleet"),
 ]

@@ -64,10 +64,6 @@ def test_a_diagnosis_speaks_in_seven_lines(diagnosed: Run) -> None:
     assert numbered == ["DATA", "MISFIT", "CAUSE", "MODEL", "GAIN", "LEFT", "DO"]
 
 
-def test_the_same_seed_gives_the_same_diagnosis(measured: Path, diagnosed: Run) -> None:
-    assert mlg("diagnose", measured).out == diagnosed.out
-
-
 def test_a_diagnosis_says_how_to_use_its_extension(diagnosed: Run, extension: Path) -> None:
     assert f"mlg check FILE --extension {extension}" in diagnosed.err
 
@@ -192,13 +188,24 @@ def test_an_extension_that_cannot_be_written_exits_5(measured: Path) -> None:
     assert "What to do:" in found.err
 
 
+APPROVAL = ("--approve", "J. Smith", "--why", "fleet trial 7")
+
+
 @pytest.fixture(scope="module")
-def approved(measured: Path, diagnosed: Run) -> Path:
-    """That extension, approved."""
+def diagnosed_again(measured: Path) -> Run:
+    """The same diagnosis, which writes an approved extension."""
     file = measured.with_name("approved.toml")
-    approval = ("--approve", "J. Smith", "--why", "fleet trial 7")
-    mlg("diagnose", measured, "--write-extension", file, *approval)
-    return file
+    return mlg("diagnose", measured, "--write-extension", file, *APPROVAL)
+
+
+@pytest.fixture(scope="module")
+def approved(measured: Path, diagnosed_again: Run) -> Path:
+    return measured.with_name("approved.toml")
+
+
+def test_the_same_seed_gives_the_same_diagnosis(diagnosed: Run, diagnosed_again: Run) -> None:
+    until = diagnosed.out.index("7 DO")
+    assert diagnosed_again.out[:until] == diagnosed.out[:until]
 
 
 def test_an_approval_is_printed_with_every_verdict(measured: Path, approved: Path) -> None:

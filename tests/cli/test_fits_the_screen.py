@@ -6,6 +6,7 @@ import os
 import re
 import sys
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -44,13 +45,17 @@ SAID = {
 }
 
 
+@cache
+def judged(gear: str) -> task.CheckResult:
+    return task.check_inspection(SAID[gear], task.CheckOptions(), None)
+
+
 @pytest.mark.parametrize("gear", SAID)
 def test_one_gear_takes_twenty_lines_with_verdict_and_next_last(
     gear: str, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    result = task.check_inspection(SAID[gear], task.CheckOptions(), None)
-    one_gear.show(result.judgements[0], result.gear, console(), detail=False)
+    one_gear.show(judged(gear).judgements[0], judged(gear).gear, console(), detail=False)
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) <= 20
     (title,) = (place for place, line in enumerate(lines) if line.startswith("N1 LH  ["))
@@ -62,9 +67,8 @@ def test_a_number_is_never_parted_from_its_unit(
     wide: int, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(wide))
-    for gear in SAID.values():
-        result = task.check_inspection(gear, task.CheckOptions(), None)
-        one_gear.show(result.judgements[0], result.gear, console(), detail=True)
+    for gear in SAID:
+        one_gear.show(judged(gear).judgements[0], judged(gear).gear, console(), detail=True)
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
     parted = [
         (before, after)

@@ -105,12 +105,13 @@ def in_a_shell(line: str, folder: Path) -> tuple[int, str, str]:
         ("mlg check - <&-", 3, "the file is empty"),
         ("mlg check <&-", 2, "nothing to check"),
         ("mlg check FILE >&-", 5, "standard output is closed"),
-        ("mlg check FILE --json >&-", 5, "standard output is closed"),
         ("mlg template new.xlsx >&-", 5, "standard output is closed"),
         ("mlg check FILE <&- >&- 2>&-", 5, ""),
         ("mlg check FILE --keep --report r --format html <&- 2>&-", 1, ""),
         ("ulimit -n 5; mlg check FILE --report r", 5, "ulimit -n 256"),
-        ("ulimit -n 8; mlg check FILE --report r", 5, "ulimit -n 256"),
+        pytest.param(
+            "ulimit -n 8; mlg check FILE --report r", 5, "ulimit -n 256", marks=pytest.mark.slow
+        ),
     ],
 )
 def test_a_stream_or_a_file_that_cannot_be_opened_ends_no_run_without_words(

@@ -19,7 +19,7 @@ from tests.benchmarks.worn_gears import LIMIT_IN, displacement
 from tests.decision.conftest import inspected
 
 GAUGE_U_IN, PLUNGER_U_IN, MARGIN_IN = 0.0005, 0.002, 0.03
-SIZES = pytest.mark.parametrize("n", [300, pytest.param(2000, marks=pytest.mark.slow)])
+SIZES = pytest.mark.parametrize("n", [150, pytest.param(2000, marks=pytest.mark.slow)])
 
 
 def drawn(

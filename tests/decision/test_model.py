@@ -86,7 +86,7 @@ def usual_chances(gear: Gear) -> tuple[Array, float]:
     how rarely work on it leaves every worn joint. [1]
     """
     rng = np.random.default_rng(77)
-    n = 400_000
+    n = 200_000
     share = drawn_shares(rng, gear, {}, n)
     response = responses(gear)[0]
     reach = response.amplification * gear.limits_in * share
@@ -178,7 +178,7 @@ def test_belief_is_what_plain_draws_of_the_model_say(
     gear: Gear, read: dict[int, float], y: float
 ) -> None:
     sets = some_sets(believed(gear, read, y, np.zeros((1, 10), bool)).worn)
-    truth = simulated(gear, read, y, sets, 600_000, 9)
+    truth = simulated(gear, read, y, sets, 200_000, 9)
     found = believed(gear, read, y, sets)
     error = 3.0 / np.sqrt(truth.effective)
     assert found.causes == pytest.approx(truth.causes, abs=0.02 + error)

@@ -61,7 +61,7 @@ def test_one_gear_is_told_alone_what_it_is_told_in_a_batch(worked: tuple, tmp_pa
 
 @pytest.mark.parametrize("name", ["A one joint shut", "A one area shut"])
 def test_a_plan_ends_without_asking_for_what_cannot_be_reached(name: str, tmp_path: Path) -> None:
-    hangar = Hangar(_BY_NAME[name], 24, 1902).work(tmp_path)
+    hangar = Hangar(_BY_NAME[name], 12, 1902).work(tmp_path)
     assert all(gear.shut and gear.end for gear in hangar.gears)
     assert [gear.asked & gear.shut for gear in hangar.gears] == [set()] * len(hangar.gears)
 

@@ -73,27 +73,21 @@ def test_a_table_that_cannot_answer_says_why_and_what_to_record_next_time(
 
 
 @pytest.mark.parametrize(
-    ("column", "value"),
+    ("column", "value", "factor"),
     [
-        ("temperature_c", 15.0),
-        ("hydraulic_pressure_psi", 2500.0),
-        ("gear_landings", 0.0),
-        ("day", 3.0),
+        ("temperature_c", 15.0, "gauge_id"),
+        ("hydraulic_pressure_psi", 2500.0, "technician_id"),
+        ("gear_landings", 0.0, "side"),
+        ("day", 3.0, "approach"),
     ],
 )
-def test_a_constant_column_names_nothing(
-    column: str, value: float, gear: Gear, plain: DiagnosisTable
+def test_a_constant_column_and_a_constant_name_name_nothing(
+    column: str, value: float, factor: str, gear: Gear, plain: DiagnosisTable
 ) -> None:
-    constant = {**plain.quantities, column: np.full(len(plain), value)}
-    found = diagnose(gear.model, replace(plain, quantities=constant), gear.discrepancies)
-    assert found.verdict == "NONE"
-
-
-@pytest.mark.parametrize("factor", ["gauge_id", "technician_id", "side", "approach"])
-def test_a_constant_name_names_nothing(factor: str, gear: Gear, plain: DiagnosisTable) -> None:
-    constant = {**plain.factors, factor: np.full(len(plain), "X")}
-    found = diagnose(gear.model, replace(plain, factors=constant), gear.discrepancies)
-    assert found.verdict == "NONE"
+    quantities = {**plain.quantities, column: np.full(len(plain), value)}
+    factors = {**plain.factors, factor: np.full(len(plain), "X")}
+    constant = replace(plain, quantities=quantities, factors=factors)
+    assert diagnose(gear.model, constant, gear.discrepancies).verdict == "NONE"
 
 
 def test_constant_clearances_are_not_a_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:

@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -91,6 +92,7 @@ def test_a_cause_that_is_only_plausible_at_far_larger_sizes_is_not_named(tmp_pat
     assert cause not in named("--causes", str(larger))
 
 
+@cache
 def probability_of_another_linkage(gear: Path | str, beliefs: Path | None = None) -> float:
     table = ROOT / "inspection_data/measured_pin_direction.csv"
     options = DiagnoseOptions(gear=str(gear), beliefs_file=beliefs)

@@ -306,9 +306,16 @@ def turned_pin(gear: Gear, rows: int, seed: int) -> DiagnosisTable:
     )
 
 
-def test_a_set_says_in_which_gear_its_likeliest_causes_differ_most(gear: Gear) -> None:
-    table = turned_pin(gear, 80, 332)
-    found = diagnose(gear.model, table, gear.discrepancies)
+@pytest.fixture(scope="module")
+def open_set(gear: Gear) -> Diagnosis:
+    """Of eighty rows, which name no single cause."""
+    return diagnose(gear.model, turned_pin(gear, 80, 332), gear.discrepancies)
+
+
+def test_a_set_says_in_which_gear_its_likeliest_causes_differ_most(
+    gear: Gear, open_set: Diagnosis
+) -> None:
+    table, found = turned_pin(gear, 80, 332), open_set
     assert found.verdict == "AMBIGUOUS"
     assert found.further is not None
     assert [c.key for c in found.further.between] == [("direction_not_worst_case", "joint 4")]
@@ -318,9 +325,10 @@ def test_a_set_says_in_which_gear_its_likeliest_causes_differ_most(gear: Gear) -
     assert found.further.apart_in < 0.43 * 2.4 * table.clearance_in[most, 3]
 
 
-def test_after_the_further_inspections_that_are_asked_for_the_cause_is_named(gear: Gear) -> None:
-    table = turned_pin(gear, 80, 332)
-    further = diagnose(gear.model, table, gear.discrepancies).further
+def test_after_the_further_inspections_that_are_asked_for_the_cause_is_named(
+    gear: Gear, open_set: Diagnosis
+) -> None:
+    further = open_set.further
     assert further is not None
     assert further.inspections is not None
     assert 20 < further.inspections <= 80
@@ -333,8 +341,8 @@ def test_where_nothing_is_open_nothing_further_is_asked_for(gear: Gear) -> None:
     assert diagnose(gear.model, fleet(gear.model), gear.discrepancies).further is None
 
 
-def test_what_to_do_about_a_set_names_joint_gear_number_and_power(gear: Gear) -> None:
-    found = diagnose(gear.model, turned_pin(gear, 80, 332), gear.discrepancies)
+def test_what_to_do_about_a_set_names_joint_gear_number_and_power(open_set: Diagnosis) -> None:
+    found = open_set
     assert found.further is not None
     said = seven_lines(found)[-1].text
     assert "that joint" not in said

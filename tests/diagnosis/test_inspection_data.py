@@ -89,12 +89,19 @@ def test_the_seeds_in_the_description_are_those_of_the_command() -> None:
         ("measured_pin_direction", (), "NAMED", [("direction_not_worst_case", "joint 3")]),
         ("measured_frozen_grease", (), "UNLISTED", []),
         ("measured_nothing_wrong", (), "NONE", []),
-        ("measured_pressure", ("own_cause.py",), "NAMED", [("elastic_compliance", None)]),
-        (
+        pytest.param(
+            "measured_pressure",
+            ("own_cause.py",),
+            "NAMED",
+            [("elastic_compliance", None)],
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
             "measured_pin_direction",
             ("own_cause.py",),
             "NAMED",
             [("direction_not_worst_case", "joint 3")],
+            marks=pytest.mark.slow,
         ),
         ("measured_frozen_grease", ("own_cause.py",), "NAMED", [("frozen_grease", None)]),
         ("measured_nothing_wrong", ("own_cause.py",), "NONE", []),

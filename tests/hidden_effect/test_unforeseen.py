@@ -8,7 +8,7 @@ import pytest
 
 from .unforeseen import KINDS, run
 
-EVERY_DAY = ("humidity", "station", "bent_link", "two_lots", "nothing")
+EVERY_DAY = ("humidity", "bent_link", "nothing")
 ALL = [pytest.param(kind, marks=() if kind in EVERY_DAY else pytest.mark.slow) for kind in KINDS]
 
 

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -21,6 +23,24 @@ def store(tmp_path: Path) -> Path:
 @pytest.fixture
 def sit(store: Path, monkeypatch: pytest.MonkeyPatch) -> Sit:
     return sitting(store, monkeypatch)
+
+
+_BEGUN: dict[tuple[str, ...], bytes] = {}
+
+
+@pytest.fixture
+def begun(sit: Sit, store: Path) -> Callable[..., None]:
+    """Type a first visit, once for all tests of a worker."""
+
+    def of(*typed: str) -> None:
+        if typed in _BEGUN:
+            store.write_bytes(_BEGUN[typed])
+            return
+        sit(*typed, "")
+        with closing(sqlite3.connect(store)) as kept:
+            _BEGUN[typed] = kept.serialize()
+
+    return of
 
 
 @pytest.fixture

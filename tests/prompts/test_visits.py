@@ -19,6 +19,7 @@ from tests.prompts.test_one_gear import TEN, failed
 
 Life = Callable[..., GearLife]
 Now = Callable[..., Inspection]
+Begun = Callable[..., None]
 NEAR = failed("8", "11", "15.6", "6", "14", "done")
 LIMIT = failed("8", "11", "26", "6", "14", "done")
 
@@ -36,28 +37,32 @@ def test_a_known_gear_is_shown_with_the_next_that_stood_when_it_was_left(
     assert next_of(capsys.readouterr().out) == next_of(left)
 
 
-def test_a_tail_is_known_under_each_of_its_spellings(sit: Sit, life: Life) -> None:
-    sit(*failed("8", "done"), "")
+def test_a_tail_is_known_under_each_of_its_spellings(sit: Sit, begun: Begun, life: Life) -> None:
+    begun(*failed("8", "done"))
     sit("n-1 left", "p 40", "")
     assert [kept.inspection.readings_in for kept in life().inspections] == [(0.046,), (0.04,)]
 
 
-def test_what_is_open_on_the_other_side_is_said(sit: Sit, capsys: pytest.CaptureFixture) -> None:
-    sit(*failed("8", "done"), "")
+def test_what_is_open_on_the_other_side_is_said(
+    sit: Sit, begun: Begun, capsys: pytest.CaptureFixture
+) -> None:
+    begun(*failed("8", "done"))
     sit("N1 RH", "", "r", "", "done", "", "", "")
     sit("N1 RH", "")
     assert "Open on N1 LH:" in capsys.readouterr().err
 
 
-def test_y_asks_only_for_what_next_asks_with_the_last_reading_beside(sit: Sit) -> None:
-    sit(*NEAR, "")
+def test_y_asks_only_for_what_next_asks_with_the_last_reading_beside(
+    sit: Sit, begun: Begun
+) -> None:
+    begun(*NEAR)
     terminal = sit("N1 LH", "y", "15.4", "")
     assert [prompt[:2] for prompt in terminal.prompts] == ["Ta", "En", "#2", "En"]
     assert f"last 15.6 thou on {date.today().isoformat()}" in terminal.prompts[2]
 
 
-def test_enter_is_no_second_reading(sit: Sit, now: Now) -> None:
-    sit(*NEAR, "")
+def test_enter_is_no_second_reading(sit: Sit, begun: Begun, now: Now) -> None:
+    begun(*NEAR)
     sit("N1 LH", "y", "", "")
     found = now()
     assert (found.measured_again, found.clearance_in[2]) == ((), 0.0078)
@@ -79,9 +84,9 @@ def test_five_visits_lead_to_done_with_few_keys(
 
 
 def test_a_failure_after_the_repair_on_its_day_counts(
-    sit: Sit, life: Life, capsys: pytest.CaptureFixture
+    sit: Sit, begun: Begun, life: Life, capsys: pytest.CaptureFixture
 ) -> None:
-    sit(*LIMIT, "")
+    begun(*LIMIT)
     sit("N1 LH", "restored 2", "", "4", "")
     sit("N1 LH", "f p 40", "")
     said = capsys.readouterr().out
@@ -159,8 +164,10 @@ class _Tomorrow(datetime):
         ("rigging yes", "rigging checked"),
     ],
 )
-def test_an_undo_says_what_it_will_take_back(sit: Sit, now: Now, line: str, undone: str) -> None:
-    sit(*failed("8", "done"), "")
+def test_an_undo_says_what_it_will_take_back(
+    sit: Sit, begun: Begun, now: Now, line: str, undone: str
+) -> None:
+    begun(*failed("8", "done"))
     before = now()
     assert f"u = undo {undone}" in sit("N1 LH", line, "").screen
     sit("N1 LH", "u", "")
@@ -168,8 +175,10 @@ def test_an_undo_says_what_it_will_take_back(sit: Sit, now: Now, line: str, undo
         assert getattr(now(), field) == getattr(before, field)
 
 
-def test_undo_goes_back_visit_by_visit_to_the_first_one(sit: Sit, life: Life, now: Now) -> None:
-    sit(*LIMIT, "")
+def test_undo_goes_back_visit_by_visit_to_the_first_one(
+    sit: Sit, begun: Begun, life: Life, now: Now
+) -> None:
+    begun(*LIMIT)
     sit("N1 LH", "restored 2", "", "4", "")
     assert [repair.joints for repair in life().repairs] == [frozenset({2})]
     screen = sit("N1 LH", "u", "u", "u", "").screen
@@ -178,21 +187,23 @@ def test_undo_goes_back_visit_by_visit_to_the_first_one(sit: Sit, life: Life, no
     assert now().clearance_in[2] == 0.013
 
 
-def test_a_new_inspection_of_a_known_gear_is_a_second_one(sit: Sit, life: Life) -> None:
-    sit(*failed("8", "done"), "")
+def test_a_new_inspection_of_a_known_gear_is_a_second_one(
+    sit: Sit, begun: Begun, life: Life
+) -> None:
+    begun(*failed("8", "done"))
     terminal = sit("N1 LH", "new", "", "n", "", "#3", "9", "done", "", "", "")
     assert len(life().inspections) == 2
     assert any("last 8 thou on" in prompt for prompt in terminal.prompts)
 
 
-def test_a_reading_tighter_than_the_last_is_asked_about(sit: Sit) -> None:
-    sit(*LIMIT, "")
+def test_a_reading_tighter_than_the_last_is_asked_about(sit: Sit, begun: Begun) -> None:
+    begun(*LIMIT)
     screen = sit("N1 LH", "#2 6", "y", "").screen
     assert "#2 6 thou is tighter than 26 thou on" in screen
 
 
-def test_a_word_that_nobody_knows_changes_nothing(sit: Sit, life: Life) -> None:
-    sit(*failed("8", "done"), "")
+def test_a_word_that_nobody_knows_changes_nothing(sit: Sit, begun: Begun, life: Life) -> None:
+    begun(*failed("8", "done"))
     records = len(life().entries)
     screen = sit("N1 LH", "46", "x", "plumger 4", "s", "n 3", "?", "").screen
     assert screen.count("is not understood") + screen.count("✗") >= 4
@@ -235,8 +246,10 @@ def test_what_only_a_table_said_of_a_gear_stands(sit: Sit, now: Now, tmp_path: P
     assert (found.margin_in, found.no_spare, found.readings_in) == (0.028, (4,), (0.036,))
 
 
-def test_readings_of_another_convention_are_shown_in_that_of_today(sit: Sit, life: Life) -> None:
-    sit(*failed("8", "done"), "")
+def test_readings_of_another_convention_are_shown_in_that_of_today(
+    sit: Sit, begun: Begun, life: Life
+) -> None:
+    begun(*failed("8", "done"))
     sit("N1 LH", "new", "radial thou", "f", "", "#5 5", "done", "", "", "")
     sit("N1 LH", "#5 4", "")
     assert str(life().inspections[-1].inspection.entered[5]) == "4 thou"
@@ -244,9 +257,9 @@ def test_readings_of_another_convention_are_shown_in_that_of_today(sit: Sit, lif
 
 @pytest.mark.parametrize(("line", "gear"), [("side RH", ("RH", "N1")), ("tail N2", ("LH", "N2"))])
 def test_a_corrected_tail_or_side_moves_the_inspection(
-    sit: Sit, life: Life, line: str, gear: tuple[str, str]
+    sit: Sit, begun: Begun, life: Life, line: str, gear: tuple[str, str]
 ) -> None:
-    sit(*failed("8", "done"), "")
+    begun(*failed("8", "done"))
     sit("N1 LH", line, "")
     assert len(life(*gear).inspections) == 1
     assert life().inspections == ()

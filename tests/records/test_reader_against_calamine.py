@@ -139,11 +139,11 @@ def test_escaped_characters_of_a_text_are_restored(package):
 def test_rows_split_between_pieces_of_the_archive_are_whole(package):
     rows = "".join(
         f'<row r="{n}"><c r="A{n}" t="inlineStr"><is><t>{"x" * 90}ü{n}</t></is></c></row>'
-        for n in range(1, 30001)
+        for n in range(1, 6001)
     )
     found = ours(package(rows))
-    assert len(found) == 30000
-    assert found[30000] == ["x" * 90 + "ü30000"]
+    assert len(found) == 6000
+    assert found[6000] == ["x" * 90 + "ü6000"]
 
 
 def test_a_workbook_saved_as_strict_open_xml_is_read(xlsx):

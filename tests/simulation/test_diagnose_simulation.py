@@ -281,7 +281,7 @@ def test_groups_scatter_in_the_unit_of_the_readings_however_exact_some_of_these_
 
 def test_readings_far_out_are_not_a_pattern_although_rows_share_a_nuisance_parameter() -> None:
     alarms = 0
-    for seed in range(12):
+    for seed in range(6):
         rng = np.random.default_rng([18, seed])
         groups, x = np.repeat(np.arange(3), 40), rng.uniform(-1.0, 1.0, 120)
 
@@ -401,11 +401,11 @@ def test_masked_readings_are_not_read() -> None:
     assert of_spring(measured=masked) == of_spring(measured=np.where(blank, np.nan, read))
 
 
-@pytest.mark.parametrize("zone", [None, "UTC", "Europe/Berlin"])
-def test_times_may_have_a_zone(zone: str | None) -> None:
-    here = HOURS.tz_localize("UTC").tz_convert(zone) if zone else HOURS
-    rows = np.zeros(40)
-    assert of_spring(series=rows, time=here) == of_spring(series=rows, time=np.arange(40))
+def test_times_may_have_a_zone() -> None:
+    rows, berlin = np.zeros(40), HOURS.tz_localize("UTC").tz_convert("Europe/Berlin")
+    counted = of_spring(series=rows, time=np.arange(40))
+    assert of_spring(series=rows, time=HOURS) == counted
+    assert of_spring(series=rows, time=berlin) == counted
 
 
 @pytest.mark.parametrize(

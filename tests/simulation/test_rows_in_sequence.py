@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 import pytest
@@ -32,11 +33,16 @@ SUSPECTS = [Suspect("rate", 1.0, 0.1), Suspect("wave", 0.0, 0.1)]
 LEVEL = [Suspect("level", 0.0, 0.1)]
 
 
+def readings(seed: int, correlation: float, rate: float) -> np.ndarray:
+    scatter = 0.1 * drifting(N, correlation, np.random.default_rng([35, seed]))
+    return np.asarray(line({"level": 0.0, "rate": rate, "wave": 0.0})[:, 0] + scatter)
+
+
+@cache
 def diagnosed(
     seed: int, correlation: float, rate: float = 1.0, stated: bool = True
 ) -> SimulationDiagnosis:
-    scatter = 0.1 * drifting(N, correlation, np.random.default_rng([35, seed]))
-    read = line({"level": 0.0, "rate": rate, "wave": 0.0})[:, 0] + scatter
+    read = readings(seed, correlation, rate)
     return diagnose_simulation(line, read, SUSPECTS, LEVEL, series=np.zeros(N) if stated else None)
 
 
@@ -125,11 +131,9 @@ def test_a_smooth_discrepancy_of_a_series_stays_unlisted() -> None:
 
 
 def test_dates_in_any_order_give_what_the_rows_in_order_give() -> None:
-    rng = np.random.default_rng(6)
-    order = rng.permutation(N)
-    read = line({"level": 0.0, "rate": 2.0, "wave": 0.0})[:, 0] + 0.1 * drifting(N, 0.7, rng)
+    order = np.random.default_rng(6).permutation(N)
+    read, plain = readings(1, 0.7, 2.0), diagnosed(1, 0.7, 2.0)
     dates = np.datetime64("2026-03-01T00:00") + np.arange(N) * np.timedelta64(1, "h")
-    plain = diagnose_simulation(line, read, SUSPECTS, LEVEL, series=np.zeros(N))
     mixed = diagnose_simulation(
         lambda p: line(p)[order], read[order], SUSPECTS, LEVEL,
         series=np.zeros(N), time=dates[order],

@@ -25,10 +25,11 @@ def test_a_gear_with_too_many_joints_for_three_gauss_points_takes_two(
 def test_a_seed_gives_the_same_table_again(gear: Gear) -> None:
     def table(seed: int) -> IndexTable:
         options = StudyOptions(StudyDesign.LHS, seed, n1=4, n2=50, iterations=2)
-        return run_study(gear, options).table
+        return run_study(replace(gear, ensemble=gear.ensemble[:1]), options).table
 
-    assert table(3) == table(3)
-    assert not np.array_equal(table(3).first_order, table(0).first_order)
+    first = table(3)
+    assert first == table(3)
+    assert not np.array_equal(first.first_order, table(0).first_order)
 
 
 @pytest.mark.parametrize("limits", [np.zeros(10), np.full(3, 0.01), np.full(10, np.nan)])

@@ -110,12 +110,17 @@ def test_lengths_alone_leave_several_linkages() -> None:
 
 
 def test_a_distance_in_another_unit_is_named_alone_and_does_not_bend_the_linkage() -> None:
-    table = table_of((*BRACED, ("O2", "B", LATER)), 2e-3)
-    table.loc[4, "value_in"] *= 25.4
+    """In a table of millimetres, of which a row without a value was not read."""
+    table = table_of((*BRACED, ("O2", "B", LATER), ("A", "B", LATER)), 2e-3)
+    true_in = table.loc[4, "value_in"]
+    table["value_mm"] = 25.4 * table.pop("value_in")
+    table.loc[4, "value_mm"] *= 25.4
+    table.loc[8, "value_mm"] = np.nan
     found = survey(table, FOUR_BAR)
+    assert len(found.readings) == 8
     (misfit,) = found.misfits
     assert misfit.reading.row == 4
-    assert misfit.expected == pytest.approx(table.loc[4, "value_in"] / 25.4, abs=5e-3)
+    assert misfit.expected == pytest.approx(true_in, abs=5e-3)
     assert "row 4, distance O4 A" in str(misfit)
     true = index_of((CRANK, COUPLER, ROCKER, GROUND, TURN))
     assert found.joints[1].value == pytest.approx(true, rel=1e-3)
@@ -214,17 +219,6 @@ def test_a_wrong_cell_is_named(column: str, value: Any, words: str) -> None:
     table.loc[1, column] = value
     with pytest.raises(UsageError, match=words):
         survey(table, FOUR_BAR)
-
-
-def test_readings_in_millimetres_are_those_in_inches_and_rows_without_a_value_were_not_read() -> (
-    None
-):
-    table = table_of((*BRACED, ("O2", "B", LATER)), 2e-3)
-    table.loc[7, "value_in"] = np.nan
-    table["value_mm"] = 25.4 * table["value_in"]
-    found = survey(table.drop(columns="value_in"), FOUR_BAR)
-    assert len(found.readings) == 7
-    assert found.joints[1].value == pytest.approx(braced().joints[1].value)
 
 
 def test_predictions_in_a_batch_are_those_of_the_calibrated_linkage(gear: Gear) -> None:
