@@ -139,7 +139,7 @@ def test_the_shipped_table_of_indices_fits_the_schema_of_a_study(gear: Gear) -> 
     "options",
     [
         (),
-        ("--design", "lhs", "--size", "4,20,2", "--workers", "1"),
+        ("--design", "lhs", "--size", "4,20,2"),
         ("--design", "ccd", "--size", "4,0,2"),
     ],
     ids=["exact", "paper's design", "without total order"],

@@ -19,11 +19,7 @@ from mlg_troubleshoot.errors import (
 )
 
 # What helps where the system refuses something.
-_REMEDIES = {
-    errno.EMFILE: "Let this program open more files: ulimit -n 256",
-    errno.ENFILE: "Close other programs: this computer has no room for more open files.",
-    errno.ENAMETOOLONG: "Give it a shorter name.",
-}
+_MORE_FILES = "Let this program open more files: ulimit -n 256"
 _REMEDY = "Make room, or write to another place that you may read and write."
 # Some releases of typer carry their own click: what it says about usage is found through a name
 # that typer exports.
@@ -76,7 +72,7 @@ def _explain(error: Exception) -> ExitCode:
         return ExitCode.USAGE
     if isinstance(error, OSError) and error.errno is not None:
         say(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}")
-        say(f"What to do: {_REMEDIES.get(error.errno, _REMEDY)}")
+        say(f"What to do: {_MORE_FILES if error.errno == errno.EMFILE else _REMEDY}")
         try:
             # What is still to be written to stdout is written now or dropped: the interpreter must
             # not fail on it.

@@ -51,15 +51,14 @@ class Flags:
 
 
 @dataclass(frozen=True, slots=True)
-class CheckOutputs(options.Shown):
-    """What ``mlg check`` shows and writes."""
+class Wanted(options.Shown):
+    """What ``mlg check`` predicts with, shows, writes and keeps."""
 
     formats: Annotated[
         list[ReportFormat] | None,
         typer.Option(
             "--format",
             metavar="html|pdf",
-            parser=options.report_format,
             help="Report format, may repeat; default html and pdf. HTML is the accessible form.",
         ),
     ] = None
@@ -77,12 +76,6 @@ class CheckOutputs(options.Shown):
     detail: Annotated[
         bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")
     ] = False
-
-
-@dataclass(frozen=True, slots=True)
-class Wanted(CheckOutputs):
-    """What ``mlg check`` predicts with, shows, writes and keeps."""
-
     extension: Annotated[
         list[Path] | None,
         typer.Option(

@@ -15,13 +15,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mlg_troubleshoot.cli import by_hand, options, output
+from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.cli.output import stages
 from mlg_troubleshoot.cli.views import batch, one_gear
-from mlg_troubleshoot.cli.views import batch as notes
-from mlg_troubleshoot.decision.inspection import RowSource, Side
+from mlg_troubleshoot.decision.columns import RECORD_ID, SIDE, TAIL_NO
+from mlg_troubleshoot.decision.inspection import Inspection, RowSource, Side
 from mlg_troubleshoot.decision.judge_rows import Listed, listed
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import whole_file
 from mlg_troubleshoot.units import LengthUnit
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.decision.assessment import Judgement
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.json_form import CheckText
+    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows.keep import Told
 
 # Inspections that --report writes at most: HTML and PDF of one take 0.1 s, and their judgements
@@ -71,12 +73,13 @@ class Run:
         self._wanted = wanted
         self._page = options.paper_size()
         self._asks = not (files or flags.values)
-        outputs = [("--csv", wanted.csv), ("--annotate", wanted.annotate)]
-        wanted.claim(
+        output.claim(
             tables.gear,
             [*files, *extensions, *causes, *tables.map_files],
-            outputs,
+            [("--csv", wanted.csv), ("--annotate", wanted.annotate)],
+            wanted.report,
             store=wanted.store,
+            force=wanted.force,
         )
         if wanted.causes and not wanted.extension:
             raise UsageError(
@@ -101,7 +104,7 @@ class Run:
             return self._check_files()
         if self._asks:
             return self._ask().exit_code
-        typed = by_hand.from_flags(self._flags, self.asked, self._place)
+        typed = from_flags(self._flags, self.asked, self._place)
         result = task.check_inspection(typed, self.asked, self._place)
         against: list[str] = []
         try:
@@ -209,8 +212,9 @@ class Run:
 
         if self._place is None:
             raise TypeError("the prompts keep what they find")
-        given = by_hand.given_cells(self._flags, self.asked)
-        return by_hand.Sitting(self, self._place).hold(given)
+        from mlg_troubleshoot.cli.prompts.sitting import Sitting
+
+        return Sitting(self, self._place).hold(self._flags.tail)
 
     @property
     def stops_after_one(self) -> bool:
@@ -244,8 +248,8 @@ class Run:
         *,
         detail: bool,
     ) -> None:
-        notes.show_notes(result.unread if self._wanted.quiet else result.notes)
-        notes.show_problems(result.problems)
+        batch.show_notes(result.unread if self._wanted.quiet else result.notes)
+        batch.show_problems(result.problems)
         screen = output.console(unit=unit)
         screen.asks = self._asks
         if len(lines) > 1:
@@ -253,7 +257,7 @@ class Run:
         elif result.judgements:
             one_gear.show(result.judgements[0], result.gear, screen, detail=detail)
         if lines or result.judgements:
-            notes.show_unread(result.unread_files, screen)
+            batch.show_unread(result.unread_files, screen)
 
     def _annotate(
         self, read: ReadResult, said: Mapping[RowSource, task.Annotated], out: Path
@@ -270,19 +274,14 @@ class Run:
         self, result: task.CheckResult, directory: Path, unit: LengthUnit
     ) -> list[Path]:
         """Write the reports of what was found; their files are returned."""
-        formats = tuple(
-            str(f)
-            for f in self._wanted.formats or (options.ReportFormat.HTML, options.ReportFormat.PDF)
-        )
         with stages(quiet=self._wanted.quiet) as bar:
-            progress = partial(bar, "Writing reports")
             written = task.write_reports(
                 result,
                 self.asked,
                 directory,
-                formats,
+                tuple(self._wanted.formats or options.ReportFormat),
                 self._page,
-                on_written=progress,
+                on_written=partial(bar, "Writing reports"),
                 unit=unit,
                 store=self._place,
                 # The prompts write the report of one inspection anew after each change.
@@ -314,3 +313,49 @@ class Run:
         for warning in (*added.warnings, *against):
             output.say(f"Warning: {warning}")
         return against
+
+
+def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = None) -> Inspection:
+    """Let the judge of table rows judge the flags; a refusal names the flag. An id that was made
+    is free in the store.
+    """
+    from mlg_troubleshoot.records import ReadOptions, admit, made_record_id
+
+    gear = load_gear(declared.gear)
+    options = ReadOptions.of(gear, declared)
+    own = {TAIL_NO.name: flags.tail, SIDE.name: flags.side}
+    pairs = [f"{column}={text}" for column, text in own.items() if (text or "").strip()]
+    given = named_cells([*pairs, *(flags.values or ())], gear, "--set ")
+    labels = {TAIL_NO.name: "--tail", SIDE.name: "--side"}
+    values = dict.fromkeys(labels, "")
+    labels |= {column: f"--set {pair!r}" for column, (pair, _text) in given.items()}
+    values |= {column: text for column, (_pair, text) in given.items()}
+    read = admit({RECORD_ID.name: "-", **values}, options, labels)
+    if RECORD_ID.name in values:
+        return read
+    read = replace(read, record_id=made_record_id(read))
+    if place is None:
+        return read
+    from mlg_troubleshoot.workflows.keep import under_a_free_id
+
+    return under_a_free_id(read, place)
+
+
+def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, tuple[str, str]]:
+    """COLUMN=VALUE and its VALUE, by the column that is named by its own or a short name."""
+    from mlg_troubleshoot.records import ReadOptions, headers
+
+    joints = ReadOptions.of(gear).joints
+    values: dict[str, tuple[str, str]] = {}
+    for pair in pairs:
+        name, sign, text = pair.partition("=")
+        if not sign or (flag and not text.strip()):
+            raise UsageError(
+                f"{flag}{pair!r} is not COLUMN=VALUE",
+                f"Write for example {flag}3=0.013in or {flag}outcome=FAILED.",
+            )
+        column = headers.column_named(name, joints)
+        if column in values:
+            raise UsageError(f"{flag or 'amend '}gives {column} twice", "Give each column once.")
+        values[column] = pair, text
+    return values

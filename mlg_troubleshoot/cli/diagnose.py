@@ -70,7 +70,8 @@ def diagnose(
     priors = [file for file in causes or () if file.suffix == ".toml"]
     if len(priors) > 1:
         raise UsageError("two files of prior probabilities", "Give one --causes FILE.toml.")
-    shown.claim(tables.gear, inputs, [("--write-extension", write_extension)])
+    outputs = [("--write-extension", write_extension)]
+    output.claim(tables.gear, inputs, outputs, shown.report, force=shown.force)
     asked = task.DiagnoseOptions(
         **tables.declared(),
         cause_files=tuple(file for file in causes or () if file not in priors),

@@ -69,7 +69,8 @@ def fleet(
     shown = _shown(report=report, force=force, as_json=as_json, quiet=quiet)
     if joint is not None:
         known.require_joints([joint], "--joint")
-    shown.claim(records.gear, (), [("--csv", csv)], store=records.store)
+    outputs = [("--csv", csv)]
+    output.claim(records.gear, (), outputs, report, store=records.store, force=force)
     with stages(quiet=shown.quiet) as bar:
         everything = show_fleet(
             records.kept,

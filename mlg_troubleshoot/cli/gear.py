@@ -40,10 +40,9 @@ def verify(context: typer.Context, as_json: options.Json = False) -> None:
     """Print every number of the paper and that of the model; exit 1 if a required one fails."""
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.paper import verification
-    from mlg_troubleshoot.paper import verification as statements
 
     gear = load_gear(context.obj)
-    checked = statements.check_statements(gear)
+    checked = verification.check_statements(gear)
     numbers = verification.verify(gear)
     failed = [n for n in numbers if n.target.expected and not n.holds]
     if as_json:

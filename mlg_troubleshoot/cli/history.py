@@ -71,7 +71,7 @@ def show(
 
     place = records.kept
     known = load_gear(records.gear)
-    shown.claim(records.gear, store=records.store)
+    output.claim(records.gear, (), (), shown.report, store=records.store, force=shown.force)
     if tail is None:
         if shown.report is not None:
             raise UsageError(
@@ -136,7 +136,7 @@ def show_gears(
     """Show one line per gear, the most urgent first and why; `within`: with the parts of so many
     landings, `joint`: with the readings of that joint.
     """
-    from mlg_troubleshoot.cli.views.batch import STYLES, Cell
+    from mlg_troubleshoot.cli.views.batch import Cell
     from mlg_troubleshoot.life.forecast import most_urgent_first, parts_within, work_sentence
 
     console = output.console(unit=unit)
@@ -147,7 +147,6 @@ def show_gears(
         *("tail", "side", why, f"{worst_in}>", "by when", "last seen", "landings>"),
         *("verdict", "failed", "next action"),
     )
-    styles = {each.value: style for each, style in STYLES.items()}
     rows: list[list[Cell]] = []
     for line in lines:
         verdict = line.now.verdict or "-"
@@ -161,7 +160,7 @@ def show_gears(
                 line.by_when(found.gear),
                 str(line.inspection_date or "no date"),
                 _count(line.gear_landings),
-                output.text(verdict.removesuffix("_MARGIN"), styles.get(verdict, "")),
+                verdict.removesuffix("_MARGIN"),
                 ", ".join(line.failed) or "-",
                 line.now.next_action or "-",
             ]
@@ -328,7 +327,7 @@ def amend(
     records: options.Records,
 ) -> None:
     """Correct values of an inspection; nothing behind = clears one. The old ones stay readable."""
-    from mlg_troubleshoot.cli.by_hand import named_cells
+    from mlg_troubleshoot.cli.check_run import named_cells
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.life.folding import find
     from mlg_troubleshoot.workflows import keep

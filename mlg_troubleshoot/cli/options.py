@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
 from functools import partial, wraps
@@ -18,7 +18,6 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.cli.output import Outputs
     from mlg_troubleshoot.store import Store
 
 
@@ -28,14 +27,6 @@ _Word = TypeVar("_Word", bound=StrEnum)
 class ReportFormat(StrEnum):
     HTML = "html"
     PDF = "pdf"
-
-
-def report_format(text: str) -> ReportFormat:
-    try:
-        return ReportFormat(text)
-    except ValueError:
-        remedy = "Give html or pdf; the HTML report is the accessible form."
-        raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
 
 
 def one_of(kind: type[_Word], text: str, flag: str) -> _Word:
@@ -179,19 +170,6 @@ class Shown:
     as_json: Json = False
     quiet: Quiet = False
 
-    def claim(
-        self,
-        gear: str,
-        inputs: Iterable[str | Path | None] = (),
-        outputs: Outputs = (),
-        *,
-        store: str | None = None,
-    ) -> None:
-        """Refuse, before anything is read, what must not be written."""
-        from mlg_troubleshoot.cli.output import claim
-
-        claim(gear, inputs, outputs, self.report, store=store, force=self.force)
-
     def unit(self, entered_in: LengthUnit = LengthUnit.INCH) -> LengthUnit:
         """The unit that lengths are shown in; where none is asked for, that of the entry."""
         return self.show or entered_in
@@ -281,18 +259,15 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
     shown: list[Parameter] = []
-
-    def show(name: str, default: Any, hint: Any) -> None:
-        shown.append(Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hint))
-
-    for name, parameter in signature(command).parameters.items():
-        if name not in groups:
-            show(name, parameter.default, hints[name])
-            continue
-        own = get_type_hints(groups[name], include_extras=True)
-        # What all commands share stands last.
-        for each in sorted(fields(groups[name]), key=lambda each: each in fields(Shown)):
-            show(each.name, each.default, own[each.name])
+    for parameter in signature(command).parameters.values():
+        group = groups.get(parameter.name)
+        own = get_type_hints(group, include_extras=True) if group else hints
+        shown += (
+            Parameter(
+                each.name, Parameter.KEYWORD_ONLY, default=each.default, annotation=own[each.name]
+            )
+            for each in (fields(group) if group else [parameter])
+        )
 
     @wraps(command)
     def run(**given: Any) -> None:

@@ -14,11 +14,11 @@ import json
 import os
 import re
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from itertools import groupby
 from pathlib import Path
+from shutil import get_terminal_size
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from mlg_troubleshoot.errors import ExitCode, OutputError, TroubleshootError, UsageError
+from mlg_troubleshoot.errors import ExitCode, OutputError, TroubleshootError
 from mlg_troubleshoot.units import LengthUnit, said_in
 from mlg_troubleshoot.visible import unbroken, visible
 
@@ -36,15 +36,12 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.reporting.publish import WrittenReport
 
 
-_WIDTH_ELSEWHERE = 80
 WIDE = 100
-WIDEST = 120
 _PLAIN = "mlg.plain"
 # Between a number and its unit until the lines are folded: rich breaks them at any space.
 _GLUE = "\ue000"
 # Between the cells of a table in a template.
 _CELL = "│"
-_MARK = re.compile(r"[<>]\d*$")
 # Room that the last column of a table gets before other columns are left out for it, and rows that
 # are printed where all of them are listed elsewhere.
 _LEAST = 27
@@ -76,9 +73,8 @@ def to_ascii(text: str) -> str:
 def prepare_streams() -> None:
     """Let stdout and stderr degrade to what they can show; no character ends a run.
 
-    Python turns a C locale into UTF-8 for itself, so for a terminal the locale is asked. A stream
-    that is closed is opened on nothing, so that no other file takes its number; without stdout the
-    run ends.
+    A stream that is closed is opened on nothing, so that no other file takes its number; without
+    stdout the run ends.
     """
     closed = [name for name in ("stdin", "stdout", "stderr") if getattr(sys, name) is None]
     for name in closed:
@@ -90,26 +86,13 @@ def prepare_streams() -> None:
     codecs.register_error(_PLAIN, _shown_instead)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            plain = stream.isatty() and not os.environ.get("PYTHONIOENCODING") and not speaks_utf8()
-            stream.reconfigure(encoding="ascii" if plain else None, errors=_PLAIN)
+            stream.reconfigure(errors=_PLAIN)
 
 
 def _shown_instead(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     return to_ascii(error.object[error.start : error.end]), error.end
-
-
-def speaks_utf8() -> bool:
-    """Tell whether the user's locale is one of UTF-8."""
-    if sys.platform == "win32":
-        return (sys.stderr.encoding or "").lower().startswith("utf")
-    types = os.environ.get("LC_CTYPE", "")
-    if types in ("C.UTF-8", "C.utf8"):
-        # Python's own doing at start-up when the locale is C or unknown.
-        types = ""
-    chosen = os.environ.get("LC_ALL") or types or os.environ.get("LANG", "")
-    return re.search(r"utf-?8", chosen, re.IGNORECASE) is not None
 
 
 def can_ask() -> bool:
@@ -166,41 +149,31 @@ def is_plain() -> bool:
     return bool(plain) or os.environ.get("TERM") in ("dumb", "unknown")
 
 
-def console(
-    *,
-    to_stderr: bool = False,
-    unit: LengthUnit = LengthUnit.INCH,
-    elsewhere: int = _WIDTH_ELSEWHERE,
-) -> DataConsole:
-    """Return a console for stdout or stderr, as wide as the terminal, COLUMNS, or `elsewhere`."""
-    columns = os.environ.get("COLUMNS", "")
-    given = int(columns) if columns.isascii() and columns.isdecimal() and int(columns) else None
+def console(*, to_stderr: bool = False, unit: LengthUnit = LengthUnit.INCH) -> DataConsole:
+    """Return a console for stdout or stderr, as wide as COLUMNS, the terminal, or 80 columns."""
     found = DataConsole(
         stderr=to_stderr,
         highlight=False,
         markup=False,
         emoji=False,
-        width=given,
+        width=get_terminal_size().columns,
         color_system=None if is_plain() else "auto",
     )
-    if given is None and not found.is_terminal:
-        found.width = elsewhere
     found.unit = unit
     return found
 
 
 def show_page(name: str, screen: DataConsole, **values: object) -> None:
-    """Print the screen that a template makes: each line folded, one after ``#`` bold; lines of
-    cells are a table under their heading.
+    """Print the screen that a template makes: each line folded; lines of cells are a table under
+    their heading.
     """
     for is_table, lines in groupby(page(name, screen.unit, **values), lambda line: _CELL in line):
-        if not is_table:
+        if is_table:
+            headings, *rows = ([cell.strip() for cell in line.split(_CELL)] for line in lines)
+            print_table(screen, headings, rows)
+        else:
             for line in lines:
-                bold = line.startswith("# ")
-                screen.print(line.removeprefix("# "), style="bold" if bold else "")
-            continue
-        headings, *rows = ([cell.strip() for cell in line.split(_CELL)] for line in lines)
-        print_table(screen, headings, rows)
+                screen.print(line)
 
 
 def print_table(
@@ -212,7 +185,7 @@ def print_table(
     folded: str = "",
 ) -> None:
     """Print a table without rules; a heading may end with ``>``, which aligns its column to the
-    right, or ``<``, and its greatest width.
+    right.
 
     With `spare` a column that says nothing is left out, and on a narrow screen those of `spare`,
     the first first; then only the last column, or the one that is named, is folded. Of many rows
@@ -223,7 +196,7 @@ def print_table(
         [text(visible(each, one_line=True)) if isinstance(each, str) else each for each in row]
         for row in shown
     ]
-    kept = {_MARK.sub("", heading): place for place, heading in enumerate(headings)}
+    kept = {heading.removesuffix(">"): place for place, heading in enumerate(headings)}
     last = folded or [*kept][-1]
     wide = {
         name: max(*map(cell_len, name.split("\n")), 1, *(row[place].cell_len for row in cells))
@@ -240,11 +213,9 @@ def print_table(
     gap = 2 if sum(wide[name] + 2 for name in kept) - 2 <= screen.width else 1
     table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
     for name, place in kept.items():
-        mark = headings[place].removeprefix(name)
         table.add_column(
             name,
-            justify="right" if mark.startswith(">") else "left",
-            max_width=int(mark[1:]) if mark[1:] else None,
+            justify="left" if headings[place] == name else "right",
             overflow="fold",
             no_wrap=spare is not None and name != last,
         )
@@ -316,11 +287,8 @@ def write(result: str) -> None:
 
 
 def write_json(result: dict[str, Any]) -> None:
-    """Write a result as JSON to stdout."""
-    utf8 = codecs.lookup(sys.stdout.encoding or "ascii").name == "utf-8"
-    beyond = re.compile("[\ud800-\udfff]" if utf8 else "[^\x00-\x7f]")
-    text = json.dumps(result, allow_nan=False, ensure_ascii=False, indent=1)
-    write(beyond.sub(lambda found: json.dumps(found[0])[1:-1], text))
+    """Write a result as JSON to stdout, in ASCII: no stream changes a character."""
+    write(json.dumps(result, allow_nan=False, indent=1))
 
 
 def write_pieces(pieces: Iterable[str]) -> None:
@@ -335,17 +303,13 @@ def write_pieces(pieces: Iterable[str]) -> None:
 
 Advance = Callable[[str, int, int | None], None]
 
-# A bar that would be gone before it is read is not shown. [s]
-_WORTH_SHOWING_AFTER_S = 0.5
-
 
 @contextmanager
 def stages(*, quiet: bool) -> Iterator[Advance]:
-    """Show how far each stage of a run is, once it has run long enough to be worth it."""
+    """Show how far each stage of a run is."""
     if quiet or is_plain() or not sys.stderr.isatty():
         yield lambda _name, _done, _total: None
         return
-    start = time.monotonic()
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -356,34 +320,27 @@ def stages(*, quiet: bool) -> Iterator[Advance]:
         TimeRemainingColumn,
     )
 
-    bar = Progress(
+    tasks: dict[str, TaskID] = {}
+    with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
         console=Console(stderr=True),
         transient=True,
-    )
-    tasks: dict[str, TaskID] = {}
+    ) as bar:
 
-    def advance(name: str, done: int, total: int | None) -> None:
-        if not tasks:
-            if time.monotonic() - start < _WORTH_SHOWING_AFTER_S:
-                return
-            bar.start()
-        if name not in tasks:
-            tasks[name] = bar.add_task(name, total=total)
-        bar.update(tasks[name], completed=done, total=total)
+        def advance(name: str, done: int, total: int | None) -> None:
+            if name not in tasks:
+                tasks[name] = bar.add_task(name, total=total)
+            bar.update(tasks[name], completed=done, total=total)
 
-    try:
         yield advance
-    finally:
-        if tasks:
-            bar.stop()
 
 
-WRITE_TABLE = "--write-table"
+# Standard input as it is named, and its descriptor. [1]
 _STANDARD_INPUT = "-"
+_DESCRIPTOR = 0
 Outputs = Sequence[tuple[str, str | Path | None]]
 
 
@@ -413,14 +370,11 @@ def claim(
     for name in inputs:
         files += _read(name)
     if gear is not None:
-        known = load_gear(gear)
-        writes_table = any(option == WRITE_TABLE for option, _ in wanted)
-        # The table of indices may be written again, unless it is the gear file that is named so.
-        own = {known.indices_file} - {known.path} if writes_table else set()
-        files += [file for file in known.files if file not in own]
+        files += load_gear(gear).files
     claim_outputs(files, wanted, force=force)
     if report is not None:
-        claim_outputs(files, _reports(report, wanted), force=True)
+        others = [Path(path) for _, path in wanted]
+        claim_outputs([*files, *others], _reports(report, others), force=True)
 
 
 def _read(name: str | Path | None) -> Sequence[str | Path | int]:
@@ -429,12 +383,9 @@ def _read(name: str | Path | None) -> Sequence[str | Path | int]:
 
     if name is None:
         return ()
-    if str(name) != _STANDARD_INPUT:
-        return [Path(str(file)) for file in expand(str(name))]
-    try:
-        return [sys.stdin.fileno()]
-    except (OSError, ValueError):
-        return ()
+    if str(name) == _STANDARD_INPUT:
+        return [_DESCRIPTOR]
+    return [Path(str(file)) for file in expand(str(name))]
 
 
 def _is_gear_file(path: Path) -> bool:
@@ -450,23 +401,13 @@ def _is_gear_file(path: Path) -> bool:
     return True
 
 
-def _reports(folder: Path, others: Outputs) -> Outputs:
-    """Return the files of a folder that a report could replace."""
+def _reports(folder: Path, others: Iterable[Path]) -> Outputs:
+    """Return the files of a folder that a report could replace: some are there, `others` are to be
+    written.
+    """
     from mlg_troubleshoot.reporting.publish import could_be_report
 
     real = Path(os.path.realpath(folder))
-    for option, other in others:
-        path = Path(os.path.realpath(str(other)))
-        if could_be_report(path) and path.parent == real:
-            raise UsageError(
-                f"{option} {other} has the name of a report in --report {folder}",
-                f"Give {option} another name.",
-            )
-    try:
-        known = [*real.iterdir()] if real.exists() else []
-    except OSError as error:
-        raise OutputError(
-            f"--report {folder} cannot be read: {error.strerror}",
-            "Give a folder that you may read and write.",
-        ) from error
-    return [("--report", path) for path in known if could_be_report(path)]
+    known = [*real.iterdir()] if real.exists() else []
+    known += (Path(os.path.realpath(path)) for path in others)
+    return [("--report", path) for path in known if could_be_report(path) and path.parent == real]

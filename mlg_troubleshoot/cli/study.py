@@ -6,17 +6,13 @@ import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-
-if TYPE_CHECKING:
-    pass
 
 EPILOG = (
     "Example: mlg study; the paper's design: mlg study --design lhs; the table"
@@ -44,14 +40,6 @@ class StudyFlags:
             help="Size of a paper design; 100,1000,10 (lhs) or 100,862,10 if not given.",
         ),
     ] = None
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Cores for the total order of lhs; all if not given."),
-    ] = None
-    csv: Annotated[Path | None, typer.Option(metavar="OUT.csv", help="One line per joint.")] = None
-    figure: Annotated[
-        Path | None, typer.Option(metavar="OUT.svg", help="A picture of the indices of all joints.")
-    ] = None
     write_table: Annotated[
         bool,
         typer.Option(
@@ -65,24 +53,24 @@ class StudyFlags:
 @options.flat
 def study(flags: StudyFlags) -> None:
     """Recompute the sensitivity and amplification indices of every joint."""
-    from mlg_troubleshoot.cli.output import WRITE_TABLE, claim, stages
+    from mlg_troubleshoot.cli.output import claim, stages
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.paper.study import StudyDesign, StudyOptions
     from mlg_troubleshoot.workflows import study as task
 
     gear = load_gear(flags.gear)
     table = gear.indices_file if flags.write_table else None
-    outputs = [("--csv", flags.csv), ("--figure", flags.figure), (WRITE_TABLE, table)]
-    claim(flags.gear, (), outputs, force=flags.force)
+    # The table may be written again, unless it is the gear file that is named so.
+    kept = {*gear.files} - ({gear.indices_file} - {gear.path})
+    claim(None, kept, [("--write-table", table)], force=flags.force)
     design = options.one_of(StudyDesign, flags.design.lower(), "--design")
     n1, n2, iterations = _size(flags.size)
     with ExitStack() as processes, stages(quiet=False) as progress:
         executor = None
-        count = flags.workers or os.cpu_count() or 1
-        if design is StudyDesign.LHS and count > 1:
+        if design is StudyDesign.LHS:
             from mlg_troubleshoot.workers import WorkerProcesses
 
-            executor = processes.enter_context(WorkerProcesses(count))
+            executor = processes.enter_context(WorkerProcesses(os.cpu_count() or 1))
         asked = StudyOptions(design, flags.seed, n1=n1, n2=n2, iterations=iterations)
         if flags.write_table:
             task.refuse_other_tables(asked)
@@ -93,12 +81,8 @@ def study(flags: StudyFlags) -> None:
         output.write_json(study_as_json(findings))
     else:
         rows = [*zip(gear.joints, findings.table.joints, strict=True)]
-        screen = output.console(elsewhere=output.WIDEST)
+        screen = output.console()
         output.show_page("study", screen, f=findings, rows=rows)
-    if flags.csv is not None:
-        task.write_study_csv(findings, flags.csv)
-    if flags.figure is not None:
-        task.write_study_figure(findings, flags.figure)
     if table is not None:
         task.write_study_table(findings)
         output.say(f"Table written: {table}")

@@ -66,7 +66,7 @@ def _parts(value: Any) -> Any:
     return dict(value) if isinstance(value, Mapping) else list(value)
 
 
-_ENCODED = json.JSONEncoder(allow_nan=False, ensure_ascii=False, check_circular=False).encode
+_ENCODED = json.JSONEncoder(allow_nan=False, check_circular=False).encode
 
 
 def written(kind: Any, *records: Any, **given: Any) -> dict[str, Any]:

@@ -16,7 +16,6 @@ import pytest
 from mlg_troubleshoot.cli import output
 from tests.cli.conftest import DATA, FAILURE, FLEET, ROOT
 
-pexpect = pytest.importorskip("pexpect")
 STORE = ROOT / "tests" / "store" / "data" / "version-1.sqlite"
 COMMANDS = {
     "help": (("--help",), 0),
@@ -96,28 +95,6 @@ def test_every_command_ends_as_documented_on_every_stream(
     command: str, stream: str, tmp_path: Path
 ) -> None:
     as_documented(command, stream, tmp_path)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
-@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
-def test_a_terminal_of_a_plain_locale_gets_ascii(tmp_path: Path) -> None:
-    environment = {
-        "PATH": os.environ["PATH"],
-        "HOME": str(tmp_path),
-        "PYTHONPATH": str(ROOT),
-        "LC_ALL": "C",
-    }
-    child = pexpect.spawn(
-        sys.executable,
-        ["-m", "mlg_troubleshoot", "check", str(FAILURE)],
-        env=environment,
-        timeout=60,
-    )
-    shown = child.read()
-    child.close()
-    assert child.exitstatus == 1
-    assert shown.isascii()
-    assert b"COULD BE OUTSIDE" in shown
 
 
 def test_json_holds_every_character_on_a_stream_that_cannot(

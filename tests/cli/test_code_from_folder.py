@@ -55,7 +55,7 @@ SLOW = [
     (AS_A_MODULE, "check table.csv"),
     (MLG, "history"),
     (MLG, "diagnose few.csv"),
-    (MLG, "study --design lhs --size 4,60,1 --workers 2"),
+    (MLG, "study --design lhs --size 4,60,1"),
     (MLG, "gear verify"),
     (MLG, "template form.pdf"),
     (MLG, "template form.xlsx"),

@@ -82,7 +82,6 @@ def test_an_output_that_cannot_be_written_exits_5(option: str, occupied: Path) -
     assert "occupied" in found.err
     assert "What to do:" in found.err
     if option == "--report":
-        assert "Give a folder" in found.err
         assert found.out == ""
 
 
@@ -116,9 +115,3 @@ def test_an_interrupt_exits_130(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(task, "check_files", interrupted)
     found = mlg("check", FAILURE)
     assert (found.code, found.err.strip()) == (130, "Interrupted.")
-
-
-def test_the_former_format_for_screen_readers_names_the_accessible_form(tmp_path: Path) -> None:
-    found = mlg("check", FAILURE, "--report", tmp_path, "--format", "pdf-ua")
-    assert (found.code, found.out, list(tmp_path.iterdir())) == (2, "", [])
-    assert "the HTML report is the accessible form" in found.err

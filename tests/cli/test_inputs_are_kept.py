@@ -64,8 +64,8 @@ def kept(found: Run, path: Path, before: bytes, option: str) -> None:
         "diagnose fleet.csv --map other.toml --write-extension other.toml",
         "diagnose fleet.csv --write-extension fleet.csv",
         "diagnose fleet.csv --gear mine.toml --write-extension mine-targets.toml",
-        "study --gear mine.toml --csv hawker-800xp-ensemble.toml",
-        "study --gear mine.toml --csv hawker-800xp-indices.json",
+        "check in.csv --gear mine.toml --csv hawker-800xp-ensemble.toml",
+        "check in.csv --gear mine.toml --csv hawker-800xp-indices.json",
     ],
 )
 def test_no_output_replaces_an_input(line: str, here: Path) -> None:
@@ -147,8 +147,6 @@ def test_another_store_is_not_replaced_by_an_export(store: Path) -> None:
         "check in.csv --csv",
         f"check {WORKBOOK} --annotate",
         "diagnose fleet.csv --write-extension",
-        "study --csv",
-        "study --figure",
         "history export",
         "template",
     ],
@@ -156,7 +154,7 @@ def test_another_store_is_not_replaced_by_an_export(store: Path) -> None:
 def test_a_file_that_something_else_wrote_is_replaced_with_force_only(
     line: str, here: Path
 ) -> None:
-    path = here / ("letter.svg" if "--figure" in line else "letter.xlsx")
+    path = here / "letter.xlsx"
     path.write_text("Dear Sir,", encoding="utf-8")
     found = mlg(*line.split(), path)
     assert (found.code, found.out, "--force" in found.err) == (2, "", True)

@@ -107,7 +107,7 @@ def test_flags_answer_questions_beforehand(start: Start) -> None:
 
 def test_a_tail_from_a_flag_that_is_none_is_refused_before_anything_is_asked(start: Start) -> None:
     child = start("check", "--tail", "n/a", "--side", "RH")
-    child.expect_exact("--tail 'n/a': expected a tail number")
+    child.expect_exact("'n/a' is not accepted: expected a tail number")
     assert finish(child) == 2
 
 

@@ -10,7 +10,7 @@ import pytest
 from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.check_run import Run
 from mlg_troubleshoot.cli.options import Tables
-from mlg_troubleshoot.cli.prompts import EntryInterruptedError
+from mlg_troubleshoot.cli.prompts.ask import EntryInterruptedError
 
 
 class StoppedError(Exception):
@@ -51,7 +51,7 @@ def sitting(store: Path, patch: pytest.MonkeyPatch) -> Sit:
         *typed: str, end: type[BaseException] = EOFError, flags: Flags | None = None
     ) -> ScriptedTerminal:
         terminal = ScriptedTerminal(typed, end)
-        patch.setattr("mlg_troubleshoot.cli.prompts.Terminal", lambda: terminal)
+        patch.setattr("mlg_troubleshoot.cli.prompts.sitting.Terminal", lambda: terminal)
         patch.setattr("mlg_troubleshoot.cli.output.can_ask", lambda: True)
         try:
             Run([], flags or Flags(), Tables(), Wanted(store=str(store))).run()

@@ -79,6 +79,8 @@ class Trial:
             timeout=60,
         )
         child.delaybeforesend = None
+        # A loaded machine takes its time to end a process.
+        child.ptyproc.delayafterterminate = 2.0
         return child
 
     def asked(self, child: pexpect.spawn) -> str | None:

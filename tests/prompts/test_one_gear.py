@@ -140,11 +140,11 @@ def test_a_reading_that_can_hardly_be_is_confirmed_or_typed_again(sit: Sit, life
     assert sorted(map(str, found.entered.values())) == ["8.5 thou", "<2 thou"]
 
 
-@pytest.mark.parametrize("again", ["46", "n", "u"])
+@pytest.mark.parametrize("again", [(), ("n",), ("u",)])
 def test_a_plunger_that_joints_cannot_cause_is_asked_for_again(
-    sit: Sit, life: Life, again: str
+    sit: Sit, life: Life, again: tuple[str, ...]
 ) -> None:
-    terminal = sit(*gear("f", "460", again, "46", "done"), "")
+    terminal = sit(*gear("f", "460", *again, "46", "done"), "")
     assert "at most" in terminal.screen
     assert life().inspections[-1].inspection.readings_in == (0.046,)
 
@@ -169,6 +169,34 @@ def test_readings_of_another_unit_are_asked_about_before_they_are_judged(
     assert life().inspections[-1].inspection.small_readings_true
 
 
+@pytest.mark.parametrize(
+    ("again", "read"),
+    [(("#3 13",), (0.0065, (0.041,))), (("p 46", "y"), (0.0002, (0.046,)))],
+)
+def test_what_is_unusual_is_typed_again_in_its_place(
+    sit: Sit, life: Life, again: tuple[str, ...], read: tuple[object, ...]
+) -> None:
+    tight = ["0.4", "y"] * 2
+    sit(*gear("f", "41", *tight, "done"), *again, "")
+    found = life().inspections[-1].inspection
+    assert (pytest.approx(found.clearance_in[3]), found.readings_in) == read
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("thou total", "thou, total play"),
+        ("mils TOTAL_PLAY", "thou, total play"),
+        ("dial mm", "mm, total play"),
+        ("inches bore", "in, diametral"),
+    ],
+)
+def test_units_and_conventions_are_understood_as_people_say_them(
+    sit: Sit, typed: str, said: str
+) -> None:
+    assert f"Readings are in {said}." in sit("N1 LH", typed, "f", "", "done", *END, "").screen
+
+
 def test_help_is_of_the_question_and_lists_the_words(sit: Sit) -> None:
     screen = sit(*gear("f", "?", "46", "?", "done"), "").screen
     assert "with the Down Lock released" in screen
@@ -183,7 +211,7 @@ def test_an_entry_that_is_stopped_goes_on_where_it_stopped(
     with pytest.raises(StoppedError):
         sit(*HEAD, "f", "46", "8", end=end)
     terminal = sit("", "11", "done", *END, "")
-    assert "Enter continues N1 LH" in terminal.screen
+    assert "Tail number (Enter: N1 LH)" in terminal.screen
     assert len(terminal.prompts) == 6
     assert life().inspections[-1].inspection.clearance_in == {3: 0.004, 5: 0.0055}
 
@@ -196,6 +224,11 @@ def test_an_unfinished_entry_is_continued_by_its_tail_and_begun_anew_by_a_word(
     screen = sit("N1 LH", "new", "thou", "play", "n", "", "9", "done", *END, "").screen
     assert "Continued: N1 LH" in screen
     assert life().inspections[-1].inspection.outcome is None
+
+
+def test_an_entry_is_begun_anew_before_its_side_is_known(sit: Sit, life: Life) -> None:
+    sit("N1", "new", "LH", *failed("8", "done")[1:], "")
+    assert life().inspections[-1].inspection.clearance_in == {3: 0.004}
 
 
 def test_a_start_at_which_nothing_was_typed_leaves_nothing(sit: Sit) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import date, datetime, timedelta, tzinfo
@@ -41,6 +42,23 @@ def test_a_tail_is_known_under_each_of_its_spellings(sit: Sit, begun: Begun, lif
     begun(*failed("8", "done"))
     sit("n-1 left", "p 40", "")
     assert [kept.inspection.readings_in for kept in life().inspections] == [(0.046,), (0.04,)]
+
+
+def test_a_gear_that_is_opened_and_left_with_an_interrupt_was_not_lost(
+    sit: Sit, begun: Begun, capsys: pytest.CaptureFixture
+) -> None:
+    begun(*failed("8", "done"))
+    screen = sit("N1 LH", end=KeyboardInterrupt).screen + capsys.readouterr().out
+    assert "Nothing" not in screen
+    assert not re.search(r"\d:\d\d:\d\d", screen)
+
+
+def test_what_cannot_be_reached_changes_next_at_once(
+    sit: Sit, capsys: pytest.CaptureFixture
+) -> None:
+    sit(*LIMIT, "no spare 2", "cannot reach 5", "")
+    said = capsys.readouterr().out
+    assert [line.startswith("OPEN") for line in said.splitlines()].count(True) == 2
 
 
 def test_what_is_open_on_the_other_side_is_said(

@@ -81,22 +81,8 @@ def test_an_undated_or_invalid_row_is_not_counted_as_a_gear(tmp_path):
     header = [*HEADER, "inspection_date"]
     rows = [header, *(sound(f"R{n}", inspection_date=day) for n, day in enumerate(days))]
     file = workbook(tmp_path / "days.xlsx", ("Inspections", rows))
-    said = "1 gear, the latest inspection of each, and every row that is undated or invalid;"
-    assert mlg("check", file).out.splitlines()[1] == said
-
-
-@pytest.mark.parametrize(
-    ("days", "said"),
-    [
-        (("2024-03-04", "2025-03-04"), "the latest inspection of each;"),
-        (("2024-03-04", "2024-03-04"), "the latest inspection of each, of several on one day the"),
-    ],
-)
-def test_a_batch_says_which_of_several_inspections_of_a_day_it_shows(tmp_path, days, said):
-    header = [*HEADER, "inspection_date"]
-    rows = [header, *(sound(f"R{n}", inspection_date=day) for n, day in enumerate(days))]
-    file = workbook(tmp_path / "days.xlsx", ("Inspections", rows))
-    assert f"1 gear, {said}" in mlg("check", file).out
+    said = "1 gear, the latest inspection of each (or the worst of its day); --csv or --json lists"
+    assert said in " ".join(mlg("check", file).out.split())
 
 
 def test_joints_over_their_limit_are_counted_over_the_batch(mixed):

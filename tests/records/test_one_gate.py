@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import pytest
 
 from mlg_troubleshoot import Inspection, Side, TroubleshootError, check
-from mlg_troubleshoot.cli.by_hand import from_flags
 from mlg_troubleshoot.cli.check import Flags
-from mlg_troubleshoot.cli.prompts import Entry
+from mlg_troubleshoot.cli.check_run import from_flags
+from mlg_troubleshoot.cli.prompts.entry import Entry
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions, judge_again

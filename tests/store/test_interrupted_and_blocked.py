@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sql
 
-from mlg_troubleshoot.cli.prompts import SavedEntries
+from mlg_troubleshoot.cli.prompts.visit import SavedEntries
 from mlg_troubleshoot.records import rows
 from mlg_troubleshoot.store import Store, StoreError
 from mlg_troubleshoot.store.database import _ADVISORY_LOCK

@@ -22,7 +22,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     label_of,
     split_words,
 )
-from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit
+from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit, reading_order
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,
@@ -39,7 +39,6 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
-from mlg_troubleshoot.records.values import is_no_name
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, with_unit
 
 _FOLLOW_HELP = (
@@ -47,8 +46,8 @@ _FOLLOW_HELP = (
     " open opens it. u takes the last answers back. new: a new inspection of this gear. gear:"
     " another gear. f, r and the words below add an answer."
 )
-_EXAMPLES_IN = {"plunger": 0.041, "margin": 0.028}
 _UNUSUAL = "unusual"
+_YES = ("y", "yes")
 _HOW = {
     ClearanceConvention.RADIAL: "half of a dial reading from limit to limit, or of hole minus pin.",
     ClearanceConvention.DIAMETRAL: "hole by a bore gauge where it is worn most, minus pin by a"
@@ -56,12 +55,13 @@ _HOW = {
     ClearanceConvention.TOTAL_PLAY: "set a dial indicator on the part next to the pin and move the"
     " joint by hand from one stop to the other, across the pin; type the whole reading.",
 }
-_CONVENTION_WORDS = {
+_CONVENTIONS = {
     "radial": ClearanceConvention.RADIAL,
-    "diametral": ClearanceConvention.DIAMETRAL,
-    "play": ClearanceConvention.TOTAL_PLAY,
+    **dict.fromkeys(("diametral", "bore"), ClearanceConvention.DIAMETRAL),
+    **dict.fromkeys(("play", "total", "total_play", "dial", "tir"), ClearanceConvention.TOTAL_PLAY),
 }
-_SPELLINGS = {"total": "play", "dial": "play", "tir": "play", "bore": "diametral"}
+# Questions that Enter leaves open.
+_OPTIONAL = (PLUNGER, *LAST)
 _QUESTIONS = {
     TAIL_NO.name: ("Tail number", "As painted, for example N123AB; N123AB LH names the side too."),
     SIDE.name: ("Side, LH or RH", "LH is the left gear as the pilot sees it, RH the right one."),
@@ -69,7 +69,7 @@ _QUESTIONS = {
     CONVENTION.name: (
         "A clearance reading is: radial, diametral or play",
         "\n".join(
-            f"{word}: {kind.meaning}. {_HOW[kind]}" for word, kind in _CONVENTION_WORDS.items()
+            f"{kind.lower().replace('_', ' ')}: {kind.meaning}. {how}" for kind, how in _HOW.items()
         )
         + "\nDiametral and play are twice radial: the wrong word can reverse the verdict.",
     ),
@@ -102,35 +102,36 @@ class EntryInterruptedError(KeyboardInterrupt):
 class Asker:
     """Asks for one sitting, and for what follows its result.
 
-    order: joints in the order in which NEXT of an entry reads them. visit: the kept state of a
-    gear.
+    visit: the kept state of a gear.
     """
 
     gear: Gear
     screen: Terminal
     saved: SavedEntries
     visit: Callable[[str, Side], Visit | None] = lambda _tail, _side: None
-    order: Callable[[Entry], tuple[int, ...]] = lambda _entry: ()
     entry: Entry = field(init=False)
     _jump: str = ""
     _known: Visit | None = None
+    _unfinished: list[Entry] = field(default_factory=list)
     _day: str = ""
     _messages: set[str] = field(default_factory=set)
 
     def begin(self, given: Mapping[str, str]) -> Entry | Visit:
         """Ask for a new entry with what flags gave already; the visit of a gear that is known."""
-        unfinished, damaged = self.saved.unfinished(self.gear.id)
+        self._unfinished, damaged = self.saved.unfinished(self.gear.id)
         for message in damaged:
             self._once(message)
         self._known = None
         self._day = ""
         self.entry = Entry.new(self.gear, dict(given))
+        if tail := given.get(TAIL_NO.name):
+            self.entry.cells[TAIL_NO.name] = self.entry.accepted(self.gear, TAIL_NO.name, tail)
         with self._interrupted():
             if not {*HEADING[:2]} <= given.keys():
                 self._say(f"{self.gear.name}. Every answer is saved. ? help, u undo, q stop.")
             while not {*HEADING[:2]} <= self.entry.cells.keys():
-                self._turn(self._open(), unfinished)
-            return self._opened(unfinished)
+                self._turn(self._open())
+            return self._opened()
 
     def follow(self, visit: Visit) -> Entry | Visit | str:
         """Ask for what follows a result: another entry, another gear, or a word for what to show;
@@ -144,6 +145,14 @@ class Asker:
         while True:
             try:
                 typed = self._typed("Enter ends", f"{visit.step.how} {_FOLLOW_HELP}".strip())
+                word = typed.lower()
+                if word in ("", "d", "report", "open"):
+                    return word
+                if word == "gear":
+                    return self.begin({})
+                self.entry = self._next_entry(visit, word)
+                if not (word == "new" or (word == "y" and visit.todo) or self._take(typed)):
+                    raise UsageError(f"{typed!r} is not understood", "Type ? for the words.")
             except (EOFError, KeyboardInterrupt):
                 self._say("")
                 return ""
@@ -152,20 +161,10 @@ class Asker:
                     return "u"
                 self._say("   Nothing is left to undo.", "magenta")
                 continue
-            word = typed.lower()
-            if word in ("", "d", "report", "open"):
-                return word
-            if word == "gear":
-                return self.begin({})
-            self.entry = self._next_entry(visit, word)
-            try:
-                is_known = word == "new" or (word == "y" and visit.todo) or self._take(typed)
             except UsageError as error:
                 self._refuse(error)
                 continue
-            if not is_known:
-                self._say(f"   {typed!r} is not understood. Type ? for the words.", "magenta")
-            elif self.entry.typed == [DATE.name]:
+            if self.entry.typed == [DATE.name]:
                 self._day = self.entry.cells[DATE.name]
             elif self.entry.typed and not (self.entry.has_findings or self._jump):
                 return self.entry
@@ -180,31 +179,26 @@ class Asker:
 
     # The course of the questions.
 
-    def _opened(self, unfinished: list[Entry]) -> Entry | Visit:
+    def _opened(self) -> Entry | Visit:
         """Continue the unfinished entry of the gear, show its records, or ask on."""
-        gear = [self.entry.cells[name] for name in HEADING[:2]]
-        if self.entry in unfinished:
+        gear = {name: self.entry.cells[name] for name in HEADING[:2]}
+        begun = [each for each in self._unfinished if each.cells | gear == gear | each.cells]
+        if begun:
+            self._resume(max(begun, key=lambda each: len(each.cells)), gear)
             return self._ask_all()
-        for other in unfinished:
-            if [other.cells.get(name) for name in HEADING[:2]] == gear:
-                self._resume(other)
-                return self._ask_all()
-        self._known = self.visit(gear[0], Side(gear[1]))
+        self._known = self.visit(*self.entry.gear_key)
         if self._known is None:
             return self._ask_all()
         self.saved.discard(self.entry.id)
         return self._known
 
-    def _resume(self, saved: Entry) -> None:
+    def _resume(self, saved: Entry, gear: Mapping[str, str]) -> None:
         self.saved.discard(self.entry.id)
         self.entry = saved
+        saved.cells = {**gear, **saved.cells}
         self._known = self.visit(*saved.gear_key)
-        read = sum(bool(text) for name, text in saved.cells.items() if joint_of(name))
-        self._say(
-            f"Continued: {saved.identity}, begun {saved.started:%Y-%m-%d %H:%M}, {read} joints"
-            " read. new = begin anew.",
-            "green",
-        )
+        begun = f"{saved.started:%Y-%m-%d %H:%M}"
+        self._say(f"Continued: {saved.identity}, begun {begun}. new = begin anew.", "green")
 
     def _next_entry(self, visit: Visit, word: str) -> Entry:
         """An entry that adds to the records of a gear, or a new inspection of it."""
@@ -222,7 +216,7 @@ class Asker:
         while True:
             name = self._open()
             if name:
-                self._turn(name, [])
+                self._turn(name)
                 continue
             try:
                 self.entry.inspection(self.gear)
@@ -247,8 +241,7 @@ class Asker:
             columns += [*FIRST, *self._joints(), *LAST]
         else:
             columns += self.entry.todo
-            if cells.get(RESTORED_JOINTS.name):
-                restored = self._judged(RESTORED_JOINTS.name).restored_joints
+            if restored := self._restored():
                 columns += [REPAIR_DATE, *map(CLEARANCE.header, restored)]
         # A unit is asked for where something is read in it.
         is_reading = self.entry.todo is None or any(map(_is_length, columns[len(HEADING) :]))
@@ -259,26 +252,22 @@ class Asker:
     def _joints(self) -> list[str]:
         """Joints in the order of NEXT, then the critical ones, then as in the gear file."""
         names = [CLEARANCE.header(n) for n in self.gear.joint_numbers]
-        if all(name in self.entry.cells for name in names):
-            return names
-        if not {*FIRST} <= self.entry.cells.keys():
+        known = self.entry.cells.keys()
+        if {*names} <= known or not {*FIRST} <= known:
             return names
         rest = sorted(self.gear.joints, key=lambda joint: not joint.critical)
-        order = (*self.order(self.entry), *(joint.number for joint in rest))
+        order = (*reading_order(self.gear, self.entry), *(joint.number for joint in rest))
         return [CLEARANCE.header(n) for n in dict.fromkeys(order)]
 
-    def _turn(self, name: str, unfinished: list[Entry]) -> None:
+    def _turn(self, name: str) -> None:
         """Ask one question and take what is typed."""
         prompt, help_text = self._question(name)
-        if name == TAIL_NO.name and unfinished:
-            prompt += f" (Enter continues {unfinished[0].identity})"
         try:
             typed = self._typed(prompt, help_text)
-            if name == TAIL_NO.name and not typed and unfinished:
-                self._resume(unfinished[0])
-            elif typed.lower() == "new" and self.entry.typed:
+            if typed.lower() == "new" and self.entry.typed:
                 self.saved.discard(self.entry.id)
-                kept = {key: self.entry.cells[key] for key in HEADING[:2]}
+                cells = self.entry.cells
+                kept = {name: cells[name] for name in HEADING[:2] if name in cells}
                 self.entry = Entry.new(self.gear, kept)
             else:
                 self._answer(name, typed)
@@ -295,7 +284,6 @@ class Asker:
         name = self.entry.typed[-1]
         text = self.entry.cells.pop(name)
         self._jump = ""
-        self.entry.confirmed = [each for each in self.entry.confirmed if each != name]
         self._say(f"– undone: {label_of(name)} {text or 'no answer'}", "magenta")
 
     def _answer(self, name: str, typed: str) -> None:
@@ -312,77 +300,48 @@ class Asker:
         # One letter at the heading is a slip, not an outcome.
         no_words = name in (TAIL_NO.name, *LAST) or (name in HEADING and len(typed) == 1)
         if no_words or not self._take(typed):
-            special = getattr(self, f"_answer_{name}", None)
-            if special is not None:
-                special(typed)
-            elif joint_of(name):
-                self._answer_joint(name, typed)
-            else:
-                self._answer_column(name, typed)
+            self._answer_question(name, typed or self._enters(name))
 
-    def _answer_tail_no(self, typed: str) -> None:
-        text = typed.upper()
-        first, _, last = text.rpartition(" ")
+    def _answer_question(self, name: str, text: str) -> None:
+        if joint_of(name):
+            self._answer_joint(name, text)
+        elif name in _OPTIONAL and not text:
+            self.entry.give(name, "")
+        elif not text:
+            raise UsageError("Enter alone is not an answer", "Type the answer, or u to go back.")
+        elif name == TAIL_NO.name:
+            self._answer_tail(text)
+        elif name in HEADING[2:]:
+            self._answer_unit(text)
+        elif name == _UNUSUAL:
+            if text.lower() not in _YES:
+                raise UsageError(f"{text!r} is not understood", "Type y, #3 13 or p 41.")
+            self.entry.give(SMALL_READINGS_TRUE.name, "yes")
+        else:
+            self._give([(name, text)])
+
+    def _answer_tail(self, typed: str) -> None:
+        first, _, last = typed.rpartition(" ")
         side = Side.spelt(last) if first else None
-        tail = first if side else text
-        if is_no_name(tail):
-            raise UsageError(f"{typed!r} is not a tail number", "Type for example N123AB.")
-        self.entry.judge(self.gear, TAIL_NO.name, tail)
-        self.entry.give(TAIL_NO.name, tail)
-        if side is not None:
-            self.entry.give(SIDE.name, side.value)
-
-    def _answer_side(self, typed: str) -> None:
-        side = Side.spelt(typed)
-        if side is None:
-            raise UsageError(f"{typed!r} is not a side", "Type LH for the left gear or RH.")
-        self.entry.give(SIDE.name, side.value)
+        words = [(TAIL_NO.name, first if side else typed)]
+        self._give(words + [(SIDE.name, last)] * bool(side))
 
     def _answer_unit(self, typed: str) -> None:
-        """Take a unit, a convention or both; Enter takes those of the last entry."""
+        """Take a unit, a convention or both; what is not typed is that of the last entry."""
         offered = self.saved.offered()
         found = {name: offered[name] for name in HEADING[2:] if name in offered}
-        if not typed and not found:
-            raise UsageError("Enter alone is not an answer", "Type in, thou or mm.")
-        for word in typed.lower().replace("total play", "play").split():
-            kinds = [k for w, k in _CONVENTION_WORDS.items() if _SPELLINGS.get(word, word) == w]
-            if word.upper() == "TOTAL_PLAY" or kinds:
-                found[CONVENTION.name] = (kinds or [ClearanceConvention.TOTAL_PLAY])[0].value
+        before = f" (last time: {', '.join(map(_plain, found.values()))})" * bool(found)
+        for word in typed.lower().replace(",", " ").split():
+            if word in _CONVENTIONS:
+                found[CONVENTION.name] = _CONVENTIONS[word].value
             else:
                 found[UNIT.name] = LengthUnit.parse(word).value
-        if UNIT.name not in found:
+        if UNIT.name not in {**self.entry.cells, **found}:
             raise UsageError("the unit is still missing", "Type in, thou or mm.")
         for name, text in found.items():
             self.entry.give(name, text)
-        if typed and found != offered:
-            said = f"   Readings are in {self.entry.unit}"
-            kind = f", {_plain(self.entry.convention)}" * (CONVENTION.name in found)
-            was = [offered[name] for name in HEADING[2:] if name in offered]
-            before = f" (last time: {', '.join(map(_plain, was))})" * bool(was)
-            self._say(f"{said}{kind}{before}.", "magenta" if was else "")
-
-    def _answer_clearance_convention(self, typed: str) -> None:
-        word = _SPELLINGS.get(typed.lower().replace("_", " ").split(" ")[0], typed.lower())
-        if word not in _CONVENTION_WORDS:
-            raise UsageError(f"{typed!r} is not known", "Type radial, diametral or play.")
-        self.entry.give(CONVENTION.name, _CONVENTION_WORDS[word].value)
-
-    def _answer_unusual(self, typed: str) -> None:
-        if typed.lower() not in ("y", "yes"):
-            raise UsageError(f"{typed!r} is not understood", "Type y, #3 13 or p 41.")
-        self.entry.give(SMALL_READINGS_TRUE.name, "yes")
-
-    def _answer_column(self, name: str, typed: str) -> None:
-        """Take the answer to a question that has a default or may be left open."""
-        text = typed or self._enters(name)
-        if name == OUTCOME.name:
-            raise UsageError(f"{typed!r} is not an answer", "Type r, f or n.")
-        if text:
-            self._give([(name, text)])
-        elif name in (RESTORED_JOINTS.name, RIGGING_CHECKED.name):
-            raise UsageError("Enter alone is not an answer", "Type the answer, or u to go back.")
-        else:
-            self.entry.give(name, "")
+        known = [self.entry.cells[name] for name in HEADING[2:] if name in self.entry.cells]
+        self._say(f"   Readings are in {', '.join(map(_plain, known))}{before}.")
 
     def _answer_joint(self, name: str, typed: str) -> None:
         """Take a clearance; one that can hardly be is confirmed."""
@@ -392,22 +351,20 @@ class Asker:
             self.entry.give(name, "")
             self._say(f"– #{number} not read", "dim")
             return
-        self.entry.judge(self.gear, name, typed)
         read, said = self.entry.judge(self.gear, name, with_unit(typed, self.entry.unit))
-        if said:
-            self._jump = name
-            self._say(f"#{number}: {said}", "magenta")
-            again = self._typed(f"y = it is right, or #{number} again", said)
-            if again.lower() not in ("y", "yes"):
-                second = None if split_words(again) else self.entry.judge(self.gear, name, again)
-                if second is None or second[0].clearance_in != read.clearance_in:
-                    self._answer(name, again)
-                    return
-            self.entry.confirmed.append(name)
+        if said and (again := self._instead(f"#{number}: {said}", typed)):
+            self._answer(name, again)
+            return
         self._jump = ""
         entered = read.entered.get(number)
         self.entry.give(name, str(entered) if entered else "")
         self._echo(number, read)
+
+    def _instead(self, said: str, typed: str) -> str:
+        """Say what is unusual; what is typed instead of it, empty if it is right."""
+        self._say(said, "magenta")
+        again = self._typed("y = it is right; or type it again", said)
+        return "" if again.lower() in (*_YES, typed.lower()) else again
 
     # Lines of words.
 
@@ -433,25 +390,24 @@ class Asker:
         """Give columns, and say what was taken."""
         before = {**self.entry.cells}
         taken = self.entry.take(self.gear, words)
-        if PLUNGER in taken and not self._is_sure_of_plunger():
+        said = self._too_far() if PLUNGER in taken else ""
+        if said and (again := self._instead(said, "")):
             self.entry.cells = before
+            self._give([(PLUNGER, again)])
             return
-        said = (f"{column_of(name).said} {self.entry.cells[name] or 'none'}" for name in taken)
-        self._say(f"✓ {', '.join(said)}", "green")
+        given = (f"{column_of(name).said} {self.entry.cells[name] or 'none'}" for name in taken)
+        self._say(f"✓ {', '.join(given)}", "green")
 
-    def _is_sure_of_plunger(self) -> bool:
-        """Confirm a plunger reading beyond what all joints at their limits could cause."""
+    def _too_far(self) -> str:
+        """What is said of a plunger reading beyond what all joints at their limits could cause."""
         readings_in = self._judged(PLUNGER).readings_in
         most_in = float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
         if max(map(abs, readings_in)) <= most_in:
-            return True
-        self._say(
+            return ""
+        return (
             f"Plunger {self.entry.cells[PLUNGER]}: all joints at their limits could move it"
-            f" {self._length(most_in)} at most.",
-            "magenta",
+            f" {self._length(most_in)} at most."
         )
-        again = self._typed("y = it is right; anything else: asked again", "")
-        return again.lower() in ("y", "yes")
 
     def _judged(self, name: str) -> Inspection:
         return self.entry.judge(self.gear, name, self.entry.cells[name])[0]
@@ -491,7 +447,9 @@ class Asker:
         return prompt, "\n".join(filter(None, lines))
 
     def _enters(self, name: str) -> str:
-        """What Enter answers."""
+        """What Enter answers: for a tail number, the gear of the last unfinished entry."""
+        if name == TAIL_NO.name:
+            return self._unfinished[0].identity if self._unfinished else ""
         if name == UNIT.name:
             found = self.saved.offered()
             known = [_plain(found[each]) for each in HEADING[2:] if each in found]
@@ -511,19 +469,19 @@ class Asker:
         found = [self.entry.unit_question(self.gear)]
         for name, text in self.entry.cells.items():
             number = joint_of(name)
-            if number and text and self._known and name not in self.entry.confirmed:
+            if number and text and self._known:
                 was_in = self._known.row.clearance_in.get(number)
                 is_in = self._judged(name).clearance_in[number]
                 # Two combined standard uncertainties of the readings.
                 apart_in = 2.0 * math.sqrt(2.0) * self._known.row.gauge_u_of(number)
-                if was_in and is_in < was_in - apart_in and not self._is_restored(number):
+                if was_in and is_in < was_in - apart_in and number not in self._restored():
                     last = self._known.last[number]
                     found.append(f"#{number} {text} is tighter than {last}: restored?")
         return " ".join(filter(None, found))
 
-    def _is_restored(self, number: int) -> bool:
+    def _restored(self) -> tuple[int, ...]:
         given = self.entry.cells.get(RESTORED_JOINTS.name)
-        return bool(given) and number in self._judged(RESTORED_JOINTS.name).restored_joints
+        return self._judged(RESTORED_JOINTS.name).restored_joints if given else ()
 
     def _echo(self, number: int, read: Inspection) -> None:
         joint = self.gear.joint(number)
@@ -562,9 +520,7 @@ class Asker:
                 return typed
 
     def _word_help(self) -> str:
-        unit = self.entry.unit
-        examples = {name: f"{unit.from_inches(x):.3g}" for name, x in _EXAMPLES_IN.items()}
-        rows = [f"  {f'{w} {e}'.format(**examples):<26}{meaning}" for w, _, e, meaning in WORDS]
+        rows = (f"  {f'{w} {example}':<26}{meaning}" for w, _, example, meaning in WORDS)
         return "\n".join(("At any question:", *rows))
 
     def _refuse(self, error: UsageError) -> None:

@@ -58,7 +58,7 @@ OUTCOMES = {"f": "FAILED", "failed": "FAILED", "r": "RETRACTED", "retracted": "R
 OUTCOMES |= {"n": "", "not tried": ""}
 # What is typed at any prompt: the word, its column, an example, and what it says.
 WORDS = (
-    ("plunger", PLUNGER, "{plunger}", "a plunger reading, + over-travel; also p"),
+    ("plunger", PLUNGER, "0.041 in", "a plunger reading, + over-travel; also p"),
     ("date", DATE.name, "20 Nov", "the day of what is typed here; else today"),
     ("landings", LANDINGS.name, "4000", "landings since overhaul"),
     ("order", WORK_ORDER.name, "WO-17", "the work order"),
@@ -66,7 +66,7 @@ WORDS = (
     ("rigging", RIGGING_CHECKED.name, "yes", "rigging and roller checked; or corrected"),
     ("cannot reach", "cannot_reach", "3 5", "joints out of reach today; none: in reach"),
     ("no spare", "no_spare", "3", "joints without a spare today; none: at hand"),
-    ("margin", MARGIN.name, "{margin}", "this gear's own margin, as found at rigging"),
+    ("margin", MARGIN.name, "0.028 in", "this gear's own margin, as found at rigging"),
     ("temperature", TEMPERATURE.name, "21", "degrees Celsius"),
     ("pressure", PRESSURE.name, "3000", "hydraulic pressure, psi"),
     ("name", TECHNICIAN_ID.name, "J. Smith", "who measured"),
@@ -101,7 +101,6 @@ class Entry(msgspec.Struct, kw_only=True):
     cells: dict[str, str] = {}
     given: list[str] = []
     todo: list[str] | None = None
-    confirmed: list[str] = []
 
     @classmethod
     def new(cls, gear: Gear, cells: dict[str, str], todo: list[str] | None = None) -> Entry:
@@ -197,11 +196,7 @@ class Entry(msgspec.Struct, kw_only=True):
 
     def inspection(self, gear: Gear) -> Inspection:
         """What was typed, as one inspection."""
-        read = admit(self.row(), ReadOptions.of(gear, asks=True))
-        names = ", ".join(f"#{joint_of(name)}" for name in self.confirmed if name in self.cells)
-        if not names:
-            return read
-        return replace(read, warnings=(*read.warnings, f"asked again and confirmed: {names}"))
+        return admit(self.row(), ReadOptions.of(gear, asks=True))
 
     def _repair(self) -> list[str]:
         """The columns that state a repair."""
@@ -251,7 +246,7 @@ class Entry(msgspec.Struct, kw_only=True):
         taken: dict[str, str] = {}
         for name, typed in words:
             text, _, day = typed.partition(" on ") if name in DAY_OF else (typed, "", "")
-            taken[name] = self._accepted(gear, name, text, taken.get(name, ""))
+            taken[name] = self.accepted(gear, name, text, taken.get(name, ""))
             if day:
                 taken[DAY_OF[name]] = day_of(day, self.started.date())
         for name in taken:
@@ -260,7 +255,7 @@ class Entry(msgspec.Struct, kw_only=True):
             self.give(name, text)
         return [*taken]
 
-    def _accepted(self, gear: Gear, name: str, typed: str, earlier: str) -> str:
+    def accepted(self, gear: Gear, name: str, typed: str, earlier: str = "") -> str:
         """A text of a column as it is kept; a plunger reading stands after an `earlier` one."""
         column = column_of(name)
         if not typed and name != OUTCOME.name:
@@ -271,9 +266,9 @@ class Entry(msgspec.Struct, kw_only=True):
             return Side.parse(typed).value
         if typed.lower() == "none" and name in ("cannot_reach", "no_spare"):
             return ""
-        if typed:
-            self.judge(gear, name, typed)
         if not column.is_length:
+            if typed:
+                self.judge(gear, name, typed)
             return typed.upper() if name == TAIL_NO.name else typed
         lengths = [with_unit(each.strip(), self.unit) for each in typed.split(";")]
         self.judge(gear, name, "; ".join(lengths))

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
-from rich.padding import Padding
 
 from mlg_troubleshoot.cli.output import console, word
 from mlg_troubleshoot.cli.output import text as data_text
@@ -125,8 +124,7 @@ def continued(known: Visit, row: Inspection, entry: Entry) -> Inspection:
     again = row.clearance_in.keys() & known.joints if is_again else ()
     more = {name: getattr(known.row, name) for name in stands}
     # What the reader of a row alone misses in it stands in other visits.
-    said = tuple(each for each in row.warnings if each.startswith("asked again"))
-    return replace(row, measured_again=tuple(sorted(again)), warnings=said, **more)
+    return replace(row, measured_again=tuple(sorted(again)), warnings=(), **more)
 
 
 def reading_order(gear: Gear, entry: Entry) -> tuple[int, ...]:
@@ -232,15 +230,11 @@ class Terminal:
 
     def __init__(self) -> None:
         self._console = console(to_stderr=True)
+        self._console.width = min(self._console.width, _WIDEST)
         self._edits = sys.stdout.isatty() and _edits_lines()
 
     def say(self, text: str, style: str = "") -> None:
-        """Show lines; long ones are wrapped below their own beginning."""
-        width = min(self._console.width, _WIDEST)
-        for each in text.split("\n"):
-            indent = len(each) - len(each.lstrip())
-            shown = Padding(data_text(each.strip(), style), (0, 0, 0, indent), expand=False)
-            self._console.print(shown, width=width)
+        self._console.print(data_text(text, style))
 
     def ask(self, prompt: str) -> str:
         """Ask for one line, with the arrow keys where the terminal and the library can."""

@@ -1,38 +1,29 @@
 """A batch: one line per gear, worst first.
 
-What the views share: verdicts in colour and shape, the plan in words, tables without rules.
+What the views share: verdicts in colour and shape.
 
 Notes and problems of the input, on stderr.
 """
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 
 from rich.text import Text
 
 from mlg_troubleshoot.cli import output
-from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, word
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Step, Verdict, VerdictTone
+from mlg_troubleshoot.cli.output import DataConsole, print_table, word
+from mlg_troubleshoot.decision.assessment import Verdict, VerdictTone
 from mlg_troubleshoot.decision.judge_rows import Listed, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.errors import Problem, ProblemGroup, grouped
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import Sentence
 
 TONES = {
     VerdictTone.RED: "bold red",
     VerdictTone.AMBER: "bold yellow",
     VerdictTone.GREEN: "bold green",
-}
-STYLES = {
-    Verdict.INVALID: "bold magenta",
-    Verdict.OUTSIDE_MARGIN: "bold red",
-    Verdict.INCOMPLETE: "bold yellow",
-    Verdict.WITHIN_MARGIN: "bold green",
-    Verdict.INCONCLUSIVE: "bold yellow",
 }
 # A shape for each verdict: it must be readable without colour.
 MARKS = {
@@ -43,32 +34,6 @@ MARKS = {
     Verdict.INCONCLUSIVE: "~",
 }
 Cell = str | Text
-
-
-def next_words(judgement: Judgement) -> str:
-    """Say what to do next, and how long it takes where it takes any time."""
-    step = judgement.next_action
-    minutes = f" ({step.minutes:.0f} min)" if step.minutes else ""
-    return Sentence.of("NEXT{}: {}", minutes, step.text)
-
-
-def what_follows(a: Assessment) -> str | None:
-    """Say what the plan expects after its first step, and where it ends; None if nothing
-    follows.
-    """
-    if len(a.plan.steps) < 2:
-        return None
-
-    def words(step: Step) -> str:
-        return step.words + f" ({step.minutes:.0f} min)" * bool(step.minutes)
-
-    rest = [words(step) for step in a.plan.steps[1:-1]]
-    return Sentence.of(
-        "Expected after that: {}{}{}",
-        ", ".join(rest),
-        ". At the end: " if rest else "",
-        a.plan.steps[-1].text,
-    )
 
 
 def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole) -> None:
@@ -82,25 +47,16 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole) -> None:
     if earlier:
         known = {(line.tail_no, line.side) for line in lines if line.tail_no and line.side}
         gears = "1 gear" if len(known) == 1 else f"{len(known)} gears"
-        alone = any(lines[place].day is None for place in latest)
-        days = Counter((line.tail_no, line.side, line.day) for line in lines if line.day)
-        worst = ", of several on one day the worst" if max(days.values()) > 1 else ""
-        also = ", and every row that is undated or invalid" if alone else ""
         screen.print(
-            f"{gears}, the latest inspection of each{worst}{also}; --csv or --json lists every one."
+            f"{gears}, the latest inspection of each (or the worst of its day); --csv or --json"
+            " lists every one."
         )
     ordered = [lines[place] for place in latest]
-    headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance>", "next"]
-    wide = screen.width >= WIDE
-    if wide or any(line.day is None for line in ordered):
-        headings.insert(5, "record")
-    if wide:
-        headings.insert(-2, f"margin {screen.unit}")
-    rows = []
-    for line in ordered:
-        cells = _cells(line, screen)
-        rows.append([cells[re.split("[ >]", heading)[0]] for heading in headings])
-    spare = ("chance", "date", "record")
+    margin = f"margin {screen.unit}"
+    headings = ["", "verdict", "tail", "side", "date", "record", f"worst {screen.unit}"]
+    headings += [margin, "chance>", "next"]
+    spare = (margin, "record", "chance", "date")
+    rows = [_cells(line, screen) for line in ordered]
     print_table(screen, headings, rows, spare, "--csv or --json lists all of them")
     worn = Counter(joint for line in ordered for joint in line.over_limit)
     if worn:
@@ -119,26 +75,24 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole) -> None:
 _SHORT = {"OUTSIDE MARGIN, MEASURED": "OUT, MEASURED", "COULD BE OUTSIDE": "COULD BE OUT"}
 
 
-def _cells(line: Listed, screen: DataConsole) -> dict[str, Cell]:
-    style = TONES[line.tone]
-    cells: dict[str, Cell] = {
-        "": MARKS[line.verdict],
-        "verdict": Text(_SHORT.get(line.title, line.verdict.value.split("_")[0]), style=style),
-        "tail": word(line.tail_no),
-        "side": str(line.side or "?"),
-        "record": word(line.record_id),
-        "next": line.in_brief,
-        **dict.fromkeys(("date", "worst", "margin", "chance"), "-"),
-    }
-    if line.margin_in is not None:
-        cells["date"] = "-" if line.day is None else line.day.isoformat()
-        if line.worst_in is not None:
-            cells["worst"] = screen.length(line.worst_in)
-        elif line.chance is None:
-            cells["worst"] = "open"
-        cells["margin"] = screen.length(line.margin_in)
-        cells["chance"] = "-" if line.chance is None else percent(line.chance)
-    return cells
+def _cells(line: Listed, screen: DataConsole) -> list[Cell]:
+    def length(value_in: float | None) -> str:
+        return "-" if value_in is None else screen.length(value_in)
+
+    title = _SHORT.get(line.title, line.verdict.value.split("_")[0])
+    is_open = line.margin_in is not None and line.worst_in is None and line.chance is None
+    return [
+        MARKS[line.verdict],
+        Text(title, style=TONES[line.tone]),
+        word(line.tail_no),
+        str(line.side or "?"),
+        str(line.day or "-"),
+        word(line.record_id),
+        "open" if is_open else length(line.worst_in),
+        length(line.margin_in),
+        "-" if line.chance is None else percent(line.chance),
+        line.in_brief,
+    ]
 
 
 _LINES_OF_PROBLEMS = 40
@@ -148,14 +102,13 @@ _FILES = 6
 
 def show_notes(notes: Sequence[str]) -> None:
     """Show notes on stderr; of many the first and the last, which are about the whole."""
-    folded = len(notes) - sum(_LINES_OF_NOTES)
-    first, last = (_LINES_OF_NOTES[0], -_LINES_OF_NOTES[1]) if folded > 1 else (len(notes), None)
-    for note in notes[:first]:
+    first, last = _LINES_OF_NOTES
+    hidden = len(notes) - first - last
+    if hidden > 1:
+        more = f"{hidden} more notes; --json lists all of them."
+        notes = [*notes[:first], more, *notes[-last:]]
+    for note in notes:
         output.say(f"Note: {note}")
-    if last is not None:
-        output.say(f"… and {folded} more notes; --json lists all of them.")
-        for note in notes[last:]:
-            output.say(f"Note: {note}")
 
 
 def show_problems(problems: Sequence[Problem]) -> None:

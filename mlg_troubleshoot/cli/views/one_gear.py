@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, show_page, text, word
-from mlg_troubleshoot.cli.views.batch import (
-    MARKS,
-    TONES,
-    next_words,
-    what_follows,
-)
-from mlg_troubleshoot.decision.assessment import Action, Assessment, JointFinding, Judgement
+from mlg_troubleshoot.cli.views.batch import MARKS, TONES
+from mlg_troubleshoot.decision.assessment import Action, Assessment, Judgement, Step
 from mlg_troubleshoot.decision.sentences import chance_wrong_sentence, rigging_sentence
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention
+from mlg_troubleshoot.units import ClearanceConvention, Sentence
 
-# Joints that are listed at least and at most. [1]
-_JOINTS = 3, 5
+# Joints that are listed. [1]
+_JOINTS = 3
 # Lines of one gear, so that a terminal of 24 has room for the question below. [1]
 _LINES = 20
 _DISCLAIMER = "Troubleshooting aid, not maintenance data; not an approval for return to service."
@@ -44,9 +39,8 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
     if isinstance(judgement, Assessment) and detail:
         _show_detail(judgement, gear, screen)
     elif isinstance(judgement, Assessment):
-        joints = min(max(room - 2 - lines_of(notes), _JOINTS[0]), _JOINTS[1])
-        _show_joints(judgement, screen, detail=False, most=joints)
-        room -= joints + 2
+        _show_joints(judgement, screen, _JOINTS)
+        room -= _JOINTS + 2
     shown = len(notes)
     while not detail and lines_of(notes[:shown]) > max(room, 0):
         shown -= 1
@@ -62,59 +56,59 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
 
 def _body(judgement: Judgement, screen: DataConsole) -> list[Text]:
     """NEXT, and what follows it."""
-    lines = [(next_words(judgement), "bold")]
+    step = judgement.next_action
+    lines: list[tuple[str, str]] = [(Sentence.of("NEXT{}: {}", _minutes(step), step.text), "bold")]
     if isinstance(judgement, Assessment):
-        follows = what_follows(judgement)
-        lines += [(follows, "")] if follows is not None else []
         question = judgement.plan.open_question
-        lines += [(f"OPEN: {question}", "bold")] if question is not None else []
-    return [text(screen.said(said), style) for said, style in lines]
+        lines += [
+            (_what_follows(judgement.plan.steps), ""),
+            (f"OPEN: {question}" if question else "", "bold"),
+        ]
+    return [text(screen.said(said), style) for said, style in lines if said]
 
 
-def _show_joints(
-    a: Assessment, screen: DataConsole, *, detail: bool, most: int | None = None
-) -> None:
-    """Show the joints in the order to read them: the first few, or all that is known of each."""
+def _minutes(step: Step) -> str:
+    return f" ({step.minutes:.0f} min)" * bool(step.minutes)
+
+
+def _what_follows(steps: Sequence[Step]) -> str:
+    """What the plan expects after its first step, and where it ends; empty if nothing follows."""
+    if len(steps) < 2:
+        return ""
+    rest = ", ".join(f"{step.words}{_minutes(step)}" for step in steps[1:-1])
+    between = ". At the end: " if rest else ""
+    return Sentence.of("Expected after that: {}{}{}", rest, between, steps[-1].text)
+
+
+def _show_joints(a: Assessment, screen: DataConsole, most: int | None = None) -> None:
+    """Show the joints in the order to read them, with a limit or without: so many."""
     row = a.inspection
     first = a.next_action
     to_read = first.joints if first.action in (Action.MEASURE, Action.MEASURE_AGAIN) else ()
-    order = {number: place for place, number in enumerate(() if detail else to_read)}
+    order = {number: place for place, number in enumerate(to_read)}
     listed = sorted(a.ranked, key=lambda f: order.get(f.joint, len(order)))
     joint = "inspect in this order" if order else "joints, by contribution"
-    columns: dict[str, Callable[[JointFinding], str]] = {
-        "rank>" if detail else ">": lambda f: str(f.rank if detail else listed.index(f) + 1),
-        joint: lambda f: f"#{f.joint} {f.name}" + " OVER LIMIT" * f.over_limit,
-    }
-    if row.convention is not ClearanceConvention.RADIAL and not detail:
-        kind = row.convention.lower().replace("_", " ")
-        columns[f"typed,\n{kind}>"] = lambda f: str(row.entered.get(f.joint, "-"))
-    columns[f"radial\n{screen.unit}>"] = lambda f: (
-        "unmeasured" if f.clearance_in is None else screen.length(f.clearance_in)
-    )
-    # A narrow terminal leaves the limit to the short view, for the sake of the names.
-    if not detail or screen.width >= WIDE:
-        columns[f"limit\n{screen.unit}>"] = lambda f: screen.length(f.limit_in)
-    columns[f"contri-\nbutes {screen.unit if detail else ''}".strip() + ">"] = lambda f: (
-        "-" if f.contribution_in is None else screen.length(f.contribution_in)
-    )
-    if detail:
-        columns["S\nfirst>"] = lambda f: f"{f.first_order:.3f}"
-        columns["S\ntotal>"] = lambda f: f"{f.total_order:.3f}"
-        columns["ampli-\nfication>"] = lambda f: f"{f.plunger_amplification:.2f}"
-        columns["rank\nrange>"] = lambda f: "-".join(map(str, dict.fromkeys(f.rank_range)))
-    rows = [
-        [text(cell(f), "bold" if f.over_limit else "") for cell in columns.values()]
-        for f in listed[:most]
-    ]
-    spare = ("rank\nrange", "S\nfirst", "S\ntotal")
-    print_table(screen, [*columns], rows, spare, folded=joint)
+    is_radial = row.convention is ClearanceConvention.RADIAL
+    kind = row.convention.lower().replace("_", " ")
+    unit = screen.unit
+    headings = [">", joint, f"typed,\n{kind}>", f"radial\n{unit}>", f"limit\n{unit}>"]
+    rows = []
+    for place, f in enumerate(listed[:most], 1):
+        cells = (
+            str(place),
+            f"#{f.joint} {f.name}" + " OVER LIMIT" * f.over_limit,
+            "-" if is_radial else str(row.entered.get(f.joint, "-")),
+            "unmeasured" if f.clearance_in is None else screen.length(f.clearance_in),
+            screen.length(f.limit_in),
+            "-" if f.contribution_in is None else screen.length(f.contribution_in),
+        )
+        rows.append([text(cell, "bold" if f.over_limit else "") for cell in cells])
+    print_table(screen, [*headings, "contri-\nbutes>"], rows, (), folded=joint)
 
 
 def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
-    """Everything that is known: all joints with their indices, repairs, re-rigging, the uncertainty
-    budget.
-    """
-    _show_joints(a, screen, detail=True)
+    """All joints, repairs, re-rigging, the uncertainty budget; the report has the indices."""
+    _show_joints(a, screen)
     restored = {number for each in a.repair_sets or () for number in each.joints}
     pairs = (" = ".join(map("#{}".format, group)) for group in gear.link_groups if len(group) > 1)
     show_page(
