@@ -101,9 +101,7 @@ def test_help_loads_no_more_than_a_command_line_needs(asked: list[str]) -> None:
 
 
 @pytest.mark.parametrize("output", [[], ["--json"], ["--detail"]])
-def test_a_check_of_one_file_loads_no_library_room_or_command_that_it_does_not_use(
-    output: list[str],
-) -> None:
+def test_a_check_of_one_file_loads_no_library_room_or_command_that_it_does_not_use(output):
     loaded = modules_of(*ONE_GEAR, *output)
     # What stands behind a verdict is a template.
     used = CHECK | ({"jinja2", "markupsafe"} if output == ["--detail"] else set())

@@ -375,9 +375,7 @@ def test_the_sentence_of_a_cause_stands_in_the_json() -> None:
 
 
 @pytest.mark.parametrize("share", [0.85, 1.15])
-def test_a_gauge_that_is_wrong_in_all_rows_is_an_alias_of_the_calibration_rate(
-    share: float,
-) -> None:
+def test_a_gauge_that_is_wrong_in_all_rows_is_an_alias_of_the_calibration_rate(share):
     frame = mlg.read_inspections(DATA / "measured_nothing_wrong.csv")
     readings = [name for name in frame.columns if name.startswith("plunger_displacement")]
     frame[readings] *= share

@@ -23,9 +23,7 @@ def test_a_file_under_a_file_cannot_be_written(tmp_path: Path) -> None:
         write_csv(tmp_path / "file" / "o.csv", ["a"], [])
 
 
-def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
     target = tmp_path / "kept.toml"
     target.write_text("old")
 
@@ -120,9 +118,7 @@ def test_no_text_splits_into_a_formula_whatever_the_separator(separator: str, si
     )
 )
 @settings(max_examples=400, deadline=None)
-def test_no_field_starts_with_a_formula_sign_whichever_separator_it_is_read_with(
-    rows: list[list[str | float]],
-) -> None:
+def test_no_field_starts_with_a_formula_sign_whichever_separator_it_is_read_with(rows):
     text = csv_lines([["id"], *(["R1", *row] for row in rows)])
     for separator in SEPARATORS:
         for field in fields(text, separator):
@@ -155,9 +151,7 @@ def test_an_output_that_is_an_input_is_refused(tmp_path: Path, name: str) -> Non
         claim_outputs([tmp_path / "in.csv"], [("--csv", f"{tmp_path}/{name}")], force=True)
 
 
-def test_an_output_in_an_input_folder_is_refused_where_it_is_one_of_its_files(
-    tmp_path: Path,
-) -> None:
+def test_an_output_in_an_input_folder_is_refused_where_it_is_one_of_its_files(tmp_path):
     (tmp_path / "a.csv").write_text("x")
     with pytest.raises(UsageError):
         claim_outputs([tmp_path], [("--csv", tmp_path / "a.csv")], force=True)

@@ -34,9 +34,7 @@ def release(gear: Gear, n: int = 401) -> tuple[np.ndarray, np.ndarray]:
 
 
 class TestSection2TargetSystem:
-    def test_the_length_of_the_retraction_actuator_is_the_most_reduced_at_down_lock(
-        self, gear: Gear
-    ) -> None:
+    def test_the_length_of_the_retraction_actuator_is_the_most_reduced_at_down_lock(self, gear):
         """2.1: "The length of the retraction actuator is the most reduced when in the Down Lock
         state."
         """
@@ -76,9 +74,7 @@ class TestSection2TargetSystem:
         assert gear.cycle is not None
         assert len({(state.plunger, state.flow) for state in gear.cycle.valve}) == 6
 
-    def test_a_total_order_index_is_never_less_than_the_first_order_index(
-        self, table: IndexTable
-    ) -> None:
+    def test_a_total_order_index_is_never_less_than_the_first_order_index(self, table):
         """2.3: "Total-order index is a value that considers the interaction, and first-order index
         is the one that does not."
         """
@@ -86,9 +82,7 @@ class TestSection2TargetSystem:
 
 
 class TestSection3Modelling:
-    def test_a_joint_is_located_from_two_others_their_distances_and_the_plane(
-        self, gear: Gear
-    ) -> None:
+    def test_a_joint_is_located_from_two_others_their_distances_and_the_plane(self, gear):
         """3.1: "if we know the distance between these points, then we can coordinate the last node
         C" (Eq. 6).
         """
@@ -99,9 +93,7 @@ class TestSection3Modelling:
         located = locate_joint(at["3"], at["4"], *lengths, np.array([0.0, 0.0, sign]))
         assert located == pytest.approx(at["5"], abs=1e-12)
 
-    def test_there_are_ten_clearances_numbered_in_the_order_of_the_mechanism(
-        self, gear: Gear
-    ) -> None:
+    def test_there_are_ten_clearances_numbered_in_the_order_of_the_mechanism(self, gear):
         """3.2: "we selected a total of ten clearance input points"."""
         assert gear.joint_numbers == NUMBERS
 
@@ -119,9 +111,7 @@ class TestSection3Modelling:
             (pivot.x + 0.003, pivot.y - 0.002)
         )
 
-    def test_joint_b_is_at_link_ab_from_a_moved_in_parallel_and_at_link_bc_from_c(
-        self, gear: Gear
-    ) -> None:
+    def test_joint_b_is_at_link_ab_from_a_moved_in_parallel_and_at_link_bc_from_c(self, gear):
         """3.2: "B** was at a distance of link AB from A** and at a distance of link BC from C*"
         (Fig. 8b).
         """
@@ -169,9 +159,7 @@ class TestSection3Modelling:
         ratio = worst_case(gear.model, small).magnitude_in / 1e-4
         assert ratio == pytest.approx(gear.model.plunger_amplification(), rel=2e-3)
 
-    def test_the_product_of_the_stages_is_the_plunger_amplification(
-        self, growth: Amplification
-    ) -> None:
+    def test_the_product_of_the_stages_is_the_plunger_amplification(self, growth):
         """3.3, Eq. 9: "multiplying amplification indices suitable for the order of mechanisms".
 
         Not for the fixed pivots #4 and #8, to which Eq. 10 does not apply: there to 4 % only.
@@ -181,9 +169,7 @@ class TestSection3Modelling:
         assert growth.local_plunger[movable] == pytest.approx(exact[movable], rel=1e-6)
         assert growth.local_plunger == pytest.approx(exact, rel=0.04)
 
-    def test_current_clearance_is_never_less_than_one_so_joint_one_needs_a_lever(
-        self, growth: Amplification
-    ) -> None:
+    def test_current_clearance_is_never_less_than_one_so_joint_one_needs_a_lever(self, growth):
         """3.3: "the amplification index can be approximated as csc θ", against 0.84 for #1 in
         4.3.
         """
@@ -199,9 +185,7 @@ class TestSection4Results:
         assert gear.down_lock_range == (0.01, 0.05)
         assert float(gear.model.plunger(gear.reference.stroke[0])) == pytest.approx(0.03, abs=1e-15)
 
-    def test_the_travel_from_the_least_displacement_to_mid_position_is_0_45_in(
-        self, gear: Gear
-    ) -> None:
+    def test_the_travel_from_the_least_displacement_to_mid_position_is_0_45_in(self, gear):
         """4.2: "the difference between the plunger displacement in its mid-position and its minimum
         displacement in the process of releasing the Down Lock was 0.45 in."
         """
@@ -231,23 +215,17 @@ class TestSection4Results:
         """4.3: "0.0075 in is the maximum clearance allowed"."""
         assert set(gear.limits_in) == {0.0075}
 
-    def test_the_largest_indices_of_joints_one_and_two_are_the_printed_ones(
-        self, growth: Amplification
-    ) -> None:
+    def test_the_largest_indices_of_joints_one_and_two_are_the_printed_ones(self, growth):
         """4.3: "the maximum amplification indices are 0.84 and 1.488, respectively." """
         assert growth.max_stage[:2] == pytest.approx([0.84, 1.488], abs=5e-4)
 
-    def test_the_largest_indices_of_joints_three_to_five_are_greater_than_five(
-        self, growth: Amplification
-    ) -> None:
+    def test_the_largest_indices_of_joints_three_to_five_are_greater_than_five(self, growth):
         """4.3: "Joints #3, #4, and #5 correspond to the first case, and the maximum indices are
         greater than 5."
         """
         assert min(growth.max_stage[2:5]) > 5
 
-    def test_the_largest_indices_of_the_remaining_joints_are_less_than_two(
-        self, growth: Amplification
-    ) -> None:
+    def test_the_largest_indices_of_the_remaining_joints_are_less_than_two(self, growth):
         """4.3: "Amplification indices of the remaining joints are less than 2." """
         assert max(growth.max_stage[5:]) < 2
 
@@ -289,9 +267,7 @@ class TestSection4Results:
             < 0.01
         )
 
-    def test_samples_at_the_boundary_make_great_indices_greater_and_small_ones_smaller(
-        self, gear: Gear
-    ) -> None:
+    def test_samples_at_the_boundary_make_great_indices_greater_and_small_ones_smaller(self, gear):
         """4.3: "the sensitivity index that is relatively great becomes greater, and … small becomes
         smaller."
 
@@ -324,9 +300,7 @@ class TestSection4Results:
         """4.3, Fig. 13a shows a visible difference: here it is below 1e-3 for every joint."""
         assert (table.total_order - table.first_order).max() < 1e-3
 
-    def test_the_order_of_the_indices_is_not_the_order_of_the_mechanism(
-        self, table: IndexTable
-    ) -> None:
+    def test_the_order_of_the_indices_is_not_the_order_of_the_mechanism(self, table):
         """4.3: "the sensitivity index is not at all great just because it was measured close to the
         starting point".
         """
@@ -360,9 +334,7 @@ class TestSection4Results:
             0.0475, abs=5e-5
         )
 
-    def test_if_the_printed_clearances_were_total_play_the_failure_would_stay_within(
-        self, gear: Gear
-    ) -> None:
+    def test_if_the_printed_clearances_were_total_play_the_failure_would_stay_within(self, gear):
         """4.4: "#3: 0.013 in, #5: 0.007 in" must be radial: half of them would stay within 0.03
         in.
         """

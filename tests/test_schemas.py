@@ -112,9 +112,7 @@ def test_every_diagnosis_fits_its_schema(fleet: str, tmp_path: Path) -> None:
     assert complain("diagnose", mlg("diagnose", path, "--json").json) == []
 
 
-def test_causes_that_rows_cannot_tell_apart_share_the_probability_of_their_class(
-    tmp_path: Path,
-) -> None:
+def test_causes_that_rows_cannot_tell_apart_share_the_probability_of_their_class(tmp_path):
     path = tmp_path / "measured.csv"
     write_csv(draw_fleet(3, rows=60, **FLEETS["aliased"]), path)
     found = mlg("diagnose", path, "--json").json["also_possible"]
@@ -187,9 +185,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any
         ("life", ("history", "N2", "LH", "--no-forecast")),
     ],
 )
-def test_what_is_kept_fits_its_schema(
-    kept: Callable[..., Any], name: str, arguments: tuple[object, ...]
-) -> None:
+def test_what_is_kept_fits_its_schema(kept, name, arguments):
     assert complain(name, kept(*arguments, "--json").json) == []
 
 

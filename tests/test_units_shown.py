@@ -24,9 +24,7 @@ THOU, MM = LengthUnit.THOU, LengthUnit.MILLIMETRE
         (Length.brief(0.015), "0.015 in", "15 thou", "0.38 mm"),
     ],
 )
-def test_a_length_keeps_its_resolution_in_every_unit(
-    length: Length, inches: str, thou: str, mm: str
-) -> None:
+def test_a_length_keeps_its_resolution_in_every_unit(length, inches, thou, mm):
     said = tuple(length.said_in(unit) for unit in (LengthUnit.INCH, THOU, MM))
     assert said == (inches, thou, mm)
 

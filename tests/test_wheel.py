@@ -110,24 +110,18 @@ def test_the_installed_package_is_not_the_source_tree(scripts: Path, elsewhere: 
     assert Path(where.strip()).is_relative_to(scripts.parent)
 
 
-def test_the_installed_command_gives_the_failure_case(
-    checked: subprocess.CompletedProcess[str],
-) -> None:
+def test_the_installed_command_gives_the_failure_case(checked):
     assert checked.returncode == 1, checked.stderr
     (found,) = json.loads(checked.stdout)["inspections"]
     assert found["verdict"] == "OUTSIDE_MARGIN"
     assert found["predicted_displacement_in"] == pytest.approx(0.0472, abs=2e-4)
 
 
-def test_the_installed_command_writes_html_and_pdf(
-    checked: subprocess.CompletedProcess[str], elsewhere: Path
-) -> None:
+def test_the_installed_command_writes_html_and_pdf(checked, elsewhere):
     assert sorted(path.suffix for path in (elsewhere / "report").iterdir()) == [".html", ".pdf"]
 
 
-def test_the_pdf_of_the_installed_command_has_its_fonts_embedded(
-    checked: subprocess.CompletedProcess[str], elsewhere: Path
-) -> None:
+def test_the_pdf_of_the_installed_command_has_its_fonts_embedded(checked, elsewhere):
     (path,) = (elsewhere / "report").glob("*.pdf")
     for page in pypdf.PdfReader(path).pages:
         for font in page["/Resources"]["/Font"].values():

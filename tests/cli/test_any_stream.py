@@ -83,23 +83,17 @@ def as_documented(command: str, stream: str, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(("command", "stream"), EVERYDAY, ids=lambda each: each)
-def test_a_command_ends_as_documented_on_a_plain_stream(
-    command: str, stream: str, tmp_path: Path
-) -> None:
+def test_a_command_ends_as_documented_on_a_plain_stream(command, stream, tmp_path):
     as_documented(command, stream, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("command", "stream"), ALL, ids=lambda each: each)
-def test_every_command_ends_as_documented_on_every_stream(
-    command: str, stream: str, tmp_path: Path
-) -> None:
+def test_every_command_ends_as_documented_on_every_stream(command, stream, tmp_path):
     as_documented(command, stream, tmp_path)
 
 
-def test_json_holds_every_character_on_a_stream_that_cannot(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_json_holds_every_character_on_a_stream_that_cannot(monkeypatch):
     plain = io.TextIOWrapper(io.BytesIO(), encoding="ascii", write_through=True)
     monkeypatch.setattr(sys, "stdout", plain)
     output.write_json({"tail": "Größe–1\udcff"})

@@ -66,9 +66,7 @@ SLOW = [
     ("program", "arguments"),
     [*EVERY_DAY, *(pytest.param(*each, marks=pytest.mark.slow) for each in SLOW)],
 )
-def test_nothing_in_the_folder_runs(
-    folders: dict[tuple[str, ...], Path], program: tuple[str, ...], arguments: str
-) -> None:
+def test_nothing_in_the_folder_runs(folders, program, arguments):
     folder = folders[program]
     imported = folder / LEFT
     imported.unlink(missing_ok=True)

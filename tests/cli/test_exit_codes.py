@@ -66,9 +66,7 @@ def occupied(tmp_path: Path) -> Path:
     return path
 
 
-def test_reports_of_which_no_file_could_be_made_end_with_the_notes_that_say_why(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_reports_of_which_no_file_could_be_made_end_with_the_notes_that_say_why(capsys):
     with pytest.raises(OutputError, match="no report could be written"):
         say_written([WrittenReport(None, None, ("no PDF: the engine stopped",))])
     assert "Note: no PDF: the engine stopped" in capsys.readouterr().err

@@ -91,9 +91,7 @@ def test_an_extension_relaxes_no_verdict(plain: Run, extended: Run) -> None:
     assert not relaxed
 
 
-def test_the_plain_model_stands_beside_what_an_extension_predicts(
-    plain: Run, extended: Run
-) -> None:
+def test_the_plain_model_stands_beside_what_an_extension_predicts(plain, extended):
     for one, two in zip(plain.json["inspections"], extended.json["inspections"], strict=True):
         assert one["rigid"] is None
         assert two["rigid"]["verdict"] == one["verdict"]
@@ -124,9 +122,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-def test_no_gear_that_is_outside_leaves_as_within_by_a_learned_extension(
-    loads: Path, drawn: Path
-) -> None:
+def test_no_gear_that_is_outside_leaves_as_within_by_a_learned_extension(loads, drawn):
     found = mlg("check", drawn, "--extension", loads, "--json")
     assert found.code == 1
     assert {i["verdict"] for i in found.json["inspections"]} == {"OUTSIDE_MARGIN"}
@@ -170,9 +166,7 @@ def test_a_rate_that_leaves_nothing_of_a_prediction_is_refused(tmp_path: Path) -
     assert "terms[1].value: expected -0.18 to 0.18" in found.err
 
 
-def test_a_file_that_no_diagnosis_wrote_relaxes_nothing_and_says_so(
-    drawn: Path, tmp_path: Path
-) -> None:
+def test_a_file_that_no_diagnosis_wrote_relaxes_nothing_and_says_so(drawn, tmp_path):
     file = rate(tmp_path, -0.18)
     found = mlg("check", drawn, "--extension", file, "--json")
     assert found.code == 1
@@ -216,9 +210,7 @@ def test_an_approval_is_printed_with_every_verdict(measured: Path, approved: Pat
 
 
 @pytest.mark.parametrize("key", ["residual_u_in", "reason", "approved_by"])
-def test_an_approval_of_changed_content_does_not_count(
-    measured: Path, approved: Path, key: str
-) -> None:
+def test_an_approval_of_changed_content_does_not_count(measured, approved, key):
     text = approved.read_text(encoding="utf-8")
     changed = re.sub(
         rf"(?m)^{key} = (.*)$",

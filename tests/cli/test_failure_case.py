@@ -45,9 +45,7 @@ def test_the_bound_and_the_chance_with_random_directions_stand_together(failure:
     ],
     ids=lambda readings: " ".join(readings[1:]),
 )
-def test_on_the_command_line_every_unit_and_convention_gives_the_same(
-    readings: tuple[str, ...], failure_json: Run
-) -> None:
+def test_on_the_command_line_every_unit_and_convention_gives_the_same(readings, failure_json):
     found = mlg(*HAND, "--set", "outcome=FAILED", *readings, "--json")
     expected = failure_json.one
     assert found.code == 1
@@ -73,9 +71,7 @@ def test_on_the_command_line_every_unit_and_convention_gives_the_same(
     ],
     ids=["total play", "millimetres", "thou"],
 )
-def test_in_a_table_every_unit_and_convention_gives_the_same(
-    changes: dict[str, str], unit: str, table: Table, failure_json: Run
-) -> None:
+def test_in_a_table_every_unit_and_convention_gives_the_same(changes, unit, table, failure_json):
     cells = {
         column.replace("_in", f"_{unit}"): value
         for column, value in row(**(BLANK | changes)).items()
@@ -94,9 +90,7 @@ def test_in_a_table_every_unit_and_convention_gives_the_same(
         (("--set", "3=0.013in"), "--convention"),
     ],
 )
-def test_by_hand_it_is_refused_without_unit_or_convention(
-    arguments: tuple[str, ...], said: str
-) -> None:
+def test_by_hand_it_is_refused_without_unit_or_convention(arguments, said):
     found = mlg(*HAND, *arguments)
     assert (found.code, found.out, said in found.err) == (2, "", True)
 
@@ -109,9 +103,7 @@ def test_by_hand_it_is_refused_without_unit_or_convention(
     ],
     ids=["unit", "convention"],
 )
-def test_a_table_without_unit_or_convention_is_refused_until_it_is_declared(
-    cells: dict[str, str], declared: tuple[str, ...], table: Table
-) -> None:
+def test_a_table_without_unit_or_convention_is_refused_until_it_is_declared(cells, declared, table):
     path = table(cells)
     found = mlg("check", path, "--json")
     assert (found.code, found.one["verdict"]) == (3, "INVALID")

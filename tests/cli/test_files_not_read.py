@@ -35,9 +35,7 @@ def bad(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return path
 
 
-def test_a_check_of_a_good_file_and_one_that_cannot_be_read_exits_1(
-    bad: Path, table: Table
-) -> None:
+def test_a_check_of_a_good_file_and_one_that_cannot_be_read_exits_1(bad, table):
     good = table(row())
     assert mlg("check", good).code == 0
     found = mlg("check", good, bad, "-q")

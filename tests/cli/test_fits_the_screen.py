@@ -51,9 +51,7 @@ def judged(gear: str) -> task.CheckResult:
 
 
 @pytest.mark.parametrize("gear", SAID)
-def test_one_gear_takes_twenty_lines_with_verdict_and_next_last(
-    gear: str, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_gear_takes_twenty_lines_with_verdict_and_next_last(gear, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     one_gear.show(judged(gear).judgements[0], judged(gear).gear, console(), detail=False)
     lines = capsys.readouterr().out.splitlines()
@@ -63,9 +61,7 @@ def test_one_gear_takes_twenty_lines_with_verdict_and_next_last(
 
 
 @pytest.mark.parametrize("wide", [40, 60, 72, 79, 80, 81, 90, 100])
-def test_a_number_is_never_parted_from_its_unit(
-    wide: int, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_number_is_never_parted_from_its_unit(wide, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(wide))
     for gear in SAID:
         one_gear.show(judged(gear).judgements[0], judged(gear).gear, console(), detail=True)
@@ -96,9 +92,7 @@ def test_the_help_of_check_has_twelve_options_and_says_where_the_others_are() ->
     ("typed", "same"),
     [(("help",), ("--help",)), (("help", "fleet"), ("fleet", "--help")), ((), ("--help",))],
 )
-def test_help_is_understood_as_it_is_asked_for(
-    typed: tuple[str, ...], same: tuple[str, ...]
-) -> None:
+def test_help_is_understood_as_it_is_asked_for(typed, same):
     assert mlg(*typed).out == mlg(*same).out
 
 
@@ -115,9 +109,7 @@ def test_a_report_is_asked_for_by_its_gear(tmp_path: Path, monkeypatch: pytest.M
     ("typed", "meant"),
     [(("chek",), "check"), (("check", "--jsn"), "--json"), (("check", "tabel.csv"), "table.csv")],
 )
-def test_what_is_nearly_a_command_an_option_or_a_file_is_named(
-    typed: tuple[str, ...], meant: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_nearly_a_command_an_option_or_a_file_is_named(typed, meant, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     table(tmp_path, row())
     assert meant in mlg(*typed).err
@@ -159,9 +151,7 @@ def test_a_life_is_not_cut_at_60_columns(tmp_path: Path, monkeypatch: pytest.Mon
     assert sum("OUTSIDE" in line for line in lines) == 4
 
 
-def test_the_list_of_gears_that_are_kept_is_cut_nowhere(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_list_of_gears_that_are_kept_is_cut_nowhere(tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "60")
     store = tmp_path / "kept.sqlite"
     dated = row(tail_no="G-ABCD", inspection_date="2026-03-04", gear_landings="1500")

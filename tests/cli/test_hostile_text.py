@@ -7,7 +7,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from rich.console import RenderableType
 from rich.panel import Panel
 from rich.rule import Rule
 
@@ -120,8 +119,6 @@ def test_the_names_of_outputs_act_on_neither_stream(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("shown", [Panel(HOSTILE), Rule(HOSTILE), HOSTILE])
-def test_what_reaches_the_console_as_a_bare_text_acts_on_no_terminal(
-    shown: RenderableType, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_reaches_the_console_as_a_bare_text_acts_on_no_terminal(shown, capsys):
     console().print(shown)
     harmless(Run(0, *capsys.readouterr()))

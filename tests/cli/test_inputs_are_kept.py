@@ -86,9 +86,7 @@ def test_an_export_does_not_replace_its_store(place: str, name: str, store: Path
 
 @pytest.mark.parametrize("option", ["--csv", "--annotate"])
 @pytest.mark.parametrize("named", ["path", "url", "environment"])
-def test_a_check_does_not_replace_the_store(
-    option: str, named: str, store: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_check_does_not_replace_the_store(option, named, store, monkeypatch):
     before = store.read_bytes()
     given = ("--keep", "--store", store if named == "path" else f"sqlite:///{store}")
     if named == "environment":
@@ -151,9 +149,7 @@ def test_another_store_is_not_replaced_by_an_export(store: Path) -> None:
         "template",
     ],
 )
-def test_a_file_that_something_else_wrote_is_replaced_with_force_only(
-    line: str, here: Path
-) -> None:
+def test_a_file_that_something_else_wrote_is_replaced_with_force_only(line, here):
     path = here / "letter.xlsx"
     path.write_text("Dear Sir,", encoding="utf-8")
     found = mlg(*line.split(), path)
@@ -193,9 +189,7 @@ def test_a_report_is_replaced_with_force_only(suffix: str, tmp_path: Path) -> No
     ],
     ids=lambda command: command[0],
 )
-def test_no_page_of_any_command_is_replaced_without_force(
-    command: tuple[object, ...], store: Path, tmp_path: Path
-) -> None:
+def test_no_page_of_any_command_is_replaced_without_force(command, store, tmp_path):
     out = ("--report", tmp_path / "out")
     places = () if command[0] == "diagnose" else ("--store", store)
     codes = [mlg(*command, *places, *out, *more).code for more in ((), (), ("--force",))]
@@ -203,9 +197,7 @@ def test_no_page_of_any_command_is_replaced_without_force(
     assert codes[1:] == [2, codes[0]]
 
 
-def test_a_report_in_a_folder_through_one_that_is_missing_does_not_replace_another_file(
-    tmp_path: Path,
-) -> None:
+def test_a_report_in_a_folder_through_one_that_is_missing_does_not_replace_another_file(tmp_path):
     command = ("check", FAILURE, "-q", "--format", "html", "--report")
     mlg(*command, tmp_path)
     (report,) = tmp_path.glob("*.html")
@@ -222,9 +214,7 @@ def test_two_outputs_of_one_run_are_two_files(first: str, second: str, here: Pat
     assert (found.code, found.out, (here / first).exists()) == (2, "", False)
 
 
-def test_a_table_may_have_the_name_of_a_report_in_another_folder_than_the_reports(
-    tmp_path: Path,
-) -> None:
+def test_a_table_may_have_the_name_of_a_report_in_another_folder_than_the_reports(tmp_path):
     csv = tmp_path / "mlg-x.html"
     assert (
         mlg(
@@ -238,9 +228,7 @@ def test_a_table_may_have_the_name_of_a_report_in_another_folder_than_the_report
 @pytest.mark.parametrize(
     "command", [("check", FAILURE, "--csv"), ("history", "export")], ids=lambda c: c[0]
 )
-def test_a_dash_is_not_taken_for_a_file(
-    command: tuple[object, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_dash_is_not_taken_for_a_file(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     found = mlg(*command, "-")
     assert found.code == 2

@@ -112,9 +112,7 @@ def test_a_tail_from_a_flag_that_is_none_is_refused_before_anything_is_asked(sta
 
 
 @pytest.mark.parametrize("plain", [{"NO_COLOR": "1"}, {"TERM": "dumb"}, {"MLG_PLAIN": "1"}])
-def test_a_plain_terminal_has_the_same_words_without_colour_and_boxes(
-    start: Start, plain: dict[str, str]
-) -> None:
+def test_a_plain_terminal_has_the_same_words_without_colour_and_boxes(start, plain):
     child = start("check", FLEET, **plain)
     child.expect_exact("Model:")
     assert "\x1b" not in child.before

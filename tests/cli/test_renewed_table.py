@@ -58,9 +58,7 @@ def test_from_python_a_table_that_is_computed_is_warned_of_once(gear: Path) -> N
 
 
 @pytest.mark.parametrize("command", [("check", *HAND), ("study", "--write-table", "--force")])
-def test_a_file_that_is_not_a_table_is_not_replaced_by_one(
-    command: tuple[str, ...], gear: Path
-) -> None:
+def test_a_file_that_is_not_a_table_is_not_replaced_by_one(command, gear):
     table = load_gear(gear).indices_file
     table.write_text('{"mine": 1}')
     assert mlg(*command, "--gear", gear).code == 2
@@ -93,9 +91,7 @@ def test_a_table_is_never_written_through_a_link(exists: bool, gear: Path) -> No
         ("\nmargin = 0.03", "\nmargin = 2.0"),
     ],
 )
-def test_a_valid_gear_file_never_ends_in_an_internal_error(
-    old: str, new: str, tmp_path: Path
-) -> None:
+def test_a_valid_gear_file_never_ends_in_an_internal_error(old, new, tmp_path):
     for file in load_gear().path.parent.glob("hawker*.toml"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     gear = tmp_path / "hawker-800xp.toml"

@@ -7,7 +7,6 @@ from html import unescape
 from pathlib import Path
 
 import pypdf
-import pytest
 
 from .conftest import mlg
 
@@ -28,9 +27,7 @@ def test_a_report_of_a_check_stands_in_the_unit_to_show(tmp_path: Path) -> None:
     assert "0.0472 in" not in written(tmp_path)
 
 
-def test_a_form_to_fill_in_by_hand_has_the_paper_and_the_unit_asked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_form_to_fill_in_by_hand_has_the_paper_and_the_unit_asked_for(tmp_path, monkeypatch):
     monkeypatch.setenv("MLG_PAGE", "Letter")
     assert mlg("template", tmp_path / "form.pdf", "--unit", "mm").code == 0
     (page,) = pypdf.PdfReader(tmp_path / "form.pdf").pages

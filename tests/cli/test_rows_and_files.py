@@ -78,9 +78,7 @@ def test_one_format_can_be_chosen(kind: str, tmp_path: Path) -> None:
     assert [path.suffix for path in tmp_path.iterdir()] == [f".{kind}"]
 
 
-def test_a_batch_has_a_report_for_each_judged_gear_and_a_summary(
-    table: Table, tmp_path: Path
-) -> None:
+def test_a_batch_has_a_report_for_each_judged_gear_and_a_summary(table, tmp_path):
     path = table(row(record_id="A"), row(record_id="B", side=""), row(record_id="C", side="RH"))
     mlg("check", path, "--format", "html", "--report", tmp_path / "out")
     assert len(list((tmp_path / "out").iterdir())) == 3

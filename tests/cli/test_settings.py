@@ -29,9 +29,7 @@ def test_the_environment_says_the_paper(monkeypatch: pytest.MonkeyPatch, tmp_pat
         assert re.findall(r"size: (A4|Letter)", page.read_text(encoding="utf-8")) == [size]
 
 
-def test_the_environment_says_unit_and_convention_of_tables(
-    monkeypatch: pytest.MonkeyPatch, table: Table
-) -> None:
+def test_the_environment_says_unit_and_convention_of_tables(monkeypatch, table):
     bare = {"clearance_3_in": None, "clearance_convention": None, "Joint 3": "0.1"}
     monkeypatch.setenv("MLG_UNIT", "mm")
     monkeypatch.setenv("MLG_CONVENTION", "TOTAL_PLAY")
@@ -90,9 +88,7 @@ def test_a_column_by_its_letter_is_not_named_by_a_file(table: Table, tmp_path: P
 @pytest.mark.parametrize(
     "text", ['show = "mm"', "headers = 3", "[headers]\nx = 3", "[", "x = " + "[" * 5000, "", None]
 )
-def test_a_file_of_headers_that_is_not_one_is_refused_with_words(
-    text: str | None, tmp_path: Path
-) -> None:
+def test_a_file_of_headers_that_is_not_one_is_refused_with_words(text, tmp_path):
     headers = tmp_path / "headers.toml"
     if text is not None:
         headers.write_text(text, encoding="utf-8")
@@ -105,9 +101,7 @@ def test_a_format_without_a_report_is_said() -> None:
     assert "without --report DIR none is written" in mlg("check", FAILURE, "--format", "html").err
 
 
-def test_a_file_that_lies_in_the_folder_changes_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_lies_in_the_folder_changes_nothing(tmp_path, monkeypatch):
     (tmp_path / "mlg.toml").write_text('show = "mm"\n[headers]\noutcome = "carry"', "utf-8")
     before = mlg("check", DATA / "fleet_batch.csv", "-q")
     monkeypatch.chdir(tmp_path)

@@ -20,9 +20,7 @@ TIGHT = {f"clearance_{joint}_in": "0.0005" for joint in range(1, 11)}
         ("Retracted?", "no"),
     ],
 )
-def test_a_failure_next_to_a_stated_retraction_is_not_overlooked(
-    table: Table, header: str, cell: str
-) -> None:
+def test_a_failure_next_to_a_stated_retraction_is_not_overlooked(table, header, cell):
     found = mlg("check", table(row(**TIGHT, outcome="RETRACTED", **{header: cell})), "--json")
     assert found.code != 0
     assert found.one["verdict"] == "INCOMPLETE"
@@ -31,9 +29,7 @@ def test_a_failure_next_to_a_stated_retraction_is_not_overlooked(
 @pytest.mark.parametrize(
     ("header", "cell"), [("Plunger reading 2", "0,041"), ("play 3 recheck", "0,013")]
 )
-def test_a_decimal_comma_in_a_column_that_may_be_a_reading_is_asked_about(
-    table: Table, header: str, cell: str
-) -> None:
+def test_a_decimal_comma_in_a_column_that_may_be_a_reading_is_asked_about(table, header, cell):
     found = mlg("check", table(row(**TIGHT, outcome="RETRACTED", **{header: cell})), "--json")
     assert (found.code, found.one["verdict"]) == (1, "INCOMPLETE")
 
@@ -53,16 +49,12 @@ def after(folder: Path, table: Table, *commands: tuple[str, ...], **later: str) 
 REPAIR = ("repair", "N123", "LH", "--joint", "3", "--date", "2026-03-09")
 
 
-def test_a_gear_that_was_repaired_by_a_command_is_tried_before_it_is_done(
-    tmp_path: Path, table: Table
-) -> None:
+def test_a_gear_that_was_repaired_by_a_command_is_tried_before_it_is_done(tmp_path, table):
     found = after(tmp_path, table, REPAIR)
     assert (found.code, found.one["next_action"]["action"]) == (1, "READ_PLUNGER")
 
 
-def test_a_retraction_from_before_the_repair_signs_nothing_off(
-    tmp_path: Path, table: Table
-) -> None:
+def test_a_retraction_from_before_the_repair_signs_nothing_off(tmp_path, table):
     old = {"outcome": "RETRACTED", "outcome_date": "2026-03-03"}
     repair = {"restored_joints": "3", "repair_date": "2026-03-09"}
     found = after(tmp_path, table, plunger_displacement_in="0.002", **old, **repair)

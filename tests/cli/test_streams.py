@@ -69,9 +69,7 @@ def closed_after_one_line(arguments: Sequence[object]) -> tuple[int, str]:
     [(("check", FLEET), 1), (("check", FAILURE, "--json"), 1), (("gear",), 0)],
     ids=["text", "json", "gear"],
 )
-def test_a_closed_pipe_is_not_an_error_and_keeps_the_exit_code(
-    arguments: tuple[object, ...], code: int
-) -> None:
+def test_a_closed_pipe_is_not_an_error_and_keeps_the_exit_code(arguments, code):
     assert closed_after_one_line(arguments) == (code, "")
 
 

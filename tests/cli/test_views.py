@@ -37,9 +37,7 @@ def at_width(monkeypatch: pytest.MonkeyPatch, width: int, *arguments: object) ->
 
 
 @pytest.mark.parametrize("width", [80, 110])
-def test_the_failure_is_whole_on_a_screen_of_any_width(
-    width: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_failure_is_whole_on_a_screen_of_any_width(width, monkeypatch):
     shown = at_width(monkeypatch, width, "check", FAILURE, "--detail").out
     words = " ".join(shown.split())
     for number, name in JOINTS.items():
@@ -52,9 +50,7 @@ def test_the_failure_is_whole_on_a_screen_of_any_width(
 VERDICT_LINE = re.compile(r"[!~?X=] ")
 
 
-def test_the_failure_fits_a_terminal_of_80_columns_and_24_lines(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_failure_fits_a_terminal_of_80_columns_and_24_lines(monkeypatch):
     lines = at_width(monkeypatch, 80, "check", FAILURE).out.splitlines()
     assert len(lines) <= 20
     assert max(map(len, lines)) <= 80
@@ -85,9 +81,7 @@ def test_a_batch_has_one_line_for_each_gear_with_its_latest_inspection(fleet: Ru
     assert len(lines) == len(latest)
 
 
-def test_tail_and_side_are_never_cut_for_width(
-    table: Table, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_tail_and_side_are_never_cut_for_width(table, monkeypatch):
     path = table(row(tail_no="N" + "1" * 30, record_id="R" * 30), row(record_id="B", side="RH"))
     shown = at_width(monkeypatch, 80, "check", path).out
     assert f" N{'1' * 30} LH " in shown
@@ -146,9 +140,7 @@ def test_lengths_are_shown_in_the_unit_that_was_asked_for(unit: str, worst: str)
 
 
 @pytest.mark.parametrize("source", [FAILURE, FLEET], ids=["one", "batch"])
-def test_every_view_says_that_it_is_not_an_approval_and_where_its_geometry_comes_from(
-    source: object,
-) -> None:
+def test_every_view_says_that_it_is_not_an_approval_and_where_its_geometry_comes_from(source):
     words = " ".join(mlg("check", source).out.split())
     assert "reconstructed from published figures, not drawing data" in words
     assert "not maintenance data" in words
@@ -156,9 +148,7 @@ def test_every_view_says_that_it_is_not_an_approval_and_where_its_geometry_comes
 
 
 @pytest.mark.parametrize("read", [True, False])
-def test_the_chance_of_a_wrong_verdict_says_how_unread_joints_count(
-    read: bool, table: Table
-) -> None:
+def test_the_chance_of_a_wrong_verdict_says_how_unread_joints_count(read, table):
     unread = {} if read else {"clearance_9_in": ""}
     words = " ".join(mlg("check", table(row(**unread)), "--detail").out.split())
     assert "lies on the other side of the margin is" in words

@@ -68,9 +68,7 @@ def test_re_rigging_alone_is_shown_with_the_risk_that_stays(failure: str) -> Non
     assert re.search(r"Re-rigging alone, .*, would leave a worst case of 0\.0450 in", failure)
 
 
-def test_the_joints_that_explain_a_reading_are_given_as_pairs_that_act_alike(
-    explained: str,
-) -> None:
+def test_the_joints_that_explain_a_reading_are_given_as_pairs_that_act_alike(explained):
     assert "#3 or #5" in explained
 
 

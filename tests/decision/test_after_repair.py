@@ -34,9 +34,7 @@ def test_an_old_reading_is_no_longer_the_measured_displacement(judge: Judge) -> 
     assert found.inspection.measured_displacement_in is None
 
 
-def test_a_reading_beyond_the_margin_that_may_be_newer_stands_and_is_taken_again(
-    judge: Judge,
-) -> None:
+def test_a_reading_beyond_the_margin_that_may_be_newer_stands_and_is_taken_again(judge):
     found = judge(RESTORED, **REPAIRED)
     assert (found.verdict, found.basis) == (Verdict.OUTSIDE_MARGIN, Basis.MEASURED)
     assert found.next_action.action is Action.READ_PLUNGER
@@ -48,9 +46,7 @@ def test_a_reading_within_the_margin_that_may_be_older_excuses_nothing(judge: Ju
 
 
 @pytest.mark.parametrize("outcome", [None, Outcome.RETRACTED, Outcome.FAILED])
-def test_a_plunger_beyond_its_margin_after_the_repair_is_never_signed_off(
-    judge: Judge, outcome: Outcome | None
-) -> None:
+def test_a_plunger_beyond_its_margin_after_the_repair_is_never_signed_off(judge, outcome):
     after = {"readings_in": (0.06,), "plunger_date": NOON}
     tried = {"outcome": outcome, "outcome_date": NOON}
     steps = judge(RESTORED, **REPAIRED | after | tried).plan.steps
@@ -58,9 +54,7 @@ def test_a_plunger_beyond_its_margin_after_the_repair_is_never_signed_off(
     assert steps[0].action in first
 
 
-def test_a_plunger_beyond_its_margin_before_the_repair_is_read_again_without_a_failure(
-    judge: Judge,
-) -> None:
+def test_a_plunger_beyond_its_margin_before_the_repair_is_read_again_without_a_failure(judge):
     found = judge(RESTORED, **REPAIRED | {"outcome": None, "plunger_date": EARLY})
     assert [step.action for step in found.plan.steps][:2] == [Action.READ_PLUNGER, Action.RETRACT]
 
@@ -78,16 +72,12 @@ def test_times_with_zones_are_compared_with_them(one: str, other: str, later: bo
     assert surely_later(datetime.fromisoformat(one), datetime.fromisoformat(other)) is later
 
 
-def test_a_plunger_read_within_its_margin_after_the_repair_leads_to_the_retraction(
-    judge: Judge,
-) -> None:
+def test_a_plunger_read_within_its_margin_after_the_repair_leads_to_the_retraction(judge):
     found = judge(RESTORED, **REPAIRED | {"readings_in": (0.002,), "plunger_date": NOON})
     assert found.next_action.action is Action.RETRACT
 
 
-def test_a_gear_that_fails_again_after_the_repair_with_its_plunger_within_has_another_cause(
-    judge: Judge,
-) -> None:
+def test_a_gear_that_fails_again_after_the_repair_with_its_plunger_within_has_another_cause(judge):
     again = {"outcome_date": NOON, "readings_in": (0.002,), "plunger_date": NOON}
     assert judge(RESTORED, **REPAIRED | again).end is End.NOT_EXPLAINED
 

@@ -7,15 +7,12 @@ import pytest
 from scipy.stats import norm
 
 from mlg_troubleshoot.decision.prediction import Cases, exact_chance
-from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 
 @pytest.mark.parametrize("clearance_in", [0.0014, 0.0018, 0.0025])
-def test_curvature_moves_the_probability_by_less_than_one_percent(
-    judge: Judge, gear: Gear, clearance_in: float
-) -> None:
+def test_curvature_moves_the_probability_by_less_than_one_percent(judge, gear, clearance_in):
     found = judge(every_joint(clearance_in), gauge_u_in=0.0005)
     half = 0.0005 * np.random.default_rng(5).standard_normal((2000, 10))
     drawn = worst_case(gear.model, np.abs(clearance_in + np.vstack([half, -half])))
@@ -35,16 +32,12 @@ def test_advice_does_not_change_the_verdict_or_its_probability(judge: Judge) -> 
 
 
 @pytest.mark.parametrize(("shift_in", "chance"), [(-0.02, 0.0), (0.02, 1.0)])
-def test_re_rigging_takes_back_what_shifts_the_plunger_already(
-    gear: Gear, shift_in: float, chance: float
-) -> None:
+def test_re_rigging_takes_back_what_shifts_the_plunger_already(gear, shift_in, chance):
     one = Cases.of(gear, [inspected(every_joint(0.0))], Shifted(0.02))
     assert exact_chance(one, one.filled(0.0), shift_in) == [chance]
 
 
-def test_re_rigging_leaves_half_of_the_range_between_both_worst_cases(
-    gear: Gear, judge: Judge
-) -> None:
+def test_re_rigging_leaves_half_of_the_range_between_both_worst_cases(gear, judge):
     found = judge(every_joint(0.004), advice=True).rigging
     exact = worst_case(gear.model, np.full((1, 10), 0.004))
     assert found is not None

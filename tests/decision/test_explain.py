@@ -35,9 +35,7 @@ def test_the_only_unmeasured_link_explains_a_large_displacement(gear: Gear) -> N
     assert found.called_worn == ((3, 5),)
 
 
-def test_a_displacement_that_clearances_cannot_reach_is_not_clearance_and_names_no_joint(
-    gear: Gear,
-) -> None:
+def test_a_displacement_that_clearances_cannot_reach_is_not_clearance_and_names_no_joint(gear):
     found = explained(gear, every_joint(0.0005), 0.04)
     assert found.not_clearance == pytest.approx(1.0, abs=0.01)
     assert "#" not in found.text
@@ -52,9 +50,7 @@ def test_a_displacement_raises_the_chance_of_wear(gear: Gear) -> None:
     assert chance(explained(gear, sound, 0.025), 2) > 3.0 * chance(explained(gear, sound, 0.0), 2)
 
 
-def test_a_joint_that_moves_the_plunger_more_explains_a_large_displacement_better(
-    gear: Gear,
-) -> None:
+def test_a_joint_that_moves_the_plunger_more_explains_a_large_displacement_better(gear):
     sound = {j: 0.0005 for j in range(1, 11) if j not in (2, 8)}
     found = explained(gear, sound, 0.02)
     assert chance(found, 2) > chance(found, 8)
@@ -67,9 +63,7 @@ def test_a_joint_read_again_beyond_its_limit_is_worn(gear: Gear) -> None:
 
 @pytest.mark.parametrize("reading_in", [0.01, 0.0335])
 @pytest.mark.parametrize("outcome", [None, Outcome.FAILED])
-def test_a_reading_over_the_limit_is_as_doubtful_as_for_the_plan(
-    gear: Gear, reading_in: float, outcome: Outcome | None
-) -> None:
+def test_a_reading_over_the_limit_is_as_doubtful_as_for_the_plan(gear, reading_in, outcome):
     read = {1: 0.003, 2: 0.0082, 3: 0.002, 4: 0.0025, 5: 0.003}
     one = Cases.of(gear, [inspected(read, readings_in=(reading_in,), outcome=outcome)])
     worn = explain(Belief(one)).intervals[1].worn
@@ -155,8 +149,6 @@ def test_every_interval_is_a_number_where_nothing_explains_the_reading(gear: Gea
     ("looked", "said"),
     [(None, "Rigging or lock roller"), (RiggingCheck.YES, "rigging and lock roller were checked")],
 )
-def test_a_rigging_that_was_looked_at_is_not_named_again(
-    gear: Gear, looked: RiggingCheck | None, said: str
-) -> None:
+def test_a_rigging_that_was_looked_at_is_not_named_again(gear, looked, said):
     row = inspected(every_joint(0.001), readings_in=(0.045,), rigging_checked=looked)
     assert said in explain(Belief(Cases.of(gear, [row]))).text

@@ -46,9 +46,7 @@ PAPER = every_joint(0.0, j3=0.013, j5=0.007)
         (every_joint(0.05), {}, "COULD BE OUTSIDE: the linkage does not close", RED),
     ],
 )  # fmt: skip
-def test_each_verdict_has_its_words_and_its_colour(
-    judge: Judge, read: dict[int, float], more: dict[str, Any], headline: str, tone: VerdictTone
-) -> None:
+def test_each_verdict_has_its_words_and_its_colour(judge, read, more, headline, tone):
     found = judge(read, **more)
     assert said_in(found.headline, LengthUnit.THOU).startswith(headline)
     assert found.tone is tone
@@ -77,9 +75,7 @@ def test_a_gear_is_within_by_a_reading_that_is_clear_and_newer_than_any_failure(
     assert ((found.verdict, found.basis) == (Verdict.WITHIN_MARGIN, Basis.MEASURED)) is within
 
 
-def test_a_gear_measured_within_that_may_leave_its_margin_in_other_directions_is_close(
-    judge: Judge,
-) -> None:
+def test_a_gear_measured_within_that_may_leave_its_margin_in_other_directions_is_close(judge):
     found = judge(PAPER, readings_in=(0.008,), **RETRACTED)
     assert (found.verdict, found.basis) == (Verdict.INCONCLUSIVE, Basis.PREDICTED)
     assert found.probability_exceed_random_directions > 0.05
@@ -87,9 +83,7 @@ def test_a_gear_measured_within_that_may_leave_its_margin_in_other_directions_is
 
 @pytest.mark.parametrize("outcome", [None, Outcome.RETRACTED])
 @pytest.mark.parametrize("read", [{}, {3: 0.002}, THIRD, every_joint(0.004), every_joint(0.0075)])
-def test_without_a_complaint_nothing_is_required_and_one_reading_ends_it(
-    judge: Judge, read: dict[int, float], outcome: Outcome | None
-) -> None:
+def test_without_a_complaint_nothing_is_required_and_one_reading_ends_it(judge, read, outcome):
     asked = judge(read, outcome=outcome)
     assert (asked.next_action.action, asked.next_action.required) == (Action.READ_PLUNGER, False)
     assert asked.next_action.text == (
@@ -124,9 +118,7 @@ def test_only_joints_over_their_limits_are_restored_without_a_complaint(judge: J
         (0.0074, {}, Action.READ_PLUNGER),
     ],
 )
-def test_a_joint_is_measured_again_only_near_its_limit_and_once(
-    judge: Judge, third: float, more: dict[str, Any], first: Action
-) -> None:
+def test_a_joint_is_measured_again_only_near_its_limit_and_once(judge, third, more, first):
     assert judge(every_joint(0.003, j3=third), **RETRACTED, **more).next_action.action is first
 
 
@@ -148,9 +140,7 @@ def test_a_limit_that_is_assumed_is_said_to_be(judge: Judge) -> None:
     )
 
 
-def test_a_reading_is_flagged_only_where_no_direction_of_the_joints_explains_it(
-    judge: Judge,
-) -> None:
+def test_a_reading_is_flagged_only_where_no_direction_of_the_joints_explains_it(judge):
     inside, beyond = (judge(THIRD, readings_in=(y,)).warnings for y in (-0.02, 0.09))
     assert not any("beyond what the entered clearances" in said for said in inside)
     assert any("beyond what the entered clearances" in said for said in beyond)
@@ -230,9 +220,7 @@ def screen(a: Assessment) -> str:
 
 
 @pytest.mark.parametrize("n", [300, pytest.param(2000, marks=pytest.mark.slow)])
-def test_no_two_sentences_of_one_screen_contradict_each_other(
-    gear: Gear, table: IndexTable, n: int
-) -> None:
+def test_no_two_sentences_of_one_screen_contradict_each_other(gear, table, n):
     for a in judged(gear, table, n):
         text = screen(a)
         for one, other in CONTRADICTIONS:

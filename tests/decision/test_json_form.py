@@ -89,9 +89,7 @@ def test_the_identity_of_an_invalid_row_is_given_as_far_as_it_could_be_read(form
     assert row["warnings"] == ["noticed"]
 
 
-def test_a_clearance_that_was_not_measured_is_null_and_one_measured_as_zero_is_zero(
-    gear: Gear, judge: Judge
-) -> None:
+def test_a_clearance_that_was_not_measured_is_null_and_one_measured_as_zero_is_zero(gear, judge):
     joints = check_as_json(gear, [judge({3: 0.0})], [], [])["inspections"][0]["joints"]
     assert (joints[2]["clearance_in"], joints[3]["clearance_in"]) == (0.0, None)
 

@@ -55,9 +55,7 @@ def test_gears_that_were_not_read_whole_say_nothing_of_their_pins(gear: Gear) ->
 
 
 @pytest.mark.parametrize(("clearance_in", "more"), [(0.0002, False), (0.006, True)])
-def test_unread_joints_are_worn_as_the_fleet_is(
-    gear: Gear, clearance_in: float, more: bool
-) -> None:
+def test_unread_joints_are_worn_as_the_fleet_is(gear, clearance_in, more):
     fleet = learned(gear, [inspected(every_joint(clearance_in))] * 20)
     expected = [
         (given_readings(Cases.of(gear, [inspected({})], fleet=known))[0] @ WEAR @ SHARES)[0]
@@ -71,9 +69,7 @@ def test_a_small_fleet_excludes_no_level_of_wear(gear: Gear) -> None:
     assert min(new_parts.levels) > 0.05
 
 
-def test_a_failure_near_the_bound_is_repaired_again_more_often_where_loads_hold_the_pins(
-    gear: Gear,
-) -> None:
+def test_a_failure_near_the_bound_is_repaired_again_more_often_where_loads_hold_the_pins(gear):
     """Plain draws of the model: .025 with free pins, .203 with held ones."""
     reading = float(0.8 * gear.model.plunger_amplification() @ np.full(10, 0.0035))
     row = inspected(every_joint(0.0035), readings_in=(reading,))

@@ -62,9 +62,7 @@ def test_a_gear_whose_measured_joints_are_worn_is_expected_to_be_worn_elsewhere(
     assert worn @ WEAR @ SHARES > 1.5 * tight @ WEAR @ SHARES
 
 
-def test_readings_unlike_each_other_speak_for_joints_that_each_have_their_own_level(
-    gear: Gear,
-) -> None:
+def test_readings_unlike_each_other_speak_for_joints_that_each_have_their_own_level(gear):
     alike, unlike = (
         levels_of(gear, dict(enumerate(read, 1)))
         for read in ((0.0006,) * 6, (0.0002, 0.007, 0.0003, 0.0068, 0.0001, 0.006))

@@ -174,9 +174,7 @@ def some_sets(worn: Array) -> Array:
         ({3: 0.004, 4: 0.0013, 5: 0.0021}, 0.036),
     ],
 )
-def test_belief_is_what_plain_draws_of_the_model_say(
-    gear: Gear, read: dict[int, float], y: float
-) -> None:
+def test_belief_is_what_plain_draws_of_the_model_say(gear, read, y):
     sets = some_sets(believed(gear, read, y, np.zeros((1, 10), bool)).worn)
     truth = simulated(gear, read, y, sets, 200_000, 9)
     found = believed(gear, read, y, sets)

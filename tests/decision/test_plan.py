@@ -35,9 +35,7 @@ def test_without_a_reading_nothing_is_explained(judge: Judge) -> None:
     assert (found.explained_at_most_in, found.unexplained_in) == (None, None)
 
 
-def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(
-    gear: Gear, judge: Judge
-) -> None:
+def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(gear, judge):
     form = check_as_json(gear, [judge({3: 0.013})], [], [])["inspections"][0]
     assert form["next_action"] == form["plan"][0]
     assert form["end"] in set(End)
@@ -84,9 +82,7 @@ def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judg
     assert (3 in found.plan.steps[1].joints, found.end) == (True, End.DONE)
 
 
-def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_cause(
-    judge: Judge,
-) -> None:
+def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_cause(judge):
     found = judge(every_joint(0.0035), outcome=Outcome.FAILED)
     assert found.verdict is Verdict.OUTSIDE_MARGIN
     assert (found.probability_exceed_random_directions or 0.0) < 0.05
@@ -118,9 +114,7 @@ def test_a_joint_at_its_limit_is_not_restored_even_if_read_in_millimetres(judge:
     assert at_limit.end is End.WITHIN
 
 
-def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone(
-    judge: Judge,
-) -> None:
+def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone(judge):
     read = every_joint(0.005, j3=0.0079)
     del read[4]
     failed = {"outcome": Outcome.FAILED, "measured_again": (3,)}
@@ -144,9 +138,7 @@ def test_a_reading_in_doubt_is_taken_again_before_the_rigging_is_checked(judge: 
     assert confirmed.next_action.action is Action.RESTORE
 
 
-def test_a_reading_in_doubt_of_a_joint_that_hardly_moves_the_plunger_waits_for_the_others(
-    judge: Judge,
-) -> None:
+def test_a_reading_in_doubt_of_a_joint_that_hardly_moves_the_plunger_waits_for_the_others(judge):
     read = {8: 0.0085} | dict.fromkeys((6, 7, 9, 10), 0.001)
     steps = judge(read, readings_in=(0.036,), outcome=Outcome.FAILED).plan.steps
     assert (steps[0].action, 8 in steps[0].joints) == (Action.MEASURE, False)

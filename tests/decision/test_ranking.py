@@ -54,9 +54,7 @@ def test_an_unmeasured_joint_counts_with_half_its_limit(judge: Judge) -> None:
         assert order(judge, clearance)[0] == first
 
 
-def test_ties_go_to_the_larger_total_order_index(
-    judge: Judge, gear: Gear, table: IndexTable
-) -> None:
+def test_ties_go_to_the_larger_total_order_index(judge, gear, table):
     ranked = order(judge, every_joint(0.0))
     total = dict(zip(gear.joint_numbers, table.total_order.round(6), strict=True))
     assert [total[j] for j in ranked] == sorted(total.values(), reverse=True)
@@ -83,9 +81,7 @@ def test_the_rank_range_covers_the_rank_on_every_linkage(gear: Gear, judge: Judg
         assert finding.rank_range[0] >= min(places)
 
 
-def test_two_to_five_lead_on_every_linkage_with_one_next_and_the_link_assembly_last(
-    judge: Judge,
-) -> None:
+def test_two_to_five_lead_on_every_linkage_with_one_next_and_the_link_assembly_last(judge):
     found = judge(every_joint(0.002), gauge_u_in=1e-9)
     ranges = {finding.joint: finding.rank_range for finding in found.joints}
     assert all(ranges[j][1] <= 4 for j in (2, 3, 4, 5))
@@ -93,9 +89,7 @@ def test_two_to_five_lead_on_every_linkage_with_one_next_and_the_link_assembly_l
     assert all(ranges[j][0] >= 6 for j in (6, 7, 8, 9, 10))
 
 
-def test_the_rank_range_holds_the_rank_of_another_reading_as_often_as_it_should(
-    gear: Gear, table: IndexTable
-) -> None:
+def test_the_rank_range_holds_the_rank_of_another_reading_as_often_as_it_should(gear, table):
     rng = np.random.default_rng(4)
     true = rng.uniform(0.0, 0.007, (200, 10))
     once, again = (np.maximum(true + rng.normal(0.0, 0.0005, true.shape), 0.0) for _ in "ab")
@@ -124,9 +118,7 @@ def test_the_order_on_each_linkage_is_that_of_its_own_amplification(gear: Gear) 
         assert response.amplification == pytest.approx(model.plunger_amplification(), rel=1e-9)
 
 
-def test_the_table_agrees_with_the_model_it_was_computed_from(
-    gear: Gear, table: IndexTable
-) -> None:
+def test_the_table_agrees_with_the_model_it_was_computed_from(gear, table):
     (findings,) = rank_joints(gear, table, np.full((1, 10), np.nan))
     exact = gear.model.plunger_amplification()
     assert [f.plunger_amplification for f in findings] == pytest.approx(exact.tolist(), rel=1e-8)

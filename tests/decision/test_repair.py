@@ -57,17 +57,13 @@ def probabilities_after(gear: Gear, *repairs: tuple[int, ...]) -> np.ndarray:
     return found.probability_within(np.full(n, MARGIN_IN), np.zeros(n))
 
 
-def test_only_what_is_measured_and_worn_beyond_a_new_part_can_be_restored_with_a_gain(
-    gear: Gear,
-) -> None:
+def test_only_what_is_measured_and_worn_beyond_a_new_part_can_be_restored_with_a_gain(gear):
     new = gear.new_parts_in
     read = {1: new[0], 2: new[1] + 5e-5, 3: new[2] + 2e-4, 4: 0.5 * new[3]}
     assert Cases.of(gear, [inspected(read)]).removable[0].tolist() == [n == 3 for n in range(1, 11)]
 
 
-def test_restoring_joint_three_alone_is_too_close_and_three_and_five_clear_the_failure(
-    gear: Gear, judge: Judge
-) -> None:
+def test_restoring_joint_three_alone_is_too_close_and_three_and_five_clear_the_failure(gear, judge):
     assert 0.90 <= probabilities_after(gear, (3,))[0] < 0.95
     assert probabilities_after(gear, (3, 5))[0] >= 0.95
     sets = judge(FULL_FAILURE).repair_sets
@@ -80,9 +76,7 @@ def sets_of_failure(gear: Gear) -> tuple[tuple[int, ...], ...]:
     return tuple(s.joints for s in repair_sets(gear, inspected(FULL_FAILURE), MARGIN_IN))
 
 
-def test_every_repair_set_reaches_95_percent_and_contains_no_joint_too_many(
-    gear: Gear, sets_of_failure: tuple[tuple[int, ...], ...]
-) -> None:
+def test_every_repair_set_reaches_95_percent_and_contains_no_joint_too_many(gear, sets_of_failure):
     assert probabilities_after(gear, *sets_of_failure).min() >= 0.95
     # Joint 3 is over its limit and must be in every set.
     smaller = [
@@ -95,9 +89,7 @@ def test_every_repair_set_reaches_95_percent_and_contains_no_joint_too_many(
     assert probabilities_after(gear, *smaller).max() < 0.955
 
 
-def test_a_joint_over_its_limit_is_in_every_repair_set_even_where_it_moves_the_plunger_little(
-    gear: Gear,
-) -> None:
+def test_a_joint_over_its_limit_is_in_every_repair_set_even_where_it_moves_the_plunger_little(gear):
     found = repair_sets(
         gear, inspected(every_joint(0.001, j3=0.0074, j5=0.0074, j7=0.008)), MARGIN_IN
     )
@@ -138,9 +130,7 @@ def test_a_restored_joint_has_the_clearance_of_a_new_part(gear: Gear) -> None:
     ],
     ids=["no repair needed", "within", "no set suffices"],
 )
-def test_a_gear_that_needs_no_repair_or_that_none_helps_has_no_repair_set(
-    gear: Gear, read: dict[int, float], margin_in: float
-) -> None:
+def test_a_gear_that_needs_no_repair_or_that_none_helps_has_no_repair_set(gear, read, margin_in):
     assert repair_sets(gear, inspected(read), margin_in) == ()
 
 
@@ -170,9 +160,7 @@ def test_an_unmeasured_joint_and_a_gear_beyond_its_margin_have_no_allowance(judg
 
 
 @pytest.mark.parametrize("unread", [(6, 7), (2,), (8, 9, 10), (1, 2, 4)])
-def test_the_search_knows_what_every_set_leaves_with_unread_joints_at_their_limit(
-    gear: Gear, unread: tuple[int, ...]
-) -> None:
+def test_the_search_knows_what_every_set_leaves_with_unread_joints_at_their_limit(gear, unread):
     joints = every_joint(0.001, j1=0.004, j3=0.009, j4=0.005, j5=0.006)
     cases = Cases.of(
         gear,
@@ -198,9 +186,7 @@ def test_an_allowance_counts_on_what_an_extension_adds(gear: Gear) -> None:
     )
 
 
-def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_readings(
-    gear: Gear,
-) -> None:
+def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_readings(gear):
     joints = every_joint(0.003, j1=0.004, j3=0.009, j4=0.005, j5=0.006)
     cases = Cases.of(gear, [inspected(joints, margin_in=0.045, gauge_u_in=0.003)])
     found = repair.Sets(cases, cases.predict_bounds()[1], 0)
@@ -233,9 +219,7 @@ def test_a_set_that_only_just_suffices_is_found(gear: Gear) -> None:
     ]
 
 
-def test_a_set_that_the_exact_prediction_does_not_confirm_is_not_offered(
-    gear: Gear, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_set_that_the_exact_prediction_does_not_confirm_is_not_offered(gear, monkeypatch):
     cases = Cases.of(gear, [inspected(FULL_FAILURE)])
 
     def alone(sets: repair.Sets) -> list[int]:

@@ -22,9 +22,7 @@ def test_every_gear_comes_to_an_end(worked: tuple) -> None:
     assert worked[0]["ended"] == 1.0
 
 
-def test_failures_by_clearance_are_cured_in_fewer_minutes_than_by_measuring_everything(
-    worked: tuple,
-) -> None:
+def test_failures_by_clearance_are_cured_in_fewer_minutes_than_by_measuring_everything(worked):
     assert worked[0]["cured"] == 1.0
     assert worked[2][CLEARANCE] <= 0.82 * worked[3][CLEARANCE]
 
@@ -66,9 +64,7 @@ def test_a_plan_ends_without_asking_for_what_cannot_be_reached(name: str, tmp_pa
     assert [gear.asked & gear.shut for gear in hangar.gears] == [set()] * len(hangar.gears)
 
 
-def test_no_repaired_failure_is_sent_elsewhere_by_what_its_row_says_from_before(
-    tmp_path: Path,
-) -> None:
+def test_no_repaired_failure_is_sent_elsewhere_by_what_its_row_says_from_before(tmp_path):
     repaired, sent_elsewhere, _unasked = replayed(24, 1903, tmp_path)
     assert repaired > 5
     assert sent_elsewhere == 0

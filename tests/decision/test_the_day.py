@@ -21,9 +21,7 @@ def asked(found: object) -> set[int]:
 
 @pytest.mark.parametrize("more", [{}, FAILED])
 @pytest.mark.parametrize("out_of_reach", [(4,), SIDESTAY, LINKS])
-def test_no_plan_asks_for_what_cannot_be_reached(
-    judge: Judge, more: dict, out_of_reach: tuple[int, ...]
-) -> None:
+def test_no_plan_asks_for_what_cannot_be_reached(judge, more, out_of_reach):
     found = judge({3: 0.002} if 3 not in out_of_reach else {}, **more, cannot_reach=out_of_reach)
     assert not asked(found) & set(out_of_reach)
 
@@ -63,9 +61,7 @@ def test_unread_joints_are_not_mentioned_before_the_plan_ends(judge: Judge) -> N
         {"restored_joints": (5,), "repair_date": datetime(2026, 3, 2, 9)},
     ],
 )
-def test_no_gear_is_done_while_a_joint_over_its_limit_waits_for_its_spare(
-    judge: Judge, been: dict
-) -> None:
+def test_no_gear_is_done_while_a_joint_over_its_limit_waits_for_its_spare(judge, been):
     found = judge(every_joint(0.0005, j3=0.009), **been, no_spare=(3,), measured_again=(3,))
     assert found.next_action.text.startswith("Stop for today: #3 must be restored but cannot be.")
     assert found.plan.open_question == "#3 is over the limit and cannot be restored today."
@@ -87,9 +83,7 @@ def test_joints_are_read_where_the_one_without_a_spare_does_not_explain_it(judge
     assert waits.next_action.joints == judge(read, **FAILED).next_action.joints
 
 
-def test_a_reading_in_doubt_is_taken_again_before_the_day_ends_for_want_of_a_spare(
-    judge: Judge,
-) -> None:
+def test_a_reading_in_doubt_is_taken_again_before_the_day_ends_for_want_of_a_spare(judge):
     failed = {"outcome": Outcome.FAILED, "readings_in": (0.036,), "no_spare": (3,)}
     assert judge(every_joint(0.002, j3=0.009), **failed).next_action.action is Action.MEASURE_AGAIN
 

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
 from threadpoolctl import threadpool_info
 
 from mlg_troubleshoot.decision import judge_rows
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import inspected
 
 
-def test_matrix_products_of_a_judgement_wait_for_no_other_threads(
-    gear: Gear, table: IndexTable, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_matrix_products_of_a_judgement_wait_for_no_other_threads(gear, table, monkeypatch):
     seen: list[int] = []
     judge = judge_rows._assess_valid
 

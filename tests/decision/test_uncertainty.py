@@ -19,7 +19,6 @@ from mlg_troubleshoot.decision.prediction import (
 )
 from mlg_troubleshoot.gear.gear import Adjustment, Gear
 from mlg_troubleshoot.gear.linkage import worst_case
-from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 WORN = every_joint(0.002, j3=0.005, j8=0.0)
@@ -50,9 +49,7 @@ def test_the_standard_uncertainty_is_the_root_of_the_sum_of_squares(judge: Judge
     assert min(squares) > 0
 
 
-def test_the_part_of_the_readings_is_their_amplification_times_their_uncertainty(
-    gear: Gear, judge: Judge
-) -> None:
+def test_the_part_of_the_readings_is_their_amplification_times_their_uncertainty(gear, judge):
     def worst(joint: int, more: float) -> float:
         row = np.array([[WORN[j] + (more if j == joint else 0.0) for j in range(1, 11)]])
         return float(worst_case(gear.model, row).magnitude_in[0])
@@ -80,9 +77,7 @@ def test_each_measured_joint_has_a_part_of_its_own(gear: Gear, judge: Judge) -> 
     )
 
 
-def test_the_chance_of_a_wrong_verdict_is_given_only_where_a_prediction_decides(
-    judge: Judge,
-) -> None:
+def test_the_chance_of_a_wrong_verdict_is_given_only_where_a_prediction_decides(judge):
     within, outside = judge(every_joint(0.001)), judge(every_joint(0.012))
     assert (within.verdict, outside.verdict) == (Verdict.WITHIN_MARGIN, Verdict.OUTSIDE_MARGIN)
     assert within.chance_wrong == pytest.approx(1.0 - within.probability_within_margin)
@@ -113,9 +108,7 @@ def test_the_part_of_the_geometry_is_the_sample_standard_deviation_over_the_ten_
     )
 
 
-def test_the_geometry_spread_is_the_least_and_largest_prediction_of_the_ten_linkages(
-    gear: Gear, judge: Judge
-) -> None:
+def test_the_geometry_spread_is_the_least_and_largest_prediction_of_the_ten_linkages(gear, judge):
     over_all = magnitudes(gear, WORN)
     assert judge(WORN).geometry_spread_in == pytest.approx(
         (over_all.min(), over_all.max()), abs=1e-5
@@ -169,9 +162,7 @@ def test_the_upper_prediction_gives_unmeasured_joints_no_reading_uncertainty(gea
     assert found.u_clearances_in[0] == 0.0
 
 
-def test_an_extension_replaces_the_model_uncertainty_by_its_residual_scatter_and_says_so(
-    judge: Judge,
-) -> None:
+def test_an_extension_replaces_the_model_uncertainty_by_its_residual_scatter_and_says_so(judge):
     found = budget(judge(WORN, extension=Shifted()))
     assert found.model_in == 0.001
     assert "plunger shifted by 0.004 in" in found.model_source
@@ -189,9 +180,7 @@ def test_an_extension_acts_on_every_displacement(judge: Judge) -> None:
 
 
 @pytest.mark.parametrize(("gauge", "lacks"), [({}, True), ({"gauge_id": "G-1"}, False)])
-def test_an_inspection_without_a_column_that_an_extension_needs_says_so(
-    judge: Judge, gauge: dict[str, str], lacks: bool
-) -> None:
+def test_an_inspection_without_a_column_that_an_extension_needs_says_so(judge, gauge, lacks):
     said = " ".join(judge(WORN, extension=Shifted(), **gauge).warnings)
     lacking = "The extension of the model needs gauge_id, which this inspection lacks"
     assert (lacking in said) is lacks
@@ -233,9 +222,7 @@ def test_the_bound_is_the_worst_case_over_all_directions_whatever_an_extension_p
     assert loaded.predicted_displacement_in == pytest.approx(0.4 * bound, rel=0.02)
 
 
-def test_the_geometry_spread_is_that_of_the_prediction_as_loaded_on_every_linkage(
-    judge: Judge, loaded: Assessment
-) -> None:
+def test_the_geometry_spread_is_that_of_the_prediction_as_loaded_on_every_linkage(judge, loaded):
     plain = judge(WORN).geometry_spread_in or (0.0, 0.0)
     assert loaded.geometry_spread_in == pytest.approx([0.4 * end for end in plain], rel=0.04)
 
@@ -264,16 +251,12 @@ def test_an_extension_relaxes_no_verdict(judge: Judge, loaded: Assessment) -> No
     assert loaded.probability_within_margin == plain.probability_within_margin
 
 
-def test_what_an_extension_predicts_stands_after_the_verdict_that_it_does_not_relax(
-    judge: Judge, loaded: Assessment
-) -> None:
+def test_what_an_extension_predicts_stands_after_the_verdict_that_it_does_not_relax(judge, loaded):
     said = f" With the extension: {loaded.predicted_displacement_in:.4f} in, within margin; it"
     assert loaded.headline == judge(WORN).headline + said + " relaxes no verdict."
 
 
-def test_what_decides_is_the_larger_of_bound_and_extension(
-    judge: Judge, loaded: Assessment
-) -> None:
+def test_what_decides_is_the_larger_of_bound_and_extension(judge, loaded):
     assert loaded.deciding_in == judge(WORN).predicted_displacement_in
     found = judge(WORN, extension=Shifted(0.04), gauge_id="G-1")
     assert found.deciding_in == found.predicted_displacement_in
@@ -287,9 +270,7 @@ def test_what_decides_is_the_larger_of_bound_and_extension(
 
 
 @pytest.mark.slow
-def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(
-    gear: Gear, table: IndexTable
-) -> None:
+def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(gear, table):
     rng = np.random.default_rng(5)
     n, margin = 3000, 0.03
     true = rng.uniform(0.0, 1.0, (n, 1)) * rng.uniform(0.0, 0.009, (n, 10))
@@ -317,9 +298,7 @@ def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(
         )
 
 
-def test_a_joint_over_its_limit_may_state_any_uncertainty_above_nothing(
-    gear: Gear, table: IndexTable
-) -> None:
+def test_a_joint_over_its_limit_may_state_any_uncertainty_above_nothing(gear, table):
     row = inspected({3: 0.009}, gauge_u_by_joint_in={3: 1e-320}, outcome=Outcome.FAILED)
     (found,) = assess([row], gear, table)
     assert isinstance(found, Assessment)

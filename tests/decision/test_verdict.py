@@ -40,30 +40,22 @@ probability = st.floats(0, 1)
         (1.0, Verdict.WITHIN_MARGIN),
     ],
 )
-def test_the_limits_of_the_zones_are_5_and_95_percent_and_belong_to_the_clear_verdicts(
-    p: float, expected: Verdict
-) -> None:
+def test_the_limits_of_the_zones_are_5_and_95_percent_and_belong_to_the_clear_verdicts(p, expected):
     assert zone(p) is expected
 
 
 @given(p_lower=st.floats(0, 0.05), p_upper=probability, missing=st.booleans())
-def test_outside_comes_first_even_with_critical_joints_missing(
-    p_lower: float, p_upper: float, missing: bool
-) -> None:
+def test_outside_comes_first_even_with_critical_joints_missing(p_lower, p_upper, missing):
     assert verdict(p_lower, p_upper, critical_missing=missing) is Verdict.OUTSIDE_MARGIN
 
 
 @given(p_lower=st.floats(0.06, 1), p_upper=probability)
-def test_a_missing_critical_joint_is_incomplete_whatever_the_rest_says(
-    p_lower: float, p_upper: float
-) -> None:
+def test_a_missing_critical_joint_is_incomplete_whatever_the_rest_says(p_lower, p_upper):
     assert verdict(p_lower, p_upper, critical_missing=True) is Verdict.INCOMPLETE
 
 
 @given(p_lower=st.floats(0.06, 1), p_upper=probability)
-def test_verdicts_that_differ_between_zero_and_the_bound_are_incomplete(
-    p_lower: float, p_upper: float
-) -> None:
+def test_verdicts_that_differ_between_zero_and_the_bound_are_incomplete(p_lower, p_upper):
     found = verdict(p_lower, p_upper, critical_missing=False)
     assert (found is Verdict.INCOMPLETE) == (zone(p_lower) is not zone(p_upper))
 
@@ -133,9 +125,7 @@ def test_an_invalid_row_is_rejected_with_what_to_correct(gear: Gear, table: Inde
     assert found.next_action.text == "CANNOT BE JUDGED. Correct: clearance_3_in, side."
 
 
-def test_every_row_is_judged_once_in_its_order_with_invalid_rows_between(
-    gear: Gear, table: IndexTable
-) -> None:
+def test_every_row_is_judged_once_in_its_order_with_invalid_rows_between(gear, table):
     rows = [
         inspected(every_joint(0.001), record_id="a"),
         InvalidRow("b", None, None, ("unit",)),
@@ -148,9 +138,7 @@ def test_every_row_is_judged_once_in_its_order_with_invalid_rows_between(
     assert names == ["a", "b", "c"]
 
 
-def test_a_batch_judges_each_gear_as_if_it_were_alone(
-    gear: Gear, table: IndexTable, judge: Judge
-) -> None:
+def test_a_batch_judges_each_gear_as_if_it_were_alone(gear, table, judge):
     cases = [every_joint(0.001), FAILURE, every_joint(0.002), {1: 0.001}, every_joint(0.05)]
     batch = assess([inspected(case) for case in cases], gear, table)
     for found, case in zip(batch, cases, strict=True):
@@ -162,9 +150,7 @@ def test_a_batch_judges_each_gear_as_if_it_were_alone(
         )
 
 
-def test_gears_of_which_the_same_is_known_are_judged_once(
-    gear: Gear, table: IndexTable, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_gears_of_which_the_same_is_known_are_judged_once(gear, table, monkeypatch):
     judged: list[int] = []
     of = Cases.of
 
@@ -181,9 +167,7 @@ def test_gears_of_which_the_same_is_known_are_judged_once(
     assert found[5].headline != found[0].headline
 
 
-def test_a_gear_that_does_not_close_is_outside_with_its_numbers_absent_and_a_warning(
-    judge: Judge,
-) -> None:
+def test_a_gear_that_does_not_close_is_outside_with_its_numbers_absent_and_a_warning(judge):
     found = judge(every_joint(0.05))
     assert found.verdict is Verdict.OUTSIDE_MARGIN
     numbers = (
@@ -195,9 +179,7 @@ def test_a_gear_that_does_not_close_is_outside_with_its_numbers_absent_and_a_war
     assert any("does not close" in warning for warning in found.warnings)
 
 
-def test_where_only_some_linkages_of_the_ensemble_close_the_uncertainty_is_absent_and_said(
-    judge: Judge,
-) -> None:
+def test_where_only_some_linkages_of_the_ensemble_close_the_uncertainty_is_absent_and_said(judge):
     found = judge(every_joint(0.03))
     assert found.verdict is Verdict.OUTSIDE_MARGIN
     assert found.predicted_displacement_in is not None
@@ -210,9 +192,7 @@ def test_where_only_some_linkages_of_the_ensemble_close_the_uncertainty_is_absen
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.001, 0.03, 0.05])
-def test_no_clearance_gives_json_that_is_not_json(
-    gear: Gear, judge: Judge, clearance: float
-) -> None:
+def test_no_clearance_gives_json_that_is_not_json(gear, judge, clearance):
     json.dumps(check_as_json(gear, [judge(every_joint(clearance))], [], []), allow_nan=False)
 
 
@@ -242,9 +222,7 @@ def test_gears_worn_up_to_the_limit_are_mostly_outside_and_some_inconclusive(gea
     assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.07, abs=0.03)
 
 
-def test_gears_worn_up_to_three_thou_are_mostly_within_and_the_others_inconclusive(
-    gear: Gear,
-) -> None:
+def test_gears_worn_up_to_three_thou_are_mostly_within_and_the_others_inconclusive(gear):
     found = shares(gear, 0.003)
     assert found[Verdict.WITHIN_MARGIN] == pytest.approx(0.89, abs=0.03)
     assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.11, abs=0.03)

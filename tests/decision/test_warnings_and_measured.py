@@ -27,9 +27,7 @@ def test_a_margin_larger_than_that_of_the_gear_file_is_said_with_both(judge: Jud
 
 
 @pytest.mark.parametrize("margin_in", [None, 0.028, 0.03, 0.762 / 25.4])
-def test_a_margin_up_to_that_of_the_gear_file_is_taken_without_a_word(
-    judge: Judge, margin_in: float | None
-) -> None:
+def test_a_margin_up_to_that_of_the_gear_file_is_taken_without_a_word(judge, margin_in):
     assert not said(judge(every_joint(0.004), margin_in=margin_in).warnings, "margin of")
 
 
@@ -50,9 +48,7 @@ def test_limits_in_place_of_readings_are_asked_about(judge: Judge, c3: float, as
         (dict.fromkeys(range(1, 5), 0.002), False),
     ],
 )
-def test_one_value_in_five_joints_or_more_is_asked_about(
-    judge: Judge, clearances: dict[int, float], asked: bool
-) -> None:
+def test_one_value_in_five_joints_or_more_is_asked_about(judge, clearances, asked):
     said_so = "Every clearance is 0.0020 in, hardly a reading of each joint"
     assert said(judge(clearances).warnings, said_so) is asked
 
@@ -67,9 +63,7 @@ def test_a_joint_at_its_limit_is_not_above_it_even_if_read_in_millimetres(judge:
 
 
 @pytest.mark.parametrize("unit", [LengthUnit.INCH, LengthUnit.THOU, LengthUnit.MILLIMETRE])
-def test_a_plunger_at_its_margin_is_not_beyond_it_in_any_unit(
-    judge: Judge, unit: LengthUnit
-) -> None:
+def test_a_plunger_at_its_margin_is_not_beyond_it_in_any_unit(judge, unit):
     typed = {"in": 0.03, "thou": 30.0, "mm": 0.762}[unit.value]
     found = judge(every_joint(0.004), readings_in=(unit.to_inches(typed),))
     assert found.basis is Basis.PREDICTED
@@ -144,9 +138,7 @@ def test_a_suggested_slip_is_never_applied(judge: Judge) -> None:
 @pytest.mark.parametrize(
     ("declared", "readings", "expected"), [(None, 1, 0.002), (None, 4, 0.001), (0.003, 4, 0.0015)]
 )
-def test_the_mean_of_repeat_readings_is_better_than_one(
-    declared: float | None, readings: int, expected: float
-) -> None:
+def test_the_mean_of_repeat_readings_is_better_than_one(declared, readings, expected):
     found = plunger_u(inspected({}, readings_in=(0.01,) * readings, plunger_gauge_u_in=declared))
     assert found == pytest.approx(expected)
 
@@ -195,24 +187,18 @@ def test_what_the_reader_noticed_stays_with_the_judgement(judge: Judge) -> None:
         ((0.0305, 0.029), None),
     ],
 )
-def test_an_uncertainty_never_clears_what_a_reading_does_not(
-    judge: Judge, readings: tuple[float, ...], u_in: float | None
-) -> None:
+def test_an_uncertainty_never_clears_what_a_reading_does_not(judge, readings, u_in):
     found = judge(every_joint(0.0003), readings_in=readings, plunger_gauge_u_in=u_in)
     assert found.verdict is not Verdict.WITHIN_MARGIN
 
 
-def test_a_displacement_is_not_called_beyond_the_clearances_where_none_was_entered(
-    judge: Judge,
-) -> None:
+def test_a_displacement_is_not_called_beyond_the_clearances_where_none_was_entered(judge):
     said = [" ".join(judge(read, readings_in=(0.036,)).warnings) for read in ({}, {3: 0.001})]
     assert ["what the entered clearances can do" in each for each in said] == [False, True]
 
 
 @pytest.mark.parametrize("rigging", [None, RiggingCheck.YES])
-def test_a_plunger_out_of_its_position_at_down_lock_needs_its_rigging_checked(
-    judge: Judge, rigging: RiggingCheck | None
-) -> None:
+def test_a_plunger_out_of_its_position_at_down_lock_needs_its_rigging_checked(judge, rigging):
     found = judge(every_joint(0.0003), plunger_down_lock_in=0.2, rigging_checked=rigging)
     assert found.next_action.action is Action.CHECK_RIGGING
     assert not Listed.of(found).is_fine

@@ -29,9 +29,7 @@ def test_a_rigging_that_was_looked_at_is_rarely_the_cause(gear: Gear) -> None:
     assert odds[1] == pytest.approx(0.03 * odds[0])
 
 
-def test_the_joints_explain_a_reading_at_their_worst_directions_though_no_random_ones_would(
-    gear: Gear,
-) -> None:
+def test_the_joints_explain_a_reading_at_their_worst_directions_though_no_random_ones_would(gear):
     worst_in = float(0.94 * gear.model.plunger_amplification() @ np.full(10, 0.004))
     found = causes_of(gear, WORN, readings_in=(worst_in,), rigging_checked=RiggingCheck.YES)
     assert found.held > 100.0
@@ -44,9 +42,7 @@ def test_a_joint_that_was_read_twice_is_known_to_be_worn_or_not(gear: Gear) -> N
     assert ((found.worn[[0, 6]] > 0.0) & (found.worn[[0, 6]] < 1.0)).all()
 
 
-def test_of_a_gear_of_which_nothing_was_read_the_joints_are_the_cause_as_often_as_usual(
-    gear: Gear,
-) -> None:
+def test_of_a_gear_of_which_nothing_was_read_the_joints_are_the_cause_as_often_as_usual(gear):
     found = Belief(Cases.of(gear, [inspected({})]))
     assert found.chances[0] / found.chances[2] == pytest.approx(
         PRIORS.joints_for_one_elsewhere, rel=0.01
@@ -67,9 +63,7 @@ def test_the_same_plunger_reading_is_the_joints_rather_than_the_rigging_where_on
     assert worn.chances[1] < 0.3 * sound.chances[1]
 
 
-def test_a_worn_joint_that_hardly_moves_the_plunger_speaks_against_the_rigging_all_the_same(
-    gear: Gear,
-) -> None:
+def test_a_worn_joint_that_hardly_moves_the_plunger_speaks_against_the_rigging_all_the_same(gear):
     # A rigging goes wrong at work on the gear, at which what is over its limit is restored.
     worn, sound = (
         causes_of(gear, every_joint(0.0015, j6=worn), readings_in=(0.036,), measured_again=(6,))

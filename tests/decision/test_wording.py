@@ -6,7 +6,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.sentences import percent
-from tests.decision.conftest import Judge, every_joint
+from tests.decision.conftest import every_joint
 
 
 @pytest.mark.parametrize(
@@ -23,9 +23,7 @@ from tests.decision.conftest import Judge, every_joint
         (1.0, "100 %"),
     ],
 )
-def test_a_probability_is_written_as_a_percentage_that_is_not_a_false_certainty(
-    share: float, written: str
-) -> None:
+def test_a_probability_is_written_as_a_percentage_that_is_not_a_false_certainty(share, written):
     assert percent(share) == written
 
 
@@ -36,9 +34,7 @@ def test_a_probability_is_written_as_a_percentage_that_is_not_a_false_certainty(
         ({"j2": 0.0148, "j3": 0.0148}, "IF #2, #3 are restored, THEN "),
     ],
 )
-def test_what_follows_a_repair_is_a_sentence_for_one_joint_and_for_several(
-    judge: Judge, worn: dict[str, float], beginning: str
-) -> None:
+def test_what_follows_a_repair_is_a_sentence_for_one_joint_and_for_several(judge, worn, beginning):
     read = every_joint(0.0005, **worn)
     found = judge(read, advice=True, outcome=Outcome.RETRACTED)
     assert [each.text.startswith(beginning) for each in found.plan.then] == [True]

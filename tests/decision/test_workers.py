@@ -179,9 +179,7 @@ def cluster() -> Iterator[str]:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-def test_the_page_on_clusters_finds_the_same_on_two_dask_workers(
-    cluster: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_page_on_clusters_finds_the_same_on_two_dask_workers(cluster, tmp_path, monkeypatch):
     header, *rows = BATCH.read_text(encoding="utf-8").splitlines()
     table = tmp_path / "inspections.csv"
     table.write_text("\n".join([header, *(f"{k}{row}" for k in range(12) for row in rows)]))

@@ -63,9 +63,7 @@ CANNOT: dict[str, tuple[Spoil, str, str]] = {
 
 
 @pytest.mark.parametrize("case", CANNOT)
-def test_a_table_that_cannot_answer_says_why_and_what_to_record_next_time(
-    case: str, gear: Gear, plain: DiagnosisTable
-) -> None:
+def test_a_table_that_cannot_answer_says_why_and_what_to_record_next_time(case, gear, plain):
     spoil, why, remedy = CANNOT[case]
     with pytest.raises(InconclusiveDataError, match=why) as refused:
         diagnose(gear.model, spoil(plain), gear.discrepancies)
@@ -81,9 +79,7 @@ def test_a_table_that_cannot_answer_says_why_and_what_to_record_next_time(
         ("day", 3.0, "approach"),
     ],
 )
-def test_a_constant_column_and_a_constant_name_name_nothing(
-    column: str, value: float, factor: str, gear: Gear, plain: DiagnosisTable
-) -> None:
+def test_a_constant_column_and_a_constant_name_name_nothing(column, value, factor, gear, plain):
     quantities = {**plain.quantities, column: np.full(len(plain), value)}
     factors = {**plain.factors, factor: np.full(len(plain), "X")}
     constant = replace(plain, quantities=quantities, factors=factors)
@@ -133,18 +129,14 @@ TABLE_IS_WRONG: dict[str, tuple[Spoil, str]] = {
 
 
 @pytest.mark.parametrize("case", TABLE_IS_WRONG)
-def test_what_is_wrong_with_the_table_is_not_a_cause(
-    case: str, gear: Gear, plain: DiagnosisTable
-) -> None:
+def test_what_is_wrong_with_the_table_is_not_a_cause(case, gear, plain):
     spoil, remedy = TABLE_IS_WRONG[case]
     with pytest.raises(InconclusiveDataError) as refused:
         diagnose(gear.model, spoil(plain), gear.discrepancies)
     assert remedy in refused.value.remedy
 
 
-def test_a_table_that_is_wrong_is_refused_before_causes_are_sought(
-    gear: Gear, plain: DiagnosisTable, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_table_that_is_wrong_is_refused_before_causes_are_sought(gear, plain, monkeypatch):
     def sought(_self: Cause, _scene: object) -> Iterator[Candidate]:
         raise AssertionError
 
@@ -153,9 +145,7 @@ def test_a_table_that_is_wrong_is_refused_before_causes_are_sought(
         diagnose(gear.model, plunger_in_millimetres(plain), gear.discrepancies)
 
 
-def test_a_column_with_one_value_known_is_not_a_reason_to_fail(
-    gear: Gear, plain: DiagnosisTable
-) -> None:
+def test_a_column_with_one_value_known_is_not_a_reason_to_fail(gear, plain):
     lonely = np.full(len(plain), np.nan)
     lonely[7] = 21.0
     table = replace(plain, quantities={**plain.quantities, "temperature_c": lonely})

@@ -64,9 +64,7 @@ def test_the_example_of_the_page_is_read(tmp_path: Path) -> None:
         ("expected = 0.3", "schema"),
     ],
 )
-def test_what_is_wrong_in_the_file_is_named_by_its_key(
-    text: str, says: str, tmp_path: Path
-) -> None:
+def test_what_is_wrong_in_the_file_is_named_by_its_key(text, says, tmp_path):
     with pytest.raises(GearFileError) as caught:
         load_beliefs(written(tmp_path, text), 0.9, NAMES, SIZED)
     assert says in caught.value.message
@@ -115,9 +113,7 @@ def test_another_linkage_is_less_likely_where_the_gear_was_measured(measured_gea
     assert probability_of_another_linkage(measured_gear) < 0.15 * drawn
 
 
-def test_how_rare_another_linkage_is_of_a_measured_gear_can_be_stated(
-    measured_gear: Path, tmp_path: Path
-) -> None:
+def test_how_rare_another_linkage_is_of_a_measured_gear_can_be_stated(measured_gear, tmp_path):
     alike = written(tmp_path, "schema = 1\nsurveyed = 1.0")
     assert probability_of_another_linkage(measured_gear, alike) == pytest.approx(
         probability_of_another_linkage("hawker-800xp")

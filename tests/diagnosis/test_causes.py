@@ -77,9 +77,7 @@ def test_a_cause_of_size_zero_changes_nothing(name: str, gear: Gear, scene: Scen
 
 
 @pytest.mark.parametrize("name", SINGLE)
-def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(
-    name: str, gear: Gear, scene: Scene
-) -> None:
+def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(name, gear, scene):
     cause = BY_NAME[name]
     candidate = first(cause, scene)
     (column,) = effects_of(scene, [candidate])
@@ -144,9 +142,7 @@ def test_growth_moves_fixed_points_in_proportion_to_the_distance_from_20_c(scene
 
 
 @pytest.mark.parametrize("exponent", [0.84, 1.0, 1.19])
-def test_unlisted_wear_shifts_the_lever_with_a_power_of_the_landings(
-    exponent: float, scene: Scene
-) -> None:
+def test_unlisted_wear_shifts_the_lever_with_a_power_of_the_landings(exponent, scene):
     cause = BY_NAME["unlisted_wear"]
     candidate = next(c for c in cause.candidates(scene) if c.setting["wear_exponent"] == exponent)
     (shift,) = cause.adjust(scene, candidate, 0.002).changed.values()
@@ -162,9 +158,7 @@ def test_wear_of_the_joints_stands_for_landings_that_nobody_recorded(scene: Scen
     assert np.corrcoef(shift, scene.clearance_in.sum(axis=1))[0, 1] > 0.9
 
 
-def test_contact_may_cost_the_smaller_clearance_where_that_contributes_more(
-    gear: Gear, scene: Scene
-) -> None:
+def test_contact_may_cost_the_smaller_clearance_where_that_contributes_more(gear, scene):
     cause = JointContact()
     candidate = next(
         c
@@ -192,9 +186,7 @@ def test_a_clearance_that_is_not_taken_up_is_never_negative(scene: Scene) -> Non
     assert np.min(cause.adjust(scene, first(cause, scene), -7.0).clearance_in) == 0.0
 
 
-def test_a_joint_without_any_clearance_is_not_a_candidate(
-    gear: Gear, plain: DiagnosisTable
-) -> None:
+def test_a_joint_without_any_clearance_is_not_a_candidate(gear, plain):
     clearance = plain.clearance_in.copy()
     clearance[:, 6] = 0.0
     scene = scene_of(gear.model, replace(plain, clearance_in=clearance), gear.discrepancies)
@@ -219,9 +211,7 @@ def test_contact_takes_clearance_from_its_own_joints_only(scene: Scene) -> None:
         assert not np.delete(taken, list(own), axis=1).any()
 
 
-def test_contact_takes_at_most_the_contribution_of_the_one_that_gives_less(
-    gear: Gear, scene: Scene
-) -> None:
+def test_contact_takes_at_most_the_contribution_of_the_one_that_gives_less(gear, scene):
     cause = JointContact()
     candidate = next(c for c in cause.candidates(scene) if c.target == "joints 3,5")
     least = np.min(scene.contribution_in[:, [2, 4]], axis=1)
@@ -337,9 +327,7 @@ def test_a_rigging_change_acts_from_its_day_on(scene: Scene) -> None:
     assert np.array_equal(offset != 0.0, own & later)
 
 
-def test_the_date_of_a_change_is_found_in_a_table_with_another_first_day(
-    gear: Gear, scene: Scene
-) -> None:
+def test_the_date_of_a_change_is_found_in_a_table_with_another_first_day(gear, scene):
     cause = RiggingOffset()
     candidate = next(
         c
@@ -369,9 +357,7 @@ def test_a_change_without_dates_in_the_table_does_nothing(name: str, scene: Scen
 
 
 @pytest.mark.parametrize("name", ["elastic_compliance", "thermal_growth"])
-def test_a_missing_cell_makes_a_cause_do_nothing_in_that_row(
-    name: str, gear: Gear, scene: Scene
-) -> None:
+def test_a_missing_cell_makes_a_cause_do_nothing_in_that_row(name, gear, scene):
     cause = BY_NAME[name]
     column = cause.needs[0]
     values = scene.table.quantities[column].copy()

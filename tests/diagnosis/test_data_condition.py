@@ -60,10 +60,8 @@ def test_of_clean_data_nothing_is_said(gear: Gear) -> None:
     assert kinds(histories(gear), gear) == set()
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_of_a_simulated_sound_fleet_nothing_is_said_but_of_overhauls(
-    seed: int, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("seed", range(2))
+def test_of_a_simulated_sound_fleet_nothing_is_said_but_of_overhauls(seed, tmp_path):
     rows, _truth = blemished_fleet("sound", "mild", 61_000 + seed, rows=100)
     write_rows(rows, tmp_path / "sound.csv")
     said = mlg("diagnose", tmp_path / "sound.csv", "--convention", "RADIAL", "--json").json
@@ -157,9 +155,7 @@ def test_what_was_done_to_the_data_is_said(gear: Gear, change: Change, kind: str
 
 
 @pytest.mark.parametrize("change", [only_worn_of_one, until_the_first_worn_of_one])
-def test_blanks_not_at_random_are_said_of_the_technician_whose_they_are(
-    gear: Gear, change: Change
-) -> None:
+def test_blanks_not_at_random_are_said_of_the_technician_whose_they_are(gear, change):
     (found,) = data_condition(changed(gear, change), gear)[0]
     assert (found.kind, "of technician T-1:" in found.where) == ("blank_not_at_random", True)
     # Others read the same joints.
@@ -190,9 +186,7 @@ def test_rows_that_stand_twice_count_once(gear: Gear) -> None:
     assert np.flatnonzero(aside).tolist() == [120, 121]
 
 
-def test_a_row_with_every_joint_below_the_end_of_its_gauge_is_not_one_value_ten_times(
-    gear: Gear,
-) -> None:
+def test_a_row_with_every_joint_below_the_end_of_its_gauge_is_not_one_value_ten_times(gear):
     table = changed(gear, all_alike)
     below = np.zeros(table.clearance_in.shape, bool)
     below[4::30] = True
@@ -319,9 +313,7 @@ def test_a_re_rigging_needs_a_day_before_it_and_two_after_it(gear: Gear) -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("case", "form"), [("mnar", "strong"), ("gonogo", "strong")])
-def test_what_depends_on_clearances_that_are_cut_off_is_not_named(
-    case: str, form: str, tmp_path: Path
-) -> None:
+def test_what_depends_on_clearances_that_are_cut_off_is_not_named(case, form, tmp_path):
     for seed in (61_000, 61_001):
         rows, _truth = blemished_fleet(case, form, seed, rows=200)
         write_rows(rows, tmp_path / "cut.csv")
@@ -361,9 +353,7 @@ def test_landings_that_fall_are_said_of_the_data_and_not_row_by_row(tmp_path: Pa
     assert not [note for note in said["warnings"] if "never fall" in note]
 
 
-def test_a_gauge_that_was_read_as_a_diameter_for_a_time_is_named_with_its_dates(
-    tmp_path: Path,
-) -> None:
+def test_a_gauge_that_was_read_as_a_diameter_for_a_time_is_named_with_its_dates(tmp_path):
     rows, _truth = blemished_fleet("diametral_month", "strong", 61_000, rows=150)
     write_rows(rows, tmp_path / "diametral.csv")
     said = mlg("diagnose", tmp_path / "diametral.csv", "--json").json

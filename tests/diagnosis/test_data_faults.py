@@ -87,9 +87,7 @@ def test_a_sound_fleet_has_no_faults(gear: Gear, sound: DiagnosisTable) -> None:
         "reading x 10",
     ],
 )
-def test_a_slip_is_found_in_its_cell(
-    slip: Slip, column: str, kind: str, gear: Gear, sound: DiagnosisTable
-) -> None:
+def test_a_slip_is_found_in_its_cell(slip, column, kind, gear, sound):
     assert faults(gear, slip(sound)) == [(ROW, column, kind)]
 
 
@@ -106,9 +104,7 @@ def test_two_swapped_joints_are_found_together(gear: Gear, sound: DiagnosisTable
     ]
 
 
-def test_a_slip_is_named_with_its_row_and_repaired_in_the_analysis_only(
-    gear: Gear, sound: DiagnosisTable
-) -> None:
+def test_a_slip_is_named_with_its_row_and_repaired_in_the_analysis_only(gear, sound):
     table = clearance(25.4)(sound)
     before = table.clearance_in.copy()
     repaired, (fault,), _usable = screen_faults(gear.model, table)
@@ -141,9 +137,7 @@ def test_rows_that_stand_out_with_one_gauge_are_an_effect(gear: Gear) -> None:
     assert faults(gear, table) == []
 
 
-def test_a_row_without_explanation_is_implausible_and_not_used(
-    gear: Gear, sound: DiagnosisTable
-) -> None:
+def test_a_row_without_explanation_is_implausible_and_not_used(gear, sound):
     values = sound.readings_in.copy()
     values[ROW] = -0.9
     _table, found, usable = screen_faults(gear.model, replace(sound, readings_in=values))
@@ -171,9 +165,7 @@ def test_a_heavily_worn_gear_is_not_at_fault(gear: Gear) -> None:
     assert faults(gear, worn_by_landings(gear)) == []
 
 
-def test_two_swapped_joints_are_found_by_the_wear_that_their_landings_make_expect(
-    gear: Gear,
-) -> None:
+def test_two_swapped_joints_are_found_by_the_wear_that_their_landings_make_expect(gear):
     table = worn_by_landings(gear)
     values = table.clearance_in.copy()
     values[ROW, [4, 6]] = values[ROW, [6, 4]]
@@ -225,9 +217,7 @@ def restored(gear: Gear, table: DiagnosisTable) -> set[int]:
     return {fault.row - 2 for fault in found if fault.kind == "restored_joint"}
 
 
-def test_rows_whose_worst_joint_was_restored_between_the_readings_are_named_and_no_cause(
-    gear: Gear,
-) -> None:
+def test_rows_whose_worst_joint_was_restored_between_the_readings_are_named_and_no_cause(gear):
     table, rows, _moved = restored_between_the_readings(gear)
     found = diagnose(gear.model, table, gear.discrepancies)
     assert found.verdict == "NONE"

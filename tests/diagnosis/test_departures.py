@@ -234,9 +234,7 @@ DIRECTIONS, OTHER_LINKAGE = ("load_directions", None), ("geometry", None)
         ("unread, worn with the read ones", set()),
     ],
 )
-def test_what_acts_is_named_and_nothing_else(
-    name: str, causes: set[tuple[str, str | None]]
-) -> None:
+def test_what_acts_is_named_and_nothing_else(name, causes):
     assert named(name) == causes
 
 
@@ -268,9 +266,7 @@ def test_rows_of_other_tails_are_predicted_as_well_as_noise_allows() -> None:
     assert gain.rms_after_in < 1.3 * 0.0015 < 0.3 * gain.rms_before_in
 
 
-def test_readings_against_the_prediction_are_not_a_wrong_sign_where_clearances_explain_them() -> (
-    None
-):
+def test_readings_against_the_prediction_are_not_a_wrong_sign_where_clearances_explain_them():
     d = found("loads against")
     assert named("loads against") == {("gauge_bias", "gauge G-2")}
     assert d.beside[0].candidate.cause.name == "load_directions"
@@ -312,9 +308,7 @@ def open_set(gear: Gear) -> Diagnosis:
     return diagnose(gear.model, turned_pin(gear, 80, 332), gear.discrepancies)
 
 
-def test_a_set_says_in_which_gear_its_likeliest_causes_differ_most(
-    gear: Gear, open_set: Diagnosis
-) -> None:
+def test_a_set_says_in_which_gear_its_likeliest_causes_differ_most(gear, open_set):
     table, found = turned_pin(gear, 80, 332), open_set
     assert found.verdict == "AMBIGUOUS"
     assert found.further is not None
@@ -325,9 +319,7 @@ def test_a_set_says_in_which_gear_its_likeliest_causes_differ_most(
     assert found.further.apart_in < 0.43 * 2.4 * table.clearance_in[most, 3]
 
 
-def test_after_the_further_inspections_that_are_asked_for_the_cause_is_named(
-    gear: Gear, open_set: Diagnosis
-) -> None:
+def test_after_the_further_inspections_that_are_asked_for_the_cause_is_named(gear, open_set):
     further = open_set.further
     assert further is not None
     assert further.inspections is not None
@@ -399,9 +391,7 @@ def test_readings_against_the_prediction_that_no_clearance_tells_of_are_refused(
 
 
 @pytest.mark.slow
-def test_small_readings_that_the_clearances_explain_are_directions_and_no_wrong_unit(
-    gear: Gear,
-) -> None:
+def test_small_readings_that_the_clearances_explain_are_directions_and_no_wrong_unit(gear):
     factors = np.array([0.1, 0.4, 0.0, 0.3, 0.0, -1.0, 0.9, 0.5, -1.0, -0.5])
     table = fleet(gear.model, lambda t, over: loads(t, over, factors), rows=200, noise_in=0.003)
     d = diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:])
@@ -494,9 +484,7 @@ def test_an_aircraft_whose_unread_joints_may_be_worn_is_not_named_as_re_rigged()
     }
 
 
-def test_an_aircraft_is_not_named_as_re_rigged_from_a_day_on_from_which_joints_were_not_read() -> (
-    None
-):
+def test_an_aircraft_is_not_named_as_re_rigged_from_a_day_on_from_which_joints_were_not_read():
     assert "rigging_offset" not in {cause for cause, _target in named("worn when not read")}
 
 

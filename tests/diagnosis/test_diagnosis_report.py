@@ -135,9 +135,7 @@ def test_each_of_three_causes_is_drawn_before_and_after(gear: Gear, make: Make) 
     )
 
 
-def test_the_report_shows_each_clearance_of_the_other_convention_as_entered_and_as_used(
-    convention: Made,
-) -> None:
+def test_the_report_shows_each_clearance_of_the_other_convention_as_entered_and_as_used(convention):
     cells = convention.diagnosis.corrected
     first = [c for c in cells if c.place == cells[0].place]
     entered, used = (
@@ -158,9 +156,7 @@ def test_the_screen_says_what_is_used_otherwise_than_entered(convention: Made) -
     assert "Corrected for this analysis" in data.text
 
 
-def test_where_directions_are_named_the_report_says_why_readings_are_smaller(
-    gear: Gear, make: Make
-) -> None:
+def test_where_directions_are_named_the_report_says_why_readings_are_smaller(gear, make):
     text = make(FLEETS["loads"](gear)).text
     assert "Why your readings are smaller than the bound" in text
     assert "Under load each pin rests where the load presses it." in text
@@ -187,9 +183,7 @@ def test_more_wrong_verdicts_are_not_shown_as_a_gain(named: Made) -> None:
 
 
 @pytest.mark.parametrize(("after", "warned"), [(4, True), (3, False)])
-def test_more_rows_falsely_within_are_said_beside_the_verdict(
-    named: Made, after: int, warned: bool
-) -> None:
+def test_more_rows_falsely_within_are_said_beside_the_verdict(named, after, warned):
     gain = named.diagnosis.gain
     assert gain is not None
     counted = replace(gain, false_within_before=3, false_within_after=after)
@@ -297,9 +291,7 @@ def test_a_fault_stands_with_what_was_written_and_what_was_used(gear: Gear, make
         *("Column 'mood' is not known.", "as the model's standard uncertainty"),
     ],
 )
-def test_the_report_says_what_it_rests_on_what_it_names_and_what_follows(
-    words: str, named: Made
-) -> None:
+def test_the_report_says_what_it_rests_on_what_it_names_and_what_follows(words, named):
     assert words in named.text
 
 

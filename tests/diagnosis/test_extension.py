@@ -132,9 +132,7 @@ def test_the_file_says_on_which_data_and_geometry_it_rests(gear: Gear, tmp_path:
     ],
     ids=lambda each: getattr(each, "value", None),
 )
-def test_a_term_that_no_gear_can_have_is_refused(
-    saved: Term, expected: str, gear: Gear, tmp_path: Path
-) -> None:
+def test_a_term_that_no_gear_can_have_is_refused(saved, expected, gear, tmp_path):
     write_extension(extension(gear, saved), tmp_path / "e.toml")
     with pytest.raises(GearFileError, match=expected):
         load_extension([tmp_path / "e.toml"], gear)
@@ -165,9 +163,7 @@ def test_a_file_that_is_not_an_extension_is_refused(gear: Gear, tmp_path: Path) 
         ("residual_u_in = 0.0031", 'residual_u_in = "small"'),
     ],
 )
-def test_a_damaged_extension_is_refused_with_its_name(
-    written: str, instead: str, gear: Gear, tmp_path: Path
-) -> None:
+def test_a_damaged_extension_is_refused_with_its_name(written, instead, gear, tmp_path):
     file = tmp_path / "e.toml"
     write_extension(extension(gear, RATE), file)
     text = file.read_text(encoding="utf-8")
@@ -243,9 +239,7 @@ def test_a_cause_that_is_not_known_asks_for_the_file_of_causes(gear: Gear, tmp_p
 @pytest.mark.parametrize(
     "changed", ["value = 0.05", "rows = 200", "program = ", "residual_u_in = "]
 )
-def test_a_file_that_no_diagnosis_wrote_so_says_it(
-    changed: str, gear: Gear, tmp_path: Path
-) -> None:
+def test_a_file_that_no_diagnosis_wrote_so_says_it(changed, gear, tmp_path):
     file = tmp_path / "e.toml"
     write_extension(extension(gear, RATE), file)
     lines = file.read_text(encoding="utf-8").splitlines()
@@ -288,9 +282,7 @@ def test_stretches_of_one_link_add_up(gear: Gear) -> None:
     ("day", "moved"),
     [(date(2024, 3, 4), 0.0), (date(2024, 3, 5), -0.01), (date(2030, 1, 1), -0.01)],
 )
-def test_a_change_since_a_date_acts_in_a_table_that_starts_on_another_day(
-    day: date, moved: float, gear: Gear
-) -> None:
+def test_a_change_since_a_date_acts_in_a_table_that_starts_on_another_day(day, moved, gear):
     assert offset_of(gear, (RIGGED,), inspection_date=day) == pytest.approx(moved, abs=1e-12)
 
 

@@ -46,16 +46,12 @@ def test_a_model_that_is_right_to_the_last_digit_has_no_cause(gear: Gear) -> Non
 
 @every_day_and_slow
 @pytest.mark.parametrize("high_in", [0.005, 0.010])
-def test_clearances_drawn_evenly_and_read_exactly_are_not_a_cause(
-    high_in: float, seeds: range, allowed: int, gear: Gear
-) -> None:
+def test_clearances_drawn_evenly_and_read_exactly_are_not_a_cause(high_in, seeds, allowed, gear):
     assert alarms(gear, lambda seed: read_exactly(gear, seed, high_in), seeds) <= allowed
 
 
 @every_day_and_slow
-def test_small_clearances_read_better_than_declared_are_not_a_cause(
-    seeds: range, allowed: int, gear: Gear
-) -> None:
+def test_small_clearances_read_better_than_declared_are_not_a_cause(seeds, allowed, gear):
     assert alarms(gear, lambda seed: read_exactly(gear, seed, None), seeds) <= allowed
 
 

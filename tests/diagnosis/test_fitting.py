@@ -49,9 +49,7 @@ def dense(ratio: float, noise: NoiseModel = NOISE) -> Array:
 
 @pytest.mark.parametrize("noise", NOISES)
 @pytest.mark.parametrize("ratio", NOISE.tail_ratios)
-def test_the_inverse_covariance_is_that_of_the_whole_matrix(
-    ratio: float, noise: NoiseModel
-) -> None:
+def test_the_inverse_covariance_is_that_of_the_whole_matrix(ratio, noise):
     columns = RNG.standard_normal((N, 3))
     product, log_determinant = replace(noise).precision_times(columns, ratio)
     assert product == pytest.approx(np.linalg.solve(dense(ratio, noise), columns))

@@ -65,9 +65,7 @@ def test_the_misfit_of_held_out_tails_falls_by_a_share_above_zero(found: Diagnos
     assert 0.0 < low < high < 1.0
 
 
-def test_rows_of_one_tail_are_held_out_together(
-    gear: Gear, table: DiagnosisTable, fitted_tails: list[int]
-) -> None:
+def test_rows_of_one_tail_are_held_out_together(gear, table, fitted_tails):
     diagnose(gear.model, table, gear.discrepancies)
     # Ten tails of twelve rows: each fit leaves out whole tails.
     assert fitted_tails
@@ -95,9 +93,7 @@ def nothing(gear: Gear, plain: DiagnosisTable) -> Diagnosis:
     return diagnose(gear.model, plain, gear.discrepancies)
 
 
-def test_wrong_verdicts_of_a_model_that_stays_are_counted_by_their_sense(
-    nothing: Diagnosis,
-) -> None:
+def test_wrong_verdicts_of_a_model_that_stays_are_counted_by_their_sense(nothing):
     # Every row is measured beyond its margin and predicted within it.
     margin, none = np.full(len(nothing.predicted_in), 1e-9), np.zeros_like(nothing.predicted_in)
     kept = replace(nothing, used=replace(nothing.used, margin_in=margin), predicted_in=none)
@@ -140,9 +136,7 @@ def test_repeat_readings_tell_the_repeatability(found: Diagnosis) -> None:
 @pytest.mark.parametrize(
     ("declared_in", "said"), [(0.002, (0.002, "declared")), (None, (None, "unknown"))]
 )
-def test_without_repeat_readings_the_declared_repeatability_is_marked(
-    declared_in: float | None, said: tuple[float | None, str], gear: Gear
-) -> None:
+def test_without_repeat_readings_the_declared_repeatability_is_marked(declared_in, said, gear):
     stated = {} if declared_in is None else {"plunger_gauge_u_in": np.full(120, declared_in)}
     single = diagnose(gear.model, _one_reading(fleet(gear.model, **stated)), gear.discrepancies)
     assert (single.repeatability_in, single.repeatability_source) == said

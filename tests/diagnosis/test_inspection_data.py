@@ -107,9 +107,7 @@ def test_the_seeds_in_the_description_are_those_of_the_command() -> None:
         ("measured_nothing_wrong", ("own_cause.py",), "NONE", []),
     ],
 )
-def test_what_is_hidden_is_named_and_nothing_else(
-    file: str, causes: tuple[str, ...], verdict: str, named: list[tuple[str, str | None]]
-) -> None:
+def test_what_is_hidden_is_named_and_nothing_else(file, causes, verdict, named):
     found = diagnosis(f"{file}.csv", *causes)
     assert found.verdict == verdict
     assert [c.candidate.key for c in found.causes] == named

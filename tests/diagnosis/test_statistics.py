@@ -31,9 +31,7 @@ def test_an_interval_holds_the_middle_95_percent_of_a_normal_distribution() -> N
     assert interval_of(0.05, 0.01) == pytest.approx(norm.interval(0.95, 0.05, 0.01), abs=1e-4)
 
 
-def test_a_link_is_shorter_below_the_reference_pressure_for_a_positive_stretch(
-    scene: Scene,
-) -> None:
+def test_a_link_is_shorter_below_the_reference_pressure_for_a_positive_stretch(scene):
     cause = BY_NAME["elastic_compliance"]
     candidate = next(iter(cause.candidates(scene)))
     (change,) = cause.adjust(scene, candidate, 1e-6).changed.values()
@@ -71,9 +69,7 @@ def test_the_mean_of_four_readings_is_twice_as_certain_as_one(plain: DiagnosisTa
     )
 
 
-def test_gauges_alone_leave_what_their_errors_do_through_the_mechanism(
-    gear: Gear, plain: DiagnosisTable
-) -> None:
+def test_gauges_alone_leave_what_their_errors_do_through_the_mechanism(gear, plain):
     rng, n = np.random.default_rng(1), 4000
     clearance = np.tile(plain.clearance_in[0], (n, 1))
     moved = worst_case(
@@ -149,9 +145,7 @@ def test_what_is_written_twice_as_large_has_twice_the_error(plain: DiagnosisTabl
 
 
 @pytest.mark.parametrize(("wrong", "refused"), [(15, False), (30, True)])
-def test_a_table_of_which_a_third_looks_wrong_has_no_slips_of_the_pen(
-    wrong: int, refused: bool
-) -> None:
+def test_a_table_of_which_a_third_looks_wrong_has_no_slips_of_the_pen(wrong, refused):
     faults = tuple(
         DataFault(k, k, f"R{k}", "clearance_3_in", "mm_as_in", "0.1", "0.004") for k in range(wrong)
     )
@@ -160,9 +154,7 @@ def test_a_table_of_which_a_third_looks_wrong_has_no_slips_of_the_pen(
     assert not refused or "(rows 0, 1, 2, 3, 4, 5, 6, 7 and 22 more)" in str(told.value)
 
 
-def test_a_reading_that_is_too_large_by_chance_predicts_too_much(
-    gear: Gear, plain: DiagnosisTable
-) -> None:
+def test_a_reading_that_is_too_large_by_chance_predicts_too_much(gear, plain):
     clearance = plain.clearance_in.copy()
     clearance[5, 2] += 0.002
     table = replace(plain, clearance_in=clearance, gauge_u_in=np.full(len(plain), 0.001))

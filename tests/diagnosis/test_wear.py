@@ -61,9 +61,7 @@ def test_what_is_expected_lies_nearer_the_truth_than_the_readings_do() -> None:
 
 
 @pytest.mark.parametrize("error_in", [0.0002, DECLARED_IN, 2.0 * DECLARED_IN])
-def test_readings_better_than_declared_are_recognised_and_never_taken_to_be_worse(
-    error_in: float,
-) -> None:
+def test_readings_better_than_declared_are_recognised_and_never_taken_to_be_worse(error_in):
     taken = np.sqrt(worn(error_in).history().reading_in2).max()
     assert taken == pytest.approx(min(error_in, DECLARED_IN), rel=0.25)
 
@@ -143,9 +141,7 @@ def test_a_gear_s_line_is_that_of_a_linear_mixed_model() -> None:
         assert variance == pytest.approx(np.sum(shape @ covariance * shape, axis=1))
 
 
-def test_a_reading_is_overruled_by_two_of_its_standard_errors_at_most(
-    plain: DiagnosisTable,
-) -> None:
+def test_a_reading_is_overruled_by_two_of_its_standard_errors_at_most(plain):
     written = plain.clearance_in.copy()
     written[5, 2] = 0.02
     table = replace(plain, clearance_in=written, gauge_u_in=np.full(len(plain), 0.0005))
@@ -166,9 +162,7 @@ def fleet_of(plain: DiagnosisTable, together: float, apart: float) -> tuple[Diag
     return replace(plain, clearance_in=read), true_in
 
 
-def test_an_unread_joint_follows_the_others_of_its_gear_as_far_as_joints_wear_together(
-    plain: DiagnosisTable,
-) -> None:
+def test_an_unread_joint_follows_the_others_of_its_gear_as_far_as_joints_wear_together(plain):
     for together, apart, least, most in ((0.4, 0.1, 0.8, 1.2), (0.0, 0.4, -0.2, 0.6)):
         table, true_in = fleet_of(plain, together, apart)
         others = np.log(
@@ -184,9 +178,7 @@ def test_an_unread_joint_follows_the_others_of_its_gear_as_far_as_joints_wear_to
         assert least < np.linalg.lstsq(shape, filled, rcond=None)[0][1] < most
 
 
-def test_an_unread_joint_of_a_row_without_landings_is_as_worn_as_the_row_s_other_joints(
-    plain: DiagnosisTable,
-) -> None:
+def test_an_unread_joint_of_a_row_without_landings_is_as_worn_as_the_row_s_other_joints(plain):
     table, true_in = fleet_of(plain, 0.3, 0.05)
     latest = int(np.argmax(table.quantities["gear_landings"]))
     gap = table.quantities["gear_landings"].copy()
@@ -197,9 +189,7 @@ def test_an_unread_joint_of_a_row_without_landings_is_as_worn_as_the_row_s_other
     assert likely[latest, 9] == pytest.approx(true_in[latest, 9], rel=0.25)
 
 
-def test_a_gear_of_new_joints_does_not_make_unread_joints_scatter_more(
-    plain: DiagnosisTable,
-) -> None:
+def test_a_gear_of_new_joints_does_not_make_unread_joints_scatter_more(plain):
     scatter = np.exp(np.random.default_rng(5).normal(0.0, 0.2, plain.clearance_in.shape))
     clearance = plain.clearance_in * scatter
     clearance[:, 9] = np.nan

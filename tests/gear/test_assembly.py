@@ -98,9 +98,7 @@ def gear_of(form: dict[str, Any], folder: Path) -> Gear:
     return load_gear(file)
 
 
-def test_a_four_bar_without_what_is_assumed_predicts_as_the_one_that_states_it(
-    tmp_path: Path,
-) -> None:
+def test_a_four_bar_without_what_is_assumed_predicts_as_the_one_that_states_it(tmp_path):
     full = load_gear(Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml")
     clearance = np.array([[0.004, 0.01, 0.002, 0.007]])
     found, wanted = (worst_case(g.model, clearance) for g in (gear_of(FOUR_BAR, tmp_path), full))
@@ -209,9 +207,7 @@ def test_an_assumed_number_is_not_counted_as_a_given_one(tmp_path: Path) -> None
         ),
     ],
 )
-def test_what_is_wrong_is_named_with_key_and_what_was_expected(
-    parts: dict[str, Any], words: str, tmp_path: Path
-) -> None:
+def test_what_is_wrong_is_named_with_key_and_what_was_expected(parts, words, tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(tomli_w.dumps(changed(**parts)))
     with pytest.raises(GearFileError, match=words) as caught:
@@ -234,9 +230,7 @@ def test_what_is_wrong_is_named_with_key_and_what_was_expected(
         ),
     ],
 )
-def test_a_linkage_that_cannot_move_is_refused(
-    parts: dict[str, Any], words: str, tmp_path: Path
-) -> None:
+def test_a_linkage_that_cannot_move_is_refused(parts, words, tmp_path):
     with pytest.raises(MechanismError, match=words):
         _ = gear_of(changed(**parts), tmp_path).model
 

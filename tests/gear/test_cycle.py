@@ -23,9 +23,7 @@ def test_the_four_stages_stand_in_the_order_of_the_text(cycle: RetractionCycle) 
     assert cycle.source == "Section 2.1 of the paper"
 
 
-def test_the_valve_has_six_combinations_of_three_positions_and_two_flows(
-    cycle: RetractionCycle,
-) -> None:
+def test_the_valve_has_six_combinations_of_three_positions_and_two_flows(cycle):
     combinations = {(state.plunger, state.flow) for state in cycle.valve}
     assert combinations == {
         (p, f) for p in ("in", "mid", "out") for f in ("retracting", "extending")
@@ -35,9 +33,7 @@ def test_the_valve_has_six_combinations_of_three_positions_and_two_flows(
     assert all(position[state.stage] == state.plunger for state in cycle.valve)
 
 
-def test_the_gear_moves_with_the_plunger_at_mid_and_where_the_text_is_silent_is_not_stated(
-    cycle: RetractionCycle,
-) -> None:
+def test_the_gear_moves_with_the_plunger_at_mid_and_where_the_text_is_silent_is_not_stated(cycle):
     at_mid = {state.flow: state.result for state in cycle.valve if state.plunger == "mid"}
     assert at_mid == {
         "retracting": "the main landing gear is raised",
@@ -50,9 +46,7 @@ def test_the_gear_moves_with_the_plunger_at_mid_and_where_the_text_is_silent_is_
     assert said == silent
 
 
-def test_the_release_has_the_four_steps_of_the_text_from_the_actuator_to_the_released_lock(
-    cycle: RetractionCycle,
-) -> None:
+def test_the_release_has_the_four_steps_of_the_text_from_the_actuator_to_the_released_lock(cycle):
     words = [
         "actuator extends",
         "locking pin travels",
@@ -62,9 +56,7 @@ def test_the_release_has_the_four_steps_of_the_text_from_the_actuator_to_the_rel
     assert all(word in step for word, step in zip(words, cycle.release, strict=True))
 
 
-def test_doors_open_before_the_gear_is_lowered_and_close_last_when_it_is_raised(
-    cycle: RetractionCycle,
-) -> None:
+def test_doors_open_before_the_gear_is_lowered_and_close_last_when_it_is_raised(cycle):
     assert cycle.extension_order == ("doors open first", "gear moves down")
     assert cycle.retraction_order[-1] == "doors close last"
 
@@ -77,7 +69,5 @@ def test_doors_open_before_the_gear_is_lowered_and_close_last_when_it_is_raised(
         (-0.0301, "short of the range"),
     ],
 )
-def test_a_displaced_plunger_is_told_in_the_words_of_the_text(
-    cycle: RetractionCycle, displacement: float, words: str
-) -> None:
+def test_a_displaced_plunger_is_told_in_the_words_of_the_text(cycle, displacement, words):
     assert words in cycle.symptom(displacement, 0.03)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -71,9 +70,7 @@ def test_the_numbers_of_a_batch_are_those_of_each_linkage(gear: Gear) -> None:
             ), name
 
 
-def test_a_linkage_written_as_a_member_reads_back_from_the_ensemble(
-    gear: Gear, tmp_path: Path
-) -> None:
+def test_a_linkage_written_as_a_member_reads_back_from_the_ensemble(gear, tmp_path):
     for file in gear.path.parent.glob("hawker-800xp*"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     ensemble = tmp_path / "hawker-800xp-ensemble.toml"

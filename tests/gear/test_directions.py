@@ -104,9 +104,7 @@ def test_a_global_search_of_directions_and_stroke_finds_hardly_more_than_the_rul
 
 
 @given(clearance=clearances, direction=arrays(float, 10, elements=st.floats(-np.pi, np.pi)))
-def test_no_other_directions_go_beyond_the_worst_ones_by_more_than_that(
-    gear: Gear, clearance: np.ndarray, direction: np.ndarray
-) -> None:
+def test_no_other_directions_go_beyond_the_worst_ones_by_more_than_that(gear, clearance, direction):
     worst = worst_case(gear.model, clearance)
     assert worst.under_in[0] <= 0.0 <= worst.over_in[0]
     moved = float(gear.model.displacement(links_from(clearance, direction)))
@@ -159,17 +157,13 @@ def test_each_gear_of_a_batch_gets_the_directions_of_its_own_clearances(gear: Ge
         )
 
 
-def test_a_joint_without_clearance_still_has_the_direction_in_which_it_would_act(
-    gear: Gear,
-) -> None:
+def test_a_joint_without_clearance_still_has_the_direction_in_which_it_would_act(gear):
     worst = worst_case(gear.model, np.zeros(10))
     tiny = gear.model.displacement(links_from(np.eye(10) * 1e-5, worst.over_directions))
     assert tiny / 1e-5 == pytest.approx(gear.model.plunger_amplification(), rel=1e-3)
 
 
-def test_without_clearance_nothing_moves_and_what_does_not_close_is_beyond_every_margin(
-    gear: Gear,
-) -> None:
+def test_without_clearance_nothing_moves_and_what_does_not_close_is_beyond_every_margin(gear):
     still = worst_case(gear.model, np.zeros(10))
     assert (still.over_in[0], still.under_in[0]) == pytest.approx((0.0, 0.0), abs=1e-15)
     worst = worst_case(gear.model, np.array([[0.005] * 10, [0.05] * 10]))
@@ -197,9 +191,7 @@ def test_with_two_worn_joints_the_chance_is_what_their_two_angles_give(gear: Gea
 
 
 @pytest.mark.parametrize("offset_in", [0.012, -0.012])
-def test_what_moves_the_plunger_besides_is_added_with_its_sign(
-    gear: Gear, offset_in: float
-) -> None:
+def test_what_moves_the_plunger_besides_is_added_with_its_sign(gear, offset_in):
     moved = gear.model.displacement(links_from(FAILURE, random_directions(10, 64))) + offset_in
     chance = chance_beyond(
         gear.model, FAILURE, np.array([MARGIN_IN]), 64, offset_in=np.array([offset_in])
@@ -213,16 +205,12 @@ def worn_gears() -> np.ndarray:
     return 0.0075 * qmc.Sobol(10, seed=13).random(1024)
 
 
-def test_gears_worn_up_to_the_limit_exceed_in_five_percent_of_random_directions(
-    gear: Gear, worn_gears: np.ndarray
-) -> None:
+def test_gears_worn_up_to_the_limit_exceed_in_five_percent_of_random_directions(gear, worn_gears):
     chance = chance_beyond(gear.model, worn_gears, np.full(len(worn_gears), MARGIN_IN), 512)
     assert chance.mean() == pytest.approx(0.05, abs=0.005)
 
 
-def test_gears_worn_up_to_the_limit_exceed_with_worst_directions_in_97_percent(
-    gear: Gear, worn_gears: np.ndarray
-) -> None:
+def test_gears_worn_up_to_the_limit_exceed_with_worst_directions_in_97_percent(gear, worn_gears):
     beyond = worst_case(gear.model, worn_gears).magnitude_in > MARGIN_IN
     assert beyond.mean() == pytest.approx(0.97, abs=0.015)
 

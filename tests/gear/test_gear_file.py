@@ -86,9 +86,7 @@ def test_the_coordinates_are_called_reconstructed_and_not_drawing_data(gear: Gea
         ("new_part", 0.0005, SourceKind.ASSUMED),
     ],
 )
-def test_numbers_behind_the_verdict_say_what_they_are_worth(
-    gear: Gear, what: str, value: float, kind: SourceKind
-) -> None:
+def test_numbers_behind_the_verdict_say_what_they_are_worth(gear, what, value, kind):
     number = gear.margin if what == "margin" else getattr(gear.joint(3), what)
     assert (number.value, number.kind) == (value, kind)
 
@@ -200,9 +198,7 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         ("schema = 2", "schema = = 2", r"copy\.toml: cannot be read as TOML"),
     ],
 )
-def test_what_is_wrong_with_a_gear_file_is_named_with_its_place(
-    edited: Edit, old: str, new: str, words: str
-) -> None:
+def test_what_is_wrong_with_a_gear_file_is_named_with_its_place(edited, old, new, words):
     with pytest.raises(GearFileError, match=words) as caught:
         load_gear(edited(old, new))
     assert caught.value.message.startswith(("copy.toml: ", str(edited(old, new))))
@@ -237,9 +233,7 @@ def test_a_linkage_that_cannot_be_assembled_is_a_mechanism_error_that_names_the_
         ("source = ", "spurce = ", ": source: expected a text, found nothing"),
     ],
 )
-def test_what_is_wrong_with_an_ensemble_is_named_with_its_member(
-    edited: Edit, old: str, new: str, words: str
-) -> None:
+def test_what_is_wrong_with_an_ensemble_is_named_with_its_member(edited, old, new, words):
     path = edited("schema = 2", "schema = 2 ")
     ensemble = path.with_name("hawker-800xp-ensemble.toml")
     text = ensemble.read_text(encoding="utf-8")
@@ -250,9 +244,7 @@ def test_what_is_wrong_with_an_ensemble_is_named_with_its_member(
     assert f"hawker-800xp-ensemble.toml{words}" in caught.value.message
 
 
-def test_a_gear_file_of_an_earlier_version_is_refused_with_the_page_that_tells_the_change(
-    edited: Edit,
-) -> None:
+def test_a_gear_file_of_an_earlier_version_is_refused_with_the_page_that_tells_the_change(edited):
     with pytest.raises(GearFileError, match=r"copy\.toml: is written as 0\.2\.0 read it") as caught:
         load_gear(edited("schema = 2", "schema = 1"))
     page, heading = re.findall(r"(docs/\S+\.md), \"([^\"]+)\"", caught.value.remedy)[0]
@@ -270,9 +262,7 @@ def test_the_joints_carry_the_names_of_the_paper_and_one_to_five_are_critical(ge
 
 
 @pytest.mark.parametrize("clearance", [0.0075, 0.1905 / 25.4, 0.381 / 25.4 / 2, 7.5 / 1000])
-def test_a_clearance_at_its_limit_is_not_over_it_in_whatever_unit_it_was_read(
-    gear: Gear, clearance: float
-) -> None:
+def test_a_clearance_at_its_limit_is_not_over_it_in_whatever_unit_it_was_read(gear, clearance):
     assert not gear.joint(1).is_over_limit(clearance)
     assert gear.joint(1).is_over_limit(clearance + 0.0001)
 
@@ -290,9 +280,7 @@ def test_what_a_gear_file_need_not_state_is_assumed_and_says_so(edited: Edit) ->
 
 
 @pytest.mark.parametrize("name", ["length.F-1", "lever.6.across", "length.6-7"])
-def test_a_cause_that_would_change_no_number_of_the_linkage_is_refused(
-    edited: Edit, name: str
-) -> None:
+def test_a_cause_that_would_change_no_number_of_the_linkage_is_refused(edited, name):
     with pytest.raises(GearFileError, match=r"a number of the linkage instead of 'length\.1-F'"):
         load_gear(edited(f'"{name}"', '"length.1-F"'))
 

@@ -65,9 +65,7 @@ def test_hostile_names_never_become_code_in_the_program(hostile: Gear, gear: Gea
     assert programs[0].inputs == programs[1].inputs
 
 
-def test_a_linkage_with_hostile_names_moves_as_the_same_linkage_with_plain_names(
-    hostile: Gear, gear: Gear
-) -> None:
+def test_a_linkage_with_hostile_names_moves_as_the_same_linkage_with_plain_names(hostile, gear):
     assert (
         hostile.model.plunger_amplification().tolist()
         == gear.model.plunger_amplification().tolist()
@@ -85,9 +83,7 @@ def of_gear(table: IndexTable, gear: Gear) -> IndexTable:
     return msgspec.structs.replace(table, gear=other)
 
 
-def test_hostile_names_are_text_in_the_drawing_of_a_report(
-    hostile: Gear, table: IndexTable
-) -> None:
+def test_hostile_names_are_text_in_the_drawing_of_a_report(hostile, table):
     gear = hostile
     own = of_gear(table, gear)
     inspection = Inspection("R", "N1", Side.LH, ClearanceConvention.RADIAL, {3: 0.013, 5: 0.007})
@@ -225,9 +221,7 @@ def edited(gear: Gear, tmp_path: Path) -> Edit:
         ("schema = 2", "schema = 2\nseen = 2024-01-01", r"seen: expected a known key"),
     ],
 )
-def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(
-    edited: Edit, old: str, new: str, words: str
-) -> None:
+def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(edited, old, new, words):
     began = time.process_time()
     with pytest.raises(GearFileError, match=words) as caught:
         load_gear(edited(old, new))

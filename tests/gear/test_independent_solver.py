@@ -53,9 +53,7 @@ def closed_form(sample: Sample) -> np.ndarray:
     return sample.model.kernel.output(sample.stroke, [flat[:, i] for i in range(20)])
 
 
-def test_plunger_positions_agree_to_a_billionth_of_an_inch_on_every_linkage(
-    samples: list[Sample],
-) -> None:
+def test_plunger_positions_agree_to_a_billionth_of_an_inch_on_every_linkage(samples):
     errors = [np.max(np.abs(closed_form(s) - s.solved[:, 4])) for s in samples]
     assert sum(len(s.stroke) for s in samples) >= 300
     assert max(errors) < 1e-9
@@ -65,16 +63,12 @@ def test_the_samples_move_the_plunger_far_more_than_the_tolerance(samples: list[
     assert np.std(np.concatenate([s.solved[:, 4] for s in samples])) > 0.05
 
 
-def test_the_calibration_rate_agrees_on_every_linkage(
-    gear: Gear, solvers: dict[str, LoopClosure]
-) -> None:
+def test_the_calibration_rate_agrees_on_every_linkage(gear, solvers):
     for linkage, model in zip(gear.ensemble, gear.ensemble_models, strict=True):
         assert solvers[linkage.name].calibration(0.45) == pytest.approx(model.rate, rel=1e-8)
 
 
-def test_lever_joints_agree_in_space(
-    samples: list[Sample], solvers: dict[str, LoopClosure]
-) -> None:
+def test_lever_joints_agree_in_space(samples, solvers):
     sample, solver = samples[0], solvers["A"]
     flat = sample.links.reshape(len(sample.stroke), 20)
     place = sample.model.kernel.positions(sample.stroke, [flat[:, i] for i in range(20)])

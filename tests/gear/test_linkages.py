@@ -87,9 +87,7 @@ def test_the_least_plunger_displacement_is_the_recorded_one(gear: Gear, name: st
 
 
 @each_linkage
-def test_the_failure_case_moves_the_plunger_as_recorded_in_both_senses(
-    gear: Gear, name: str
-) -> None:
+def test_the_failure_case_moves_the_plunger_as_recorded_in_both_senses(gear, name):
     worst = worst_case(model_of(gear, name), FAILURE)
     assert (worst.over_in[0], worst.under_in[0]) == pytest.approx(
         ACHIEVED[name][2:4], abs=HALF_DIGIT
@@ -97,9 +95,7 @@ def test_the_failure_case_moves_the_plunger_as_recorded_in_both_senses(
 
 
 @each_linkage
-def test_all_ten_joints_at_their_limit_move_the_plunger_as_recorded_in_both_senses(
-    gear: Gear, name: str
-) -> None:
+def test_all_ten_joints_at_their_limit_move_the_plunger_as_recorded_in_both_senses(gear, name):
     worst = worst_case(model_of(gear, name), ALL_TEN)
     # The search looked over all directions at once; the sequential rule may fall short by 0.04 %.
     recorded = np.array(ACHIEVED[name][4:])

@@ -88,9 +88,7 @@ def test_every_simulated_state_lies_within_what_all_offsets_give(model: LinkageM
         assert reached.min() - 1e-9 <= moved(model, state) <= reached.max() + 1e-9
 
 
-def test_near_dead_centre_the_farthest_slider_is_not_at_an_end_of_the_offset(
-    model: LinkageModel,
-) -> None:
+def test_near_dead_centre_the_farthest_slider_is_not_at_an_end_of_the_offset(model):
     angle, offsets = 0.003, np.linspace(-CLEARANCE, CLEARANCE, 2001)
     reached = slider(model, angle, offsets)
     assert reached.max() > max(reached[0], reached[-1])

@@ -67,31 +67,23 @@ def test_equal_clearances_at_the_four_joints_contribute_equally(model: LinkageMo
     assert model.plunger_amplification() == pytest.approx(np.full(4, 0.2332436), abs=5e-8)
 
 
-def test_the_contribution_is_one_over_rocker_times_sine_of_the_transmission_angle(
-    model: LinkageModel,
-) -> None:
+def test_the_contribution_is_one_over_rocker_times_sine_of_the_transmission_angle(model):
     coupler, rocker = np.radians(angles_deg(model, +1.0))
     assert model.plunger_amplification() == pytest.approx(
         np.full(4, 1 / (ROCKER * math.sin(rocker - coupler)))
     )
 
 
-def test_a_coupler_shorter_by_all_clearances_gives_the_published_worst_over_travel(
-    model: LinkageModel,
-) -> None:
+def test_a_coupler_shorter_by_all_clearances_gives_the_published_worst_over_travel(model):
     assert rocker_turn(model, COUPLER - 4 * CLEARANCE) == pytest.approx(WORST_OVER_RAD, abs=1e-10)
 
 
-def test_a_coupler_longer_by_all_clearances_gives_the_published_worst_under_travel(
-    model: LinkageModel,
-) -> None:
+def test_a_coupler_longer_by_all_clearances_gives_the_published_worst_under_travel(model):
     assert rocker_turn(model, COUPLER + 4 * CLEARANCE) == pytest.approx(WORST_UNDER_RAD, abs=1e-10)
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_clearances_all_along_the_final_coupler_act_as_a_longer_or_shorter_coupler(
-    model: LinkageModel, sense: float
-) -> None:
+def test_clearances_all_along_the_final_coupler_act_as_a_longer_or_shorter_coupler(model, sense):
     longer = COUPLER + sense * 4 * CLEARANCE
     place = model.kernel.positions(
         CRANK_RAD, model.kernel.no_clearance(), model.numbers({"length.A-B": longer})
@@ -104,9 +96,7 @@ def test_clearances_all_along_the_final_coupler_act_as_a_longer_or_shorter_coupl
     assert float(moved) == pytest.approx(rocker_turn(model, longer), abs=1e-14)
 
 
-def test_the_sequential_rule_comes_within_twenty_in_a_million_of_the_exact_worst_case(
-    model: LinkageModel,
-) -> None:
+def test_the_sequential_rule_comes_within_twenty_in_a_million_of_the_exact_worst_case(model):
     worst = worst_case(model, np.full((1, 4), CLEARANCE))
     assert (worst.over_in[0], worst.under_in[0]) == pytest.approx(
         (WORST_OVER_RAD, WORST_UNDER_RAD), rel=2e-5

@@ -58,9 +58,7 @@ def test_a_valid_mechanism_lists_its_virtual_links_in_order() -> None:
         ),
     ],
 )
-def test_a_mechanism_that_refers_to_what_is_not_there_is_refused_by_name(
-    changes: dict[str, Any], words: str
-) -> None:
+def test_a_mechanism_that_refers_to_what_is_not_there_is_refused_by_name(changes, words):
     with pytest.raises(MechanismError, match=words):
         build(**changes)
 
@@ -85,9 +83,7 @@ def replaced(name: str, **coordinates: float) -> tuple[Point, ...]:
         ),
     ],
 )
-def test_a_mechanism_whose_numbers_make_no_sense_is_refused_by_name(
-    changes: dict[str, Any], words: str
-) -> None:
+def test_a_mechanism_whose_numbers_make_no_sense_is_refused_by_name(changes, words):
     mechanism = build(**changes)
     with pytest.raises(MechanismError, match=words):
         write_program(mechanism)
@@ -102,8 +98,6 @@ def test_a_step_across_planes_that_cannot_cross_them_is_refused() -> None:
         write_program(mechanism)
 
 
-def test_a_linkage_that_does_not_close_over_its_stroke_is_refused_with_the_share_that_closes() -> (
-    None
-):
+def test_a_linkage_that_does_not_close_over_its_stroke_is_refused_with_the_share_that_closes():
     with pytest.raises(MechanismError, match=r"closes over only \d+ % of its stroke"):
         LinkageModel(build(points=replaced("B", x=4.0, y=1.0)), (0.0, 3.0), Calibration())

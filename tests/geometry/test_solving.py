@@ -183,9 +183,7 @@ def test_the_compiled_loop_equals_numpy_and_gives_nan_at_the_same_samples(gear: 
 
 @pytest.mark.parametrize("ends", [(3, 5), (6, 7), (9, 10)])
 @given(clearance=clearances, direction=directions)
-def test_swapping_the_two_ends_of_one_link_changes_nothing(
-    gear: Gear, ends: tuple[int, int], clearance: np.ndarray, direction: np.ndarray
-) -> None:
+def test_swapping_the_two_ends_of_one_link_changes_nothing(gear, ends, clearance, direction):
     first, second = (end - 1 for end in ends)
     swapped = np.arange(10)
     swapped[[first, second]] = second, first
@@ -202,9 +200,7 @@ def test_swapping_joints_of_different_links_changes_the_result(gear: Gear) -> No
 
 
 @given(clearance=arrays(float, 10, elements=st.floats(0.001, 0.01)), direction=directions)
-def test_opposite_directions_cancel_to_first_order(
-    gear: Gear, clearance: np.ndarray, direction: np.ndarray
-) -> None:
+def test_opposite_directions_cancel_to_first_order(gear, clearance, direction):
     def remainder(size: float) -> float:
         there = gear.model.displacement(links_from(size * clearance, direction))
         back = gear.model.displacement(links_from(size * clearance, direction + np.pi))

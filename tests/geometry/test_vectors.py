@@ -27,9 +27,7 @@ def unit(v: np.ndarray) -> np.ndarray:
 
 
 @given(a=vector, b=vector, normal=vector, ca=st.floats(0.5, 20), bc=st.floats(0.5, 20))
-def test_the_located_joint_is_at_both_link_lengths_in_the_plane_to_the_left(
-    a: np.ndarray, b: np.ndarray, normal: np.ndarray, ca: float, bc: float
-) -> None:
+def test_the_located_joint_is_at_both_link_lengths_in_the_plane_to_the_left(a, b, normal, ca, bc):
     ab = b - a
     distance = np.linalg.norm(ab)
     assume(abs(ca - bc) + 0.01 < distance < ca + bc - 0.01)
@@ -54,14 +52,7 @@ def test_links_that_do_not_reach_each_other_locate_no_joint() -> None:
     direction=angle,
     dihedral=angle,
 )
-def test_the_solver_locates_a_dyad_where_equation_six_does(
-    a: tuple[float, float],
-    b: tuple[float, float],
-    c: tuple[float, float],
-    shift: tuple[float, float],
-    direction: float,
-    dihedral: float,
-) -> None:
+def test_the_solver_locates_a_dyad_where_equation_six_does(a, b, c, shift, direction, dihedral):
     ab, ac = np.subtract(b, a), np.subtract(c, a)
     cross = float(ab[0] * ac[1] - ab[1] * ac[0])
     assume(

@@ -38,13 +38,7 @@ SLIP, BIAS = ("convention_slip", "gauge G-03"), ("gauge_bias", "gauge G-03")
     ],
     ids=["a base", "another", "beside", "offered", "partly true", "blemish", "nothing"],
 )
-def test_a_name_is_right_in_the_set_near_or_wrong(
-    names: tuple[Name, ...],
-    also: tuple[Name, ...],
-    hidden: Truth,
-    beside: str | None,
-    counted: set[str],
-) -> None:
+def test_a_name_is_right_in_the_set_near_or_wrong(names, also, hidden, beside, counted):
     found = judged("NAMED", said(*names), said(*also), hidden, beside)
     assert {key for key in ("right", "in_set", "near", "wrong") if found[key]} == counted
 

@@ -42,9 +42,7 @@ def column(case: str, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("case", BLEMISHES)
-def test_a_blemish_changes_the_table_tells_nothing_of_itself_and_leaves_unseen_rows(
-    case: str,
-) -> None:
+def test_a_blemish_changes_the_table_tells_nothing_of_itself_and_leaves_unseen_rows(case):
     rows, truth = drawn(case)
     assert (rows != drawn("sound")[0]) == (case != "sound")
     assert set(rows[0]) - {"mod_status", "base"} == set(drawn("sound")[0][0])

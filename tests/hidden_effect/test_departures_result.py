@@ -29,9 +29,7 @@ def rate(line: str, *records: dict[str, Any]) -> float:
         ([], 0.0),
     ],
 )
-def test_on_another_linkage_only_the_linkage_is_there(
-    named: list[list[str | None]], false: float
-) -> None:
+def test_on_another_linkage_only_the_linkage_is_there(named, false):
     one = record("linkage, nothing hidden", named, [])
     assert rate("another linkage, nothing hidden: a cause named that is not there", one) == false
 
@@ -75,17 +73,13 @@ LOADS = "load directions: something else named"
     ],
     ids=["joint in place of rest", "not all directions", "pin far off", "one that turns"],
 )
-def test_another_linkage_and_directions_are_told_from_one_joint(
-    fleet: tuple[str, int, int], line: str, share: float
-) -> None:
+def test_another_linkage_and_directions_are_told_from_one_joint(fleet, line, share):
     assert rate(line, run(fleet)) == share
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fleet", [("loads:40", 25, 6_201_025), ("loads:40", 109, 8_940_109)])
-def test_directions_are_likeliest_before_one_joint_and_one_scale(
-    fleet: tuple[str, int, int],
-) -> None:
+def test_directions_are_likeliest_before_one_joint_and_one_scale(fleet):
     assert run(fleet)["probabilities"][0][0] == "load_directions"
 
 
@@ -96,9 +90,7 @@ def test_rows_that_scatter_more_decide_no_more_between_two_joints_and_directions
 
 
 @pytest.mark.slow
-def test_what_moves_with_temperature_on_one_aircraft_is_not_a_re_rigging_of_its_last_two_rows() -> (
-    None
-):
+def test_what_moves_with_temperature_on_one_aircraft_is_not_a_re_rigging_of_its_last_two_rows():
     # Fleet 49 of those that the rule was set on; its other rows show what moves.
     found = run(("one group", 49, 6_300_049))
     assert (found["named"], found["variables"]) == ([], ["tail_no", "temperature_c"])

@@ -194,9 +194,7 @@ def test_two_named_causes_gain_on_rows_that_the_fit_never_saw() -> None:
     assert gain.rms_after_in < 0.7 * gain.rms_before_in
 
 
-def test_how_the_effect_of_a_named_cause_bends_is_not_named_as_directions_or_another_linkage() -> (
-    None
-):
+def test_how_the_effect_of_a_named_cause_bends_is_not_named_as_directions_or_another_linkage():
     fleet, gear = draw_fleet(9_100_836, "double"), load_gear()
     ensemble = gear.ensemble_models[1:]
     found = diagnose(gear.model, as_table(fleet.table), gear.discrepancies, ensemble=ensemble)
@@ -223,9 +221,7 @@ def test_two_causes_of_single_joints_are_not_taken_for_another_linkage_or_direct
     ("unlisted", "part"),
     [("lost_motion_under_load", "elastic_compliance"), ("pressure_of_one_gauge", "gauge_bias")],
 )
-def test_what_an_unlisted_effect_has_of_a_listed_cause_is_not_put_down_to_that(
-    unlisted: str, part: str
-) -> None:
+def test_what_an_unlisted_effect_has_of_a_listed_cause_is_not_put_down_to_that(unlisted, part):
     seed = 40_100
     spec = replace(draw_spec(seed, "null", null="iid"), effects=(EffectSpec(unlisted, None, 15.0),))
     gear = load_gear()
@@ -235,9 +231,7 @@ def test_what_an_unlisted_effect_has_of_a_listed_cause_is_not_put_down_to_that(
 
 
 @pytest.mark.slow
-def test_a_cause_that_predicts_held_out_rows_worse_does_not_extend_the_model(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_cause_that_predicts_held_out_rows_worse_does_not_extend_the_model(monkeypatch):
     spec = replace(
         draw_spec(FIRST_SEED, "null", null="iid"),
         effects=(EffectSpec("elastic_compliance", None, STRENGTH),),

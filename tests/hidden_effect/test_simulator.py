@@ -76,9 +76,7 @@ def _hide(*effects: EffectSpec, **changes: object) -> FleetSpec:
 
 
 @pytest.mark.parametrize("name", linkage.names())
-def test_every_linkage_has_the_published_failure_case_and_the_rate_of_the_drawing(
-    name: str,
-) -> None:
+def test_every_linkage_has_the_published_failure_case_and_the_rate_of_the_drawing(name):
     geometry = linkage.load(name)
     stored = json.loads((FOLDER / "coordinates.json").read_text(encoding="utf-8"))["linkages"][name]
     assert physics.worst_case(geometry, _failure_case())[0] == pytest.approx(0.0472, abs=2e-4)
@@ -362,9 +360,7 @@ def test_every_fault_of_the_label_stands_in_the_table_and_no_other() -> None:
     assert {fault.kind for fault in fleet.label.faults} >= set(kinds) - {"swapped_joints"}
 
 
-def test_the_table_has_the_columns_of_the_interface_and_nothing_of_the_label(
-    tmp_path: Path,
-) -> None:
+def test_the_table_has_the_columns_of_the_interface_and_nothing_of_the_label(tmp_path):
     for seed, kind in enumerate(KINDS):
         fleet = draw_fleet(seed, kind)
         assert set(fleet.table) <= set(COLUMNS)

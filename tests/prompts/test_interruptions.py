@@ -161,9 +161,7 @@ _SECOND = ("restored 3 5", "", "4", "5")
 
 @pytest.mark.parametrize("end", _ENDS)
 @pytest.mark.parametrize("place", range(len(_SECOND) + 1))
-def test_a_second_visit_loses_no_answer_at_any_question(
-    end: int, place: int, tmp_path: Path
-) -> None:
+def test_a_second_visit_loses_no_answer_at_any_question(end, place, tmp_path):
     trial = Trial(tmp_path, random.Random(1))
     entered = [f"--set={n}={n + 2}thou" for n in range(1, 11)]
     gear = ("--tail", "N1", "--side", "LH")

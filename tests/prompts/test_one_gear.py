@@ -118,9 +118,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("question", WRONG)
-def test_a_wrong_answer_is_refused_and_its_question_is_asked_again(
-    sit: Sit, life: Life, question: int
-) -> None:
+def test_a_wrong_answer_is_refused_and_its_question_is_asked_again(sit, life, question):
     right = [*HEAD, "f", "46", "8", "done", *END, ""]
     wrong = WRONG[question]
     asked = sit(*right[:question], *wrong, *right[question:]).prompts
@@ -141,9 +139,7 @@ def test_a_reading_that_can_hardly_be_is_confirmed_or_typed_again(sit: Sit, life
 
 
 @pytest.mark.parametrize("again", [(), ("n",), ("u",)])
-def test_a_plunger_that_joints_cannot_cause_is_asked_for_again(
-    sit: Sit, life: Life, again: tuple[str, ...]
-) -> None:
+def test_a_plunger_that_joints_cannot_cause_is_asked_for_again(sit, life, again):
     terminal = sit(*gear("f", "460", *again, "46", "done"), "")
     assert "at most" in terminal.screen
     assert life().inspections[-1].inspection.readings_in == (0.046,)
@@ -160,9 +156,7 @@ def test_a_joint_is_named_to_jump_to_it_or_to_give_its_reading(sit: Sit, life: L
     assert life().inspections[-1].inspection.clearance_in == {9: 0.0025, 10: 0.0035}
 
 
-def test_readings_of_another_unit_are_asked_about_before_they_are_judged(
-    sit: Sit, life: Life
-) -> None:
+def test_readings_of_another_unit_are_asked_about_before_they_are_judged(sit, life):
     tight = ["0.4"] * 10
     terminal = sit(*gear("f", "46", *[each for x in tight for each in (x, "y")]), "y", "")
     assert "y = it is right; or type it again" in terminal.screen
@@ -173,9 +167,7 @@ def test_readings_of_another_unit_are_asked_about_before_they_are_judged(
     ("again", "read"),
     [(("#3 13",), (0.0065, (0.041,))), (("p 46", "y"), (0.0002, (0.046,)))],
 )
-def test_what_is_unusual_is_typed_again_in_its_place(
-    sit: Sit, life: Life, again: tuple[str, ...], read: tuple[object, ...]
-) -> None:
+def test_what_is_unusual_is_typed_again_in_its_place(sit, life, again, read):
     tight = ["0.4", "y"] * 2
     sit(*gear("f", "41", *tight, "done"), *again, "")
     found = life().inspections[-1].inspection
@@ -191,9 +183,7 @@ def test_what_is_unusual_is_typed_again_in_its_place(
         ("inches bore", "in, diametral"),
     ],
 )
-def test_units_and_conventions_are_understood_as_people_say_them(
-    sit: Sit, typed: str, said: str
-) -> None:
+def test_units_and_conventions_are_understood_as_people_say_them(sit, typed, said):
     assert f"Readings are in {said}." in sit("N1 LH", typed, "f", "", "done", *END, "").screen
 
 
@@ -205,9 +195,7 @@ def test_help_is_of_the_question_and_lists_the_words(sit: Sit) -> None:
 
 
 @pytest.mark.parametrize("end", [EOFError, KeyboardInterrupt])
-def test_an_entry_that_is_stopped_goes_on_where_it_stopped(
-    sit: Sit, life: Life, end: type[BaseException]
-) -> None:
+def test_an_entry_that_is_stopped_goes_on_where_it_stopped(sit, life, end):
     with pytest.raises(StoppedError):
         sit(*HEAD, "f", "46", "8", end=end)
     terminal = sit("", "11", "done", *END, "")
@@ -216,9 +204,7 @@ def test_an_entry_that_is_stopped_goes_on_where_it_stopped(
     assert life().inspections[-1].inspection.clearance_in == {3: 0.004, 5: 0.0055}
 
 
-def test_an_unfinished_entry_is_continued_by_its_tail_and_begun_anew_by_a_word(
-    sit: Sit, life: Life
-) -> None:
+def test_an_unfinished_entry_is_continued_by_its_tail_and_begun_anew_by_a_word(sit, life):
     with pytest.raises(StoppedError):
         sit(*HEAD, "f", "46", "8")
     screen = sit("N1 LH", "new", "thou", "play", "n", "", "9", "done", *END, "").screen
@@ -237,9 +223,7 @@ def test_a_start_at_which_nothing_was_typed_leaves_nothing(sit: Sit) -> None:
             sit()
 
 
-def test_answers_that_cannot_be_saved_are_said_once(
-    sit: Sit, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_answers_that_cannot_be_saved_are_said_once(sit, monkeypatch):
     from mlg_troubleshoot.errors import OutputError
     from mlg_troubleshoot.store import Drafts
 

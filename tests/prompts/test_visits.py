@@ -29,9 +29,7 @@ def next_of(screen: str) -> str:
     return next(line for line in screen.splitlines() if line.startswith("NEXT"))
 
 
-def test_a_known_gear_is_shown_with_the_next_that_stood_when_it_was_left(
-    sit: Sit, capsys: pytest.CaptureFixture
-) -> None:
+def test_a_known_gear_is_shown_with_the_next_that_stood_when_it_was_left(sit, capsys):
     sit(*failed(*TEN), "")
     left = capsys.readouterr().out
     sit("N1 LH", "")
@@ -44,35 +42,27 @@ def test_a_tail_is_known_under_each_of_its_spellings(sit: Sit, begun: Begun, lif
     assert [kept.inspection.readings_in for kept in life().inspections] == [(0.046,), (0.04,)]
 
 
-def test_a_gear_that_is_opened_and_left_with_an_interrupt_was_not_lost(
-    sit: Sit, begun: Begun, capsys: pytest.CaptureFixture
-) -> None:
+def test_a_gear_that_is_opened_and_left_with_an_interrupt_was_not_lost(sit, begun, capsys):
     begun(*failed("8", "done"))
     screen = sit("N1 LH", end=KeyboardInterrupt).screen + capsys.readouterr().out
     assert "Nothing" not in screen
     assert not re.search(r"\d:\d\d:\d\d", screen)
 
 
-def test_what_cannot_be_reached_changes_next_at_once(
-    sit: Sit, capsys: pytest.CaptureFixture
-) -> None:
+def test_what_cannot_be_reached_changes_next_at_once(sit, capsys):
     sit(*LIMIT, "no spare 2", "cannot reach 5", "")
     said = capsys.readouterr().out
     assert [line.startswith("OPEN") for line in said.splitlines()].count(True) == 2
 
 
-def test_what_is_open_on_the_other_side_is_said(
-    sit: Sit, begun: Begun, capsys: pytest.CaptureFixture
-) -> None:
+def test_what_is_open_on_the_other_side_is_said(sit, begun, capsys):
     begun(*failed("8", "done"))
     sit("N1 RH", "", "r", "", "done", "", "", "")
     sit("N1 RH", "")
     assert "Open on N1 LH:" in capsys.readouterr().err
 
 
-def test_y_asks_only_for_what_next_asks_with_the_last_reading_beside(
-    sit: Sit, begun: Begun
-) -> None:
+def test_y_asks_only_for_what_next_asks_with_the_last_reading_beside(sit, begun):
     begun(*NEAR)
     terminal = sit("N1 LH", "y", "15.4", "")
     assert [prompt[:2] for prompt in terminal.prompts] == ["Ta", "En", "#2", "En"]
@@ -86,9 +76,7 @@ def test_enter_is_no_second_reading(sit: Sit, begun: Begun, now: Now) -> None:
     assert (found.measured_again, found.clearance_in[2]) == ((), 0.0078)
 
 
-def test_five_visits_lead_to_done_with_few_keys(
-    sit: Sit, now: Now, capsys: pytest.CaptureFixture
-) -> None:
+def test_five_visits_lead_to_done_with_few_keys(sit, now, capsys):
     keys = sit(*LIMIT, "").keys
     readings = sum(len(each) + 1 for each in ("46", "8", "11", "26", "6", "14"))
     for typed in (("y", "", "", "4", "4"), ("y", "12"), ("y", "r")):
@@ -101,9 +89,7 @@ def test_five_visits_lead_to_done_with_few_keys(
     assert "NEXT: Sign the repair off" in capsys.readouterr().out
 
 
-def test_a_failure_after_the_repair_on_its_day_counts(
-    sit: Sit, begun: Begun, life: Life, capsys: pytest.CaptureFixture
-) -> None:
+def test_a_failure_after_the_repair_on_its_day_counts(sit, begun, life, capsys):
     begun(*LIMIT)
     sit("N1 LH", "restored 2", "", "4", "")
     sit("N1 LH", "f p 40", "")
@@ -122,9 +108,7 @@ def test_last_weeks_forms_give_last_weeks_days(sit: Sit, life: Life, now: Now) -
     assert now().clearance_in[2] == 0.002
 
 
-def test_what_is_typed_before_and_after_a_repair_in_one_entry_stands_so(
-    sit: Sit, life: Life, now: Now
-) -> None:
+def test_what_is_typed_before_and_after_a_repair_in_one_entry_stands_so(sit, life, now):
     asked = ("8", "11", "26", "restored 2", "p 12", "#2 4", "r", "#4 6", "done")
     screen = sit(*failed(*asked), "p 12", "#2 4", "").screen
     for refused in ("plunger displacement 46 thou", "#2 26 thou", "outcome FAILED"):
@@ -150,9 +134,7 @@ DAY = (
 )
 
 
-def test_a_day_typed_live_and_typed_later_from_paper_is_one_log(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_day_typed_live_and_typed_later_from_paper_is_one_log(tmp_path, monkeypatch):
     logs = []
     for late in (False, True):
         store = tmp_path / f"{late}.sqlite"
@@ -182,9 +164,7 @@ class _Tomorrow(datetime):
         ("rigging yes", "rigging checked"),
     ],
 )
-def test_an_undo_says_what_it_will_take_back(
-    sit: Sit, begun: Begun, now: Now, line: str, undone: str
-) -> None:
+def test_an_undo_says_what_it_will_take_back(sit, begun, now, line, undone):
     begun(*failed("8", "done"))
     before = now()
     assert f"u = undo {undone}" in sit("N1 LH", line, "").screen
@@ -193,9 +173,7 @@ def test_an_undo_says_what_it_will_take_back(
         assert getattr(now(), field) == getattr(before, field)
 
 
-def test_undo_goes_back_visit_by_visit_to_the_first_one(
-    sit: Sit, begun: Begun, life: Life, now: Now
-) -> None:
+def test_undo_goes_back_visit_by_visit_to_the_first_one(sit, begun, life, now):
     begun(*LIMIT)
     sit("N1 LH", "restored 2", "", "4", "")
     assert [repair.joints for repair in life().repairs] == [frozenset({2})]
@@ -205,9 +183,7 @@ def test_undo_goes_back_visit_by_visit_to_the_first_one(
     assert now().clearance_in[2] == 0.013
 
 
-def test_a_new_inspection_of_a_known_gear_is_a_second_one(
-    sit: Sit, begun: Begun, life: Life
-) -> None:
+def test_a_new_inspection_of_a_known_gear_is_a_second_one(sit, begun, life):
     begun(*failed("8", "done"))
     terminal = sit("N1 LH", "new", "", "n", "", "#3", "9", "done", "", "", "")
     assert len(life().inspections) == 2
@@ -264,9 +240,7 @@ def test_what_only_a_table_said_of_a_gear_stands(sit: Sit, now: Now, tmp_path: P
     assert (found.margin_in, found.no_spare, found.readings_in) == (0.028, (4,), (0.036,))
 
 
-def test_readings_of_another_convention_are_shown_in_that_of_today(
-    sit: Sit, begun: Begun, life: Life
-) -> None:
+def test_readings_of_another_convention_are_shown_in_that_of_today(sit, begun, life):
     begun(*failed("8", "done"))
     sit("N1 LH", "new", "radial thou", "f", "", "#5 5", "done", "", "", "")
     sit("N1 LH", "#5 4", "")
@@ -274,9 +248,7 @@ def test_readings_of_another_convention_are_shown_in_that_of_today(
 
 
 @pytest.mark.parametrize(("line", "gear"), [("side RH", ("RH", "N1")), ("tail N2", ("LH", "N2"))])
-def test_a_corrected_tail_or_side_moves_the_inspection(
-    sit: Sit, begun: Begun, life: Life, line: str, gear: tuple[str, str]
-) -> None:
+def test_a_corrected_tail_or_side_moves_the_inspection(sit, begun, life, line, gear):
     begun(*failed("8", "done"))
     sit("N1 LH", line, "")
     assert len(life(*gear).inspections) == 1

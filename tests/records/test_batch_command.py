@@ -10,7 +10,6 @@ import random
 import re
 import sys
 import zipfile
-from pathlib import Path
 
 import openpyxl
 import pytest
@@ -243,9 +242,7 @@ def test_the_json_of_a_batch_written_in_pieces_is_the_whole_form(gear, mixed):
     )
 
 
-def test_reports_of_a_table_that_is_too_long_are_refused_before_it_is_judged(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_reports_of_a_table_that_is_too_long_are_refused_before_it_is_judged(tmp_path, monkeypatch):
     monkeypatch.setattr("mlg_troubleshoot.cli.check_run._MOST_REPORTS", 45)
     run = mlg("check", FLEET, "--report", tmp_path / "out")
     assert (run.code, run.out) == (2, "")

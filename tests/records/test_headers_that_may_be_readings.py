@@ -69,9 +69,7 @@ def test_a_question_is_answered_as_it_was_asked(header: str, answer: str) -> Non
 
 @pytest.mark.parametrize("header", ["Retracts OK?", "no retraction", "hyd failure", "2 failed"])
 @pytest.mark.parametrize("answer", ["yes", "N", "1", "TRUE"])
-def test_an_answer_under_a_question_that_is_not_understood_is_asked_about(
-    header: str, answer: str
-) -> None:
+def test_an_answer_under_a_question_that_is_not_understood_is_asked_about(header, answer):
     assert judged([header], [answer]).verdict is Verdict.INCOMPLETE
 
 
@@ -98,9 +96,7 @@ def test_a_failure_in_a_remark_leaves_what_was_measured_judged() -> None:
 @pytest.mark.parametrize(
     ("header", "cell"), [("remarks", "did not retract"), ("Status", "hung"), ("VI", "0.06")]
 )
-def test_a_row_that_says_something_only_where_nobody_reads_is_not_set_aside(
-    header: str, cell: str
-) -> None:
+def test_a_row_that_says_something_only_where_nobody_reads_is_not_set_aside(header, cell):
     blank = ["R2", "N2", *GOOD[2:4], *[""] * 10, cell]
     text = "\n".join(",".join(line) for line in ([*ALL, header], [*GOOD, ""], blank))
     result = check(Named(text.encode(), "t.csv"), advice=False)
@@ -119,9 +115,7 @@ UNCLEAR = ("F", "x", "0", "3", "intermittent", "hung", "partial", "FAULT", "slow
 
 @pytest.mark.parametrize("word", UNCLEAR)
 @pytest.mark.parametrize("header", ["Result", "Status", "Gear swing", "Defect", "P/F", "Result 2"])
-def test_what_is_not_plainly_good_in_a_column_of_results_is_asked_about(
-    header: str, word: str
-) -> None:
+def test_what_is_not_plainly_good_in_a_column_of_results_is_asked_about(header, word):
     asked = judged([header], [word])
     assert asked.verdict is Verdict.INCOMPLETE
     assert f'--map "{header}=outcome"' in asked.row.unit_question
@@ -139,9 +133,7 @@ def test_what_is_not_plainly_good_in_a_column_of_results_is_asked_about(
         ("six", "12", "thou"),
     ],
 )
-def test_a_bare_number_that_could_decide_is_asked_about_under_any_header(
-    header: str, value: str, unit: str
-) -> None:
+def test_a_bare_number_that_could_decide_is_asked_about_under_any_header(header, value, unit):
     names = [name.replace("_in", f"_{unit}") for name in [*ALL, header]]
     text = (
         ",".join(names) + "\n" + ",".join([*GOOD[:4], *["1" if unit == "thou" else "0.001"] * 10])
@@ -164,9 +156,7 @@ def test_a_number_that_may_be_a_clearance_is_asked_about(header: str, value: str
 
 @pytest.mark.parametrize("value", ["0.005", "5 thou", "0.12 mm"])
 @pytest.mark.parametrize("header", MARGINS)
-def test_a_number_that_may_be_the_margin_of_the_gear_is_asked_about(
-    header: str, value: str
-) -> None:
+def test_a_number_that_may_be_the_margin_of_the_gear_is_asked_about(header, value):
     assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
 
 
@@ -194,9 +184,7 @@ def test_carry_answers_the_question(header: str) -> None:
         ("Outcome", "closed", Verdict.WITHIN_MARGIN),
     ],
 )
-def test_what_bears_the_verdict_is_not_declared_away(
-    header: str, value: str, verdict: Verdict, meaning: str
-) -> None:
+def test_what_bears_the_verdict_is_not_declared_away(header, value, verdict, meaning):
     text = ",".join([*ALL, header]) + "\n" + ",".join([*GOOD, value]) + "\n"
     result = check(Named(text.encode(), "t.csv"), advice=False, column_map={header: meaning})
     said = "is left unread" if meaning == "carry" else f"is read as {meaning}"
@@ -302,9 +290,7 @@ def test_a_margin_under_another_header_is_asked_about(header: str) -> None:
 @pytest.mark.parametrize("row", [1, 60])
 @pytest.mark.parametrize("gap", [0, 1, 2])
 @pytest.mark.parametrize("joint", [False, True])
-def test_a_number_to_the_right_of_the_headers_is_never_dropped(
-    value: object, row: int, gap: int, joint: bool
-) -> None:
+def test_a_number_to_the_right_of_the_headers_is_never_dropped(value, row, gap, joint):
     book = openpyxl.Workbook()
     sheet = book.worksheets[0]
     good = [*GOOD[:4], *[0.001] * 10]

@@ -5,13 +5,11 @@ its row.
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable
 from dataclasses import replace
-from enum import StrEnum
 
 import pytest
 
-from mlg_troubleshoot.decision.columns import COLUMNS, Column
+from mlg_troubleshoot.decision.columns import COLUMNS
 from mlg_troubleshoot.decision.inspection import Approach, Inspection, InvalidRow, Outcome, Side
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.values import read_value
@@ -110,9 +108,7 @@ def test_the_usual_spellings_of_a_side_are_read(read, table, side, texts):
     ids=lambda value: getattr(value, "name", str(value)),
 )
 @pytest.mark.parametrize("written", [str.upper, str.lower, str.title])
-def test_a_word_of_a_few_is_read_in_upper_and_lower_case(
-    column: Column, choice: StrEnum, written: Callable[[str], str]
-) -> None:
+def test_a_word_of_a_few_is_read_in_upper_and_lower_case(column, choice, written):
     assert read_value(column, written(choice.value)) is choice
 
 

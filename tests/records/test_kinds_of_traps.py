@@ -78,9 +78,7 @@ def test_a_reading_that_is_shown_in_percent_is_a_cell_to_correct(shown: str) -> 
     ("number", "shown"), [(801, '"N"000"HK"'), (100000, "0.00E+00"), (7, '"R"0'), (5, '0" LH"')]
 )
 @pytest.mark.parametrize("cell", ["A2", "B2"])
-def test_a_name_that_is_shown_otherwise_than_it_is_stored_is_refused(
-    cell: str, number: float, shown: str
-) -> None:
+def test_a_name_that_is_shown_otherwise_than_it_is_stored_is_refused(cell, number, shown):
     def change(sheet: Worksheet) -> None:
         sheet[cell] = number
         sheet[cell].number_format = shown

@@ -158,9 +158,7 @@ def test_such_a_character_in_a_workbook_leaves_json_and_annotated_copy_whole(
     assert openpyxl.load_workbook(out).worksheets[0]["B1"].value == "tail_no"
 
 
-def test_a_file_name_that_is_not_text_is_shown_in_a_way_that_every_output_can_carry(
-    tmp_path: Path,
-) -> None:
+def test_a_file_name_that_is_not_text_is_shown_in_a_way_that_every_output_can_carry(tmp_path):
     name = os.fsencode(tmp_path) + b"/a\xff.csv"
     Path(os.fsdecode(name)).write_text(HEADER + GOOD)
     result = read_many([Path(os.fsdecode(name))], ReadOptions())

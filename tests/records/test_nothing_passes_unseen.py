@@ -42,9 +42,7 @@ def workbook(second: list[list[object]], *, hidden: bool = False) -> Named:
     ("above", "hidden"),
     [([["Instructions"]], False), ([], True), ([["x"]] * 25, False), ([["instructions:"]], True)],
 )
-def test_a_sheet_of_inspections_that_is_left_out_is_not_a_success(
-    above: list[list[object]], hidden: bool, sheet: str | None
-) -> None:
+def test_a_sheet_of_inspections_that_is_left_out_is_not_a_success(above, hidden, sheet):
     result = check(workbook([*above, HEADER, WORN], hidden=hidden), advice=False, sheet=sheet)
     assert [j.row.record_id for j in result.judgements] == ["R1"]
     assert result.unread_files == ("t.xlsx, sheet 'Other'",)
@@ -54,9 +52,7 @@ def test_a_sheet_of_inspections_that_is_left_out_is_not_a_success(
 
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("rows", [[["LH"], ["RH"]], [["Instructions"], ["Fill in the table."]]])
-def test_a_sheet_without_inspections_may_be_left_out(
-    rows: list[list[object]], hidden: bool
-) -> None:
+def test_a_sheet_without_inspections_may_be_left_out(rows, hidden):
     result = check(workbook(rows, hidden=hidden), advice=False)
     assert (result.unread_files, result.exit_code) == ((), ExitCode.FINE)
 

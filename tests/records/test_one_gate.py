@@ -127,9 +127,7 @@ def said(found: Found) -> set[str]:
 
 
 @pytest.mark.parametrize("value", VALUES)
-def test_a_value_gives_the_same_as_a_cell_a_flag_and_a_prompt_answer(
-    gear: Gear, value: str
-) -> None:
+def test_a_value_gives_the_same_as_a_cell_a_flag_and_a_prompt_answer(gear, value):
     for convention in (Convention.RADIAL, Convention.TOTAL_PLAY):
         for margin in MARGINS:
             cell = by_cell(gear, value, margin, convention)
@@ -143,9 +141,7 @@ def test_a_value_gives_the_same_as_a_cell_a_flag_and_a_prompt_answer(
 
 @pytest.mark.parametrize("value", NUMBERS)
 @pytest.mark.parametrize("convention", Convention)
-def test_a_number_gives_the_same_in_python_as_the_other_ways(
-    gear: Gear, value: float, convention: Convention
-) -> None:
+def test_a_number_gives_the_same_in_python_as_the_other_ways(gear, value, convention):
     for margin in MARGIN_NUMBERS:
         python = by_python(gear, value, margin, convention)
         written = repr(value), repr(margin), convention
@@ -211,9 +207,7 @@ def test_a_joint_that_the_gear_lacks_is_refused_in_python(gear: Gear, joint: obj
         ("gauge_u_by_joint_in", {3: 0.0}, "a gauge u above 0"),
     ],
 )
-def test_whatever_a_table_would_refuse_is_refused_in_python(
-    gear: Gear, name: str, value: object, words: str
-) -> None:
+def test_whatever_a_table_would_refuse_is_refused_in_python(gear, name, value, words):
     good = Inspection("R1", "N1", Side.LH, Convention.RADIAL, {3: 0.01})
     with pytest.raises(TroubleshootError, match=words):
         check(replace(good, **{name: value}), gear)  # type: ignore[arg-type]

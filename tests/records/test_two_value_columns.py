@@ -203,9 +203,7 @@ def test_a_workbook_with_several_visits_in_a_row_is_not_annotated(tmp_path: Path
 @pytest.mark.parametrize("line", [["Outcome", "FAILED"], ["Plunger displacement (in)", 0.0748]])
 @pytest.mark.parametrize("label", ["Outcome", "Result 2"])
 @pytest.mark.parametrize("at", [3, 4, 99])
-def test_what_stands_once_beside_columns_that_are_not_read_counts(
-    line: list[object], label: str, at: int
-) -> None:
+def test_what_stands_once_beside_columns_that_are_not_read_counts(line, label, at):
     lines = [["Joint", "New part (in)", "Found (in)"], *([n, 0.0005, 0.001] for n in range(1, 11))]
     who = [["Tail", "N1"], ["Side", "LH"], ["Unit", "in"], ["Convention", "RADIAL"]]
     who.insert(at, [label if line[0] == "Outcome" else line[0], line[1]])

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
+from mlg_troubleshoot.decision.assessment import Judgement, Rejected
 from mlg_troubleshoot.decision.judge_rows import latest_of_each_gear, listed, worst_first
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
@@ -76,45 +76,33 @@ def records(html: str) -> list[str]:
     )
 
 
-def test_each_verdict_is_counted_once_under_its_name(
-    batch: Sequence[Judgement], summary: tuple[str, bytes]
-) -> None:
+def test_each_verdict_is_counted_once_under_its_name(batch, summary):
     counts = [int(n) for n in re.findall(r'class="count-number">(\d+)<', summary[0])]
     assert sum(counts) == len(batch)
     assert re.search(r"2</span><span>COULD BE OUTSIDE", summary[0])
 
 
-def test_every_gear_has_one_line_what_was_measured_beyond_its_margin_and_the_worst_first(
-    summary: tuple[str, bytes],
-) -> None:
+def test_every_gear_has_one_line_what_was_measured_beyond_its_margin_and_the_worst_first(summary):
     assert records(summary[0]) == ["little", "worn", "published", "sound"]
 
 
 @pytest.mark.parametrize("words", ["LEFT", "cell C7", "2 columns unread."])
-def test_the_summary_says_what_is_wrong_with_gears_and_input(
-    words: str, summary: tuple[str, bytes]
-) -> None:
+def test_the_summary_says_what_is_wrong_with_gears_and_input(words, summary):
     assert words in summary[0] + readable(summary[0])
 
 
-def test_a_row_that_cannot_be_judged_stands_in_a_list_with_what_to_correct(
-    summary: tuple[str, bytes], rejected: Rejected
-) -> None:
+def test_a_row_that_cannot_be_judged_stands_in_a_list_with_what_to_correct(summary, rejected):
     listed = readable(summary[0]).partition("Rows to correct: 1 could not be judged")[2]
     assert "R-9" in listed
     assert rejected.in_brief in listed
 
 
-def test_an_action_stands_alone_on_paper(
-    batch: list[Judgement], summary: tuple[str, bytes]
-) -> None:
+def test_an_action_stands_alone_on_paper(batch, summary):
     words = readable(summary[0])
     assert all(judgement.in_brief in words for judgement in batch)
 
 
-def test_of_gears_outside_the_margin_the_one_farther_beyond_its_own_stands_first(
-    judge: Judge,
-) -> None:
+def test_of_gears_outside_the_margin_the_one_farther_beyond_its_own_stands_first(judge):
     # The gear that moves the plunger farther is allowed to do so.
     wide, narrow = judge(WORN, margin_in=0.05), judge(FAILURE, tail_no="N2")
     assert wide.predicted_displacement_in > narrow.predicted_displacement_in
@@ -126,9 +114,7 @@ def test_the_summary_is_printed_in_landscape(summary: tuple[str, bytes]) -> None
     assert box.width > box.height
 
 
-def test_a_long_table_repeats_its_header_on_each_page(
-    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
+def test_a_long_table_repeats_its_header_on_each_page(judge, gear, provenance, tmp_path):
     one = judge(SOUND)
     many = [
         dataclasses.replace(one, inspection=dataclasses.replace(one.inspection, record_id=f"r{i}"))
@@ -189,9 +175,7 @@ def test_each_gear_has_one_line_with_its_latest_inspection(twice: list[Judgement
     assert named == [["autumn", "other"], ["spring", "summer"]]
 
 
-def test_an_inspection_without_a_date_is_not_an_earlier_one(
-    judge: Judge, twice: list[Judgement]
-) -> None:
+def test_an_inspection_without_a_date_is_not_an_earlier_one(judge, twice):
     undated = judge(SOUND, record_id="undated", tail_no="N2", inspection_date=None)
     latest, earlier = latest_of_each_gear(listed([*twice, undated]))
     assert len(twice) in latest
@@ -225,9 +209,7 @@ def test_a_gear_that_cannot_be_cleared_has_no_probability_that_would_clear_it(
     assert "99.9" not in text
 
 
-def test_earlier_inspections_have_a_table_of_their_own(
-    twice: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
+def test_earlier_inspections_have_a_table_of_their_own(twice, gear, provenance, tmp_path):
     written = write_batch_report(
         twice, [], gear, tmp_path, provenance=provenance, formats=("html",)
     )
@@ -240,9 +222,7 @@ def test_earlier_inspections_have_a_table_of_their_own(
     assert "2024-03-01 spring" in second
 
 
-def test_a_link_in_the_pdf_opens_the_pdf_beside_it(
-    twice: list[Judgement], gear: Gear, tmp_path: Path
-) -> None:
+def test_a_link_in_the_pdf_opens_the_pdf_beside_it(twice, gear, tmp_path):
     written = write_reports(twice, gear, tmp_path, ("pdf",))
     assert written[0].pdf is not None
     actions = [
@@ -255,9 +235,7 @@ def test_a_link_in_the_pdf_opens_the_pdf_beside_it(
     assert files == {report.pdf.name for report in written[1:] if report.pdf}
 
 
-def test_inspections_of_the_same_identity_do_not_overwrite_each_other(
-    judge: Judge, gear: Gear, tmp_path: Path
-) -> None:
+def test_inspections_of_the_same_identity_do_not_overwrite_each_other(judge, gear, tmp_path):
     twice = [judge(SOUND), judge(FAILURE)]
     written = write_reports(twice, gear, tmp_path)
     assert len({report.html for report in written}) == 3
@@ -267,9 +245,7 @@ def test_one_inspection_gets_no_summary(judge: Judge, gear: Gear, tmp_path: Path
     assert len(write_reports([judge(SOUND)], gear, tmp_path)) == 1
 
 
-def test_a_folder_that_cannot_be_written_is_named(
-    batch: list[Assessment], gear: Gear, tmp_path: Path
-) -> None:
+def test_a_folder_that_cannot_be_written_is_named(batch, gear, tmp_path):
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
     with pytest.raises(OutputError, match="taken"):
         write_reports(batch, gear, tmp_path / "taken")

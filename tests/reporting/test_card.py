@@ -70,14 +70,7 @@ def card(
 
 @pytest.mark.parametrize("paper", PAPERS)
 @pytest.mark.parametrize("clearance", [FAILURE, SOUND, WORN], ids=["failure", "sound", "worn"])
-def test_what_is_signed_stands_on_the_first_page(
-    clearance: dict[int, float],
-    paper: str,
-    engine: PdfEngine,
-    judge: Judge,
-    gear: Gear,
-    provenance: ReportProvenance,
-) -> None:
+def test_what_is_signed_stands_on_the_first_page(clearance, paper, engine, judge, gear, provenance):
     _page, text = card(engine, judge, gear, provenance, paper, (clearance, {}, []))
     assert [role for role in ROLES if role not in text] == []
 
@@ -94,9 +87,7 @@ def test_two_hundred_drawn_gears_have_their_sign_off_on_the_first_page(
     assert beyond == []
 
 
-def test_what_is_read_at_the_gear_is_nine_points_high(
-    engine: PdfEngine, judge: Judge, gear: Gear, provenance: ReportProvenance
-) -> None:
+def test_what_is_read_at_the_gear_is_nine_points_high(engine, judge, gear, provenance):
     page, _text = card(engine, judge, gear, provenance, "A4", (FAILURE, {}, []))
     sizes: dict[str, float] = {}
 
@@ -109,9 +100,7 @@ def test_what_is_read_at_the_gear_is_nine_points_high(
         assert heights and min(heights) >= 8.99, (words, heights)
 
 
-def test_each_joint_and_the_plunger_have_a_box_with_their_limit(
-    judge: Judge, gear: Gear, provenance: ReportProvenance
-) -> None:
+def test_each_joint_and_the_plunger_have_a_box_with_their_limit(judge, gear, provenance):
     judged = judge(FAILURE, convention=ClearanceConvention.TOTAL_PLAY, entered={})
     html = render(inspection_document(judged, gear, provenance), "A4").replace("\u00a0", " ")
     boxes = [part.split("<")[0] for part in html.split('class="box">')[1:]]

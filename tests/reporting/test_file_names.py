@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -41,8 +40,6 @@ def test_a_name_can_be_read_and_follows_from_the_fields() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"formats": ("docx",)}, {"page": "B7"}])
-def test_an_unknown_format_or_paper_is_refused(
-    wrong: dict[str, Any], judge: Judge, make: Callable[..., Made]
-) -> None:
+def test_an_unknown_format_or_paper_is_refused(wrong, judge, make):
     with pytest.raises(UsageError, match=r"docx|B7"):
         make(judge(FAILURE), **wrong)

@@ -81,9 +81,7 @@ def test_the_form_has_the_boxes_of_the_prompts_in_their_order(gear: Gear, tmp_pa
     assert boxes == [*FIRST, *joints, *LAST]
 
 
-def test_without_an_engine_the_form_says_what_to_do(
-    gear: Gear, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_an_engine_the_form_says_what_to_do(gear, tmp_path, monkeypatch):
     monkeypatch.setattr(pdf, "engine_is_installed", lambda: False)
     with pytest.raises(OutputError, match="no PDF can be made") as refused:
         write_form(tmp_path / "form.pdf", gear)

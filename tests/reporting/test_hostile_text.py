@@ -122,17 +122,13 @@ def test_a_css_string_cannot_be_left() -> None:
     assert not set('";}</\\\n') & set(re.sub(r"\\[0-9a-f]+ ", "", written[1:-1]))
 
 
-def test_long_remarks_stand_in_full_and_do_not_push_the_verdict_off_the_first_page(
-    judge: Judge, make: Callable[..., Made]
-) -> None:
+def test_long_remarks_stand_in_full_and_do_not_push_the_verdict_off_the_first_page(judge, make):
     made = make(judge(FAILURE, carried={"remarks": "many words " * 400 + "LAST"}))
     assert "LAST" in made.text
     assert "OVER LIMIT" in opened(made.pdf).pages[0].extract_text()
 
 
-def test_a_word_without_end_does_not_shrink_the_page(
-    rejected: Rejected, make: Callable[..., Made]
-) -> None:
+def test_a_word_without_end_does_not_shrink_the_page(rejected, make):
     problem = Problem(
         "x", "fleet.csv", None, 7, "x" * 300, "C7", "y" * 900, "LH or RH", "Write LH or RH."
     )

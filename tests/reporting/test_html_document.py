@@ -23,9 +23,7 @@ from .conftest import Made
         ("<script", 0),
     ],
 )
-def test_the_document_holds_its_landmarks_once_and_nothing_that_loads(
-    markup: str, times: int, failure: Made
-) -> None:
+def test_the_document_holds_its_landmarks_once_and_nothing_that_loads(markup, times, failure):
     assert len(re.findall(markup, failure.html)) == times
 
 

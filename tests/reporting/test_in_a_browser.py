@@ -16,8 +16,6 @@ from pathlib import Path
 import pypdf
 import pytest
 
-from mlg_troubleshoot.decision.assessment import Rejected
-from mlg_troubleshoot.gear.gear import Gear
 from tests.cli.conftest import FLEET, mlg
 from tests.store.places import table
 from tests.store.test_history_commands import keep, visit
@@ -152,15 +150,11 @@ def test_axe_finds_nothing_in_a_report(width: int, worn: Made, tmp_path: Path) -
     assert violations(worn.html, tmp_path, width) == []
 
 
-def test_axe_finds_nothing_in_the_report_of_an_invalid_row(
-    rejected: Rejected, make: Callable[..., Made], tmp_path: Path
-) -> None:
+def test_axe_finds_nothing_in_the_report_of_an_invalid_row(rejected, make, tmp_path):
     assert violations(make(rejected, formats=("html",)).html, tmp_path) == []
 
 
-def test_axe_finds_nothing_in_a_batch_summary(
-    judge: Judge, rejected: Rejected, gear: Gear, tmp_path: Path
-) -> None:
+def test_axe_finds_nothing_in_a_batch_summary(judge, rejected, gear, tmp_path):
     written = write_reports([judge(FAILURE), rejected], gear, tmp_path)
     assert written[0].html is not None
     assert violations(written[0].html.read_text(encoding="utf-8"), tmp_path) == []
@@ -212,9 +206,7 @@ def documents(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 @pytest.mark.parametrize("width", [390, 1000, 1600])
 @pytest.mark.parametrize("place", range(4), ids=["report", "batch", "fleet", "life"])
-def test_no_text_lies_over_another(
-    place: int, width: int, documents: list[str], tmp_path: Path
-) -> None:
+def test_no_text_lies_over_another(place, width, documents, tmp_path):
     assert len(documents) == 4
     assert overlaps(documents[place], tmp_path, width) == []
 
@@ -227,8 +219,6 @@ def test_no_text_lies_over_another(
     ],
     ids=["text", "shape"],
 )
-def test_what_covers_a_text_would_be_found(
-    end: str, cover: str, worn: Made, tmp_path: Path
-) -> None:
+def test_what_covers_a_text_would_be_found(end, cover, worn, tmp_path):
     assert end in worn.html
     assert overlaps(worn.html.replace(end, cover, 1), tmp_path, 1000)

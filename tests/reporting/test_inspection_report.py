@@ -14,7 +14,6 @@ from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.sentences import rigging_sentence
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear, SourceKind
-from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import LengthUnit
 
 from .conftest import FAILURE, SOUND, WORN, Judge, Made, inspection
@@ -109,9 +108,7 @@ def test_an_outcome_before_the_repair_is_called_so(judge: Judge, make: Make) -> 
     assert "Outcome FAILED before repair" in make(repaired, formats=("html",)).text
 
 
-def test_which_joints_explain_the_displacement_is_said_as_on_the_screen(
-    judge: Judge, make: Make
-) -> None:
+def test_which_joints_explain_the_displacement_is_said_as_on_the_screen(judge, make):
     found = judge(SOUND, readings_in=(0.002,))
     assert found.posterior is not None
     assert found.posterior.text in make(found, formats=("html",)).text
@@ -137,9 +134,7 @@ def test_joints_stand_in_the_order_to_inspect_them(judge: Judge, worn: Made) -> 
     assert places == sorted(places)
 
 
-def test_a_joint_over_its_limit_is_distinguished_by_text_next_to_the_schematic(
-    failure: Made,
-) -> None:
+def test_a_joint_over_its_limit_is_distinguished_by_text_next_to_the_schematic(failure):
     table = failure.html[failure.html.index('<table class="ranked">') :]
     line = next(row for row in table.split("<tr") if "short link inner bearing" in row)
     assert ">0.0130<" in line
@@ -172,18 +167,14 @@ def test_no_repair_table_where_none_was_asked_for(judge: Judge, make: Make) -> N
     )
 
 
-def test_the_symptom_of_a_sound_gear_is_the_one_within(
-    gear: Gear, judge: Judge, make: Make
-) -> None:
+def test_the_symptom_of_a_sound_gear_is_the_one_within(gear, judge, make):
     assert gear.cycle is not None
     text = make(judge(SOUND), formats=("html",)).text
     assert gear.cycle.within in text
     assert gear.cycle.beyond not in text
 
 
-def test_what_stays_open_stands_on_the_first_page_and_in_the_handover(
-    judge: Judge, make: Make
-) -> None:
+def test_what_stays_open_stands_on_the_first_page_and_in_the_handover(judge, make):
     ended = judge({3: 0.0005}, readings_in=(0.002,), cannot_reach=(4,))
     open_question = ended.plan.open_question or ""
     text = make(ended, formats=("html",)).text
@@ -215,9 +206,7 @@ def test_warnings_of_the_decision_stand_on_the_report(judge: Judge, failure: Mad
     assert all(warning in failure.text for warning in warnings)
 
 
-def test_many_warnings_are_cut_short_in_front_and_stand_in_full_behind(
-    judge: Judge, make: Make
-) -> None:
+def test_many_warnings_are_cut_short_in_front_and_stand_in_full_behind(judge, make):
     many = tuple(f"Remark {i} about this row." for i in range(9))
     text = make(judge(FAILURE, warnings=many), formats=("html",)).text
     assert "more warnings under “Warnings”" in text
@@ -249,9 +238,7 @@ def test_an_invalid_row_says_what_to_correct(rejected: Rejected, make: Make) -> 
     assert "C8" not in text
 
 
-def test_an_invalid_row_without_a_side_shows_a_question_mark(
-    rejected: Rejected, make: Make
-) -> None:
+def test_an_invalid_row_without_a_side_shows_a_question_mark(rejected, make):
     assert '<p class="side" aria-hidden="true">?</p>' in make(rejected, formats=("html",)).html
 
 
@@ -260,9 +247,7 @@ def test_a_sound_gear_needs_no_repair(judge: Judge, make: Make) -> None:
     assert "None needed" in section
 
 
-def test_unread_joints_are_named_where_they_keep_a_repair_from_being_sure(
-    judge: Judge, make: Make
-) -> None:
+def test_unread_joints_are_named_where_they_keep_a_repair_from_being_sure(judge, make):
     some = dict.fromkeys((1, 3, 5), 0.006)
     section = make(judge(some, outcome=None), formats=("html",)).text
     assert "No repair set is certain while #2, #4" in section.split("Repair sets")[1]
@@ -313,9 +298,7 @@ def test_each_step_has_a_box_to_tick_and_room_for_a_signature(judge: Judge, fail
     assert failure.html.count('class="sign-here"') == len(steps) - 1
 
 
-def test_an_incomplete_gear_has_no_probability_that_would_clear_it(
-    judge: Judge, make: Make
-) -> None:
+def test_an_incomplete_gear_has_no_probability_that_would_clear_it(judge, make):
     judged = judge({3: 0.001}, outcome=None)
     assert judged.verdict == "INCOMPLETE"
     text = make(judged, formats=("html",)).text
@@ -345,9 +328,7 @@ def test_a_report_has_one_unit(unit: LengthUnit, shown: str, judge: Judge, make:
     )
 
 
-def test_the_joints_that_explain_a_measured_displacement_have_a_table(
-    gear: Gear, table: IndexTable, make: Make
-) -> None:
+def test_the_joints_that_explain_a_measured_displacement_have_a_table(gear, table, make):
     (partly,) = assess(
         [inspection({2: 0.001, 4: 0.001}, readings_in=(0.028,))], gear, table, advice=True
     )

@@ -54,9 +54,7 @@ def test_ordinary_text_has_no_box(failure: Made) -> None:
     assert not check_fonts(opened(failure.pdf))
 
 
-def test_ordinary_text_gives_no_note(
-    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
+def test_ordinary_text_gives_no_note(judge, gear, provenance, tmp_path):
     assert (
         write_inspection_report(judge(FAILURE), gear, tmp_path, provenance=provenance).notes == ()
     )

@@ -10,7 +10,6 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable
 from contextlib import closing
 from datetime import UTC, datetime
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -56,13 +55,7 @@ def test_every_font_is_embedded_and_one_of_the_bundled_ones(failure: Made) -> No
             assert "/FontFile2" in font["/FontDescriptor"]
 
 
-def test_a_computer_without_fonts_makes_the_same_pdf(
-    judge: Judge,
-    make: Callable[..., Made],
-    failure: Made,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_computer_without_fonts_makes_the_same_pdf(judge, make, failure, tmp_path, monkeypatch):
     (tmp_path / "fonts.conf").write_text("<fontconfig></fontconfig>", encoding="utf-8")
     monkeypatch.setenv("FONTCONFIG_FILE", str(tmp_path / "fonts.conf"))
     assert make(judge(FAILURE), formats=("pdf",)).pdf == failure.pdf
@@ -106,9 +99,7 @@ def test_title_language_and_date_are_those_that_were_given(failure: Made) -> Non
     assert (metadata.creation_date, metadata.modification_date) == (NOW, NOW)
 
 
-def test_with_the_date_of_the_sources_two_runs_give_the_same_bytes(
-    judge: Judge, gear: Gear, make: Callable[..., Made], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_with_the_date_of_the_sources_two_runs_give_the_same_bytes(judge, gear, make, monkeypatch):
     # 20:30 in UTC, the next day in Nepal.
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1715977800")
     monkeypatch.setenv("TZ", "Asia/Kathmandu")
@@ -123,25 +114,19 @@ def test_with_the_date_of_the_sources_two_runs_give_the_same_bytes(
     assert "report made 2024-05-17" in second.text
 
 
-def test_a_date_of_the_sources_that_is_not_valid_is_refused(
-    gear: Gear, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_date_of_the_sources_that_is_not_valid_is_refused(gear, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
     with pytest.raises(UsageError, match="yesterday"):
         provenance_of(gear, {})
 
 
-def test_another_moment_gives_other_bytes(
-    judge: Judge, make: Callable[..., Made], failure: Made, provenance: ReportProvenance
-) -> None:
+def test_another_moment_gives_other_bytes(judge, make, failure, provenance):
     later = dataclasses.replace(provenance, created=datetime(2024, 5, 18, tzinfo=UTC))
     assert make(judge(FAILURE), provenance=later).pdf != failure.pdf
 
 
 @pytest.mark.parametrize(("page", "width", "height"), [("A4", 595, 842), ("Letter", 612, 792)])
-def test_the_paper_is_the_one_asked_for(
-    page: str, width: int, height: int, judge: Judge, make: Callable[..., Made], failure: Made
-) -> None:
+def test_the_paper_is_the_one_asked_for(page, width, height, judge, make, failure):
     pages = opened(make(judge(FAILURE), page=page, formats=("pdf",)).pdf).pages
     box = pages[0].mediabox
     assert len(pages) == len(opened(failure.pdf).pages)

@@ -80,9 +80,7 @@ def concluded(
         ({(SHAPE, A): 0.4, (A,): 0.6}, MisfitVerdict.NAMED),
     ],
 )
-def test_the_verdict_is_what_is_likelier_than_not(
-    sets: dict[tuple[Key, ...], float], verdict: MisfitVerdict
-) -> None:
+def test_the_verdict_is_what_is_likelier_than_not(sets, verdict):
     assert concluded(sets).verdict is verdict
 
 

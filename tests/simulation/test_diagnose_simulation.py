@@ -319,9 +319,7 @@ A = Suspect("rate", 1.0, 0.1)
         ({"predict": lambda _p: np.full((8, 1), np.nan)}, "no number for 8 of 8"),
     ],
 )
-def test_what_a_caller_gets_wrong_is_refused_with_words(
-    changed: dict[str, object], says: str
-) -> None:
+def test_what_a_caller_gets_wrong_is_refused_with_words(changed, says):
     x = np.linspace(0.0, 1.0, 8)
     given: dict[str, object] = {
         "predict": lambda p: (p["rate"] * x)[:, None],

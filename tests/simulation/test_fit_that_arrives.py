@@ -175,9 +175,7 @@ def test_among_rivals_the_parameters_predict_better_than_the_nominal_values() ->
 
 
 @pytest.mark.parametrize(("one_seed", "said"), [(False, True), (True, False)])
-def test_a_simulation_that_draws_other_numbers_in_each_call_is_told(
-    one_seed: bool, said: bool
-) -> None:
+def test_a_simulation_that_draws_other_numbers_in_each_call_is_told(one_seed, said):
     any_draw = np.random.default_rng(5)
 
     def drawing(p: Mapping[str, float]) -> np.ndarray:

@@ -17,9 +17,7 @@ def gear() -> SimulationDiagnosis:
     return diagnose_simulation(rig.predict, rig.runout_mm, rig.suspects, groups=rig.session)
 
 
-def test_the_gear_names_sleeves_and_dial_as_one_class_with_the_reading_that_separates_them() -> (
-    None
-):
+def test_the_gear_names_sleeves_and_dial_as_one_class_with_the_reading_that_separates_them():
     first = gear().causes[0]
     assert gear().verdict is Verdict.NAMED
     assert {first.name, *first.aliases} == {"sleeve_size", "dial_scale"}
@@ -90,18 +88,14 @@ def test_both_sessions_of_the_arm_name_the_same_causes() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("session", [1, 2])
-def test_trained_on_some_places_the_arms_misfit_at_another_falls_by_80_percent(
-    session: int,
-) -> None:
+def test_trained_on_some_places_the_arms_misfit_at_another_falls_by_80_percent(session):
     gain = arm(session).gain
     assert gain.held_out_by == "group"
     assert gain.rms_after < 0.2 * gain.rms_before
 
 
 @pytest.mark.slow
-def test_with_all_denavit_hartenberg_parameters_no_session_names_what_the_other_contradicts() -> (
-    None
-):
+def test_with_all_denavit_hartenberg_parameters_no_session_names_what_the_other_contradicts():
     found = []
     for session in (1, 2):
         rig = Panda(session)

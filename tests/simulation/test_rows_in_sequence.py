@@ -151,9 +151,7 @@ def test_dates_in_any_order_give_what_the_rows_in_order_give() -> None:
         ({"series": np.zeros(N), "time": np.full(N, np.nan)}, "not finite"),
     ],
 )
-def test_series_and_times_that_say_nothing_are_refused(
-    given: dict[str, np.ndarray], says: str
-) -> None:
+def test_series_and_times_that_say_nothing_are_refused(given, says):
     with pytest.raises(UsageError) as caught:
         diagnose_simulation(line, T, SUSPECTS, LEVEL, **given)  # type: ignore[arg-type]
     assert says in caught.value.message

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -69,9 +68,7 @@ def test_while_one_writes_no_other_begins_to(store: Store) -> None:
         pass
 
 
-def test_the_same_identity_with_other_content_is_refused_and_nothing_of_the_call_is_kept(
-    store: Store,
-) -> None:
+def test_the_same_identity_with_other_content_is_refused_and_nothing_of_the_call_is_kept(store):
     other = [*places.records(20, 22), inspection_record(places.inspection(3, clearance_in=0.009))]
     with pytest.raises(StoreError, match=r"R3 \(N3 LH 2026-01-04\).*nothing of this was kept"):
         store.add(other)
@@ -107,9 +104,7 @@ def test_a_place_that_no_store_can_be_at_is_refused(url: str) -> None:
 @pytest.mark.parametrize(
     "change", ["UPDATE mlg_records SET side = 'RH'", "DELETE FROM mlg_records"]
 )
-def test_the_database_itself_refuses_to_change_a_record(
-    store: Store, place: Path, change: str
-) -> None:
+def test_the_database_itself_refuses_to_change_a_record(store, place, change):
     with (
         closing(sqlite3.connect(place)) as raw,
         raw,
@@ -148,9 +143,7 @@ def forged(place: Path, column: str, seq: int) -> Iterator[object]:
 
 
 @pytest.mark.parametrize("column", COLUMNS)
-def test_a_changed_byte_in_any_field_is_found_and_its_record_named(
-    store: Store, place: Path, column: str
-) -> None:
+def test_a_changed_byte_in_any_field_is_found_and_its_record_named(store, place, column):
     for value in list(forged(place, column, 4)):
         with closing(sqlite3.connect(place)) as raw, raw:
             raw.execute("DROP TRIGGER IF EXISTS mlg_no_update")
@@ -211,9 +204,7 @@ def test_a_store_of_a_newer_schema_is_refused(store: Store, place: Path) -> None
 @pytest.mark.parametrize(
     "version", sorted(OLD.glob("version-*.sqlite")), ids=lambda path: path.stem
 )
-def test_a_store_of_each_schema_version_can_be_read_and_added_to(
-    version: Path, tmp_path: Path
-) -> None:
+def test_a_store_of_each_schema_version_can_be_read_and_added_to(version, tmp_path):
     copied = tmp_path / "store.sqlite"
     copied.write_bytes(version.read_bytes())
     store = Store(copied)
@@ -253,9 +244,7 @@ def test_an_export_whose_columns_or_content_alone_were_changed_is_refused(
         {"carried": {}},
     ],
 )
-def test_what_was_found_otherwise_is_another_inspection_and_comes_back_so(
-    found: dict[str, Any], place: Path
-) -> None:
+def test_what_was_found_otherwise_is_another_inspection_and_comes_back_so(found, place):
     kept, other = places.inspection(2), replace(places.inspection(2), **found)
     one, two = (Told.of(inspection_record(each)) for each in (kept, other))
     assert one.content != two.content

@@ -76,9 +76,7 @@ def test_records_of_one_date_do_not_contradict_each_other() -> None:
         ),
     ],
 )
-def test_the_record_that_alone_may_be_wrong_is_named_with_the_nearest_it_contradicts(
-    pairs: list[tuple[int, int]], said: dict[int, str]
-) -> None:
+def test_the_record_that_alone_may_be_wrong_is_named_with_the_nearest_it_contradicts(pairs, said):
     found = contradictions(moments(pairs), str)
     assert {place: text[: len(said[place])] for place, text in found.items()} == said
 

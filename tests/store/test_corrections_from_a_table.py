@@ -74,9 +74,7 @@ def test_nor_one_whose_date_was_another(keep: Keep) -> None:
 
 
 @pytest.mark.parametrize("times", [1, 2])
-def test_once_the_record_is_corrected_the_table_is_known(
-    keep: Keep, tmp_path: Path, times: int
-) -> None:
+def test_once_the_record_is_corrected_the_table_is_known(keep, tmp_path, times):
     keep(B={DAY: "2026-02-31"})
     for _ in range(times):
         for cells in ({"B": {CLEARANCE: "0.002"}}, {}):
@@ -156,9 +154,7 @@ def without_ids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("name", ["table.csv", "renamed.csv"])
-def test_a_table_without_ids_that_was_sorted_or_renamed_is_known(
-    without_ids: Path, name: str
-) -> None:
+def test_a_table_without_ids_that_was_sorted_or_renamed_is_known(without_ids, name):
     rows = (unnamed(without_ids, "0.0011", "0.0012", "0.0013", name=name)).read_text().splitlines()
     (without_ids / name).write_text("\n".join([rows[0], *rows[:0:-1]]) + "\n")
     said = mlg("check", without_ids / name, "--keep").err

@@ -94,9 +94,7 @@ def test_gears_without_work_are_not_counted_as_having_some(store: Path) -> None:
     assert f"on {waiting} of {len(listed['gears'])} gears" in listed["work"]
 
 
-def test_the_action_has_the_same_words_on_screen_in_json_and_on_paper(
-    store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_action_has_the_same_words_on_screen_in_json_and_on_paper(store, tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     screen = mlg("fleet", "--store", store, "-q", "--no-forecast", "--report", tmp_path).out
     page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
@@ -113,9 +111,7 @@ def test_no_reason_is_cut_on_a_narrow_screen(store: Path, monkeypatch: pytest.Mo
         assert all(word in screen for word in str(gear["why"]).split())
 
 
-def test_the_page_of_a_gear_plots_each_joint_with_limit_and_forecast(
-    store: Path, tmp_path: Path
-) -> None:
+def test_the_page_of_a_gear_plots_each_joint_with_limit_and_forecast(store, tmp_path):
     assert mlg("history", "N777", "LH", "--store", store, "--report", tmp_path).code == 0
     (file,) = tmp_path.glob("*.html")
     page = file.read_text(encoding="utf-8")

@@ -118,9 +118,7 @@ def test_keeping_a_file_twice_keeps_it_once(tmp_path: Path, place: Path) -> None
     assert ", 2 known already" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
 
 
-def test_the_same_identity_with_other_content_is_refused_with_what_to_do(
-    tmp_path: Path, place: Path
-) -> None:
+def test_the_same_identity_with_other_content_is_refused_with_what_to_do(tmp_path, place):
     keep(tmp_path, visit(1, 0.001))
     run = keep(tmp_path, visit(2, 0.002), visit(1, 0.005))
     assert run.code == 5
@@ -180,9 +178,7 @@ def test_a_correction_counts_and_what_it_corrects_does_not(tmp_path: Path, place
         (["date=2024-01-31"], "inspection_date", date(2024, 1, 31)),
     ],
 )
-def test_an_amended_value_is_that_of_its_column(
-    tmp_path: Path, place: Path, values: list[str], field: str, value: object
-) -> None:
+def test_an_amended_value_is_that_of_its_column(tmp_path, place, values, field, value):
     blank = {n: "" for n in visit(1, 0.001) if re.match(r"clearance_\d", n)}
     keep(tmp_path, visit(1, 0.001) | blank | {"clearance_3_in": "0.001", "outcome": "RETRACTED"})
     before = life_of(Store(place), "N123", "LH").inspections[0]
@@ -205,9 +201,7 @@ def test_an_amended_value_is_that_of_its_column(
         (["landings=400"], "says that already"),
     ],
 )
-def test_what_cannot_be_amended_is_refused(
-    tmp_path: Path, place: Path, values: list[str], said: str
-) -> None:
+def test_what_cannot_be_amended_is_refused(tmp_path, place, values, said):
     keep(tmp_path, visit(1, 0.001))
     run = mlg("history", "amend", "N123-LH-1", *values)
     assert (run.code, len(Store(place).all())) == (2, 1)
@@ -228,9 +222,7 @@ def test_a_void_inspection_does_not_count(tmp_path: Path, place: Path) -> None:
     assert mlg("history", "void", "N123-LH-2", "--why", "again").code == 2
 
 
-def test_no_worst_case_is_stated_of_a_visit_on_which_no_joint_was_read(
-    tmp_path: Path, place: Path
-) -> None:
+def test_no_worst_case_is_stated_of_a_visit_on_which_no_joint_was_read(tmp_path, place):
     seen = visit(1, 0.0, outcome="FAILED", plunger_displacement_in="0.041")
     keep(tmp_path, {n: "" if re.match(r"clearance_\d", n) else text for n, text in seen.items()})
     shown = mlg("history", "N123", "LH", "--no-forecast").out
@@ -238,9 +230,7 @@ def test_no_worst_case_is_stated_of_a_visit_on_which_no_joint_was_read(
     assert "worst case" not in shown
 
 
-def test_a_life_is_shown_in_the_unit_that_the_user_reads(
-    place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_life_is_shown_in_the_unit_that_the_user_reads(place, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     seeded((1, 0.0100))
     shown = mlg("history", "N123", "LH", "--no-forecast", "--show", "mm").out
@@ -248,9 +238,7 @@ def test_a_life_is_shown_in_the_unit_that_the_user_reads(
     assert re.search(r"worst case 0\.\d+ mm", shown)
 
 
-def test_a_re_rigging_is_an_event_of_a_life_and_the_joints_wear_on(
-    tmp_path: Path, place: Path
-) -> None:
+def test_a_re_rigging_is_an_event_of_a_life_and_the_joints_wear_on(tmp_path, place):
     seeded((1, 0.001), (3, 0.002))
     done = ("rigging_checked=corrected", "date=2024-07-15", "repair_date=2024-07-15")
     flags = ("--tail", "N123", "--side", "LH", "--convention", "RADIAL", "--keep")
@@ -268,9 +256,7 @@ def test_a_quiet_history_writes_its_page_and_says_nothing(tmp_path: Path, place:
     assert (run.err, len(list((tmp_path / "out").glob("mlg-life-*.html")))) == ("", 1)
 
 
-def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(
-    tmp_path: Path, place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(tmp_path, place, monkeypatch):
     seeded((1, 0.001))
     monkeypatch.setenv("MLG_PAGE", "Letter")
     mlg("fleet", "--no-forecast", "--report", tmp_path)
@@ -322,9 +308,7 @@ def test_what_is_not_an_exported_record_is_refused_with_its_line(tmp_path: Path,
         ("history", "import", "not-there.jsonl"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_as_usage(
-    tmp_path: Path, place: Path, command: tuple[str, ...]
-) -> None:
+def test_what_cannot_be_meant_is_refused_as_usage(tmp_path, place, command):
     seeded((1, 0.001))
     run = mlg(*command)
     assert run.code == 2
@@ -337,9 +321,7 @@ def test_an_empty_store_says_how_to_keep(place: Path) -> None:
     assert "--keep" in run.out
 
 
-def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(
-    tmp_path: Path, place: Path
-) -> None:
+def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(tmp_path, place):
     keep(
         tmp_path,
         visit(1, 0.013),
@@ -355,9 +337,7 @@ def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(
     assert told["gears"][0]["worst_joint"] == 3
 
 
-def test_a_fleet_without_landings_has_no_forecast_and_says_null(
-    tmp_path: Path, place: Path
-) -> None:
+def test_a_fleet_without_landings_has_no_forecast_and_says_null(tmp_path, place):
     keep(tmp_path, {k: v for k, v in visit(1, 0.001).items() if k != "gear_landings"})
     assert mlg("fleet", "--no-forecast").out.startswith("1 gear, ")
     (gear,) = mlg("fleet", "--json").json["gears"]
@@ -400,9 +380,7 @@ def test_a_missed_restoration_is_suggested(tmp_path: Path, place: Path) -> None:
     assert notes.count("read much tighter") == 1
 
 
-def test_the_fleet_page_has_a_line_a_gear_that_links_to_its_life(
-    tmp_path: Path, place: Path
-) -> None:
+def test_the_fleet_page_has_a_line_a_gear_that_links_to_its_life(tmp_path, place):
     seeded((1, 0.001), (2, 0.012))
     assert mlg("fleet", "--no-forecast", "--report", tmp_path / "out").code == 0
     page = (tmp_path / "out" / "fleet.html").read_text(encoding="utf-8")
@@ -449,9 +427,7 @@ def own_gear(tmp_path: Path) -> Callable[[str], Path]:
     return write
 
 
-def test_a_forecast_beyond_the_horizon_of_the_gear_file_is_null(
-    place: Path, own_gear: Callable[[str], Path]
-) -> None:
+def test_a_forecast_beyond_the_horizon_of_the_gear_file_is_null(place, own_gear):
     seeded((1, 0.001), (2, 0.0012), (3, 0.0014))
     far = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
     near = joint_3(life("--gear", str(own_gear("horizon_landings = 50\naccepted_chance = 0.05"))))[
@@ -461,9 +437,7 @@ def test_a_forecast_beyond_the_horizon_of_the_gear_file_is_null(
     assert near["p95"] is None
 
 
-def test_who_accepts_a_larger_chance_inspects_later(
-    place: Path, own_gear: Callable[[str], Path]
-) -> None:
+def test_who_accepts_a_larger_chance_inspects_later(place, own_gear):
     seeded((1, 0.001), (2, 0.0012), (3, 0.0014))
     (usual,) = mlg("fleet", "--json").json["gears"]
     bold = own_gear("horizon_landings = 20000\naccepted_chance = 0.3")

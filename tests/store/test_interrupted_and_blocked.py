@@ -70,17 +70,13 @@ def test_a_connection_string_is_not_a_file_and_its_password_is_not_shown(
     assert [file.name for file in tmp_path.iterdir()] == ["table.csv"]
 
 
-def test_drafts_have_an_owner_where_the_environment_names_none(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_drafts_have_an_owner_where_the_environment_names_none(tmp_path, monkeypatch):
     for name in ("USER", "USERNAME", "LOGNAME", "LNAME"):
         monkeypatch.delenv(name, raising=False)
     assert SavedEntries(tmp_path / "store.sqlite").owner
 
 
-def test_a_clock_at_the_end_of_all_days_ends_no_command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_clock_at_the_end_of_all_days_ends_no_command(tmp_path, monkeypatch):
     class LastDay(date):
         @classmethod
         def today(cls) -> date:

@@ -8,7 +8,6 @@ import sqlite3
 import time
 import tracemalloc
 import zlib
-from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -149,9 +148,7 @@ def test_a_record_that_cannot_be_read_is_not_imported_named_by_verify_and_put_as
     assert mlg("history", "import", tmp_path / "chain.jsonl", *new).code == 0
 
 
-def test_the_record_and_its_column_are_named_and_nothing_is_added_or_exported(
-    place: Path, tmp_path: Path
-) -> None:
+def test_the_record_and_its_column_are_named_and_nothing_is_added_or_exported(place, tmp_path):
     Store(place).add([evil("a clearance below zero")])
     run = mlg("history", "N1", "LH", "--no-forecast")
     assert run.code == 5
@@ -164,9 +161,7 @@ def test_the_record_and_its_column_are_named_and_nothing_is_added_or_exported(
     assert not (tmp_path / "chain.jsonl").exists()
 
 
-def test_every_kind_of_record_that_the_program_keeps_is_read_again(
-    tmp_path: Path, place: Path
-) -> None:
+def test_every_kind_of_record_that_the_program_keeps_is_read_again(tmp_path, place):
     table = places.table(
         tmp_path,
         row(
@@ -232,9 +227,7 @@ BROKEN = {**READ_WRONGLY, **NOT_A_CHAIN}
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: " ".join(map(str, command)))
 @pytest.mark.parametrize("change", READ_WRONGLY)
-def test_a_record_that_cannot_be_read_is_named_with_what_to_do(
-    place: Path, change: str, command: Sequence[object]
-) -> None:
+def test_a_record_that_cannot_be_read_is_named_with_what_to_do(place, change, command):
     tampered(place, READ_WRONGLY[change][0], *READ_WRONGLY[change][1])
     run = mlg(*command)
     # Whoever does not read the record cannot be hindered by it, unless the chain is written to.
@@ -258,9 +251,7 @@ def test_a_chain_that_does_not_fit_is_found_nothing_is_kept_on_it_and_it_is_not_
     assert "mlg history verify" in run.err
 
 
-def test_of_a_long_chain_the_newest_records_are_walked_before_another_is_added(
-    place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_a_long_chain_the_newest_records_are_walked_before_another_is_added(place, monkeypatch):
     monkeypatch.setattr("mlg_troubleshoot.store.database._NEWEST", 2)
     tampered(place, "UPDATE mlg_records SET record_id = 'R9' WHERE seq = 3")
     assert Store(place).add(places.records(7, 8)).new == 2
@@ -284,9 +275,7 @@ def bomb(megabytes: int) -> bytes:
     return press.compress(b'{"x":"') + spaces + press.compress(b'"}') + press.flush()
 
 
-def test_a_record_that_unpacks_to_more_than_a_megabyte_is_refused_before_it_is_unpacked(
-    place: Path,
-) -> None:
+def test_a_record_that_unpacks_to_more_than_a_megabyte_is_refused_before_it_is_unpacked(place):
     Store(place).add([replace(SOUND, packed=bomb(100), identity=("bomb",))])
     run, _seconds, peak_mb = measured("history", "N1", "LH", "--no-forecast")
     assert run.code == 5
@@ -375,9 +364,7 @@ def deep(path: Path) -> None:
 @pytest.mark.parametrize(
     "written", [sparse, one_long_line, zeros_of_allowed_size, deep], ids=lambda f: f.__name__
 )
-def test_what_is_too_large_to_import_is_refused_in_little_time_and_memory(
-    tmp_path: Path, written: Callable[[Path], None]
-) -> None:
+def test_what_is_too_large_to_import_is_refused_in_little_time_and_memory(tmp_path, written):
     written(tmp_path / "chain.jsonl")
     run, seconds, peak_mb = imported(tmp_path / "chain.jsonl")
     assert run.code in (2, 5), run.err
@@ -385,9 +372,7 @@ def test_what_is_too_large_to_import_is_refused_in_little_time_and_memory(
     assert peak_mb < 300
 
 
-def test_an_import_of_too_many_records_is_refused(
-    tmp_path: Path, place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_import_of_too_many_records_is_refused(tmp_path, place, monkeypatch):
     monkeypatch.setattr("mlg_troubleshoot.store.database._MOST_IMPORTED", 5)
     with pytest.raises(StoreError, match="line 6: at most 5 records"):
         Store(tmp_path / "new.sqlite").restore(Store(place).export(), "chain")
@@ -399,9 +384,7 @@ def test_a_refused_import_makes_no_store(tmp_path: Path) -> None:
     assert not (tmp_path / "new.sqlite").exists()
 
 
-def test_a_body_that_a_record_says_and_does_not_hold_is_refused(
-    tmp_path: Path, place: Path
-) -> None:
+def test_a_body_that_a_record_says_and_does_not_hold_is_refused(tmp_path, place):
     lines = list(Store(place).export())
     first = json.loads(lines[0])
     lines[0] = json.dumps({**first, "seq": 1.0}) + "\n"

@@ -86,9 +86,7 @@ def test_the_life_of_one_gear_says_how_far_the_wear_of_its_fleet_is_learnt(store
     ]
 
 
-def test_the_life_of_one_gear_is_shown_without_reading_the_whole_store(
-    store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_life_of_one_gear_is_shown_without_reading_the_whole_store(store, monkeypatch):
     read: list[str] = []
     found = Store._record
     monkeypatch.setattr(
@@ -106,9 +104,7 @@ def test_where_few_gears_state_their_landings_all_of_them_are_learnt_from(tmp_pa
     assert {unit.split()[0] for unit in model.paths} == set(last)
 
 
-def test_a_store_kept_in_many_blocks_is_the_one_kept_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_store_kept_in_many_blocks_is_the_one_kept_at_once(tmp_path, monkeypatch):
     batch = Path(__file__).parents[2] / "inspection_data" / "fleet_batch.csv"
     told = told_by(check_files([batch, batch], CheckOptions()).judgements)
     at_once, in_blocks = (Store(tmp_path / f"{name}.sqlite") for name in ("one", "many"))

@@ -149,9 +149,7 @@ VIEWS = pytest.mark.parametrize("view", [life, gear_of_the_fleet])
 
 
 @VIEWS
-def test_a_slip_in_the_landings_of_a_worn_gear_leaves_it_due_now(
-    tmp_path: Path, view: View
-) -> None:
+def test_a_slip_in_the_landings_of_a_worn_gear_leaves_it_due_now(tmp_path, view):
     kept(tmp_path, SLIP)
     told = view()
     nothing = dict.fromkeys(("p05", "p50", "p95"), 0.0)
@@ -160,9 +158,7 @@ def test_a_slip_in_the_landings_of_a_worn_gear_leaves_it_due_now(
 
 
 @VIEWS
-def test_a_slip_in_the_landings_of_a_sound_gear_gives_no_forecast(
-    tmp_path: Path, view: View
-) -> None:
+def test_a_slip_in_the_landings_of_a_sound_gear_gives_no_forecast(tmp_path, view):
     assert mlg("check", years(tmp_path, {2: 86}, only=range(3)), "--keep").code in (0, 1)
     told = view()
     assert [told[name] for name in (*QUANTILES, "next_inspection_landings", "due_date")] == [
@@ -178,9 +174,7 @@ def test_a_slip_gives_no_joint_a_forecast_but_those_over_their_limit(tmp_path: P
 
 @pytest.mark.parametrize("command", [("history", "N507", "LH"), ("fleet",)])
 @pytest.mark.parametrize("form", ["screen", "json", "report"])
-def test_every_view_names_the_record_and_how_to_correct_it(
-    tmp_path: Path, command: tuple[str, ...], form: str
-) -> None:
+def test_every_view_names_the_record_and_how_to_correct_it(tmp_path, command, form):
     kept(tmp_path, SLIP)
     wrong = next(record.digest[:10] for record in Store().all() if record.record_id == "S4")
     if form == "report":
@@ -401,9 +395,7 @@ def test_landings_are_left_to_the_margin_that_the_last_inspection_states(tmp_pat
 
 
 @pytest.mark.parametrize(("reads", "told"), [(0.0033, False), (0.0031, True), (0.0090, False)])
-def test_a_reading_four_standard_deviations_tighter_is_taken_for_a_restoration(
-    reads: float, told: bool
-) -> None:
+def test_a_reading_four_standard_deviations_tighter_is_taken_for_a_restoration(reads, told):
     # Readings to 0.0005 in: their difference to 0.0007 in.
     seen = [inspection(n, f"2024-0{n}-01", 100.0 * n) for n in (1, 2)]
     add(
@@ -516,9 +508,7 @@ def undated_after_sound_ones(folder: Path, **undated: str) -> None:
     ("landings", "view"),
     [("240", life), ("500", gear_of_the_fleet), ("2407000", life), ("", gear_of_the_fleet)],
 )
-def test_an_undated_inspection_outside_the_margin_leaves_nothing(
-    tmp_path: Path, landings: str, view: View
-) -> None:
+def test_an_undated_inspection_outside_the_margin_leaves_nothing(tmp_path, landings, view):
     undated_after_sound_ones(tmp_path, gear_landings=landings)
     assert view()["next_inspection_landings"] == 0.0
 

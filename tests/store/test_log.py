@@ -45,9 +45,7 @@ def fleet(store: Path) -> dict[str, Any]:
     return {f"{gear['tail_no']} {gear['side']}": gear for gear in found}
 
 
-def test_a_record_says_when_and_by_whom_it_was_recorded(
-    store: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_record_says_when_and_by_whom_it_was_recorded(store, monkeypatch):
     monkeypatch.setenv("MLG_BY", "J. Smith")
     keep(store, visit("R1", "2026-01-01"))
     (record,) = Store(store).all()
@@ -120,9 +118,7 @@ def two_stores(tmp_path: Path) -> tuple[Path, Path]:
     return first, second
 
 
-def test_a_merged_record_keeps_its_hash_its_clock_and_its_writer(
-    two_stores: tuple[Path, Path],
-) -> None:
+def test_a_merged_record_keeps_its_hash_its_clock_and_its_writer(two_stores):
     first, second = two_stores
     there = {r.key: (r.recorded_at, r.recorded_by) for r in Store(second).all()}
     imported(first, second)

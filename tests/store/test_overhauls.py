@@ -86,9 +86,7 @@ def test_one_inspection_on_a_side_is_enough(visits: Sequence[Visit]) -> None:
     ],
     ids=["as worn", "two tighter", "three tighter", "one wider", "hardly tighter", "three read"],
 )
-def test_several_joints_must_clearly_read_tighter_and_none_wider(
-    anew: Mapping[int, float], some: bool
-) -> None:
+def test_several_joints_must_clearly_read_tighter_and_none_wider(anew, some):
     visits = FIRST, LAST, read(ANEW, anew), read(NEWEST, anew)
     assert bool(overhauls(moments(visits))) is some
 

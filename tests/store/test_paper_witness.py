@@ -60,9 +60,7 @@ def test_a_report_prints_its_record_the_head_of_the_log_and_the_count(kept: Path
     assert f"sha256 {newest.digest}" in text
 
 
-def test_a_fact_that_was_added_since_makes_reports_of_its_gear_stale(
-    kept: Path, tmp_path: Path
-) -> None:
+def test_a_fact_that_was_added_since_makes_reports_of_its_gear_stale(kept, tmp_path):
     store = tmp_path / "store.sqlite"
     shutil.copy(kept / "store.sqlite", store)
     assert keep(tmp_path, visit(9, 0.014, "A", **ALL_READ), more=("--store", str(store))).code == 1
@@ -74,9 +72,7 @@ def test_a_fact_that_was_added_since_makes_reports_of_its_gear_stale(
     assert set(standing.values()) <= {"HOLDS", "STALE"}
 
 
-def test_a_verdict_that_is_another_one_today_is_said(
-    kept: Path, gear: Gear, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_verdict_that_is_another_one_today_is_said(kept, gear, monkeypatch):
     from mlg_troubleshoot.workflows import witness
 
     (own,) = (kept / "history").glob("*.pdf")
@@ -143,9 +139,7 @@ def test_a_log_that_was_cut_back_or_changed_is_found_by_any_report(
         assert found.why
 
 
-def test_a_log_that_was_written_anew_without_its_last_record_is_found(
-    kept: Path, tmp_path: Path, gear: Gear
-) -> None:
+def test_a_log_that_was_written_anew_without_its_last_record_is_found(kept, tmp_path, gear):
     whole = Store(kept / "store.sqlite").all()
     for n in range(len(whole)):
         anew = Store(tmp_path / f"{n}.sqlite")

@@ -58,9 +58,7 @@ def test_a_device_or_a_folder_is_not_a_store(tmp_path: Path, where: str) -> None
     assert keep(tmp_path, where).code == 2
 
 
-def test_the_home_folder_is_found_behind_quotes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_home_folder_is_found_behind_quotes(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.chdir(tmp_path)
     assert keep(tmp_path, "~/store.sqlite").code == 0
@@ -68,9 +66,7 @@ def test_the_home_folder_is_found_behind_quotes(
     assert not (tmp_path / "~").exists()
 
 
-def test_a_url_of_a_file_is_that_file_and_reading_at_that_of_no_file_makes_none(
-    tmp_path: Path, place: Path
-) -> None:
+def test_a_url_of_a_file_is_that_file_and_reading_at_that_of_no_file_makes_none(tmp_path, place):
     assert Store(f"sqlite:///{place}").file == place
     assert Store(f"sqlite:///{place}").verify() == (6, None)
     assert Store(f"sqlite:///{tmp_path}/none.sqlite").gears() == []
@@ -85,9 +81,7 @@ def application_id(path: Path) -> int:
         return int(raw.execute("PRAGMA application_id").fetchone()[0])
 
 
-def test_a_store_is_marked_one_of_before_by_the_first_that_is_kept(
-    tmp_path: Path, place: Path
-) -> None:
+def test_a_store_is_marked_one_of_before_by_the_first_that_is_kept(tmp_path, place):
     assert application_id(place) == ID
     copied = tmp_path / "store.sqlite"
     copied.write_bytes(OLD.read_bytes())
@@ -100,9 +94,7 @@ def test_a_store_is_marked_one_of_before_by_the_first_that_is_kept(
 
 @pytest.mark.parametrize("command", ["history", "keep", "verify"])
 @pytest.mark.parametrize(("marked", "table"), [(0, True), (252006674, True), (252006674, False)])
-def test_the_database_of_another_program_is_not_taken_as_a_store(
-    tmp_path: Path, command: str, marked: int, table: bool
-) -> None:
+def test_the_database_of_another_program_is_not_taken_as_a_store(tmp_path, command, marked, table):
     other = tmp_path / "other.sqlite"
     with closing(sqlite3.connect(other)) as raw, raw:
         if table:
@@ -152,9 +144,7 @@ NO_DELETE = "CREATE TRIGGER mlg_no_delete BEFORE DELETE ON mlg_records BEGIN SEL
         ),
     ],
 )
-def test_what_a_store_should_have_and_has_not_is_named(
-    place: Path, statements: tuple[str, ...], named: str
-) -> None:
+def test_what_a_store_should_have_and_has_not_is_named(place, statements, named):
     changed(place, *statements)
     run = mlg("history", "verify", "--store", place)
     assert run.code == 1

@@ -49,9 +49,7 @@ def test_a_failure_after_the_repair_is_a_new_one(history: Path) -> None:
     assert next_of(history)["later"] != "READ_PLUNGER"
 
 
-def test_a_repair_that_a_row_states_is_kept_once_with_the_row(
-    history: Path, tmp_path: Path
-) -> None:
+def test_a_repair_that_a_row_states_is_kept_once_with_the_row(history, tmp_path):
     place = str(tmp_path / "store.sqlite")
     for _ in range(2):
         mlg("check", history, "--keep", "--store", place)

@@ -64,9 +64,7 @@ def test_a_restored_joint_is_not_read(at: At) -> None:
 
 
 @pytest.mark.parametrize(("worn_in", "stands"), [(WORN, True), (SOUND, False)])
-def test_what_is_kept_and_cannot_be_ordered_counts_only_against_the_gear(
-    gear: Gear, worn_in: float, stands: bool
-) -> None:
+def test_what_is_kept_and_cannot_be_ordered_counts_only_against_the_gear(gear, worn_in, stands):
     for day in (None, MAR):
         kept = GearVisit(of(day, {3: worn_in}), 1)
         found = states([kept, GearVisit(of(MAR, {6: SOUND}))], gear)[-1]
@@ -74,25 +72,19 @@ def test_what_is_kept_and_cannot_be_ordered_counts_only_against_the_gear(
 
 
 @pytest.mark.parametrize("day", [None, MAR])
-def test_rows_of_one_table_that_cannot_be_ordered_speak_each_for_itself(
-    at: At, day: date | None
-) -> None:
+def test_rows_of_one_table_that_cannot_be_ordered_speak_each_for_itself(at, day):
     row = of(day, {6: SOUND})
     assert at(of(day, {3: WORN}, readings_in=(FAR,), **FAILED), row).inspection is row
 
 
 @pytest.mark.parametrize(("worn_in", "stands"), [(WORN, True), (SOUND, False)])
-def test_a_reading_of_the_day_of_a_repair_counts_only_against_the_gear(
-    at: At, worn_in: float, stands: bool
-) -> None:
+def test_a_reading_of_the_day_of_a_repair_counts_only_against_the_gear(at, worn_in, stands):
     found = at(of(FEB, {3: worn_in}), repaired(FEB, 3), of(MAR, {6: SOUND}))
     assert (3 in found.inspection.clearance_in) is stands
 
 
 @pytest.mark.parametrize("landings", [(None, None), (100, 500)])
-def test_of_two_readings_of_one_day_the_worse_stands(
-    at: At, landings: tuple[float | None, float | None]
-) -> None:
+def test_of_two_readings_of_one_day_the_worse_stands(at, landings):
     worn = of(JAN, {3: WORN}, gear_landings=landings[0])
     sound = of(JAN, {3: SOUND}, gear_landings=landings[1])
     assert at(worn, sound, of(FEB, {6: SOUND})).inspection.clearance_in[3] == WORN
@@ -117,9 +109,7 @@ def test_an_older_reading_keeps_the_uncertainty_of_its_gauge(at: At) -> None:
         ([of(JAN, **FAILED), of(MAR, **RETRACTED, restored_joints=(3,), repair_date=FEB)], False),
     ],
 )
-def test_a_failure_stands_until_a_repair_and_a_good_retraction(
-    at: At, visits: Sequence[Inspection], stands: bool
-) -> None:
+def test_a_failure_stands_until_a_repair_and_a_good_retraction(at, visits, stands):
     found = at(*visits)
     assert (found.inspection.outcome is Outcome.FAILED) is stands
     assert (FactKind.FAILED in {fact.kind for fact in found.older}) is stands

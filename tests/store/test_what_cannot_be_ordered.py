@@ -66,9 +66,7 @@ KINDS: Mapping[str, list[dict[str, str]]] = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_plunger_beyond_its_margin_stands_where_no_repair_is_surely_later(
-    kind: str, tmp_path: Path
-) -> None:
+def test_a_plunger_beyond_its_margin_stands_where_no_repair_is_surely_later(kind, tmp_path):
     ran = mlg("check", table(tmp_path, *KINDS[kind]))
     assert ran.code == 1
     assert "OUT" in ran.out

@@ -139,9 +139,7 @@ NAMELESS = [
 
 
 @pytest.mark.parametrize("rows", [ROWS, NAMELESS], ids=["with ids", "with made ids"])
-def test_the_same_inspections_from_another_file_add_nothing(
-    tmp_path: Path, place: Path, rows: list[dict[str, str]]
-) -> None:
+def test_the_same_inspections_from_another_file_add_nothing(tmp_path, place, rows):
     files = [places.table(tmp_path, *rows, name=name) for name in ("one.csv", "other.csv")]
     of_both = mlg("check", *files, "--keep").err
     assert "3 inspections kept" in of_both
@@ -149,18 +147,14 @@ def test_the_same_inspections_from_another_file_add_nothing(
     assert ", 3 known already" in kept(tmp_path, "renamed.csv", *rows)
 
 
-def test_the_same_reading_written_in_another_unit_is_the_same_inspection(
-    tmp_path: Path, place: Path
-) -> None:
+def test_the_same_reading_written_in_another_unit_is_the_same_inspection(tmp_path, place):
     kept(tmp_path, "one.csv", ROWS[0])
     in_thou = {**ROWS[0], "clearance_3_thou": "1"}
     assert in_thou.pop("clearance_3_in") == "0.001"
     assert ", 1 known already" in kept(tmp_path, "other.csv", in_thou)
 
 
-def test_what_is_mostly_the_same_on_one_day_in_files_without_ids_is_one_inspection(
-    tmp_path: Path, place: Path
-) -> None:
+def test_what_is_mostly_the_same_on_one_day_in_files_without_ids_is_one_inspection(tmp_path, place):
     kept(tmp_path, "one.csv", NAMELESS[0])
     other = places.table(tmp_path, {**NAMELESS[0], "clearance_3_in": "0.002"}, name="other.csv")
     assert "the table says 0.002" in mlg("check", other, "--keep").err
@@ -175,9 +169,7 @@ def test_bodies_of_records_are_those_of_earlier_versions(tmp_path: Path) -> None
     assert [record.content for record in old] == [record.content for record in new]
 
 
-def test_two_entries_of_one_gear_within_a_second_are_both_kept(
-    place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_two_entries_of_one_gear_within_a_second_are_both_kept(place, monkeypatch):
     made = "N1-LH-20260201"
     monkeypatch.setattr(records, "made_record_id", lambda *_entry: made)
     for value in ("0.001in", "0.002in", "0.003in", "0.002in"):

@@ -78,9 +78,7 @@ def test_a_writer_killed_at_any_moment_loses_nothing_that_it_said_was_kept(tmp_p
 
 
 @pytest.mark.slow
-def test_a_server_keeps_what_eight_writers_bring_at_once_and_a_role_may_only_insert_and_read() -> (
-    None
-):
+def test_a_server_keeps_what_eight_writers_bring_at_once_and_a_role_may_only_insert_and_read():
     with places.server() as url:
         store = at_once(url, 8)
         assert store.verify() == (8 * 100, None)

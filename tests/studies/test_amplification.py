@@ -50,9 +50,7 @@ def test_the_stage_of_a_current_clearance_is_the_cosecant_of_the_angle_between_t
     assert growth.local_stage[2] == pytest.approx(float(expected), rel=1e-9)
 
 
-def test_the_stage_of_the_locking_pin_is_the_ratio_of_the_release_levers_arms(
-    gear: Gear, growth: Amplification
-) -> None:
+def test_the_stage_of_the_locking_pin_is_the_ratio_of_the_release_levers_arms(gear, growth):
     place = {p.name: np.array([p.x, p.y]) for p in gear.reference.mechanism.points}
     ratio = np.linalg.norm(place["3"] - place["Q"]) / np.linalg.norm(place["2"] - place["Q"])
     assert growth.local_stage[1] == pytest.approx(ratio, rel=1e-9)

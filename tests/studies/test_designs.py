@@ -41,9 +41,7 @@ def test_every_replicate_has_every_level_once() -> None:
 
 
 @pytest.mark.parametrize(("n2", "with_ccd"), [(50, False), (50, True), (0, True)])
-def test_the_samples_of_a_group_share_one_clearance_and_differ_in_the_others(
-    n2: int, with_ccd: bool
-) -> None:
+def test_the_samples_of_a_group_share_one_clearance_and_differ_in_the_others(n2, with_ccd):
     rows = first_order_design(
         10, 6, n2, central_composite(10) if with_ccd else None, np.random.default_rng(0)
     )
@@ -62,8 +60,6 @@ def test_every_replicate_holds_all_composite_points() -> None:
 
 
 @pytest.mark.parametrize(("count", "quantile"), [(2, 12.7062), (5, 2.7764), (10, 2.2622)])
-def test_a_mean_has_as_many_degrees_of_freedom_as_values_but_one(
-    count: int, quantile: float
-) -> None:
+def test_a_mean_has_as_many_degrees_of_freedom_as_values_but_one(count, quantile):
     # Table of Student's distribution, 97.5 %.
     assert student_half(np.ones(1), count) == pytest.approx(quantile / np.sqrt(count), rel=1e-4)

@@ -9,7 +9,6 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
 from mlg_troubleshoot.indices.variance import (
     HeldDirections,
-    TensorIndices,
     group_indices,
     tensor_indices,
 )
@@ -20,9 +19,7 @@ def test_the_groups_are_the_links_of_the_linkage(gear: Gear) -> None:
     assert gear.link_groups == ((1,), (2,), (3, 5), (4,), (6, 7), (8,), (9, 10))
 
 
-def test_a_group_of_both_ends_of_a_link_has_the_sum_of_their_shares(
-    gear: Gear, exact: TensorIndices
-) -> None:
+def test_a_group_of_both_ends_of_a_link_has_the_sum_of_their_shares(gear, exact):
     found = {group.joints: group for group in group_indices(gear, exact.closed)}
     assert found[3, 5].closed == pytest.approx(
         exact.first_order[2] + exact.first_order[4], abs=1e-4
@@ -37,9 +34,7 @@ def test_the_tensor_is_exact_for_ishigami_with_many_points(request: pytest.Fixtu
     assert found.total_order == pytest.approx(oracle.total_order, abs=1e-9)
 
 
-def test_three_gauss_points_are_enough_for_the_linkage(
-    gear: Gear, response: HeldDirections
-) -> None:
+def test_three_gauss_points_are_enough_for_the_linkage(gear, response):
     coarse = tensor_indices(response, gear.limits_in, order=2)
     fine = tensor_indices(response, gear.limits_in, order=3)
     assert fine.first_order == pytest.approx(coarse.first_order, abs=2e-5)
@@ -70,9 +65,7 @@ def statements(gear: Gear) -> dict[str, Statement]:
         ("large enough to be seen", ClaimOutcome.FAILS),
     ],
 )
-def test_a_statement_of_section_4_3_has_its_outcome_on_all_ten_linkages(
-    statements: dict[str, Statement], words: str, outcome: ClaimOutcome
-) -> None:
+def test_a_statement_of_section_4_3_has_its_outcome_on_all_ten_linkages(statements, words, outcome):
     found = [statement for claim, statement in statements.items() if words in claim]
     assert [statement.outcome for statement in found] == [outcome]
     assert len(found[0].linkages) == 10

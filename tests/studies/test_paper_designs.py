@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.indices.variance import Response, TensorIndices, tensor_indices
+from mlg_troubleshoot.indices.variance import Response, tensor_indices
 from mlg_troubleshoot.paper.study import (
     PAPER_DESIGNS,
     PaperDesign,
@@ -23,16 +23,12 @@ def test_the_sizes_are_the_papers() -> None:
 
 
 @pytest.mark.parametrize("name", list(PAPER_DESIGNS))
-def test_corrected_indices_are_the_exact_ones_within_their_scatter(
-    on_cube: Response, exact: TensorIndices, name: str
-) -> None:
+def test_corrected_indices_are_the_exact_ones_within_their_scatter(on_cube, exact, name):
     found = replicated_first_order(on_cube, 10, PAPER_DESIGNS[name], 0, iterations=4)
     assert found.corrected == pytest.approx(exact.first_order, abs=0.006)
 
 
-def test_plain_indices_exceed_the_exact_ones_by_their_bias(
-    on_cube: Response, exact: TensorIndices
-) -> None:
+def test_plain_indices_exceed_the_exact_ones_by_their_bias(on_cube, exact):
     design = PaperDesign("lhs", 20, 1000, 0)
     found = replicated_first_order(on_cube, 10, design, 0, iterations=10)
     expected = exact.first_order + (1.0 - exact.first_order) / 20
@@ -49,9 +45,7 @@ def test_ishigamis_first_order_is_met(ishigami: Oracle) -> None:
     assert found.corrected == pytest.approx(ishigami.first_order, abs=0.005)
 
 
-def test_the_change_from_lhs_to_ccd_is_below_the_scatter_of_the_papers_design(
-    on_cube: Response, exact: TensorIndices
-) -> None:
+def test_the_change_from_lhs_to_ccd_is_below_the_scatter_of_the_papers_design(on_cube, exact):
     corners = tensor_indices(
         on_cube, np.ones(10), nodes=(np.array([0.0, 1.0]), np.array([0.5, 0.5]))
     )

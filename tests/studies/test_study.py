@@ -13,9 +13,7 @@ from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.paper.study import StudyDesign, StudyOptions, run_study
 
 
-def test_a_gear_with_too_many_joints_for_three_gauss_points_takes_two(
-    gear: Gear, table: IndexTable, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_gear_with_too_many_joints_for_three_gauss_points_takes_two(gear, table, monkeypatch):
     monkeypatch.setattr("mlg_troubleshoot.indices.variance._MOST_POINTS", 3**9)
     found = run_study(replace(gear, ensemble=gear.ensemble[:1]), StudyOptions()).table
     assert found.design == "tensor of 2 Gauss points per joint"
@@ -33,9 +31,7 @@ def test_a_seed_gives_the_same_table_again(gear: Gear) -> None:
 
 
 @pytest.mark.parametrize("limits", [np.zeros(10), np.full(3, 0.01), np.full(10, np.nan)])
-def test_limits_that_are_not_one_positive_length_per_joint_are_refused(
-    gear: Gear, limits: np.ndarray
-) -> None:
+def test_limits_that_are_not_one_positive_length_per_joint_are_refused(gear, limits):
     with pytest.raises(UsageError, match="of 10 joints"):
         run_study(gear, StudyOptions(limits_in=limits))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.variance import HeldDirections, TensorIndices
+from mlg_troubleshoot.indices.variance import HeldDirections
 from mlg_troubleshoot.paper.study import TotalOrderStudy, compute_block, total_order
 
 
@@ -17,16 +17,12 @@ def study(gear: Gear, response: HeldDirections) -> TotalOrderStudy:
     return TotalOrderStudy(response, gear.limits_in, 5, 8, 120, 2)
 
 
-def test_the_papers_study_has_a_thousand_million_solutions(
-    gear: Gear, response: HeldDirections
-) -> None:
+def test_the_papers_study_has_a_thousand_million_solutions(gear, response):
     paper = TotalOrderStudy(response, gear.limits_in, 0)
     assert paper.evaluations == 10 * 100 * 1000 * (100 * 10 + 1)
 
 
-def test_total_order_indices_are_the_exact_ones(
-    gear: Gear, response: HeldDirections, exact: TensorIndices
-) -> None:
+def test_total_order_indices_are_the_exact_ones(gear, response, exact):
     study = TotalOrderStudy(response, gear.limits_in, 0, 20, 300, 3)
     found = total_order(study)
     assert found.total_order == pytest.approx(exact.total_order, abs=0.01)

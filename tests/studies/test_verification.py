@@ -29,9 +29,7 @@ def test_what_is_known_not_to_hold_does_not(rows: tuple[Computed, ...]) -> None:
     assert [row.target.quantity for row in rows if row.holds and not row.target.expected] == []
 
 
-def test_interaction_near_the_input_exceeds_the_largest_of_the_others_by_what_is_said(
-    gear: Gear, rows: tuple[Computed, ...]
-) -> None:
+def test_interaction_near_the_input_exceeds_the_largest_of_the_others_by_what_is_said(gear, rows):
     row = next(row for row in rows if row.target.measure == "interaction_order")
     table = load_index_table(gear)
     interaction = {j.joint: j.total_order - j.first_order for j in table.joints}

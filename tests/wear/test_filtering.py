@@ -57,9 +57,7 @@ def dense(increment_sd: float, wander_sd: float) -> float:
 @pytest.mark.parametrize(
     ("increment_sd", "wander_sd"), [(0.4, 0.0), (0.0, 0.7)], ids=["wiener", "integrated"]
 )
-def test_the_filter_gives_the_density_of_the_readings_as_one_normal_vector(
-    increment_sd: float, wander_sd: float
-) -> None:
+def test_the_filter_gives_the_density_of_the_readings_as_one_normal_vector(increment_sd, wander_sd):
     paths = [WearPath("a", FIRST, READ[:3]), WearPath("a", SECOND, READ[3:])]
     found, _state = follow(
         lay_out([paths], AS_IT_IS), parameters(increment_sd=increment_sd, wander_sd=wander_sd)
@@ -93,9 +91,7 @@ def test_units_that_were_read_at_the_same_usages_are_filtered_as_each_alone() ->
     ("values", "step"),
     [([0.9, 0.95, 1.3, 2.0], 0.05), ([0.1, 0.1, 0.2], 0.0), ([0.1234567, 0.98, 2.0 / 3.0], 0.0)],
 )
-def test_the_resolution_is_the_step_of_the_grid_that_readings_lie_on(
-    values: list[float], step: float
-) -> None:
+def test_the_resolution_is_the_step_of_the_grid_that_readings_lie_on(values, step):
     assert grid_step(np.array(values)) == pytest.approx(step)
 
 

@@ -61,9 +61,7 @@ def test_groups_of_units_have_the_very_numbers_that_each_group_has_alone(model: 
     assert np.array_equal(among, np.concatenate(alone))
 
 
-def test_a_unit_that_went_further_than_all_others_goes_on_from_its_own_last_reading(
-    model: WearModel,
-) -> None:
+def test_a_unit_that_went_further_than_all_others_goes_on_from_its_own_last_reading(model):
     last = 3.0 * model.scale.usage
     far = model.of([WearPath("far", np.linspace(0.2, last, 9), np.linspace(0.2, last, 9))])
     now, ahead = far.forecast("far", [last, 1.01 * last], reading=False).quantile(0.5)
@@ -77,9 +75,7 @@ def test_usages_in_any_order_give_each_its_own_forecast(model: WearModel) -> Non
     assert model.forecast("part 1", [2.4, 1.6]).quantile(0.5) == pytest.approx(ahead[::-1])
 
 
-def test_a_unit_read_often_is_known_better_than_one_read_once_and_that_better_than_a_new_one(
-    model: WearModel,
-) -> None:
+def test_a_unit_read_often_is_known_better_than_one_read_once_and_that_better_than_a_new_one(model):
     often, once, new = (
         width(model.forecast(unit, [1.0])) for unit in ("part 1", "read once", "nobody knows it")
     )
@@ -108,9 +104,7 @@ def test_a_limit_passed_already_is_passed_at_the_last_reading(model: WearModel) 
     assert model.usage_to_limit("part 1", 0.01).quantile(ENDS) == pytest.approx(last)
 
 
-def test_the_chance_of_having_crossed_is_that_of_being_above_where_wear_hardly_goes_back(
-    model: WearModel,
-) -> None:
+def test_the_chance_of_having_crossed_is_that_of_being_above_where_wear_hardly_goes_back(model):
     crossed = np.mean(model.usage_to_limit("part 2", 2.2).samples <= 2.0)
     above = np.mean(model.forecast("part 2", [2.0], reading=False).samples[0] > 2.2)
     assert crossed == pytest.approx(above, abs=0.1)
@@ -131,9 +125,7 @@ def test_the_same_seed_gives_the_same_forecast() -> None:
     assert np.array_equal(one.samples, two.samples)
 
 
-def test_another_seed_tells_the_kinds_alike_where_all_parts_begin_at_exactly_the_same_number() -> (
-    None
-):
+def test_another_seed_tells_the_kinds_alike_where_all_parts_begin_at_exactly_the_same_number():
     rng = np.random.default_rng(3)
     usage = np.linspace(0.0, 1.0, 8)
     worn = 0.9 + np.cumsum(
@@ -193,9 +185,7 @@ def test_one_reading_of_one_unit_is_enough_for_a_wide_forecast() -> None:
         ([0.0, 1.0], [0.0], "one value a usage|2 usages"),
     ],
 )
-def test_a_path_that_is_not_valid_is_refused(
-    usage: list[float], value: list[float], said: str
-) -> None:
+def test_a_path_that_is_not_valid_is_refused(usage, value, said):
     with pytest.raises(UsageError, match=said):
         WearPath("a", usage, value)
     with pytest.raises(UsageError, match="no path has a reading"):
