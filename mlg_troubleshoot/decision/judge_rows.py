@@ -648,6 +648,8 @@ def _warnings(
                 Length(DEFAULT_PLUNGER_U_IN),
             )
         )
+    if plunger_reading.readings_differ(inspection):
+        warnings.append("The plunger readings differ: the farthest counts. Read the plunger again.")
     if inspection.is_repaired:
         over = [f.joint for f in findings if f.over_limit]
         warnings += sentences.older_than_the_repair(inspection, over)

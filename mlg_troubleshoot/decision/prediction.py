@@ -482,17 +482,28 @@ def plunger_of(inspection: Inspection, margin_in: float) -> tuple[float, float]:
     """The plunger displacement that counts, and its standard uncertainty; NaN without one. [in]
 
     The mean of the readings; the farthest one where any is beyond the margin, since an uncertainty
-    never excuses it. One that may be older than a repair counts only beyond the margin.
+    never excuses it, or where they differ, since they settle nothing then. One that may be older
+    than a repair counts only beyond the margin.
     """
     readings = inspection.standing_readings_in
     mean = inspection.measured_displacement_in
     u = plunger_u(inspection)
     farthest = max(readings, key=abs, default=math.nan)
-    if abs(farthest) > margin_in + ROUNDING_IN:
+    in_doubt = inspection.is_plunger_in_doubt
+    is_beyond = abs(farthest) > margin_in + ROUNDING_IN
+    if is_beyond or (readings_differ(inspection) and not in_doubt):
         return farthest, u * math.sqrt(len(readings))
-    if mean is None or inspection.is_plunger_in_doubt:
+    if mean is None or in_doubt:
         return math.nan, u
     return mean, u
+
+
+def readings_differ(inspection: Inspection) -> bool:
+    """Whether plunger readings differ by more than two standard uncertainties of a difference."""
+    readings = inspection.standing_readings_in or (0.0,)
+    return max(readings) - min(readings) > 2.0 * plunger_u(inspection) * math.sqrt(
+        2 * len(readings)
+    )
 
 
 def plunger_u(inspection: Inspection) -> float:

@@ -185,11 +185,20 @@ def test_what_the_reader_noticed_stays_with_the_judgement(judge: Judge) -> None:
         ((0.0299,), 0.05),
         ((0.03,), 0.002),
         ((0.0305, 0.029), None),
+        ((0.029, -0.029), None),
+        ((0.0, 0.0, 0.028), None),
     ],
 )
 def test_an_uncertainty_never_clears_what_a_reading_does_not(judge, readings, u_in):
     found = judge(every_joint(0.0003), readings_in=readings, plunger_gauge_u_in=u_in)
     assert found.verdict is not Verdict.WITHIN_MARGIN
+
+
+@pytest.mark.parametrize(("second_in", "differ"), [(-0.02, True), (0.014, True), (0.015, False)])
+def test_plunger_readings_that_differ_are_said_and_the_farthest_counts(judge, second_in, differ):
+    found = judge(every_joint(0.0003), readings_in=(0.02, second_in))
+    assert bool(said(found.warnings, "the farthest counts")) is differ
+    assert ("0.0200" in str(found.headline)) is differ
 
 
 def test_a_displacement_is_not_called_beyond_the_clearances_where_none_was_entered(judge):
