@@ -505,4 +505,4 @@ def _text(groups: Sequence[GroupChance], none: float, rigging: float, *, looked:
         f"{' or '.join(f'#{n}' for n in group.joints)} ({percent(group.probability)})"
         for group in likely
     )
-    return f"Most likely worn: {ranked}. {also}"
+    return f"Chance of a worn joint: {ranked}. {also}"

@@ -14,7 +14,13 @@ from functools import cached_property, lru_cache
 from operator import itemgetter
 
 from mlg_troubleshoot.decision.assessment import Action, Assessment, Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, RiggingCheck, Side, plain_tail
+from mlg_troubleshoot.decision.inspection import (
+    Fleet,
+    Inspection,
+    RiggingCheck,
+    Side,
+    plain_tail,
+)
 from mlg_troubleshoot.decision.judge_rows import Listed, assess
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import UsageError
@@ -400,9 +406,16 @@ def _disagreements(key: GearKey, moments: Sequence[Moment]) -> tuple[str, ...]:
 
 
 def judge_lives(
-    lives: Iterable[GearLife], gear: Gear, table: IndexTable, *, every: bool = False
+    lives: Iterable[GearLife],
+    gear: Gear,
+    table: IndexTable,
+    *,
+    fleet: Fleet | None = None,
+    every: bool = False,
 ) -> list[GearLife]:
-    """Judge what stands of each gear today and, with `every`, what stood at each inspection."""
+    """Judge what stands of each gear today by what its `fleet` teaches and, with `every`, what
+    stood at each inspection.
+    """
     asked = list(lives)
     numbers = set(gear.joint_numbers)
     found: dict[tuple[int, str], GearState] = {}
@@ -418,7 +431,7 @@ def judge_lives(
             for state in states(known, gear)
             if (digest := state.visit.kept.digest) in inspected
         }
-    said = dict(zip(found, _judged([*found.values()], gear, table), strict=True))
+    said = dict(zip(found, _judged([*found.values()], gear, table, fleet), strict=True))
     return [
         replace(
             life,
@@ -434,7 +447,10 @@ def judge_lives(
 _NOW = ""
 
 
-def _judged(states: Sequence[GearState], gear: Gear, table: IndexTable) -> list[TodaysVerdict]:
+def _judged(
+    states: Sequence[GearState], gear: Gear, table: IndexTable, fleet: Fleet | None
+) -> list[TodaysVerdict]:
+    each = assess([state.inspection for state in states], gear, table, fleet=fleet)
     return [
         TodaysVerdict(
             found.verdict,
@@ -446,8 +462,6 @@ def _judged(states: Sequence[GearState], gear: Gear, table: IndexTable) -> list[
             tuple(n for s in found.plan.steps if s.action is Action.RESTORE for n in s.joints),
             Listed.of(replace(found, older=state.older)).is_fine,
         )
-        for state, found in zip(
-            states, assess([state.inspection for state in states], gear, table), strict=True
-        )
+        for state, found in zip(states, each, strict=True)
         if isinstance(found, Assessment)
     ]

@@ -191,7 +191,9 @@ def state_now(visits: Sequence[GearVisit], gear: Gear) -> GearState | None:
 
 
 def _is_repair_alone(row: Inspection) -> bool:
-    return row.is_repaired and not (row.clearance_in or row.readings_in or row.outcome)
+    # A rigging that was set right was found wrong.
+    found = row.rigging_checked is RiggingCheck.CORRECTED or row.readings_in or row.outcome
+    return row.is_repaired and not (row.clearance_in or found)
 
 
 def _alone(visit: GearVisit, gear: Gear) -> GearState:

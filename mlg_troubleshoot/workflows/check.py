@@ -527,12 +527,13 @@ def attention_of_kept(seen: Counter[GearKey], store: Store, gear: Gear) -> list[
     than the visits that were just seen.
     """
     from mlg_troubleshoot.life.folding import judge_lives
+    from mlg_troubleshoot.life.forecast import expected_of
 
     kept = _kept_lives(seen, store).items()
     more = [life for key, life in kept if len(life.visits) > seen[key]]
     return [
         f"{life.name}: with all that is kept of it: {life.now.next_action}"
-        for life in judge_lives(more, gear, load_index_table(gear))
+        for life in judge_lives(more, gear, load_index_table(gear), fleet=expected_of(store, gear))
         if not life.now.is_fine
     ]
 

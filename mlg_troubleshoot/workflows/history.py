@@ -121,13 +121,14 @@ def show_fleet(
     and the readings of one joint.
     """
     from mlg_troubleshoot.life.folding import judge_lives
-    from mlg_troubleshoot.life.forecast import forecast
+    from mlg_troubleshoot.life.forecast import expected_of, forecast
 
     progress("Reading the store", 0, None)
     asked = Asked(gear, since, joint)
     keys = store.gears()
     table = load_index_table(gear)
     model = _taught(store, gear, keys, progress) if ahead else None
+    fleet = expected_of(store, gear)
     keys = keys if only is None else [*only]
     doing = "Looking ahead" if ahead else "Reading the store"
     found: list[GearLife] = []
@@ -136,7 +137,7 @@ def show_fleet(
     for first in range(0, len(keys), _AT_ONCE):
         progress(doing, first, len(keys))
         part = lives_of(store, keys[first : first + _AT_ONCE]).values()
-        judged = judge_lives(part, gear, table, every=whole or bool(since))
+        judged = judge_lives(part, gear, table, fleet=fleet, every=whole or bool(since))
         forecasts = forecast(judged, model, gear)
         lines += [FleetLine.of(life, asked, forecasts[life.key]) for life in judged]
         found += judged if whole else ()

@@ -7,7 +7,17 @@ from typing import Any
 
 import pytest
 
+from mlg_troubleshoot.decision.assessment import Action, Assessment
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.folding import TodaysVerdict, judge_lives, lives
+from mlg_troubleshoot.store import Store
+from mlg_troubleshoot.workflows.check import CheckOptions, check_files, load_index_table
+from mlg_troubleshoot.workflows.history import show_fleet
+from mlg_troubleshoot.workflows.keep import keep as keep_told
+from mlg_troubleshoot.workflows.keep import told_by
 from tests.cli.conftest import Run, mlg, row
+from tests.decision.test_headlines import drawn_states
 
 from .places import table
 
@@ -89,3 +99,53 @@ def test_nothing_is_written_beside_the_store(place: Path, monkeypatch: pytest.Mo
 def test_of_two_inspections_of_one_day_the_worse_is_the_line_of_the_fleet(place: Path) -> None:
     keep(place, visit("R1", "2026-01-05", **FAR), visit("R2", "2026-01-05"))
     assert line()["verdict"] == "OUTSIDE_MARGIN"
+
+
+def entered(state: Inspection, name: str) -> dict[str, str]:
+    """A row that says what is known of a gear in some state."""
+    more = {
+        "outcome": state.outcome or "",
+        "rigging_checked": state.rigging_checked or "",
+        **{f"clearance_{n}_in": "" for n in range(1, 11)},
+        **{f"clearance_{n}_in": repr(read) for n, read in state.clearance_in.items()},
+    }
+    for column, reading in zip(
+        ("plunger_displacement_in", "plunger_displacement_2_in"), state.readings_in, strict=False
+    ):
+        more[column] = repr(reading)
+    for column in ("restored_joints", "cannot_reach", "no_spare"):
+        more[column] = " ".join(map(str, getattr(state, column)))
+    for column in ("repair_date", "plunger_date", "outcome_date"):
+        when = getattr(state, column)
+        more[column] = when.isoformat(" ", "minutes") if when else ""
+    return row(record_id=name, tail_no=name, inspection_date="2026-03-03", **more)
+
+
+def told(found: TodaysVerdict | Assessment) -> tuple[Any, ...]:
+    """NEXT, what the plan restores, and its minutes."""
+    if isinstance(found, TodaysVerdict):
+        return found.next_action, found.restore, round(found.minutes, 6)
+    steps = found.plan.steps
+    parts = tuple(n for s in steps if s.action is Action.RESTORE for n in s.joints)
+    return found.in_brief, parts, round(sum(step.minutes for step in steps), 6)
+
+
+@pytest.mark.parametrize("n", [60, pytest.param(500, marks=pytest.mark.slow)])
+def test_a_gear_that_is_opened_again_gets_the_same_next(gear: Gear, place: Path, n: int) -> None:
+    states = [s for s in drawn_states(n + n // 10, 71) if not s.says_nothing][:n]
+    assert len(states) == n
+    file = table(place, *(entered(state, f"N{k}") for k, state in enumerate(states)))
+    store = Store(place / "store.sqlite")
+
+    def checked(known: Store | None) -> dict[str, tuple[Any, ...]]:
+        found = check_files([file], CheckOptions(advice=False), store=known).judgements
+        return {a.inspection.tail_no: told(a) for a in found if isinstance(a, Assessment)}
+
+    alone = checked(None)
+    assert len(alone) == n
+    keep_told(told_by(check_files([file], CheckOptions(advice=False)).judgements), store)
+    kept = judge_lives(lives(store).values(), gear, load_index_table(gear))
+    assert {life.key[0]: told(life.now) for life in kept} == alone
+    # The fleet that is kept teaches a check, a list of the fleet and a life the same.
+    shown = show_fleet(store, gear, ahead=False)
+    assert {line.key[0]: told(line.now) for line in shown.lines} == checked(store)
