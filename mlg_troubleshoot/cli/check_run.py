@@ -73,6 +73,8 @@ class Run:
         self._wanted = wanted
         self._page = options.paper_size()
         self._asks = not (files or flags.values)
+        # A script asked for the result of one entry.
+        self.stops_after_one = wanted.report is not None or wanted.as_json
         output.claim(
             tables.gear,
             [*files, *extensions, *causes, *tables.map_files],
@@ -215,11 +217,6 @@ class Run:
         from mlg_troubleshoot.cli.prompts.sitting import Sitting
 
         return Sitting(self, self._place).hold(self._flags.tail)
-
-    @property
-    def stops_after_one(self) -> bool:
-        """Whether a script asked for the result of one entry."""
-        return self._wanted.report is not None or self._wanted.as_json
 
     def publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
         """Show and write one gear that was entered by hand."""

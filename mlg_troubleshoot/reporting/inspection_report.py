@@ -77,7 +77,8 @@ def inspection_document(
         }
         return Document("rejected.html.j2", context, stem)
     inspection = judgement.inspection
-    stem = safe_stem(inspection.tail_no, inspection.side.value, inspection.record_id)
+    gear_key = inspection.tail_no, inspection.side.value
+    stem = safe_stem(*gear_key, inspection.record_id.removeprefix("-".join(gear_key)))
     context = _inspection(judgement, gear, provenance, lengths) | {"found_left": found_left}
     return Document("inspection.html.j2", context, stem)
 

@@ -60,6 +60,7 @@ BAD_CELLS = {
     ),
     "thou as inches": ({"clearance_3_in": "13"}, "clearance_3_in", "thou (factor 1000)"),
     "decimal comma": ({"clearance_3_in": "0,013"}, "clearance_3_in", "--decimal-comma"),
+    "fraction": ({"clearance_3_in": "1/64"}, "clearance_3_in", "1/64 in = 15.6 thou"),
     "no side": ({"side": ""}, "side", "LH or RH"),
     "another side": ({"side": "LEFTISH"}, "side", "LH or RH"),
     "another convention": ({"clearance_convention": "RADIUS"}, "clearance_convention", "RADIAL"),

@@ -50,12 +50,14 @@ def judged(gear: str) -> task.CheckResult:
     return task.check_inspection(SAID[gear], task.CheckOptions(), None)
 
 
+@pytest.mark.parametrize("wide", [80, 200])
 @pytest.mark.parametrize("gear", SAID)
-def test_one_gear_takes_twenty_lines_with_verdict_and_next_last(gear, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
+def test_one_gear_takes_twenty_lines_with_verdict_and_next_last(gear, wide, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(wide))
     one_gear.show(judged(gear).judgements[0], judged(gear).gear, console(), detail=False)
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) <= 20
+    assert max(map(len, lines)) <= min(wide, 100)
     (title,) = (place for place, line in enumerate(lines) if line.startswith("N1 LH  ["))
     assert any(line.startswith("NEXT") for line in lines[title:])
 

@@ -52,6 +52,7 @@ def test_joints_are_asked_for_in_the_order_of_next_and_show_their_limit_as_read(
     joints = [prompt for prompt in terminal.prompts if prompt.startswith("#")]
     assert joints[0].startswith("#3 short link inner bearing, limit 15.0 thou")
     assert joints[1].startswith("#5")
+    assert "✓ #3 8.0 thou total play = 4.0 thou radial" in terminal.screen
     assert "Over the limit of 15.0 thou (assumed): look up the manual's." in terminal.screen
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import webbrowser
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import date, datetime, timedelta, tzinfo
@@ -47,6 +48,11 @@ def test_a_gear_that_is_opened_and_left_with_an_interrupt_was_not_lost(sit, begu
     screen = sit("N1 LH", end=KeyboardInterrupt).screen + capsys.readouterr().out
     assert "Nothing" not in screen
     assert not re.search(r"\d:\d\d:\d\d", screen)
+
+
+def test_help_at_a_result_says_how_next_is_done(sit, begun):
+    begun(*failed("8", "done"))
+    assert "Release the hydraulic pressure" in sit("N1 LH", "?", "").screen
 
 
 def test_what_cannot_be_reached_changes_next_at_once(sit, capsys):
@@ -208,10 +214,13 @@ def test_a_report_is_written_where_it_says_and_one_that_cannot_be_ends_nothing(
     sit: Sit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BROWSER", "true")
-    sit(*failed("8", "done"), "report", "")
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    sit(*failed("8", "done"), "report", "open", "")
     assert "Report: report" in capsys.readouterr().err
-    assert [*(tmp_path / "report").glob("*.html")]
+    (report,) = (tmp_path / "report").glob("*.html")
+    assert opened == [report.as_uri()]
+    assert report.name.count("N1-LH") == 1
     for file in (tmp_path / "report").iterdir():
         file.unlink()
     (tmp_path / "report").rmdir()

@@ -127,8 +127,7 @@ class Asker:
         if tail := given.get(TAIL_NO.name):
             self.entry.cells[TAIL_NO.name] = self.entry.accepted(self.gear, TAIL_NO.name, tail)
         with self._interrupted():
-            if not {*HEADING[:2]} <= given.keys():
-                self._say(f"{self.gear.name}. Every answer is saved. ? help, u undo, q stop.")
+            self._say(f"{self.gear.name}. Every answer is saved. ? help, u undo, q stop.")
             while not {*HEADING[:2]} <= self.entry.cells.keys():
                 self._turn(self._open())
             return self._opened()
@@ -457,7 +456,7 @@ class Asker:
         if name == REPAIR_DATE:
             return self.entry.day.isoformat()
         if name == RESTORED_JOINTS.name and self._known:
-            return " ".join(map(str, self._known.joints))
+            return " ".join(map(str, self._known.step.joints))
         return self.saved.offered().get(name, "") if name in LAST else ""
 
     def _unusual(self) -> str:

@@ -75,14 +75,10 @@ class Visit:
         return self.result.judgements[0].next_action
 
     @property
-    def joints(self) -> tuple[int, ...]:
-        return self.step.joints
-
-    @property
     def todo(self) -> tuple[str, ...]:
         """The columns that NEXT asks for."""
         if self.step.action in _TO_READ:
-            return tuple(map(CLEARANCE.header, self.joints))
+            return tuple(map(CLEARANCE.header, self.step.joints))
         asked = _ASKS.get(self.step.action)
         return () if asked is None else (asked,)
 
@@ -121,7 +117,7 @@ def continued(known: Visit, row: Inspection, entry: Entry) -> Inspection:
     if row.inspection_date == known.row.inspection_date and LANDINGS.name not in entry.typed:
         stands.append(LANDINGS.filled)
     is_again = known.step.action is Action.MEASURE_AGAIN
-    again = row.clearance_in.keys() & known.joints if is_again else ()
+    again = row.clearance_in.keys() & known.step.joints if is_again else ()
     more = {name: getattr(known.row, name) for name in stands}
     # What the reader of a row alone misses in it stands in other visits.
     return replace(row, measured_again=tuple(sorted(again)), warnings=(), **more)
