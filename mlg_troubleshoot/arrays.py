@@ -4,15 +4,18 @@ numbers.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Places = NDArray[np.intp]
 Wholes = NDArray[np.int64]
+Probability = Annotated[float, Meta(ge=0, le=1)]
+Size = Annotated[float, Meta(ge=0)]
 # Step of a derivative by central differences: short against every length of a linkage, long against
 # the rounding of its solution (1e-14 in). [in, rad]
 STEP = 1e-5

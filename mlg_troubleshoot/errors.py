@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import PurePath
+from typing import Literal
 
 # Cells, rows or values that are named one by one; of more, how many.
 _FEW = 6
@@ -36,6 +37,9 @@ class TroubleshootError(Exception):
     remedy : str, optional
         What the user can do about it.
     """
+
+    message: str
+    remedy: str
 
     def __init__(self, message: str, remedy: str = "") -> None:
         super().__init__(message)
@@ -67,6 +71,9 @@ class InconclusiveDataError(TroubleshootError):
     notes, problems: what was seen of the table all the same.
     """
 
+    json_names = "schema_version verdict reason=message remedy warnings=notes"
+    schema_version: Literal[2] = 2
+    verdict: None = None
     notes: tuple[str, ...] = ()
     problems: tuple[Problem, ...] = ()
 

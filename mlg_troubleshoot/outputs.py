@@ -12,12 +12,8 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
 
 from mlg_troubleshoot.errors import OutputError, UsageError
-
-# Of every JSON output: raised when a name or a meaning changes.
-SCHEMA_VERSION: Literal[2] = 2
 
 Field = str | float | int | bool | None
 # What begins a field of a CSV, whichever separator a program assumes: the start of the text, a

@@ -8,12 +8,15 @@ import textwrap
 from collections.abc import Collection, Mapping
 from dataclasses import fields, is_dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from mlg_troubleshoot.notebook import Picture
+
+# Of every JSON output: raised when a name or a meaning changes.
+SCHEMA_VERSION: Literal[2] = 2
 
 # A representation has at most so many lines of so many characters, and a value in it so many.
 _LINES = 18
@@ -35,7 +38,9 @@ class Result:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the documented JSON."""
-        values: dict[str, Any] = notebook().to_dict(self)
+        from mlg_troubleshoot.json_form import plain
+
+        values: dict[str, Any] = plain(self)
         return values
 
     def plot(self, **options: Any) -> Picture:
@@ -57,6 +62,13 @@ class Result:
         parts = (f"{name}={_short(value)}" for name, value in _parts(self).items())
         lines = textwrap.wrap(f"{type(self).__name__}({', '.join(parts)})", _WIDTH)
         return "\n".join(lines if len(lines) <= _LINES else [*lines[:_LINES], "…"])
+
+
+class JsonOutput(Result):
+    """A result that a command writes as JSON, with the version of its schema."""
+
+    __slots__ = ()
+    schema_version: Literal[2] = SCHEMA_VERSION
 
 
 def notebook() -> Any:

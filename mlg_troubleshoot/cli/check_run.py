@@ -12,6 +12,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import partial
+from itertools import chain, repeat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.cli.check import Flags, Wanted
     from mlg_troubleshoot.decision.assessment import Judgement
     from mlg_troubleshoot.records import ReadResult
-    from mlg_troubleshoot.reporting.json_form import CheckText
     from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows.keep import Told
 
@@ -51,7 +51,7 @@ class _Gathered:
     held: list[Judgement] = field(default_factory=list)
     entries: list[Told] = field(default_factory=list)
     annotated: dict[RowSource, task.Annotated] = field(default_factory=dict)
-    text: CheckText | None = None
+    end: str = ""
 
 
 class Run:
@@ -149,10 +149,10 @@ class Run:
                     outputs=partial(self._outputs, found, files),
                 )
             result = replace(result, judgements=tuple(found.held))
-            if found.text is not None:
-                output.write_pieces((found.text.end,))
+            if found.end:
+                output.write_pieces((found.end,))
             elif wanted.as_json:
-                self._write_json(result)
+                output.write_json(result)
             else:
                 self.show(result, unit, found.lines, detail=wanted.detail)
         if wanted.annotate is not None and result.read is not None:
@@ -180,13 +180,13 @@ class Run:
             )
         outputs = [task.BlockOutput(listed, found.lines.extend)]
         if wanted.as_json and total > 1:
-            from mlg_troubleshoot.reporting.json_form import CheckText, inspection_lines
-
-            text = found.text = CheckText(read.gear, read.problems, read.notes)
-            output.write_pieces((text.begin,))
-            lines = partial(inspection_lines, read.gear)
+            begin, found.end = task.json_around(read)
+            output.write_pieces((begin,))
+            joint = chain(("",), repeat(",\n"))
             outputs.append(
-                task.BlockOutput(lines, lambda block: output.write_pieces((text.joined(block),)))
+                task.BlockOutput(
+                    task.json_lines, lambda block: output.write_pieces((next(joint), block))
+                )
             )
         if wanted.csv is not None:
             write = files.enter_context(whole_file(wanted.csv))
@@ -223,19 +223,13 @@ class Run:
         wanted = self._wanted
         unit = wanted.unit(entered_in)
         if wanted.as_json:
-            self._write_json(result)
+            output.write_json(result)
         else:
             self.show(result, unit, detail=wanted.detail)
         if wanted.csv is not None:
             task.write_verdicts(result, wanted.csv)
         if wanted.report is not None:
             self.write_reports(result, wanted.report, unit)
-
-    def _write_json(self, result: task.CheckResult) -> None:
-        from mlg_troubleshoot.reporting.json_form import check_as_json
-
-        said = result.problems, result.notes
-        output.write_json(check_as_json(result.gear, result.judgements, *said))
 
     def show(
         self,

@@ -57,8 +57,6 @@ def diagnose(
     from mlg_troubleshoot.cli.output import stages
     from mlg_troubleshoot.cli.views.batch import show_notes, show_problems
     from mlg_troubleshoot.diagnosis import write_extension as keep_extension
-    from mlg_troubleshoot.json_outputs import NotConcluded
-    from mlg_troubleshoot.reporting.json_form import diagnosis_as_json, written
     from mlg_troubleshoot.workflows import diagnose as task
 
     if bool(approve.strip()) != bool(why.strip()) or (approve and write_extension is None):
@@ -86,14 +84,13 @@ def diagnose(
             )
     except InconclusiveDataError as error:
         if shown.as_json:
-            said = {"remedy": error.remedy, "warnings": list(error.notes)}
-            output.write_json(written(NotConcluded, verdict=None, reason=error.message, **said))
+            output.write_json(error)
         elif not shown.quiet:
             show_notes(error.notes)
         show_problems(error.problems)
         raise
     if shown.as_json:
-        output.write_json(diagnosis_as_json(result.diagnosis, result.extension, result.notes))
+        output.write_json(result)
     else:
         show_notes(result.unread if shown.quiet else result.notes)
         show_problems(result.problems)

@@ -62,7 +62,6 @@ def fleet(
     """
     from mlg_troubleshoot.cli.output import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.reporting.life_json import fleet_as_json
     from mlg_troubleshoot.workflows.history import show_fleet
 
     known = load_gear(records.gear)
@@ -81,12 +80,14 @@ def fleet(
             joint=joint,
             progress=bar,
         )
-        found = everything.chosen(changed=since is not None and not failed, failed=failed)
+        found = everything.chosen(
+            changed=since is not None and not failed, failed=failed, within=within
+        )
     for line in found.lines:
         if line.suggestion and not shown.quiet:
             output.say(f"Note: {line.suggestion}")
     if shown.as_json:
-        output.write_json(fleet_as_json(found.lines, within))
+        output.write_json(found)
     elif found.lines:
         history.show_gears(found, shown.unit(), ahead=not no_forecast, within=within, joint=joint)
     elif everything.lines:

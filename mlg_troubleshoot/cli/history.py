@@ -16,9 +16,7 @@ from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.units import LengthUnit, said_in
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.gear.gear import Gear
-    from mlg_troubleshoot.life.folding import GearLife
-    from mlg_troubleshoot.life.forecast import FleetLine, Forecast
+    from mlg_troubleshoot.life.forecast import FleetLine, LifeAhead
     from mlg_troubleshoot.store import Record, Store
     from mlg_troubleshoot.workflows.history import Lives
 
@@ -66,7 +64,7 @@ def show(
     """Show all gears with their latest state, or the life of one gear with its forecast."""
     from mlg_troubleshoot.cli.output import stages
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.reporting import life_json
+    from mlg_troubleshoot.life.forecast import LifeAhead
     from mlg_troubleshoot.workflows import history
 
     place = records.kept
@@ -81,7 +79,7 @@ def show(
         with stages(quiet=shown.quiet) as bar:
             everything = history.show_fleet(place, known, ahead=False, whole=False, progress=bar)
         if shown.as_json:
-            output.write_json(life_json.fleet_as_json(everything.lines))
+            output.write_json(everything)
         elif everything.lines:
             show_gears(everything, shown.unit(), ahead=False)
         else:
@@ -100,9 +98,9 @@ def show(
     unit = shown.unit(units[-1] if units else LengthUnit.INCH)
     for life, line in zip(found.lives, found.lines, strict=True):
         if shown.as_json:
-            output.write_json(life_json.life_as_json(life, line.ahead, known))
+            output.write_json(LifeAhead(life, line.ahead, known))
         else:
-            _show_life(life, line.ahead, known, unit)
+            _show_life(LifeAhead(life, line.ahead, known), unit)
     write_pages(found, place, shown, unit, fleet=False)
 
 
@@ -204,17 +202,17 @@ def _show_warnings(console: output.DataConsole, warnings: Iterable[str]) -> None
         console.print(output.text(f"Warning: {warning}"))
 
 
-def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
+def _show_life(found: LifeAhead, unit: LengthUnit) -> None:
     from mlg_troubleshoot.life.forecast import outlook_sentence
-    from mlg_troubleshoot.life.logbook import log_of, shortened
+    from mlg_troubleshoot.life.logbook import shortened
     from mlg_troubleshoot.life.urgency import repair_sentence
-    from mlg_troubleshoot.reporting.life_json import life_as_json
 
+    life = found.life
     console = output.console(unit=unit)
     console.print(output.text(life.name, "bold"))
     events = []
     before: tuple[str, ...] = ()
-    lines = log_of(life, gear)
+    lines = found.events
     for line in shortened(lines):
         # What was found together bears its day once.
         visit = line.date or "no date", _count(line.gear_landings), line.hash[:10]
@@ -226,20 +224,14 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     _show_warnings(console, life.warnings)
     for note in life.notes:
         console.print(note)
-    if outlook := outlook_sentence(life, ahead, gear):
+    if outlook := outlook_sentence(life, found.ahead, found.gear):
         console.print(outlook)
     if helped := repair_sentence(lines):
         console.print(helped)
-    _show_joints(console, life, life_as_json(life, ahead, gear)["joints"], ahead, gear)
+    _show_joints(console, found)
 
 
-def _show_joints(
-    console: output.DataConsole,
-    life: GearLife,
-    joints: Sequence[dict[str, Any]],
-    ahead: Forecast,
-    gear: Gear,
-) -> None:
+def _show_joints(console: output.DataConsole, found: LifeAhead) -> None:
     from mlg_troubleshoot.decision.sentences import joint_list
     from mlg_troubleshoot.life.forecast import span, stretches
 
@@ -250,23 +242,23 @@ def _show_joints(
         f"readings (landings: {console.unit})",
     )
     rows = []
-    for joint in joints:
-        if not joint["readings"] and joint["joint"] not in ahead.joints:
+    for joint in found.joints:
+        if not joint.readings and joint.landings_to_limit is None:
             continue
-        newest = joint["readings"][-3:]
+        newest = joint.readings[-3:]
         read = ", ".join(f"{at:g}: {console.length(clearance)}" for at, clearance in newest)
         rows.append(
             (
-                f"#{joint['joint']}",
-                console.length(joint["limit_in"]),
-                span(joint["landings_to_limit"], gear),
-                ("… " if len(joint["readings"]) > len(newest) else "") + (read or "none"),
+                f"#{joint.joint}",
+                console.length(joint.limit_in),
+                span(joint.landings_to_limit, found.gear),
+                ("… " if len(joint.readings) > len(newest) else "") + (read or "none"),
             )
         )
     if rows:
         output.print_table(console, headings, rows, ())
-    ever = {n for kept in life.inspections for n in kept.inspection.clearance_in}
-    since = stretches(life, gear.joint_numbers)
+    ever = {n for kept in found.life.inspections for n in kept.inspection.clearance_in}
+    since = stretches(found.life, found.gear.joint_numbers)
     unread = [n for n, of in since.items() if not of[-1].readings]
     for said, which in (
         ("Never read", [n for n in unread if n not in ever]),

@@ -286,9 +286,11 @@ def write(result: str) -> None:
     write_pieces((result, "\n"))
 
 
-def write_json(result: dict[str, Any]) -> None:
+def write_json(result: Any) -> None:
     """Write a result as JSON to stdout, in ASCII: no stream changes a character."""
-    write(json.dumps(result, allow_nan=False, indent=1))
+    from mlg_troubleshoot.json_form import plain
+
+    write(json.dumps(plain(result), allow_nan=False, indent=1))
 
 
 def write_pieces(pieces: Iterable[str]) -> None:

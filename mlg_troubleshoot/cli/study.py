@@ -76,9 +76,7 @@ def study(flags: StudyFlags) -> None:
             task.refuse_other_tables(asked)
         findings = task.run_study(gear, replace(asked, executor=executor), progress)
     if flags.as_json:
-        from mlg_troubleshoot.reporting.model_json import study_as_json
-
-        output.write_json(study_as_json(findings))
+        output.write_json(findings)
     else:
         rows = [*zip(gear.joints, findings.table.joints, strict=True)]
         screen = output.console()

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array, Mask, Probability, Size
 from mlg_troubleshoot.decision.inspection import Fact, FactKind, Inspection, InvalidRow
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.results import Result
@@ -92,7 +92,7 @@ class Step:
 
     action: Action
     joints: tuple[int, ...]
-    minutes: float
+    minutes: Size
     gauge_u_needed_in: float | None
     text: str
     required: bool = True
@@ -109,10 +109,11 @@ class Step:
 class Consequence:
     """What follows one outcome of the next action: IF `outcome` THEN `text`. minutes: [min]"""
 
+    json_names = "if=outcome action joints minutes text"
     outcome: str
     action: Action
     joints: tuple[int, ...]
-    minutes: float
+    minutes: Size
     text: str
 
 
@@ -222,7 +223,7 @@ class JointFinding:
         Place in the order in which to inspect, from 1.
     rank_range : tuple of int
         First and last place over the ensemble of geometries.
-    alike : tuple of int
+    acts_like : tuple of int
         Joints at the other end of the same link: plunger data alone cannot distinguish them.
     allowance_in : float or None
         How much further this joint alone may wear until the worst case reaches the margin; None if
@@ -231,17 +232,27 @@ class JointFinding:
 
     joint: int
     name: str
-    clearance_in: float | None
-    limit_in: float
+    clearance_in: Size | None
+    limit_in: Size
     over_limit: bool
-    contribution_in: float | None
+    contribution_in: Size | None
     first_order: float
     total_order: float
-    plunger_amplification: float
+    plunger_amplification: Size
     rank: int
     rank_range: tuple[int, int]
-    alike: tuple[int, ...]
-    allowance_in: float | None = None
+    acts_like: tuple[int, ...]
+    allowance_in: Size | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class UnjudgedJoint:
+    """A joint of a row that cannot be judged: its numbers are null in JSON."""
+
+    json_names = "joint name"
+    json_nulls = JointFinding
+    joint: int
+    name: str
 
 
 class RepairKind(StrEnum):
@@ -263,9 +274,9 @@ class RepairSet:
 
     joints: tuple[int, ...]
     predicted_displacement_in: float
-    probability_within_margin: float
-    access_minutes: float
-    minutes: float
+    probability_within_margin: Probability
+    access_minutes: Size
+    minutes: Size
     kind: RepairKind
     second_repair_probability: float | None = None
 
@@ -278,8 +289,8 @@ class Rigging:
 
     shift_in: float
     predicted_displacement_in: float
-    probability_within_margin: float
-    probability_exceed_random_directions: float
+    probability_within_margin: Probability
+    probability_exceed_random_directions: Probability
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,7 +302,7 @@ class UncertaintyBudget:
     readings_in: Mapping[int, float]
     geometry_in: float
     model_in: float
-    margin_in: float
+    margin_in: Size
     model_source: str
 
     @property
@@ -323,7 +334,7 @@ class GroupChance:
     """
 
     joints: tuple[int, ...]
-    probability: float
+    probability: Probability
 
 
 @dataclass(frozen=True, slots=True)
@@ -373,9 +384,16 @@ class RigidBound:
     """
 
     displacement_in: float | None
-    probability_within_margin: float | None
+    probability_within_margin: Probability | None
     verdict: Verdict
     decides: bool
+
+
+# Whose row it is, its verdict and what to do next.
+_COURSE = """
+    record_id=row.record_id tail_no=row.tail_no side=row.side verdict headline next_action in_brief
+    then=plan.then plan=plan.steps end open_question=plan.open_question joints warnings
+"""
 
 
 class _Planned:
@@ -461,17 +479,25 @@ class Assessment(_Planned, Result):
         What stands of other visits to the gear.
     """
 
+    json_names = f"""
+        {_COURSE} rigid margin_in remaining_in standard_uncertainty_in probability_within_margin
+        predicted_displacement_in over_travel_in under_travel_in predicted_upper_in bound_in
+        probability_exceed_random_directions geometry_spread_in explained_at_most_in unexplained_in
+        measured_displacement_in=row.measured_displacement_in basis standing repair_sets rigging
+        posterior outcome=row.outcome inspection_date=row.inspection_date
+        gear_landings=row.gear_landings
+    """
     inspection: Inspection
     verdict: Verdict
     predicted_displacement_in: float | None
     over_travel_in: float | None
     under_travel_in: float | None
     predicted_upper_in: float | None
-    margin_in: float
+    margin_in: Size
     remaining_in: float | None
-    standard_uncertainty_in: float | None
-    probability_within_margin: float | None
-    probability_exceed_random_directions: float | None
+    standard_uncertainty_in: Size | None
+    probability_within_margin: Probability | None
+    probability_exceed_random_directions: Probability | None
     geometry_spread_in: tuple[float, float] | None
     budget: UncertaintyBudget | None
     over_directions_rad: tuple[float, ...]
@@ -479,9 +505,9 @@ class Assessment(_Planned, Result):
     joints: tuple[JointFinding, ...]
     plan: Plan
     basis: Basis
-    bound_in: float | None
-    explained_at_most_in: float | None
-    unexplained_in: float | None
+    bound_in: Size | None
+    explained_at_most_in: Size | None
+    unexplained_in: Size | None
     headline: str
     alarm: str
     repair_sets: tuple[RepairSet, ...] | None
@@ -591,7 +617,10 @@ class Assessment(_Planned, Result):
 class Rejected(_Planned, Result):
     """A row that cannot be judged: verdict INVALID, its numbers absent."""
 
+    json_names = _COURSE
+    json_nulls = Assessment
     row: InvalidRow
+    joints: tuple[UnjudgedJoint, ...]
     plan: Plan
     warnings: tuple[str, ...]
 

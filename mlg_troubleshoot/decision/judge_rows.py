@@ -30,6 +30,7 @@ from mlg_troubleshoot.decision.assessment import (
     RepairSet,
     RigidBound,
     UncertaintyBudget,
+    UnjudgedJoint,
     Verdict,
     VerdictTone,
 )
@@ -133,7 +134,7 @@ def rank_joints(
             plunger_amplification=indices.plunger_amplification,
             rank=ranks[i][j],
             rank_range=ranges.setdefault((span := (best[i][j], worst[i][j])), span),
-            alike=gear.alike[joint.number],
+            acts_like=gear.alike[joint.number],
             allowance_in=None if allowed[i][j] != allowed[i][j] else allowed[i][j],
         )
 
@@ -316,6 +317,7 @@ def _judge_part(
         if advice:
             found = [_with_consequences(a, cases, table) for a in found]
     judged = dict(zip(alike, found, strict=True))
+    unjudged = tuple(UnjudgedJoint(joint.number, joint.name) for joint in gear.joints)
     assessed = (
         replace(judged[each], inspection=row) for each, row in zip(known, valid, strict=True)
     )
@@ -323,7 +325,7 @@ def _judge_part(
         (
             next(assessed)
             if isinstance(row, Inspection)
-            else Rejected(row, correct(row), row.warnings)
+            else Rejected(row, unjudged, correct(row), row.warnings)
         )
         for row in part
     )

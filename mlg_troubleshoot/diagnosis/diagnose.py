@@ -9,18 +9,20 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtri
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array, Mask, Wholes, rms
+from mlg_troubleshoot.arrays import Array, Mask, Probability, Size, Wholes, rms
 from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, offered
 from mlg_troubleshoot.diagnosis.causes.linkage import Block, JointFactors
 from mlg_troubleshoot.diagnosis.causes.reading import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.explain import (
+    DetectableEffect,
     Finding,
     MisfitProblem,
     WeighedCause,
@@ -59,7 +61,7 @@ from mlg_troubleshoot.misfit.columns import (
 )
 from mlg_troubleshoot.misfit.posterior import Context, Key
 from mlg_troubleshoot.misfit.simulation_result import MisfitVerdict as Verdict
-from mlg_troubleshoot.results import Result
+from mlg_troubleshoot.results import JsonOutput
 from mlg_troubleshoot.units import MM_PER_IN
 
 # With fewer tails none can be held out.
@@ -82,7 +84,7 @@ class Gain:
         Rows predicted outside whose measured displacement is within.
     verdicts_changed : tuple of str
         Records whose predicted side of the margin changes.
-    held_out_by : str
+    held_out_by : str or None
         What was held out together: ``tail`` or ``row``.
     better : bool
         True if held-out rows are likelier with the extension than without, and their misfit is
@@ -91,17 +93,43 @@ class Gain:
         True if they are less likely, and their misfit is larger.
     """
 
-    rms_before_in: float
-    rms_after_in: float
-    share_interval: tuple[float, float]
+    json_names = """
+        held_out_rms_before_in=rms_before_in held_out_rms_after_in=rms_after_in
+        share_removed_interval_95=share_interval held_out_by false_within_before false_within_after
+        false_outside_before false_outside_after verdicts_changed
+    """
+    rms_before_in: Size
+    rms_after_in: Size
     false_within_before: int
     false_within_after: int
     false_outside_before: int
     false_outside_after: int
     verdicts_changed: tuple[str, ...]
-    held_out_by: str
-    better: bool
-    worse: bool
+    share_interval: tuple[float, float] = (0.0, 0.0)
+    held_out_by: str | None = None
+    better: bool = False
+    worse: bool = False
+
+    @classmethod
+    def of(
+        cls, table: DiagnosisTable, measured: Array, before: Array, after: Array, **held_out: Any
+    ) -> Gain:
+        """Count the decisions of two predictions, shape (n,) each. [in]"""
+        outside = np.abs(measured) > table.margin_in
+        said_before = np.abs(before) <= table.margin_in
+        said_after = np.abs(after) <= table.margin_in
+        return cls(
+            rms_before_in=rms(measured - before),
+            rms_after_in=rms(measured - after),
+            false_within_before=int(np.sum(said_before & outside)),
+            false_within_after=int(np.sum(said_after & outside)),
+            false_outside_before=int(np.sum(~said_before & ~outside)),
+            false_outside_after=int(np.sum(~said_after & ~outside)),
+            verdicts_changed=tuple(
+                table.record_id[int(i)] for i in np.flatnonzero(said_before != said_after)
+            ),
+            **held_out,
+        )
 
 
 def folds(noise: NoiseModel, columns: Array) -> tuple[Wholes, str]:
@@ -136,20 +164,12 @@ def measure_gain(
     drawn = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else np.arange(len(misfit))
     smaller = bool(rms(after) < rms(before))
     more_likely = likelier(noise, expected, expected - correction, fold)
-    outside = np.abs(measured) > table.margin_in
-    said_before = np.abs(as_read) <= table.margin_in
-    said_after = np.abs(as_read + correction) <= table.margin_in
-    return Gain(
-        rms_before_in=rms(before),
-        rms_after_in=rms(after),
+    return Gain.of(
+        table,
+        measured,
+        as_read,
+        as_read + correction,
         share_interval=_interval_of_gain(before, after, drawn),
-        false_within_before=int(np.sum(said_before & outside)),
-        false_within_after=int(np.sum(said_after & outside)),
-        false_outside_before=int(np.sum(~said_before & ~outside)),
-        false_outside_after=int(np.sum(~said_after & ~outside)),
-        verdicts_changed=tuple(
-            table.record_id[int(i)] for i in np.flatnonzero(said_before != said_after)
-        ),
         held_out_by="tail" if held_out_by == "group" else "row",
         better=smaller and more_likely,
         worse=not (smaller or more_likely),
@@ -164,6 +184,27 @@ def _interval_of_gain(before: Array, after: Array, groups: Wholes) -> tuple[floa
     left = float(square_after.sum()) / whole
     reach = 1.96 * float(np.linalg.norm(square_after - left * square_before)) / whole
     return 1.0 - left - reach, 1.0 - left + reach
+
+
+class NotTestable(NamedTuple):
+    """A cause that the table cannot show, for want of a column."""
+
+    cause: str
+    missing_column: str
+
+
+class RuledOut(NamedTuple):
+    """A cause that would explain something alone, but hardly acts."""
+
+    cause: str
+    target: str | None
+
+
+class RowFarOff(NamedTuple):
+    """A row far off, and what nothing explains of it. [in]"""
+
+    record_id: str
+    residual_in: float
 
 
 LEAST_ROWS = 20
@@ -200,9 +241,14 @@ class NamedCause(Term):
         Probability that it acts, or something that these rows cannot tell from it. [1]
     """
 
+    json_names = """
+        cause=candidate.cause.name target=candidate.target sentence=candidate.sentence effect_rms_in
+        probability class_probability parameters interval_95=interval_shown
+        separating_reading=candidate.separates
+    """
     effect_in: Array
-    probability: float
-    class_probability: float
+    probability: Probability
+    class_probability: Probability
 
     @property
     def effect_rms_in(self) -> float:
@@ -287,7 +333,7 @@ class FurtherInspections:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Diagnosis(Result):
+class Diagnosis(JsonOutput):
     """What the measured data say about the model.
 
     Parameters
@@ -368,6 +414,18 @@ class Diagnosis(Result):
         How the readings were written down, where it bears on the answer; empty for a table alone.
     """
 
+    json_names = """
+        schema_version rows.read=rows_read rows.used=rows_used rows.set_aside=rows_set_aside
+        data_faults=faults misfit.mean_in=mean_in misfit.rms_in=rms_in
+        misfit.repeatability_in=repeatability_in misfit.repeatability_source=repeatability_source
+        verdict causes also_possible beside p_nothing p_unlisted sure=beliefs.sure
+        unlisted_variables unlisted_tails unlisted_rms_in not_testable cannot_say=unsaid ruled_out
+        columns_used=used.columns columns_left_out=used.left_out smallest_detectable_rms_in
+        detectable gain=decisions data_condition=condition remainder.p_value=remainder_p
+        remainder.p_something_else=p_left remainder.looks_like_noise=remainder_is_noise
+        remainder.rms_in=residual_u_in remainder.expected_from_gauges_in=expected_scatter_in
+        remainder.rows_far_off=rows_far_off
+    """
     verdict: Verdict
     causes: tuple[NamedCause, ...]
     also_possible: tuple[NamedCause, ...]
@@ -378,13 +436,13 @@ class Diagnosis(Result):
     unlisted_tails: tuple[str, ...]
     probabilities: Mapping[Key, float]
     weighed: tuple[WeighedCause, ...]
-    p_nothing: float
-    p_unlisted: float
-    p_left: float
-    remainder_p: float
-    not_testable: tuple[tuple[str, str], ...]
+    p_nothing: Probability
+    p_unlisted: Probability
+    p_left: Probability
+    remainder_p: Probability
+    not_testable: tuple[NotTestable, ...]
     unsaid: tuple[str, ...]
-    ruled_out: tuple[tuple[str, str | None], ...]
+    ruled_out: tuple[RuledOut, ...]
     faults: tuple[DataFault, ...]
     corrected: tuple[DataFault, ...]
     rows_read: int
@@ -396,7 +454,7 @@ class Diagnosis(Result):
     rms_in: float
     repeatability_in: float | None
     repeatability_source: str
-    detectable: tuple[tuple[str, float], ...]
+    detectable: tuple[DetectableEffect, ...]
     gain: Gain | None
     terms: tuple[Term, ...]
     residual_u_in: float
@@ -408,6 +466,27 @@ class Diagnosis(Result):
     misfit_in: Array
     beliefs: Beliefs
     condition: tuple[DataCondition, ...] = ()
+
+    @property
+    def rows_set_aside(self) -> int:
+        """Rows that the verdict does not rest on."""
+        return self.rows_read - self.rows_used
+
+    @property
+    def smallest_detectable_rms_in(self) -> float | None:
+        """Of the cause that is detected most easily. [in]"""
+        return self.detectable[0].rms_in if self.detectable else None
+
+    @property
+    def decisions(self) -> Gain:
+        """The gain; where the model is not extended, everything after is as before."""
+        same = self.predicted_in
+        return self.gain or Gain.of(self.used, self.used.measured_in, same, same)
+
+    @property
+    def rows_far_off(self) -> list[RowFarOff]:
+        """Rows that lie too far off for scatter and that nothing explains."""
+        return [RowFarOff(self.used.record_id[n], left) for n, left in self.far_off_in.items()]
 
 
 def diagnose(
@@ -464,7 +543,9 @@ def diagnose(
         # What never varies cannot be distinguished from a linkage of other dimensions.
         columns = plain[0].table.varying
         not_testable = tuple(
-            (cause.name, column) for cause in catalogue if (column := cause.lacks(columns))
+            NotTestable(cause.name, column)
+            for cause in catalogue
+            if (column := cause.lacks(columns))
         )
         believed = beliefs or Beliefs()
 
@@ -749,7 +830,7 @@ def _report(
     table: DiagnosisTable,
     rows_read: int,
     faults: tuple[DataFault, ...],
-    not_testable: tuple[tuple[str, str], ...],
+    not_testable: tuple[NotTestable, ...],
     case: _Case,
 ) -> Diagnosis:
     misfit = case.problem.misfit
@@ -793,7 +874,7 @@ def _report(
         ),
         not_testable=not_testable,
         unsaid=_unsaid(table),
-        ruled_out=case.ruled_out,
+        ruled_out=tuple(RuledOut(*name) for name in case.ruled_out),
         faults=faults,
         corrected=_corrected(model, table, causes),
         rows_read=rows_read,
@@ -809,7 +890,7 @@ def _report(
         gain=gain,
         # What predicts aircraft that it was not fitted to no better is not written.
         terms=(
-            tuple(cause for cause in causes if cause.predicts)
+            tuple(Term(c.candidate, c.value, c.interval) for c in causes if c.predicts)
             if gain is not None and gain.better
             else ()
         ),

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import erfc, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +38,14 @@ from mlg_troubleshoot.misfit.posterior import (
 )
 from mlg_troubleshoot.misfit.simulation_result import Conclusion
 from mlg_troubleshoot.units import DAYS_PER_YEAR
+
+
+class DetectableEffect(NamedTuple):
+    """Root mean square from which an effect of a cause is detected with 80 % power. [in]"""
+
+    cause: str
+    rms_in: float
+
 
 # What the rows of one aircraft may move with alone.
 WITHIN = ("hydraulic_pressure_psi", "temperature_c", "gear_landings", "predicted")
@@ -437,7 +446,7 @@ class Finding:
         return tuple(sorted(hardly, key=lambda name: -alone[name]))
 
     @cached_property
-    def detectable(self) -> tuple[tuple[str, float], ...]:
+    def detectable(self) -> tuple[DetectableEffect, ...]:
         """Root mean square from which an effect of each listed cause is detected with 80 % power,
         the easiest form first. [in]
         """
@@ -451,8 +460,8 @@ class Finding:
         for name, least in zip(effects.names, needed.tolist(), strict=True):
             if name is not None and name[0] != UNLISTED:
                 of_cause.setdefault(name[0], []).append(least)
-        each = [(name, float(np.median(own))) for name, own in of_cause.items()]
-        return tuple(sorted(each, key=lambda own: (own[1], own[0])))
+        each = [DetectableEffect(name, float(np.median(own))) for name, own in of_cause.items()]
+        return tuple(sorted(each, key=lambda own: own[::-1]))
 
     @cached_property
     def unlisted(self) -> tuple[tuple[str, ...], Array]:

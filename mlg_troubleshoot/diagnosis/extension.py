@@ -195,13 +195,13 @@ class Term(Result):
         95 % interval of the parameter. [unit of the cause's parameter]
     """
 
+    json_names = """
+        cause=candidate.cause.name target=candidate.target sentence=candidate.sentence
+        parameter=candidate.cause.parameter value interval_95=interval
+    """
     candidate: Candidate
     value: float
     interval: tuple[float, float]
-
-    def words(self) -> str:
-        """The term as a sentence."""
-        return self.candidate.cause.words(self.candidate.target)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -230,6 +230,7 @@ class ModelExtension(Result):
         after its approval. Only an approved extension may relax a verdict.
     """
 
+    json_names = "geometry_sha256=gear.geometry_sha256 data_sha256 residual_u_in terms"
     gear: Gear
     terms: tuple[Term, ...]
     residual_u_in: float
@@ -251,7 +252,7 @@ class ModelExtension(Result):
 
     def describe(self) -> str:
         """Return the extension in one sentence."""
-        terms = "; ".join(term.words() for term in self.terms)
+        terms = "; ".join(term.candidate.sentence for term in self.terms)
         listed = ", ".join(f"#{joint}" for joint in self.unread)
         unread = (
             f", in which nobody had read {listed}: what was fitted rests on their usual wear"
@@ -329,7 +330,7 @@ def write_extension(
     for term in extension.terms:
         candidate = term.candidate
         table = {
-            "words": term.words(),
+            "words": term.candidate.sentence,
             "cause": candidate.cause.name,
             "parameter": candidate.cause.parameter,
             "value": term.value,

@@ -23,7 +23,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import gammaln, logsumexp
 
-from mlg_troubleshoot.arrays import Array, Mask, Places, log_sum, numbered
+from mlg_troubleshoot.arrays import Array, Mask, Places, Probability, log_sum, numbered
 from mlg_troubleshoot.decision.columns import LANDINGS
 from mlg_troubleshoot.decision.sentences import LEAST_ALIKE
 from mlg_troubleshoot.diagnosis.causes.base import Scene
@@ -89,6 +89,7 @@ class DataFault:
         What was most likely meant; used in the analysis only.
     """
 
+    json_names = "row record_id column kind value suggested"
     place: int
     row: int
     record_id: str
@@ -452,9 +453,10 @@ class DataCondition:
         True if nothing that depends on the clearances can be named because of it.
     """
 
+    json_names = "kind where share effect record_next"
     kind: str
     where: str
-    share: float
+    share: Probability
     effect: str
     record_next: str
     doubtful: bool = False

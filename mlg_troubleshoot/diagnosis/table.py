@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime
 from functools import cached_property
-from typing import Any
+from itertools import starmap
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,14 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.results import Result
 
 Texts = NDArray[np.str_]
+
+
+class LeftOut(NamedTuple):
+    """A column that only this table has and that is not compared, and why."""
+
+    column: str
+    why: str
+
 
 _TEXTS = tuple(c for c in COVARIATES if c.holds in (Holds.TEXT, Holds.CHOICE))
 FACTORS = tuple(column.variable for column in _TEXTS)
@@ -88,7 +97,7 @@ class DiagnosisTable(Result):
     plunger_gauge_u_in: Array | None = None
     below: Mask | None = None
     doubt: str = ""
-    left_out: tuple[tuple[str, str], ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
 
     def __len__(self) -> int:
         return len(self.clearance_in)
@@ -202,7 +211,7 @@ def _day_number(text: str) -> float:
 
 def _own_columns(
     inspections: Sequence[Inspection],
-) -> tuple[dict[str, list[float]], dict[str, list[str]], tuple[tuple[str, str], ...]]:
+) -> tuple[dict[str, list[float]], dict[str, list[str]], tuple[LeftOut, ...]]:
     """Columns that only this source has: numbers and dates, texts, and what cannot be compared,
     each with the reason.
     """
@@ -216,7 +225,7 @@ def _own_columns(
         for name, own in texts.items()
         if len({*own}) < 2 or not (name in numbers or _groups(own))
     }
-    return numbers, texts, tuple(left_out.items())
+    return numbers, texts, tuple(starmap(LeftOut, left_out.items()))
 
 
 def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> DiagnosisTable:

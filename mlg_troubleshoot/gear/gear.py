@@ -28,8 +28,8 @@ from mlg_troubleshoot.gear.linkage import (
     links_from,
     worst_case,
 )
-from mlg_troubleshoot.geometry.mechanism import Mechanism
-from mlg_troubleshoot.results import Result
+from mlg_troubleshoot.geometry.mechanism import Mechanism, Point
+from mlg_troubleshoot.results import JsonOutput
 
 # 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
 ROUNDING_IN = 1e-9
@@ -117,9 +117,12 @@ class JointSpec:
     limit, new_part: radial clearance that the manual allows at most, and that a restored joint has.
     [in] access, restore: time to measure it, and to restore it, once its area is open. [min]
     critical: true if no gear can be cleared before this joint is measured (joints 1 to 5 of
-    the paper).
+    the paper). acts_like: the other end of the same link.
     """
 
+    json_names = """
+        joint=number name location limit new_part access area critical acts_like
+    """
     number: int
     point: str
     name: str
@@ -130,6 +133,7 @@ class JointSpec:
     restore: Sourced
     area: str
     critical: bool
+    acts_like: tuple[int, ...]
 
     def is_over_limit(self, clearance_in: float) -> bool:
         """Tell whether a clearance is above the limit, beyond the rounding of a conversion from
@@ -187,7 +191,7 @@ class RetractionCycle(Table):
 
 
 @dataclass(frozen=True, repr=False)
-class Gear(Result):
+class Gear(JsonOutput):
     """A gear type as its gear file describes it.
 
     Parameters
@@ -242,6 +246,10 @@ class Gear(Result):
         Every file that describes the gear, also one that is not written yet.
     """
 
+    json_names = """
+        schema_version id name provenance geometry_sha256 ensemble=ensemble_names
+        calibration_rate=model.rate margin release_stroke_in joints points numbers
+    """
     id: str
     name: str
     provenance: str
@@ -290,6 +298,21 @@ class Gear(Result):
         """Calibrate one linkage of this gear."""
         return LinkageModel(linkage.mechanism, linkage.stroke, self.calibration)
 
+    @property
+    def ensemble_names(self) -> tuple[str, ...]:
+        """Names of the linkages of the ensemble, the reference first."""
+        return tuple(linkage.name for linkage in self.ensemble)
+
+    @property
+    def release_stroke_in(self) -> float:
+        """Extension of the actuator at mid-position. [in]"""
+        return self.reference.stroke[1]
+
+    @property
+    def points(self) -> dict[str, Point]:
+        """The points of the reference at mid-position, by name."""
+        return {point.name: point for point in self.reference.mechanism.points}
+
     @cached_property
     def joint_numbers(self) -> tuple[int, ...]:
         """Numbers of the joints, in the order of the mechanism."""
@@ -331,11 +354,7 @@ class Gear(Result):
     @cached_property
     def alike(self) -> dict[int, tuple[int, ...]]:
         """Joints that act alike with each joint: the other end of the same link, by structure."""
-        return {
-            n: tuple(other for other in group if other != n)
-            for group in self.link_groups
-            for n in group
-        }
+        return {joint.number: joint.acts_like for joint in self.joints}
 
     def require_joints(self, numbers: Iterable[int], what: str = "") -> None:
         """Refuse numbers of joints that this gear does not have; `what` names the option."""

@@ -146,8 +146,8 @@ def _read(path: Path) -> Gear:
         reference=reference,
         ensemble=(reference, *members),
         joints=tuple(
-            _joint(file, number, point, areas, numbers)
-            for number, point in enumerate(form.joints, start=1)
+            _joint(file, reference.mechanism, number, areas, numbers)
+            for number in range(1, len(form.joints) + 1)
         ),
         areas=tuple(areas),
         **{
@@ -291,8 +291,14 @@ def _calibration(
 
 
 def _joint(
-    file: DataFile[GearFile], number: int, point: str, areas: list[Area], numbers: _Numbers
+    file: DataFile[GearFile],
+    mechanism: Mechanism,
+    number: int,
+    areas: list[Area],
+    numbers: _Numbers,
 ) -> JointSpec:
+    point = list(file.content.joints)[number - 1]
+    alike = next((group for group in mechanism.alike if number in group), ())
     form = file.content
     joint = form.joints[point]
     known = [area.name for area in areas]
@@ -311,6 +317,7 @@ def _joint(
         restore=numbers.of(joint, "restore_min", "min", _RESTORE_MIN),
         area=area,
         critical=joint.critical,
+        acts_like=tuple(n for n in alike if n != number),
     )
 
 

@@ -62,6 +62,8 @@ class LinkageModel:
         If the linkage does not close over the whole stroke without clearance.
     """
 
+    rate: float
+
     def __init__(
         self, mechanism: Mechanism, stroke: tuple[float, float], calibration: Calibration
     ) -> None:
@@ -181,6 +183,7 @@ class WorstCase(Result):
         Directions of the virtual links. [rad]
     """
 
+    json_names = "over_in under_in magnitude_in over_directions under_directions"
     over_in: Array
     under_in: Array
     over_directions: Array

@@ -45,12 +45,18 @@ class Point:
     virtual_link: number of the virtual link that displaces this fixed pivot (A* of Fig. 8a).
     """
 
+    json_names = "plane at_in fixed"
     name: str
     plane: str
     x: float
     y: float
     fixed: bool = False
     virtual_link: int | None = None
+
+    @property
+    def at_in(self) -> tuple[float, float]:
+        """Its coordinates. [in]"""
+        return self.x, self.y
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,6 +119,7 @@ class TableGear(Table):
 class IndexTable(Result, Table):
     """Precomputed indices of a gear, as the file holds them."""
 
+    json_names = "schema_version gear seed design evaluations failed joints"
     schema_version: Literal[2]
     gear: TableGear
     seed: Count
@@ -249,6 +250,7 @@ class Amplification:
     [1]
     """
 
+    json_names = "local_stage max_stage local_plunger max_plunger exact_plunger=exact"
     joints: tuple[int, ...]
     stroke: Array
     stage: Array

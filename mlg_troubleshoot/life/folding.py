@@ -130,6 +130,14 @@ class GearLife:
         return " ".join(self.key)
 
     @property
+    def tail_no(self) -> str:
+        return self.key[0]
+
+    @property
+    def side(self) -> str:
+        return self.key[1]
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What is to be known of its history: from where its landings begin anew."""
         return tuple(

@@ -29,7 +29,7 @@ from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
 from mlg_troubleshoot.life.folding import GearLife, TodaysVerdict
-from mlg_troubleshoot.life.logbook import log_of
+from mlg_troubleshoot.life.logbook import LogLine, log_of
 from mlg_troubleshoot.life.state import GearKey, Moment
 from mlg_troubleshoot.life.urgency import (
     OVER_LIMIT,
@@ -38,6 +38,7 @@ from mlg_troubleshoot.life.urgency import (
     repair_sentence,
     urgency_of,
 )
+from mlg_troubleshoot.results import JsonOutput
 from mlg_troubleshoot.store import RecordKind, Store, inspection_from
 from mlg_troubleshoot.wear import (
     Samples,
@@ -449,6 +450,15 @@ class FleetLine:
     inspections, repairs: how many count. Numbers stand as they did in the record.
     """
 
+    json_names = """
+        tail_no side record_id inspection_date gear_landings verdict=now.verdict
+        worst_joint=now.worst_joint landings_to_limit=ahead.landings_to_limit
+        limit_joint=ahead.limit_joint landings_to_margin=ahead.landings_to_margin
+        next_inspection_landings=ahead.next_inspection_landings due_date=ahead.due_date repairs
+        predicted_displacement_in=now.predicted_displacement_in margin_in=now.margin_in
+        next_action=now.next_action minutes=now.minutes restore=now.restore why=urgency.why failed
+        repair changed readings
+    """
     tail_no: str
     side: str
     inspections: int
@@ -511,6 +521,50 @@ class FleetLine:
         """By what is most urgent, how far it is, and landings to the next inspection."""
         due = self.ahead.next_inspection_landings
         return self.urgency.rank, -self.urgency.size, inf if due is None else due, self.key
+
+
+class JointLeft(NamedTuple):
+    """A joint, its readings (landings, radial clearance) since it was last restored, and the
+    landings to its limit. [in]
+    """
+
+    joint: int
+    limit_in: float
+    readings: list[tuple[float, float]]
+    landings_to_limit: Quantiles | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LifeAhead(JsonOutput):
+    """The life of one gear: its log book in the order of time, its joints, its landings left."""
+
+    json_names = """
+        schema_version tail_no=life.tail_no side=life.side events joints
+        landings_to_limit=ahead.landings_to_limit limit_joint=ahead.limit_joint
+        landings_to_margin=ahead.landings_to_margin
+        next_inspection_landings=ahead.next_inspection_landings due_date=ahead.due_date
+        notes=life.notes warnings=life.warnings
+    """
+    life: GearLife
+    ahead: Forecast
+    gear: Gear
+
+    @property
+    def events(self) -> list[LogLine]:
+        """The lines of its log book."""
+        return log_of(self.life, self.gear)
+
+    @property
+    def joints(self) -> list[JointLeft]:
+        return [
+            JointLeft(
+                number,
+                self.gear.joint(number).limit.value,
+                [(at, value) for at, value, _u in between[-1].placed],
+                self.ahead.joints.get(number),
+            )
+            for number, between in stretches(self.life, self.gear.joint_numbers).items()
+        ]
 
 
 def most_urgent_first(lines: Iterable[FleetLine]) -> list[FleetLine]:

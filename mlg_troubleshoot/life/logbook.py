@@ -27,6 +27,9 @@ class LogLine:
     of the plunger, or the worst case of a verdict. [in] counts: false where it was voided.
     """
 
+    json_names = """
+        kind text=full date joints value_in verdict gear_landings record_id hash counts
+    """
     kind: str
     text: str
     how: str = ""

@@ -224,6 +224,9 @@ class SuspectFound(Result):
         this member.
     """
 
+    json_names = """
+        name nominal=suspect.nominal value low high probability effect_rms unit=suspect.unit aliases
+    """
     suspect: Suspect
     value: float
     interval: tuple[float, float]
@@ -235,6 +238,16 @@ class SuspectFound(Result):
     def name(self) -> str:
         """Name of the suspect."""
         return self.suspect.name
+
+    @property
+    def low(self) -> float:
+        """Lower end of the interval."""
+        return self.interval[0]
+
+    @property
+    def high(self) -> float:
+        """Upper end of the interval."""
+        return self.interval[1]
 
     def words(self) -> str:
         """Say its value, its interval and how sure it is."""
@@ -249,6 +262,15 @@ class SuspectFound(Result):
     def separates(self) -> str:
         """The reading that would distinguish it from its aliases."""
         return self.suspect.separates
+
+
+@dataclass(frozen=True, slots=True)
+class SuspectNamed:
+    """A suspect, and whether it is named."""
+
+    json_names = "*found named"
+    found: SuspectFound
+    named: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,6 +343,11 @@ class SimulationDiagnosis(Result):
         Calls that gave no number for some reading, or failed.
     """
 
+    json_names = """
+        verdict causes also_possible suspects=suspects_named aliases why_untestable p_nothing
+        p_unlisted unlisted_variable gain parameters noise correlation in_sequence notes calls
+        failed
+    """
     verdict: MisfitVerdict
     causes: tuple[SuspectFound, ...]
     also_possible: tuple[SuspectFound, ...]
@@ -338,6 +365,11 @@ class SimulationDiagnosis(Result):
     notes: tuple[str, ...]
     calls: int
     failed: int
+
+    @property
+    def suspects_named(self) -> list[SuspectNamed]:
+        """The suspects, each with whether it is named."""
+        return [SuspectNamed(each, each in self.named) for each in self.suspects]
 
     @property
     def named(self) -> tuple[SuspectFound, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mlg_troubleshoot.notebook.pictures import plot
-from mlg_troubleshoot.notebook.tables import html, store_frame, to_dict, to_frame
+from mlg_troubleshoot.notebook.tables import html, store_frame, to_frame
 from mlg_troubleshoot.reporting.publish import Picture
 
 __all__ = [
@@ -11,6 +11,5 @@ __all__ = [
     "html",
     "plot",
     "store_frame",
-    "to_dict",
     "to_frame",
 ]

@@ -2,39 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from textwrap import shorten
 from typing import Any
 
 import pandas as pd
 from markupsafe import escape
 
-from mlg_troubleshoot.decision.assessment import Assessment
-from mlg_troubleshoot.diagnosis import Diagnosis, SimulationDiagnosis
-from mlg_troubleshoot.diagnosis.causes import Catalogue
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.gear.linkage import WorstCase
 from mlg_troubleshoot.life.folding import lives
-from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.records.frames import frame_of, label_of
 from mlg_troubleshoot.records.headers import Joints
-from mlg_troubleshoot.reporting.json_form import (
-    assessment_as_json,
-    check_as_json,
-    diagnosis_as_json,
-    gear_as_json,
-    plain,
-)
-from mlg_troubleshoot.reporting.life_json import fleet_as_json
-from mlg_troubleshoot.reporting.model_json import study_as_json
 from mlg_troubleshoot.store import Store
-from mlg_troubleshoot.surveying import SurveyResult
 from mlg_troubleshoot.workflows.check import CheckResult
-from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
-from mlg_troubleshoot.workflows.history import Lives, show_fleet
+from mlg_troubleshoot.workflows.history import show_fleet
 
 # The list that a result's table is of, the first one that it has.
 _MAIN = ("inspections", "gears", "suspects", "causes", "joints", "also_possible")
@@ -47,63 +29,8 @@ _SHOWN_CHARACTERS = 24
 _SHOWN_WORDS = 400
 
 
-def _catalogue_as_json(catalogue: Catalogue) -> dict[str, Any]:
-    names = ("name", "needs", "parameter", "trial", "plausible", "sign", "inspect", "separates")
-    return {
-        "causes": [
-            {"sentence": cause.words("…"), **{name: plain(getattr(cause, name)) for name in names}}
-            for cause in catalogue
-        ]
-    }
-
-
-def _worst_case_as_json(worst: WorstCase) -> dict[str, Any]:
-    names = ("over_in", "under_in", "magnitude_in", "over_directions", "under_directions")
-    return {name: plain(getattr(worst, name)) for name in names}
-
-
-def _simulation_as_json(found: SimulationDiagnosis) -> dict[str, Any]:
-    suspects = [
-        {
-            "name": s.name,
-            "nominal": s.suspect.nominal,
-            "value": s.value,
-            "low": s.interval[0],
-            "high": s.interval[1],
-            "probability": s.probability,
-            "named": s in found.named,
-            "effect_rms": s.effect_rms,
-            "unit": s.suspect.unit,
-            "aliases": ", ".join(s.aliases),
-        }
-        for s in found.suspects
-    ]
-    return {**plain(found), "suspects": suspects}
-
-
-# What has a form of its own; any other result is written as it stands.
-_AS_JSON: dict[type, Callable[[Any], Any]] = {
-    CheckResult: lambda r: check_as_json(r.gear, r.judgements, r.problems, r.notes),
-    Assessment: assessment_as_json,
-    DiagnoseResult: lambda r: diagnosis_as_json(r.diagnosis, r.extension, r.notes),
-    Diagnosis: lambda r: diagnosis_as_json(r, None),
-    SimulationDiagnosis: _simulation_as_json,
-    SurveyResult: lambda r: plain({"numbers": r.numbers, "joints": r.joints}),
-    StudyFindings: study_as_json,
-    WorstCase: _worst_case_as_json,
-    Gear: gear_as_json,
-    Catalogue: _catalogue_as_json,
-    Lives: lambda r: fleet_as_json(r.lines),
-}
-
-
-def to_dict(result: Any) -> dict[str, Any]:
-    written: dict[str, Any] = _AS_JSON.get(type(result), plain)(result)
-    return written
-
-
 def to_frame(result: Any, of: str = "") -> pd.DataFrame:
-    lists = {name: rows for name, rows in to_dict(result).items() if isinstance(rows, list)}
+    lists = {name: rows for name, rows in result.to_dict().items() if isinstance(rows, list)}
     known = [name for name in _MAIN if name in lists]
     name = of or next((name for name in known if lists[name]), "".join(known[:1]))
     if name in lists:
@@ -131,7 +58,7 @@ def html(result: Any) -> str:
     """
     words = (
         f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
-        for name, value in to_dict(result).items()
+        for name, value in result.to_dict().items()
         if isinstance(value, str | float)
     )
     frame = to_frame(result)

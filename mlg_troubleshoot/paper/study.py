@@ -60,9 +60,8 @@ from mlg_troubleshoot.indices.variance import (
     tensor_indices,
     worst_directions,
 )
-from mlg_troubleshoot.outputs import SCHEMA_VERSION
 from mlg_troubleshoot.parallel import StageProgress, map_blocks
-from mlg_troubleshoot.results import Result
+from mlg_troubleshoot.results import SCHEMA_VERSION, Result
 
 # Resolution V fractions of the two-level factorial: the columns whose product each further column
 # is. No word of their defining relations is shorter than five letters.
@@ -466,6 +465,12 @@ class StudyFindings(Result):
         Amplification indices of the reference.
     """
 
+    json_names = """
+        *table directions distribution note=indices.note mean=indices.mean variance=indices.variance
+        first_order_plain=plain groups ensemble=gear.ensemble_names amplification=growth
+    """
+    directions = "worst"
+    distribution = "uniform"
     gear: Gear
     options: StudyOptions
     table: IndexTable

@@ -39,6 +39,7 @@ from mlg_troubleshoot.indices.variance import (
     tensor_indices,
     worst_directions,
 )
+from mlg_troubleshoot.results import JsonOutput
 
 JointKey = Annotated[int, Meta(ge=0, le=LARGEST, description="the number of a joint")]
 
@@ -127,6 +128,10 @@ class TargetsFile(Table):
 class Computed:
     """A printed number and the computed one. [unit of the target]"""
 
+    json_names = """
+        quantity=target.quantity section=target.section printed=target.printed computed
+        unit=target.unit tolerance=target.accepted status holds should_hold=target.expected
+    """
     target: Target
     computed: float
 
@@ -341,6 +346,7 @@ class Statement:
     evidence: the numbers; several if the statement has parts or readings.
     """
 
+    json_names = "claim section outcome linkages evidence paragraph"
     claim: str
     section: str
     outcome: ClaimOutcome
@@ -369,6 +375,23 @@ class Statement:
         return f"{self.claim} (section {self.section}): {self.outcome}. {self.numbers}"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Verification(JsonOutput):
+    """Every number that the paper prints beside the model's, and what the linkages say to its
+    statements.
+    """
+
+    json_names = "schema_version gear=gear.id numbers statements"
+    gear: Gear
+    numbers: tuple[Computed, ...]
+    statements: tuple[Statement, ...]
+
+    @property
+    def failed(self) -> list[Computed]:
+        """Required numbers that do not hold."""
+        return [n for n in self.numbers if n.target.expected and not n.holds]
+
+
 def check_statements(
     gear: Gear, progress: Callable[[int, int], None] | None = None
 ) -> tuple[Statement, ...]:
@@ -384,7 +407,6 @@ def check_statements(
     for i, target in enumerate(entries):
         if target.claim:
             by_claim.setdefault(target.claim, []).append(i)
-    names = tuple(linkage.name for linkage in gear.ensemble)
     found = []
     for claim, places in by_claim.items():
         evidence = tuple(
@@ -393,7 +415,7 @@ def check_statements(
         readings = {entries[i].reading for i in places}
         outcome = _outcome(evidence, by_reading=len(readings) > 1)
         section = entries[places[0]].section
-        found.append(Statement(claim, section, outcome, names, evidence))
+        found.append(Statement(claim, section, outcome, gear.ensemble_names, evidence))
     return tuple(found)
 
 

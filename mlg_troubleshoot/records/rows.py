@@ -95,7 +95,7 @@ from mlg_troubleshoot.records.values import (
     says_failed,
     written_number,
 )
-from mlg_troubleshoot.results import Result
+from mlg_troubleshoot.results import JsonOutput
 from mlg_troubleshoot.units import (
     MM_PER_IN,
     SLIPS,
@@ -272,7 +272,7 @@ class TableOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
-class TableResult(Result):
+class TableResult(JsonOutput):
     """What a task tells of the tables that it read.
 
     Parameters

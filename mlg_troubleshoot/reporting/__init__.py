@@ -1,4 +1,4 @@
-"""Reports on paper and screen: one self-contained HTML file and one PDF per document; the JSON."""
+"""Reports on paper and screen: one self-contained HTML file and one PDF per document."""
 
 __all__ = [
     "diagnosis_figures",
@@ -8,9 +8,6 @@ __all__ = [
     "html",
     "inspection_figures",
     "inspection_report",
-    "json_form",
-    "life_json",
-    "model_json",
     "publish",
     "study_figures",
 ]

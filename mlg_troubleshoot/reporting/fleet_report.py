@@ -18,11 +18,12 @@ from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import (
     FleetLine,
     Forecast,
+    LifeAhead,
     most_urgent_first,
     outlook_sentence,
     work_sentence,
 )
-from mlg_troubleshoot.life.logbook import as_found_as_left, log_of, shortened
+from mlg_troubleshoot.life.logbook import as_found_as_left, shortened
 from mlg_troubleshoot.life.urgency import repair_sentence
 from mlg_troubleshoot.reporting.figures import (
     ACCENT,
@@ -35,7 +36,6 @@ from mlg_troubleshoot.reporting.figures import (
     Series,
 )
 from mlg_troubleshoot.reporting.html import Document, ReportProvenance, head
-from mlg_troubleshoot.reporting.life_json import life_as_json
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
 
@@ -164,9 +164,11 @@ def life_document(
     unit: LengthUnit,
 ) -> Document:
     """Make one gear's life: its log book, what was found and left, landings left."""
-    log = log_of(life, gear)
+    known = LifeAhead(life, ahead, gear)
+    log = known.events
     shown = {
-        "life": life_as_json(life, ahead, gear),
+        "life": life,
+        "joints": known.joints,
         "log": list(shortened(log)),
         "found_left": as_found_as_left(log),
         "helped": repair_sentence(log),

@@ -340,6 +340,7 @@ class SurveyResult(Result):
         Seed of the starts and draws.
     """
 
+    json_names = "numbers joints"
     gear: Gear
     numbers: tuple[Adjusted, ...]
     joints: tuple[Adjusted, ...]

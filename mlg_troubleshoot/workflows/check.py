@@ -37,6 +37,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.linkage import WorstCase, worst_case
 from mlg_troubleshoot.indices.index_table import IndexTable, StaleTableError, read_index_table
+from mlg_troubleshoot.json_form import as_text
 from mlg_troubleshoot.life.state import (
     GearKey,
     GearState,
@@ -146,6 +147,10 @@ class CheckResult(TableResult):
         What was read, for annotating the user's workbook; None for an inspection entered by hand.
     """
 
+    json_names = """
+        schema_version gear.id=gear.id gear.geometry_sha256=gear.geometry_sha256
+        gear.provenance=gear.provenance inspections=judgements problems warnings=notes
+    """
     judgements: tuple[Judgement, ...]
     read: ReadResult | None = None
 
@@ -178,6 +183,18 @@ class BlockOutput:
 
     make: Callable[[Sequence[Judgement]], Any]
     take: Callable[[Any], object]
+
+
+def json_around(result: CheckResult) -> tuple[str, str]:
+    """How the JSON of a check begins and ends, around one line per inspection: a large batch never
+    stands in memory.
+    """
+    head, none, tail = as_text(replace(result, judgements=())).partition('"inspections": []')
+    return head + none[:-1] + "\n", f"\n]{tail}\n"
+
+
+def json_lines(judgements: Iterable[Judgement]) -> str:
+    return ",\n".join(map(as_text, judgements))
 
 
 def check_files(

@@ -78,6 +78,7 @@ class DiagnoseResult(TableResult):
         The extended model; None unless a cause is named.
     """
 
+    json_names = "*diagnosis extension warnings=notes"
     diagnosis: Diagnosis
     extension: ModelExtension | None
 

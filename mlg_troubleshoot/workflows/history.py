@@ -16,10 +16,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TextIO
 
+from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.json_form import names_of, plain
 from mlg_troubleshoot.life.folding import (
     LEAST_OF_A_HASH,
     GearLife,
@@ -29,13 +31,19 @@ from mlg_troubleshoot.life.folding import (
     life_of,
     lives_of,
 )
-from mlg_troubleshoot.life.forecast import Asked, FleetLine
+from mlg_troubleshoot.life.forecast import (
+    Asked,
+    FleetLine,
+    most_urgent_first,
+    parts_within,
+    work_sentence,
+)
 from mlg_troubleshoot.life.state import GearKey
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.parallel import Progress, StageProgress
 from mlg_troubleshoot.records import ReadOptions, admit
 from mlg_troubleshoot.records.gate import NOBODY, judge_text
-from mlg_troubleshoot.results import Result
+from mlg_troubleshoot.results import JsonOutput
 from mlg_troubleshoot.store import Added, Broken, Record, RecordKind, Store, StoreError, packed
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files, load_index_table
@@ -58,7 +66,7 @@ _ANY_ROW = {**NOBODY, "clearance_convention": "RADIAL"}
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
-class Lives(Result):
+class Lives(JsonOutput):
     """Lives of gears, and what the wear of the whole fleet says of each.
 
     Parameters
@@ -73,20 +81,44 @@ class Lives(Result):
         How joints wear; None if nothing can be learnt.
     problems : tuple of Problem
         Wrong cells of the table that they were read from, if it was one.
+    within : float
+        For so many landings parts are asked for; none if 0. [landings]
     """
 
+    json_names = "schema_version gears work parts_within warnings"
     gear: Gear
     lives: tuple[GearLife, ...]
     lines: tuple[FleetLine, ...]
     model: WearModel | None
     problems: tuple[Problem, ...] = ()
+    within: float = 0.0
+
+    @property
+    def gears(self) -> list[FleetLine]:
+        """The gears that were inspected, the most urgent first."""
+        return most_urgent_first(self.lines)
+
+    @property
+    def work(self) -> str:
+        """Minutes and parts that their plans expect."""
+        return work_sentence(self.gears)
+
+    @property
+    def parts_within(self) -> str | None:
+        """The joints that probably reach their limit within the landings that were asked for."""
+        return parts_within(self.gears, self.within) if self.within else None
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the records of a gear disagree about."""
+        return [warning for line in self.lines for warning in line.warnings]
 
     @property
     def forecasts(self) -> Mapping[GearKey, Forecast]:
         """Landings that each gear has left. [landings]"""
         return {line.key: line.ahead for line in self.lines}
 
-    def chosen(self, *, changed: bool, failed: bool) -> Lives:
+    def chosen(self, *, changed: bool, failed: bool, within: float = 0.0) -> Lives:
         """The gears of which something changed, or that failed, as far as that is asked."""
         lines = tuple(
             line
@@ -95,14 +127,27 @@ class Lives(Result):
         )
         keys = {line.key for line in lines}
         lives = tuple(life for life in self.lives if life.key in keys)
-        return replace(self, lives=lives, lines=lines)
+        return replace(self, lives=lives, lines=lines, within=within)
 
     def write_csv(self, file: Path) -> None:
         """Write the fleet as CSV, one line per gear."""
-        from mlg_troubleshoot.reporting.life_json import fleet_as_json, fleet_table
+        rows = [
+            {k: v for name, value in gear.items() for k, v in _flat(name, value).items()}
+            for gear in plain(self.gears)
+        ]
+        header = [column for name in names_of(FleetLine) for column in _flat(name, None)]
+        write_csv(file, header, [[*row.values()] for row in rows])
 
-        gears = fleet_as_json(self.lines)["gears"]
-        write_csv(file, *fleet_table(gears))
+
+def _flat(name: str, value: Any) -> dict[str, Any]:
+    """What is written of a value: each quantile has a column of its own."""
+    if name.startswith("landings_to_"):
+        return {f"{name}_{end}": (value or {}).get(end) for end in ("p05", "p50", "p95")}
+    if name == "readings":
+        return {}
+    if name in ("failed", "changed"):
+        return {name: "; ".join(value or ())}
+    return {name: joint_list(value) if isinstance(value, list) else value}
 
 
 def show_fleet(

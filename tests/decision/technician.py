@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 import mlg_troubleshoot
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.reporting.json_form import check_as_json
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from mlg_troubleshoot.workflows.keep import keep, told_by
@@ -320,8 +319,7 @@ class Hangar:
                 )
         result = check_files([file], self.options, store=self.store)
         assert not result.problems, result.problems[0]
-        form = check_as_json(result.gear, result.judgements, result.problems, result.notes)
-        return list(form["inspections"])
+        return list(result.to_dict()["inspections"])
 
     def work(self, folder: Path) -> Hangar:
         """Do what NEXT says until every plan has ended."""

@@ -9,7 +9,7 @@ from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
-from mlg_troubleshoot.reporting.json_form import check_as_json
+from mlg_troubleshoot.workflows.check import CheckResult
 from tests.decision.conftest import Judge, every_joint
 
 INSPECTION = {
@@ -32,7 +32,9 @@ PROBLEM = Problem(
 def form(gear: Gear, table: IndexTable, judge: Judge) -> dict:
     rejected = assess([InvalidRow("R2", None, Side.RH, ("tail_no",), ("noticed",))], gear, table)
     judged = judge({3: 0.013, 5: 0.007}, readings_in=(0.041,))
-    return check_as_json(gear, [judged, *rejected], [PROBLEM], ["a note"])
+    return CheckResult(
+        gear=gear, judgements=(judged, *rejected), problems=(PROBLEM,), notes=("a note",)
+    ).to_dict()
 
 
 def test_the_top_level_has_every_key_of_the_contract(form: dict) -> None:
@@ -60,12 +62,12 @@ def test_every_joint_has_every_key_of_the_contract(form: dict, row: int) -> None
     assert all(joint.keys() >= JOINT for joint in joints)
 
 
-def test_a_repair_set_has_its_seven_keys(gear: Gear, judge: Judge) -> None:
+def test_a_repair_set_has_its_seven_keys(judge: Judge) -> None:
     keys = {
         *("joints", "predicted_displacement_in", "probability_within_margin", "access_minutes"),
         *("minutes", "kind", "second_repair_probability"),
     }
-    (row,) = check_as_json(gear, [judge(every_joint(0.004))], [], [])["inspections"]
+    row = judge(every_joint(0.004)).to_dict()
     assert row["repair_sets"][0].keys() == keys
 
 
@@ -89,8 +91,8 @@ def test_the_identity_of_an_invalid_row_is_given_as_far_as_it_could_be_read(form
     assert row["warnings"] == ["noticed"]
 
 
-def test_a_clearance_that_was_not_measured_is_null_and_one_measured_as_zero_is_zero(gear, judge):
-    joints = check_as_json(gear, [judge({3: 0.0})], [], [])["inspections"][0]["joints"]
+def test_a_clearance_that_was_not_measured_is_null_and_one_measured_as_zero_is_zero(judge):
+    joints = judge({3: 0.0}).to_dict()["joints"]
     assert (joints[2]["clearance_in"], joints[3]["clearance_in"]) == (0.0, None)
 
 
@@ -109,9 +111,8 @@ def test_what_was_not_asked_for_is_null(form: dict) -> None:
     assert [form["inspections"][1][key] for key in ("rigging", "posterior")] == [None] * 2
 
 
-def test_with_advice_the_posterior_names_groups_and_intervals(gear: Gear, judge: Judge) -> None:
+def test_with_advice_the_posterior_names_groups_and_intervals(judge: Judge) -> None:
     failed = {"readings_in": (0.041,), "outcome": Outcome.FAILED}
-    judged = judge({3: 0.01, 5: 0.007}, advice=True, **failed)
-    (row,) = check_as_json(gear, [judged], [], [])["inspections"]
+    row = judge({3: 0.01, 5: 0.007}, advice=True, **failed).to_dict()
     assert row["posterior"]["groups"][0]["joints"] == [3, 5]
     assert [interval["joint"] for interval in row["posterior"]["intervals"]] == list(range(1, 11))

@@ -10,7 +10,6 @@ from mlg_troubleshoot.decision.assessment import Action, Basis, End, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
 from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.json_form import check_as_json
 from tests.decision.conftest import Judge, every_joint, inspected
 
 
@@ -35,8 +34,8 @@ def test_without_a_reading_nothing_is_explained(judge: Judge) -> None:
     assert (found.explained_at_most_in, found.unexplained_in) == (None, None)
 
 
-def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(gear, judge):
-    form = check_as_json(gear, [judge({3: 0.013})], [], [])["inspections"][0]
+def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(judge):
+    form = judge({3: 0.013}).to_dict()
     assert form["next_action"] == form["plan"][0]
     assert form["end"] in set(End)
 

@@ -106,9 +106,9 @@ def test_the_rank_range_holds_the_rank_of_another_reading_as_often_as_it_should(
 
 def test_a_joint_that_acts_like_another_names_it(judge: Judge) -> None:
     alike = {
-        finding.joint: finding.alike
+        finding.joint: finding.acts_like
         for finding in judge(every_joint(0.001)).joints
-        if finding.alike
+        if finding.acts_like
     }
     assert alike == {3: (5,), 5: (3,), 6: (7,), 7: (6,), 9: (10,), 10: (9,)}
 

@@ -22,7 +22,6 @@ from mlg_troubleshoot.decision.prediction import Cases, predict
 from mlg_troubleshoot.decision.verdict_rule import verdict, zone
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
-from mlg_troubleshoot.reporting.json_form import check_as_json
 from tests.decision.conftest import Judge, every_joint, inspected
 
 FAILURE = {3: 0.013, 5: 0.007}
@@ -192,8 +191,8 @@ def test_where_only_some_linkages_of_the_ensemble_close_the_uncertainty_is_absen
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.001, 0.03, 0.05])
-def test_no_clearance_gives_json_that_is_not_json(gear, judge, clearance):
-    json.dumps(check_as_json(gear, [judge(every_joint(clearance))], [], []), allow_nan=False)
+def test_no_clearance_gives_json_that_is_not_json(judge, clearance):
+    json.dumps(judge(every_joint(clearance)).to_dict(), allow_nan=False)
 
 
 def test_the_probability_is_the_normal_one_of_prediction_and_uncertainty(judge: Judge) -> None:

@@ -17,7 +17,6 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Judgement
 from mlg_troubleshoot.parallel import map_blocks
-from mlg_troubleshoot.reporting.json_form import inspection_lines
 from mlg_troubleshoot.workers import WorkerProcesses
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.check import BlockOutput, CheckOptions, check_files
@@ -72,18 +71,14 @@ def told() -> Told:
 
 def test_what_is_found_does_not_depend_on_the_number_of_workers(told: Told) -> None:
     alone = check_files([BATCH], CheckOptions())
-    assert inspection_lines(alone.gear, told.judgements) == inspection_lines(
-        alone.gear, alone.judgements
-    )
+    assert task.json_lines(told.judgements) == task.json_lines(alone.judgements)
 
 
 def test_any_executor_finds_the_same(told: Told, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(task, "AT_ONCE", 20)
     with ThreadPoolExecutor(2) as executor:
         found = check_files([BATCH], CheckOptions(executor=executor))
-    assert inspection_lines(found.gear, found.judgements) == inspection_lines(
-        found.gear, told.judgements
-    )
+    assert task.json_lines(found.judgements) == task.json_lines(told.judgements)
 
 
 def test_progress_counts_rows_whoever_judges_them(told: Told) -> None:
@@ -190,6 +185,4 @@ def test_the_page_on_clusters_finds_the_same_on_two_dask_workers(cluster, tmp_pa
     found = names["result"]
     alone = check_files([table.name])
     assert len(found.judgements) == 552
-    assert inspection_lines(found.gear, found.judgements) == inspection_lines(
-        alone.gear, alone.judgements
-    )
+    assert task.json_lines(found.judgements) == task.json_lines(alone.judgements)

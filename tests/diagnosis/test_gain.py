@@ -11,7 +11,6 @@ import pytest
 from mlg_troubleshoot.diagnosis import Diagnosis, diagnose
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.misfit import columns as fitting
-from mlg_troubleshoot.reporting.json_form import diagnosis_as_json
 
 from .conftest import Array, DiagnosisTable, fleet
 
@@ -97,7 +96,7 @@ def test_wrong_verdicts_of_a_model_that_stays_are_counted_by_their_sense(nothing
     # Every row is measured beyond its margin and predicted within it.
     margin, none = np.full(len(nothing.predicted_in), 1e-9), np.zeros_like(nothing.predicted_in)
     kept = replace(nothing, used=replace(nothing.used, margin_in=margin), predicted_in=none)
-    told = diagnosis_as_json(kept, None)["gain"]
+    told = kept.to_dict()["gain"]
     assert told["false_within_before"] == told["false_within_after"] == len(margin)
     assert told["false_outside_before"] == told["false_outside_after"] == 0
 

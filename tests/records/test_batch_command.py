@@ -14,8 +14,13 @@ import zipfile
 import openpyxl
 import pytest
 
-from mlg_troubleshoot.reporting.json_form import CheckText, check_as_json, inspection_lines
-from mlg_troubleshoot.workflows.check import CheckOptions, check_files
+from mlg_troubleshoot.json_form import plain
+from mlg_troubleshoot.workflows.check import (
+    CheckOptions,
+    check_files,
+    json_around,
+    json_lines,
+)
 from tests.cli.conftest import FLEET, mlg
 
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs a terminal of POSIX")
@@ -234,12 +239,10 @@ def test_quiet_shows_no_progress(tmp_path):
 
 def test_the_json_of_a_batch_written_in_pieces_is_the_whole_form(gear, mixed):
     result = check_files([mixed], CheckOptions())
-    text = CheckText(gear, result.problems, result.notes)
-    blocks = [inspection_lines(gear, result.judgements[at : at + 2]) for at in (0, 2)]
+    begin, end = json_around(result)
+    blocks = [json_lines(result.judgements[at : at + 2]) for at in (0, 2)]
     assert len(result.judgements) == 4
-    assert json.loads(text.begin + "".join(map(text.joined, blocks)) + text.end) == json.loads(
-        json.dumps(check_as_json(gear, result.judgements, result.problems, result.notes))
-    )
+    assert json.loads(begin + ",\n".join(blocks) + end) == plain(result)
 
 
 def test_reports_of_a_table_that_is_too_long_are_refused_before_it_is_judged(tmp_path, monkeypatch):

@@ -105,7 +105,7 @@ def rejected() -> Rejected:
         ("Column 'foo' is not known.",),
         RowSource("fleet.csv", None, 7),
     )
-    return Rejected(row, correct(row), ())
+    return Rejected(row, (), correct(row), ())
 
 
 def write_inspection_report(

@@ -20,15 +20,16 @@ from mlg_troubleshoot.life.folding import judge_lives, life_of, lives
 from mlg_troubleshoot.life.forecast import (
     Asked,
     FleetLine,
+    LifeAhead,
     fit_fleet,
     forecast,
     suggestion,
     wear_paths,
 )
-from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
 from mlg_troubleshoot.store import Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import load_index_table
+from mlg_troubleshoot.workflows.history import Lives
 from tests.cli.conftest import Run, mlg, row
 
 from .places import table
@@ -448,8 +449,10 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
     model = fit_fleet(found[:5], gear)
     ahead = forecast(found, model, gear)
     lines = [FleetLine.of(life, Asked(gear), ahead[life.key]) for life in found]
-    fleet = fleet_as_json(lines)["gears"]
-    pages = [life_as_json(life, forecast([life], model, gear)[life.key], gear) for life in found]
+    fleet = Lives(gear, (), tuple(lines), model).to_dict()["gears"]
+    pages = [
+        LifeAhead(life, forecast([life], model, gear)[life.key], gear).to_dict() for life in found
+    ]
     assert len(fleet) == len(pages) == 200
     assert max(value for told in (*fleet, *pages) for value in shown(told)) == 0.0
     assert {told["next_inspection_landings"] for told in (*fleet, *pages)} == {0.0}

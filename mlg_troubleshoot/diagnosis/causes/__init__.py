@@ -40,6 +40,13 @@ from mlg_troubleshoot.results import Result
 class Catalogue(Result, tuple[Cause, ...]):
     """Causes, with a table of what each one says."""
 
+    json_names = "causes"
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """All of them."""
+        return tuple(self)
+
     def __repr__(self) -> str:
         return f"Catalogue({', '.join(cause.name for cause in self)})"
 

@@ -109,6 +109,11 @@ class Candidate:
         return frozenset((*self.cause.needs, *own)) or frozenset(("predicted",))
 
     @property
+    def sentence(self) -> str:
+        """What it is."""
+        return self.cause.words(self.target)
+
+    @property
     def separates(self) -> str:
         """The one reading that would separate it from its rivals."""
         if self.stands_in and (self.setting or not self.cause.needs):
@@ -129,6 +134,7 @@ class Cause(ABC):
     proportional to the parameter to first order; the engine fits the parameter.
     """
 
+    json_names = "sentence=in_general name needs parameter trial plausible sign inspect separates"
     name: ClassVar[str]
     """Name in the contract."""
     needs: ClassVar[tuple[str, ...]] = ()
@@ -159,6 +165,11 @@ class Cause(ABC):
     """What to inspect if it is named."""
     separates: ClassVar[str]
     """The one reading that would separate it from its rivals."""
+
+    @property
+    def in_general(self) -> str:
+        """The sentence without a target."""
+        return self.words("…")
 
     def lacks(self, columns: Collection[str]) -> str | None:
         """Return the first column that it needs and that is not among some; None if it has all."""
