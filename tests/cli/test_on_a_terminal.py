@@ -111,7 +111,10 @@ def test_a_tail_from_a_flag_that_is_none_is_refused_before_anything_is_asked(sta
     assert finish(child) == 2
 
 
-@pytest.mark.parametrize("plain", [{"NO_COLOR": "1"}, {"TERM": "dumb"}, {"MLG_PLAIN": "1"}])
+@pytest.mark.parametrize(
+    "plain",
+    [{"NO_COLOR": "1"}, {"TERM": "dumb"}, pytest.param({"MLG_PLAIN": "1"}, marks=pytest.mark.slow)],
+)
 def test_a_plain_terminal_has_the_same_words_without_colour_and_boxes(start, plain):
     child = start("check", FLEET, **plain)
     child.expect_exact("Model:")
@@ -121,10 +124,10 @@ def test_a_plain_terminal_has_the_same_words_without_colour_and_boxes(start, pla
 
 
 def test_a_large_batch_shows_its_progress(start: Start, tmp_path: Path) -> None:
-    write_csv(tmp_path / "batch.csv", 1000, blank=0.05)
+    write_csv(tmp_path / "batch.csv", 400, blank=0.05)
     child = start("check", tmp_path / "batch.csv")
-    child.expect(r"Judging .*/1000")
-    child.expect_exact("1000 inspections:")
+    child.expect(r"Judging .*/400")
+    child.expect_exact("400 inspections:")
     assert finish(child) == 1
 
 

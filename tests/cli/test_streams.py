@@ -66,8 +66,11 @@ def closed_after_one_line(arguments: Sequence[object]) -> tuple[int, str]:
 @needs_posix
 @pytest.mark.parametrize(
     ("arguments", "code"),
-    [(("check", FLEET), 1), (("check", FAILURE, "--json"), 1), (("gear",), 0)],
-    ids=["text", "json", "gear"],
+    [
+        pytest.param(("check", FLEET), 1, id="text"),
+        pytest.param(("check", FAILURE, "--json"), 1, id="json", marks=pytest.mark.slow),
+        pytest.param(("gear",), 0, id="gear", marks=pytest.mark.slow),
+    ],
 )
 def test_a_closed_pipe_is_not_an_error_and_keeps_the_exit_code(arguments, code):
     assert closed_after_one_line(arguments) == (code, "")
@@ -99,13 +102,17 @@ def in_a_shell(line: str, folder: Path) -> tuple[int, str, str]:
     ("line", "code", "words"),
     [
         ("mlg check FILE 2>&-", 1, ""),
-        ("mlg check nope.csv 2>&-", 3, ""),
+        pytest.param("mlg check nope.csv 2>&-", 3, "", marks=pytest.mark.slow),
         ("mlg check - <&-", 3, "the file is empty"),
-        ("mlg check <&-", 2, "nothing to check"),
+        pytest.param("mlg check <&-", 2, "nothing to check", marks=pytest.mark.slow),
         ("mlg check FILE >&-", 5, "standard output is closed"),
-        ("mlg template new.xlsx >&-", 5, "standard output is closed"),
+        pytest.param(
+            "mlg template new.xlsx >&-", 5, "standard output is closed", marks=pytest.mark.slow
+        ),
         ("mlg check FILE <&- >&- 2>&-", 5, ""),
-        ("mlg check FILE --keep --report r --format html <&- 2>&-", 1, ""),
+        pytest.param(
+            "mlg check FILE --keep --report r --format html <&- 2>&-", 1, "", marks=pytest.mark.slow
+        ),
         ("ulimit -n 5; mlg check FILE --report r", 5, "ulimit -n 256"),
         pytest.param(
             "ulimit -n 8; mlg check FILE --report r", 5, "ulimit -n 256", marks=pytest.mark.slow
@@ -131,10 +138,15 @@ def test_no_file_takes_the_place_of_a_closed_stream(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "code", "words"),
     [
-        ("mlg check FILE 2>/dev/full", 1, ""),
-        ("mlg check nope.csv 2>/dev/full", 5, ""),
+        pytest.param("mlg check FILE 2>/dev/full", 1, "", marks=pytest.mark.slow),
+        pytest.param("mlg check nope.csv 2>/dev/full", 5, "", marks=pytest.mark.slow),
         ("mlg check FILE >/dev/full", 5, "cannot be written: No space left on device"),
-        ("mlg check FILE --json >/dev/full", 5, "cannot be written: No space left on device"),
+        pytest.param(
+            "mlg check FILE --json >/dev/full",
+            5,
+            "cannot be written: No space left on device",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_full_stream_ends_as_documented(line: str, code: int, words: str, tmp_path: Path) -> None:

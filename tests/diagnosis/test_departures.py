@@ -225,13 +225,13 @@ DIRECTIONS, OTHER_LINKAGE = ("load_directions", None), ("geometry", None)
     [
         ("loads", {DIRECTIONS}),
         ("loads and a gauge", {DIRECTIONS, ("gauge_bias", "gauge G-2")}),
-        ("one pin turned", {DIRECTIONS}),
+        pytest.param("one pin turned", {DIRECTIONS}, marks=pytest.mark.slow),
         ("convention", {("convention_slip", "technician T-2")}),
         ("re-rigged by half", {("rigging_offset", "tail N103")}),
         ("oval on another linkage", {("oval_wear", "joint 4"), OTHER_LINKAGE}),
         ("a linkage that nobody calibrated", {OTHER_LINKAGE}),
-        ("all readings 1.7 times as large", {OTHER_LINKAGE}),
-        ("unread, worn with the read ones", set()),
+        pytest.param("all readings 1.7 times as large", {OTHER_LINKAGE}, marks=pytest.mark.slow),
+        pytest.param("unread, worn with the read ones", set(), marks=pytest.mark.slow),
     ],
 )
 def test_what_acts_is_named_and_nothing_else(name, causes):
