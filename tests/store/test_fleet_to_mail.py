@@ -47,14 +47,6 @@ def test_an_empty_store_says_how_to_keep_inspections(tmp_path: Path) -> None:
     assert " ".join(found.out.split()).endswith("Keep inspections with: mlg check FILE --keep")
 
 
-def test_history_and_fleet_agree_on_the_next_inspection(store: Path) -> None:
-    for gear in gears(store):
-        shown = mlg("history", gear["tail_no"], gear["side"], "--store", store, "--json", "-q")
-        life = json.loads(shown.out)
-        for name in ("next_inspection_landings", "due_date", "landings_to_limit"):
-            assert life[name] == gear[name]
-
-
 def test_the_csv_holds_what_the_json_holds(store: Path, tmp_path: Path) -> None:
     out = tmp_path / "due.csv"
     found = gears(store, "--csv", str(out))

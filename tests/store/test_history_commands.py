@@ -113,20 +113,6 @@ def test_keeping_does_not_change_what_a_check_says(tmp_path: Path, place: Path) 
     assert (plain.code, plain.out) == (kept.code, kept.out)
 
 
-def test_keeping_a_file_twice_keeps_it_once(tmp_path: Path, place: Path) -> None:
-    assert "2 inspections kept" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
-    assert ", 2 known already" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
-
-
-def test_the_same_identity_with_other_content_is_refused_with_what_to_do(tmp_path, place):
-    keep(tmp_path, visit(1, 0.001))
-    run = keep(tmp_path, visit(2, 0.002), visit(1, 0.005))
-    assert run.code == 5
-    assert "N123-LH-1" in run.err
-    assert "--amend" in run.err
-    assert len(Store(place).all()) == 1
-
-
 def test_a_tail_in_another_spelling_is_not_merged_in_silence(tmp_path: Path, place: Path) -> None:
     keep(tmp_path, visit(1, 0.001))
     other = visit(2, 0.002, tail="n-123")
@@ -206,13 +192,6 @@ def test_what_cannot_be_amended_is_refused(tmp_path, place, values, said):
     run = mlg("history", "amend", "N123-LH-1", *values)
     assert (run.code, len(Store(place).all())) == (2, 1)
     assert said in " ".join(run.err.split())
-
-
-def test_a_corrected_inspection_kept_again_is_known(tmp_path: Path, place: Path) -> None:
-    keep(tmp_path, visit(1, 0.02))
-    mlg("history", "amend", "N123-LH-1", "3=0.002in")
-    assert keep(tmp_path, visit(1, 0.002)).code == 0
-    assert joint_3(life())["readings"] == [[400.0, 0.002]]
 
 
 def test_a_void_inspection_does_not_count(tmp_path: Path, place: Path) -> None:

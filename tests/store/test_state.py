@@ -121,11 +121,6 @@ def test_after_a_repair_the_gear_that_failed_has_to_be_tried(at: At) -> None:
     assert "R0 states that this gear failed on 2026-01-01" in found.warnings[-1]
 
 
-def test_a_failure_without_a_repair_stands_as_one(at: At) -> None:
-    found = at(of(JAN, **FAILED), of(MAR, {3: SOUND})).inspection
-    assert found.standing_outcome is Outcome.FAILED
-
-
 def test_a_plunger_reading_stands_until_it_is_read_again(at: At) -> None:
     found = at(of(JAN, readings_in=(FAR,)), of(FEB, {3: SOUND})).inspection
     assert found.standing_readings_in == (FAR,)
