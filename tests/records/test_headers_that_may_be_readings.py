@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 
 import openpyxl
 import pytest
@@ -46,6 +47,23 @@ MARGINS = (
 )
 
 
+def crossed(header: Sequence[str], **by_name: Sequence[str]) -> pytest.MarkDecorator:
+    """Each header with a value and each value with a header every day, all pairs in the slow
+    part.
+    """
+    [(name, values)] = by_name.items()
+    pairs = [
+        pytest.param(
+            each,
+            value,
+            marks=[pytest.mark.slow] * (at != k % len(values) and k != at % len(header)),
+        )
+        for k, each in enumerate(header)
+        for at, value in enumerate(values)
+    ]
+    return pytest.mark.parametrize(("header", name), pairs)
+
+
 def judged(headers: list[str], cells: list[str], **declared: object) -> Judgement:
     cells = [f'"{cell}"' for cell in cells]
     text = ",".join([*ALL, *headers]) + "\n" + ",".join([*GOOD, *cells]) + "\n"
@@ -59,29 +77,29 @@ def read(headers: list[str], rows: list[list[str]]) -> ReadResult:
     return read_many([Named("\n".join(lines).encode(), "t.csv")], ReadOptions.of(GEAR))
 
 
-@pytest.mark.parametrize("answer", ["yes", "TRUE", "1", "y"])
-@pytest.mark.parametrize("header", [*NEGATED, *AFFIRMED])
+@crossed(header=[*NEGATED, *AFFIRMED], answer=["yes", "TRUE", "1", "y"])
 def test_a_question_is_answered_as_it_was_asked(header: str, answer: str) -> None:
     (row,) = read([*ALL, header], [[*GOOD, answer]]).rows
     assert isinstance(row, Inspection)
     assert row.outcome is (Outcome.FAILED if header in NEGATED else Outcome.RETRACTED)
 
 
-@pytest.mark.parametrize("header", ["Retracts OK?", "no retraction", "hyd failure", "2 failed"])
-@pytest.mark.parametrize("answer", ["yes", "N", "1", "TRUE"])
+@crossed(
+    header=["Retracts OK?", "no retraction", "hyd failure", "2 failed"],
+    answer=["yes", "N", "1", "TRUE"],
+)
 def test_an_answer_under_a_question_that_is_not_understood_is_asked_about(header, answer):
     assert judged([header], [answer]).verdict is Verdict.INCOMPLETE
 
 
-@pytest.mark.parametrize(
-    "word",
-    [
+@crossed(
+    header=CARRIED,
+    word=[
         *("FAILED", "fail", "failed!", "did not retract", "failed last week, repaired", "Hung."),
         *("LH gear hung at mid travel", "wouldn't retract", "leg was stuck, freed by hand"),
         *("gear cannot lock up", "Refused to retract when cold", "MLG jammed"),
     ],
 )
-@pytest.mark.parametrize("header", CARRIED)
 def test_a_failure_is_seen_whatever_the_header_is(header: str, word: str) -> None:
     row = judged([header], [word]).row
     assert isinstance(row, Inspection)
@@ -113,8 +131,7 @@ ORDINARY = (
 UNCLEAR = ("F", "x", "0", "3", "intermittent", "hung", "partial", "FAULT", "slow", "OK?")
 
 
-@pytest.mark.parametrize("word", UNCLEAR)
-@pytest.mark.parametrize("header", ["Result", "Status", "Gear swing", "Defect", "P/F", "Result 2"])
+@crossed(header=["Result", "Status", "Gear swing", "Defect", "P/F", "Result 2"], word=UNCLEAR)
 def test_what_is_not_plainly_good_in_a_column_of_results_is_asked_about(header, word):
     asked = judged([header], [word])
     assert asked.verdict is Verdict.INCOMPLETE
@@ -142,26 +159,25 @@ def test_a_bare_number_that_could_decide_is_asked_about_under_any_header(header,
     assert [each.verdict for each in result.judgements] == [Verdict.INCOMPLETE]
 
 
-@pytest.mark.parametrize("value", ["0.06", "0.06 in", "1.5 mm"])
-@pytest.mark.parametrize("header", PLUNGER)
+@crossed(header=PLUNGER, value=["0.06", "0.06 in", "1.5 mm"])
 def test_a_number_that_may_be_of_the_plunger_is_asked_about(header: str, value: str) -> None:
     assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
 
 
-@pytest.mark.parametrize("value", ["0.0121", "0.0121 in", "12.1 thou", "0.31"])
-@pytest.mark.parametrize("header", JOINTS)
+@crossed(header=JOINTS, value=["0.0121", "0.0121 in", "12.1 thou", "0.31"])
 def test_a_number_that_may_be_a_clearance_is_asked_about(header: str, value: str) -> None:
     assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
 
 
-@pytest.mark.parametrize("value", ["0.005", "5 thou", "0.12 mm"])
-@pytest.mark.parametrize("header", MARGINS)
+@crossed(header=MARGINS, value=["0.005", "5 thou", "0.12 mm"])
 def test_a_number_that_may_be_the_margin_of_the_gear_is_asked_about(header, value):
     assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
 
 
-@pytest.mark.parametrize("value", ["0.06 in", "60 thou", '.06"', "1.5 mm"])
-@pytest.mark.parametrize("header", ["プランジャ", "stantuffo", "check", "x", "P"])
+@crossed(
+    header=["プランジャ", "stantuffo", "check", "x", "P"],
+    value=["0.06 in", "60 thou", '.06"', "1.5 mm"],
+)
 def test_a_length_with_its_unit_is_asked_about_under_any_header(header: str, value: str) -> None:
     assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
 
@@ -211,9 +227,9 @@ def test_other_numbers_are_carried(header: str, value: str) -> None:
     assert judged([header], [value]).verdict is Verdict.WITHIN_MARGIN
 
 
-@pytest.mark.parametrize("value", ["nein", "no", "FALSE", "ja", "non", "OK?", "\u2717"])
-@pytest.mark.parametrize(
-    "header", ["Eingefahren?", "Ausfall", "Rentré ?", "Pass", "status", "Locked up", "OK", ""]
+@crossed(
+    header=["Eingefahren?", "Ausfall", "Rentré ?", "Pass", "status", "Locked up", "OK", ""],
+    value=["nein", "no", "FALSE", "ja", "non", "OK?", "\u2717"],
 )
 def test_an_answer_to_an_unknown_question_is_asked_about(header: str, value: str) -> None:
     asked = judged([header], [value])
