@@ -68,7 +68,8 @@ def _explain(error: Exception) -> ExitCode:
             return ExitCode.NO_CONCLUSION
         return ExitCode.USAGE
     if isinstance(error, _UsageMessage):
-        say(f"Error: {error.format_message()}\nWhat to do: See the options with --help.")
+        command = error.ctx.command_path if error.ctx else "mlg"
+        say(f"Error: {error.format_message()}\nWhat to do: See {command} --help.")
         return ExitCode.USAGE
     if isinstance(error, OSError) and error.errno is not None:
         say(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}")

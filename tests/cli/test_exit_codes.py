@@ -52,10 +52,17 @@ def test_no_row_that_could_be_judged_exits_3(table: Table) -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [("check", "--wrong"), ("chek",), ("check", FAILURE, "--format", "docx")]
+    ("line", "help_of"),
+    [
+        ("check --wrong", "mlg check"),
+        ("chek", "mlg"),
+        (f"check {FAILURE} --format docx", "mlg check"),
+        ("history void X", "mlg history void"),
+    ],
 )
-def test_usage_exits_2(arguments: tuple[object, ...]) -> None:
-    assert mlg(*arguments).code == 2
+def test_usage_exits_2_and_names_the_help_of_its_command(line, help_of):
+    found = mlg(*line.split())
+    assert (found.code, f"See {help_of} --help." in found.err) == (2, True)
 
 
 @pytest.fixture
