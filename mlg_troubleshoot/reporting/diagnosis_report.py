@@ -19,7 +19,6 @@ from mlg_troubleshoot.reporting.diagnosis_figures import (
     Residuals,
     cause_words,
     column_words,
-    data_figures,
     fitted_numbers,
     headline,
     kind_words,
@@ -97,7 +96,6 @@ def _context(
             for (cause, target), chance in d.probabilities.items()
             if chance >= _LEAST_LIKELY
         ],
-        "of_data": data_figures(residuals),
         "plots": _plots(residuals),
         "scatter": drawn.measured_against_predicted(residuals),
         "strips": drawn.tail_strips(residuals),

@@ -169,12 +169,13 @@ def _fields_of(kind: type) -> dict[str, Any]:
 
 def _type_of(kind: type, name: str) -> Any:
     """What stands in an attribute of a class, be it a field or a property."""
-    from mlg_troubleshoot import diagnosis
+    from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
 
     for each in kind.__mro__:
         if name in (own := get_annotations(each)):
             # What a workflow only names is imported when it is needed.
-            known = {**vars(diagnosis), **vars(sys.modules[each.__module__])}
+            named = {"Diagnosis": Diagnosis, "ModelExtension": ModelExtension}
+            known = named | vars(sys.modules[each.__module__])
             said = type("", (), {"__annotations__": {name: own[name]}})
             return get_type_hints(said, known, include_extras=True)[name]
     member = getattr(kind, name)

@@ -17,14 +17,12 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.diagnosis_figures import (
     Residuals,
     cause_words,
-    data_figures,
     headline,
     measured_against_predicted,
     seven_lines,
     tail_strips,
 )
 from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
-from mlg_troubleshoot.reporting.figures import INK
 from mlg_troubleshoot.reporting.html import ReportProvenance
 from mlg_troubleshoot.reporting.publish import publish
 from mlg_troubleshoot.units import LengthUnit
@@ -374,30 +372,6 @@ def test_each_explanation_has_a_bar_as_long_as_it_is_likely(named: Made) -> None
     d = named.diagnosis
     assert bar_of(named, "technician bias") == pytest.approx(d.causes[0].probability, abs=0.01)
     assert bar_of(named, "nothing wrong") == pytest.approx(d.p_nothing, abs=0.01)
-
-
-def drawn_of(gear: Gear, table: DiagnosisTable) -> dict[str, str]:
-    """The figures of the data, by their title."""
-    found = diagnose(gear.model, table, gear.discrepancies)
-    figures = data_figures(Residuals(found, gear.joint_numbers, LengthUnit.INCH))
-    return {svg.partition("<title>")[2].partition("<")[0]: str(svg) for svg, _words in figures}
-
-
-def test_a_technician_s_step_of_rounding_is_a_comb_of_as_many_lines(gear: Gear) -> None:
-    table = fleet(gear.model, rows=60)
-    rounded = np.round(table.clearance_in, 3)
-    svg = drawn_of(gear, replace(table, clearance_in=rounded))["Clearances as they were written"]
-    people = table.factors["technician_id"]
-    values = sum(len(np.unique(rounded[people == person])) for person in np.unique(people))
-    assert svg.count(f'stroke="{INK}"') == values
-
-
-def test_blanks_are_drawn_only_where_there_are_some(gear: Gear) -> None:
-    table = fleet(gear.model, rows=60)
-    clearance = table.clearance_in.copy()
-    clearance[::3, 4] = np.nan
-    assert "Blank clearances" not in drawn_of(gear, table)
-    assert "Blank clearances" in drawn_of(gear, replace(table, clearance_in=clearance))
 
 
 def test_the_points_of_an_aircraft_stand_level_with_their_mean(gear: Gear) -> None:
