@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import groupby
-from typing import Any, Literal, TypedDict, Unpack
+from typing import Any, Literal
 
 from markupsafe import Markup, escape
 
@@ -126,21 +126,15 @@ Marker = Literal["circle", "square", "diamond", "triangle", "ring"]
 Place = tuple[float, float]
 
 
-class Stroke(TypedDict, total=False):
+def _stroke(
+    colour: str | None = INK, width: float = 1.0, dash: str | None = None, cap: str | None = None
+) -> dict[str, Any]:
     """How a line is drawn: black, 1 unit wide and whole unless it says otherwise."""
-
-    colour: str | None
-    width: float
-    dash: str | None
-    cap: str | None
-
-
-def _stroke(style: Stroke) -> dict[str, Any]:
     return {
-        "stroke": style.get("colour", INK),
-        "stroke_width": style.get("width", 1.0),
-        "stroke_dasharray": style.get("dash"),
-        "stroke_linecap": style.get("cap"),
+        "stroke": colour,
+        "stroke_width": width,
+        "stroke_dasharray": dash,
+        "stroke_linecap": cap,
     }
 
 
@@ -176,8 +170,8 @@ class Canvas:
         body = f">{escape(visible(content))!s}</{element}>" if content else "/>"
         self._parts.append(f"<{element}{''.join(written)}{body}")
 
-    def line(self, x1: float, y1: float, x2: float, y2: float, **stroke: Unpack[Stroke]) -> None:
-        self.add("line", x1=x1, y1=y1, x2=x2, y2=y2, **_stroke(stroke))
+    def line(self, x1: float, y1: float, x2: float, y2: float, **stroke: Any) -> None:
+        self.add("line", x1=x1, y1=y1, x2=x2, y2=y2, **_stroke(**stroke))
 
     def rectangle(
         self,
@@ -187,9 +181,9 @@ class Canvas:
         down: float,
         *,
         fill: str = "none",
-        **edge: Unpack[Stroke],
+        **edge: Any,
     ) -> None:
-        outline = _stroke(edge) if edge else {}
+        outline = _stroke(**edge) if edge else {}
         width = max(across, 0.0)
         height = max(down, 0.0)
         self.add(
@@ -208,10 +202,10 @@ class Canvas:
         *,
         fill: str = "none",
         closed: bool = False,
-        **stroke: Unpack[Stroke],
+        **stroke: Any,
     ) -> None:
         through = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-        drawn = _stroke({"width": 1.5, **stroke})
+        drawn = _stroke(**{"width": 1.5, **stroke})
         self.add(
             "polygon" if closed else "polyline",
             points=through,

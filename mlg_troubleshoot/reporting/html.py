@@ -113,7 +113,6 @@ class ReportProvenance:
     created: datetime
     geometry_sha256: str
     input_sha256: Mapping[str, str] = field(default_factory=dict)
-    seed: int | None = None
     extension: str | None = None
     witness: Witness | None = None
 
@@ -129,12 +128,11 @@ def provenance_of(
     gear: Gear,
     input_sha256: Mapping[str, str],
     *,
-    seed: int | None = None,
     extension: str | None = None,
     witness: Witness | None = None,
 ) -> ReportProvenance:
     made = program_version(), moment_of_report(), gear.geometry_sha256
-    return ReportProvenance(*made, dict(input_sha256), seed, extension, witness)
+    return ReportProvenance(*made, dict(input_sha256), extension, witness)
 
 
 @cache

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal, Unpack
+from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -37,7 +37,6 @@ from mlg_troubleshoot.reporting.figures import (
     Canvas,
     Lengths,
     Marker,
-    Stroke,
     text_width,
 )
 
@@ -284,11 +283,11 @@ def _unit(run: complex) -> complex:
     return run / (abs(run) or 1.0)
 
 
-def _line(canvas: Canvas, start: complex, end: complex, **stroke: Unpack[Stroke]) -> None:
+def _line(canvas: Canvas, start: complex, end: complex, **stroke: Any) -> None:
     canvas.line(start.real, start.imag, end.real, end.imag, **stroke)
 
 
-def _polygon(canvas: Canvas, *corners: complex, fill: str, **stroke: Unpack[Stroke]) -> None:
+def _polygon(canvas: Canvas, *corners: complex, fill: str, **stroke: Any) -> None:
     canvas.polyline([(p.real, p.imag) for p in corners], fill=fill, closed=True, **stroke)
 
 

@@ -90,7 +90,6 @@ def provenance(gear: Gear) -> ReportProvenance:
         created=datetime(2024, 5, 17, 9, 30, tzinfo=UTC),
         geometry_sha256=gear.geometry_sha256,
         input_sha256={"failure.csv": "9f2c" + "ab" * 30},
-        seed=0,
     )
 
 
