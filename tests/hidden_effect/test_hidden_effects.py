@@ -120,8 +120,8 @@ def test_the_extension_gains_on_rows_that_the_fit_never_saw(cause: str) -> None:
     assert gain.rms_after_in < 0.85 * gain.rms_before_in
 
 
-# One of each kind every day: of the linkage, of one joint, of one tail, of reading.
-CHECKED_DAILY = ("elastic_compliance", "direction_not_worst_case", "rigging_offset", "gauge_bias")
+# One of each kind every day: of the linkage and of reading.
+CHECKED_DAILY = ("elastic_compliance", "gauge_bias")
 
 
 @pytest.mark.parametrize(
@@ -188,12 +188,14 @@ def test_of_three_hidden_causes_each_is_named_or_in_the_set() -> None:
     assert found.named <= found.hidden <= found.named | open_
 
 
+@pytest.mark.slow
 def test_two_named_causes_gain_on_rows_that_the_fit_never_saw() -> None:
     gain = case("double").diagnosis.gain
     assert gain is not None
     assert gain.rms_after_in < 0.7 * gain.rms_before_in
 
 
+@pytest.mark.slow
 def test_how_the_effect_of_a_named_cause_bends_is_not_named_as_directions_or_another_linkage():
     fleet, gear = draw_fleet(9_100_836, "double"), load_gear()
     ensemble = gear.ensemble_models[1:]
@@ -202,6 +204,7 @@ def test_how_the_effect_of_a_named_cause_bends_is_not_named_as_directions_or_ano
     assert named <= set(fleet.label.causes) <= named | {c.candidate.key for c in found.beside}
 
 
+@pytest.mark.slow
 def test_two_causes_of_single_joints_are_not_taken_for_another_linkage_or_directions() -> None:
     seed = 3_460_014
     effects = (

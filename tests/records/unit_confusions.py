@@ -11,16 +11,12 @@ import argparse
 import csv
 import json
 import re
-import subprocess
-import sys
 import tempfile
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import permutations
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -29,7 +25,6 @@ from numpy.typing import NDArray
 from tests.cli.conftest import mlg
 
 Array = NDArray[np.float64]
-Command = Callable[[Sequence[str]], str]
 
 JOINTS = 10
 NEW_PART_IN = 0.0005
@@ -219,24 +214,12 @@ def plausible(sheet: Sheet) -> bool:
     return bool(np.all((low <= stated) & (stated <= high)))
 
 
-def as_command(arguments: Sequence[str]) -> str:
-    """Start `mlg` as a command of its own; what it writes to stdout."""
-    command = [sys.executable, "-m", "mlg_troubleshoot", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return judged_at_all(done.returncode, done.stdout, done.stderr)
-
-
-def in_process(arguments: Sequence[str]) -> str:
-    """Run `mlg` in this process; what it writes to stdout."""
+def checked(arguments: Sequence[str]) -> str:
+    """Run `mlg` in this process; what it writes to stdout if it read its table."""
     done = mlg(*arguments)
-    return judged_at_all(done.code, done.out, done.err)
-
-
-def judged_at_all(code: int, out: str, err: str) -> str:
-    """The output of a run that read its table."""
-    if code not in {0, 1, 3}:
-        raise RuntimeError(f"mlg check ended with {code}: {err}")
-    return out
+    if done.code not in {0, 1, 3}:
+        raise RuntimeError(f"mlg check ended with {done.code}: {done.err}")
+    return done.out
 
 
 def write(path: Path, sheets: Sequence[Sheet]) -> list[str]:
@@ -262,7 +245,7 @@ def write(path: Path, sheets: Sequence[Sheet]) -> list[str]:
     return ["--unit", unit] if route == "flag" else []
 
 
-def judge(sheets: Iterable[Sheet], run: Command = in_process) -> list[Judged]:
+def judge(sheets: Iterable[Sheet]) -> list[Judged]:
     """Give each route of each slip to `mlg check` as one table."""
     tables: dict[tuple[str, ...], list[Sheet]] = {}
     for sheet in sheets:
@@ -272,7 +255,7 @@ def judge(sheets: Iterable[Sheet], run: Command = in_process) -> list[Judged]:
         for number, group in enumerate(tables.values()):
             path = Path(folder) / f"sheets_{number}.csv"
             extra = write(path, group)
-            found = json.loads(run(["check", str(path), "--json", *extra]))
+            found = json.loads(checked(["check", str(path), "--json", *extra]))
             judged += each_row(group, found)
     return judged
 
@@ -306,11 +289,12 @@ def names_unit(said: Sequence[str], sheet: Sheet) -> bool:
     return any(word.search(each) for each in said)
 
 
-#: What is counted of confused sheets. W is WITHIN_MARGIN.
+#: What is counted of sheets. W is WITHIN_MARGIN.
 COUNTS: Mapping[str, Callable[[Judged], bool]] = {
     "stopped": lambda row: row.stopped,
     "warned": lambda row: row.warned and not row.stopped,
     "silent": lambda row: not row.warned and not row.stopped,
+    "caught": lambda row: row.caught,
     "names unit": lambda row: row.names_unit,
     "W silent": lambda row: row.within and not row.warned,
     "W warned": lambda row: row.within and row.warned,
@@ -319,51 +303,12 @@ COUNTS: Mapping[str, Callable[[Judged], bool]] = {
 }
 
 
-def wilson(hits: int, n: int) -> tuple[float, float]:
-    """Interval of a share at 95 % (Wilson, JASA 22, 1927, 209-212)."""
-    if n == 0:
-        return 0.0, 1.0
-    z = NormalDist().inv_cdf(0.975)
-    p = hits / n
-    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
-    half = z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
-    return max(min(float(centre - half), p), 0.0), min(max(float(centre + half), p), 1.0)
-
-
-def share(hits: int, n: int) -> str:
-    """A share in per cent with its interval."""
-    low, high = wilson(hits, n)
-    return f"{100 * hits / n:6.2f} % [{100 * low:.2f}, {100 * high:.2f}]" if n else "-"
-
-
-def confused_table(title: str, groups: Mapping[str, Sequence[Judged]]) -> str:
-    """Counts of confused sheets, one line per group.
-
-    `warned` and `silent` are of the sheets that were judged; the rest: those not plausible.
-    """
-    heads = "".join(f"{name:>11}" for name in COUNTS)
-    lines = [f"{title:<27}{'n':>6}{heads}   caught of all, caught of the rest"]
+def counted(title: str, groups: Mapping[str, Sequence[Judged]]) -> str:
+    """Counts of sheets, one line per group."""
+    lines = [f"{title:<27}{'n':>6}" + "".join(f"{name:>11}" for name in COUNTS)]
     for name, rows in groups.items():
-        rest = [row for row in rows if not plausible(row.sheet)]
-        counts = (sum(counted(row) for row in rows) for counted in COUNTS.values())
-        shares = (share(sum(row.caught for row in each), len(each)) for each in (rows, rest))
-        numbers = "".join(f"{count:>11}" for count in counts)
-        lines.append(f"{name:<27}{len(rows):>6}{numbers}   {'   '.join(shares)}")
-    return "\n".join(lines)
-
-
-def sound_table(title: str, groups: Mapping[str, Sequence[Judged]]) -> str:
-    """Counts of sound sheets, one line per group."""
-    verdicts = ("WITHIN_MARGIN", "INCONCLUSIVE", "INCOMPLETE", "OUTSIDE_MARGIN")
-    heads = "".join(f"{verdict:>15}" for verdict in verdicts)
-    lines = [f"{title:<27}{'n':>6}{'warned':>8}{heads}{'stopped':>9}"]
-    for name, rows in groups.items():
-        by_verdict = Counter(row.verdict for row in rows)
-        warned = sum(row.warned and not row.stopped for row in rows)
-        stopped = sum(row.stopped for row in rows)
-        numbers = "".join(f"{by_verdict[verdict]:>15}" for verdict in verdicts)
-        counts = f"{len(rows):>6}{warned:>8}{numbers}{stopped:>9}"
-        lines.append(f"{name:<27}{counts}   {share(stopped, len(rows))}")
+        counts = (sum(map(one, rows)) for one in COUNTS.values())
+        lines.append(f"{name:<27}{len(rows):>6}" + "".join(f"{count:>11}" for count in counts))
     return "\n".join(lines)
 
 
@@ -390,19 +335,12 @@ def examples(title: str, rows: Sequence[Judged], most: int) -> str:
     return "\n".join(lines)
 
 
-def slip(sheet: Sheet) -> str:
-    """The two units, short."""
-    return f"{sheet.read_unit}>{sheet.declared_unit}"
-
-
 BY: Mapping[str, Callable[[Sheet], str]] = {
     "slip": lambda sheet: sheet.confusion,
     "gear": lambda sheet: sheet.population,
     "unit": lambda sheet: sheet.declared_unit,
     "convention": lambda sheet: sheet.declared_as,
     "unit stated by": lambda sheet: sheet.route,
-    "slip, gear": lambda sheet: f"{slip(sheet)} {sheet.population}",
-    "slip, convention": lambda sheet: f"{slip(sheet)} {sheet.declared_as}",
 }
 
 
@@ -413,33 +351,22 @@ def main() -> None:
     parser.add_argument("--sound", type=int, default=3000, help="Gears in their right unit.")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--show", type=int, default=4, help="Sheets to show per slip in each list.")
-    parser.add_argument("--commands", action="store_true", help="Start a command for each table.")
     chosen = parser.parse_args()
-    run = as_command if chosen.commands else in_process
     rng = np.random.default_rng(chosen.seed)
 
-    confused = judge(unit_confusions(chosen.rows, rng), run)
-    print("W: WITHIN_MARGIN; plausible: could as well be a sound sheet; the rest: not plausible.\n")
+    confused = judge(unit_confusions(chosen.rows, rng))
+    print("W: WITHIN_MARGIN; plausible: could as well be a sound sheet.\n")
     for title, by in BY.items():
-        print(confused_table(title, grouped(confused, by)), end="\n\n")
-    rest = [row for row in confused if not plausible(row.sheet)]
-    missed = [row for row in confused if not row.caught]
-    others = [row for row in missed if not row.within and not plausible(row.sheet)]
-    lists = {
-        "WITHIN, not plausible": [row for row in rest if row.within],
-        "not caught, not WITHIN, not plausible": others,
-        "plausible, not caught": [row for row in missed if plausible(row.sheet)],
-        "plausible and WITHIN": [row for row in missed if plausible(row.sheet) and row.within],
-    }
-    for title, rows in lists.items():
-        print(examples(title, rows, chosen.show), end="\n\n")
+        print(counted(title, grouped(confused, by)), end="\n\n")
+    missed = [row for row in confused if not row.caught and not plausible(row.sheet)]
+    print(examples("not plausible and not caught", missed, chosen.show), end="\n\n")
 
-    plays = judge(play_confusions(chosen.rows, rng), run)
-    print(confused_table("radial and total play", grouped(plays, BY["slip"])), end="\n\n")
+    plays = judge(play_confusions(chosen.rows, rng))
+    print(counted("radial and total play", grouped(plays, BY["slip"])), end="\n\n")
 
-    sound = judge(sound_sheets(chosen.sound, rng), run)
+    sound = judge(sound_sheets(chosen.sound, rng))
     for title in ("gear", "unit", "convention", "unit stated by"):
-        print(sound_table(f"sound, {title}", grouped(sound, BY[title])), end="\n\n")
+        print(counted(f"sound, {title}", grouped(sound, BY[title])), end="\n\n")
     print(examples("sound and stopped", [row for row in sound if row.stopped], 5 * chosen.show))
 
 

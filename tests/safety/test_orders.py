@@ -95,7 +95,7 @@ def found_wrong(seed: int, number: int, folder: Path, *, kept_every: int) -> lis
 
 
 def test_evidence_is_set_aside_only_by_what_is_surely_later(tmp_path: Path) -> None:
-    wrong = found_wrong(1, 80, tmp_path, kept_every=3)
+    wrong = found_wrong(1, 50, tmp_path, kept_every=3)
     assert not wrong, "\n".join(wrong)
 
 
