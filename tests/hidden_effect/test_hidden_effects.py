@@ -40,6 +40,14 @@ from .simulator.records import write_csv as write_columns
 
 FIRST_SEED, STRENGTH = 40_000, 20.0
 CAUSES = tuple(CATALOGUE)
+# Of the linkage, of joints, of one tail and of reading; the others run in the slow part.
+EVERY_DAY = (
+    *("elastic_compliance", "thermal_growth", "direction_not_worst_case", "oval_wear"),
+    *("rigging_offset", "gauge_bias", "date_step"),
+)
+each_cause = pytest.mark.parametrize(
+    "cause", [pytest.param(c, marks=() if c in EVERY_DAY else pytest.mark.slow) for c in CAUSES]
+)
 OFF_CATALOGUE = ("grease_drag", "cold_oil_under_load")
 CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     *(("single", {"cause": cause, "strength": STRENGTH}) for cause in CAUSES),
@@ -107,13 +115,13 @@ def _rms(result: CheckResult) -> float:
     return float(np.sqrt(np.mean(np.square(misfit))))
 
 
-@pytest.mark.parametrize("cause", CAUSES)
+@each_cause
 def test_a_hidden_cause_is_named_with_its_target(cause: str) -> None:
     found = case(cause)
     assert (found.diagnosis.verdict, found.named) == ("NAMED", found.hidden)
 
 
-@pytest.mark.parametrize("cause", CAUSES)
+@each_cause
 def test_the_extension_gains_on_rows_that_the_fit_never_saw(cause: str) -> None:
     gain = case(cause).diagnosis.gain
     assert gain is not None
@@ -131,7 +139,7 @@ def test_a_check_of_later_inspections_is_better_with_the_extension(cause: str) -
     assert misfit_later(cause, extended=True) < 0.95 * misfit_later(cause, extended=False)
 
 
-@pytest.mark.parametrize("cause", CAUSES)
+@each_cause
 def test_what_is_left_looks_like_noise(cause: str) -> None:
     assert case(cause).diagnosis.remainder_is_noise
 

@@ -129,7 +129,7 @@ def said(found: Found) -> set[str]:
 @pytest.mark.parametrize("value", VALUES)
 def test_a_value_gives_the_same_as_a_cell_a_flag_and_a_prompt_answer(gear, value):
     for convention in (Convention.RADIAL, Convention.TOTAL_PLAY):
-        for margin in MARGINS:
+        for margin in MARGINS[VALUES.index(value) % 2 :: 2]:
             cell = by_cell(gear, value, margin, convention)
             for other in (
                 by_flag(gear, value, margin, convention),
@@ -142,7 +142,7 @@ def test_a_value_gives_the_same_as_a_cell_a_flag_and_a_prompt_answer(gear, value
 @pytest.mark.parametrize("value", NUMBERS)
 @pytest.mark.parametrize("convention", Convention)
 def test_a_number_gives_the_same_in_python_as_the_other_ways(gear, value, convention):
-    for margin in MARGIN_NUMBERS:
+    for margin in MARGIN_NUMBERS[NUMBERS.index(value) % 2 :: 2]:
         python = by_python(gear, value, margin, convention)
         written = repr(value), repr(margin), convention
         others = (

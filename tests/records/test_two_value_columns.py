@@ -47,7 +47,11 @@ def found_in(result: ReadResult) -> list[tuple[str, dict[int, float]]]:
     return sorted(visits, key=str)
 
 
-@pytest.mark.parametrize("seed", SEEDS, ids=lambda seed: f"{drawn(seed).layout} {seed}")
+@pytest.mark.parametrize(
+    "seed",
+    [pytest.param(n, marks=pytest.mark.slow if n < len(KINDS) else ()) for n in SEEDS],
+    ids=lambda seed: f"{drawn(seed).layout} {seed}",
+)
 def test_what_was_found_is_read_at_every_visit_or_refused(seed: int) -> None:
     sheet = drawn(seed)
     result = read_many([Named(sheet.workbook(), "t.xlsx")], OPTIONS)
