@@ -203,7 +203,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "diagnosis": lambda: result("diagnose").diagnosis,
     "extension": lambda: result("diagnose").extension,
     "simulation": simulated,
-    "survey": lambda: mlg.survey(FOUR_BAR_READINGS, FOUR_BAR),
+    "survey": lambda: mlg.survey(str(FOUR_BAR_READINGS), str(FOUR_BAR)),
     "lives": lambda: mlg.forecast(DATA / "fleet_batch.csv"),
     "catalogue": lambda: CATALOGUE,
     "picture": lambda: result("gear").plot(),
@@ -407,8 +407,7 @@ def test_every_file_may_be_given_by_its_name(tmp_path: Path) -> None:
     (tmp_path / "beliefs.toml").write_text("schema = 1\n")
     options = {"cause_files": (cause,), "beliefs_file": str(tmp_path / "beliefs.toml")}
     assert mlg.diagnose(str(DATA / "measured_pressure.csv"), **options).diagnosis.causes
-    surveyed = mlg.survey(str(FOUR_BAR_READINGS), str(FOUR_BAR))
-    assert surveyed.write(str(tmp_path / "gear.toml")).path == tmp_path / "gear.toml"
+    assert result("survey").write(str(tmp_path / "gear.toml")).path == tmp_path / "gear.toml"
     found = mlg.check(str(DATA / "failure_case.csv"))
     (report,) = mlg.write_reports(found, mlg.CheckOptions(), str(tmp_path / "pages"), **PAGES)
     assert report.html is not None and report.html.parent == tmp_path / "pages"
