@@ -91,6 +91,8 @@ class Run:
         self.asked = task.CheckOptions(
             side=None if flags.side is None else Side.parse(flags.side),
             **tables.declared(),
+            # Each report of a table says what a report of one gear says.
+            advice=True if wanted.report is not None else None,
             extension=load_model_extension(extensions, tables.gear, causes),
             workers=os.cpu_count() or 1,
         )

@@ -45,11 +45,11 @@ from mlg_troubleshoot.decision.inspection import (
 )
 from mlg_troubleshoot.decision.planner import (
     Judged,
-    consequences,
     correct,
     plans,
     repair_sets,
     rigging_alternative,
+    with_consequences,
 )
 from mlg_troubleshoot.decision.prediction import (
     PROVISIONAL_U_IN,
@@ -315,7 +315,8 @@ def _judge_part(
             approval = extension.approval
             found = [_worse(*both, approval) for both in zip(found, extended, strict=True)]
         if advice:
-            found = [_with_consequences(a, cases, table) for a in found]
+            judge = partial(_assess_valid, table=table, advice=False)
+            found = with_consequences(found, cases, judge)
     judged = dict(zip(alike, found, strict=True))
     unjudged = tuple(UnjudgedJoint(joint.number, joint.name) for joint in gear.joints)
     assessed = (
@@ -334,17 +335,6 @@ def _judge_part(
 # What a judgement without an extension does not depend on.
 _IDENTITY = {"record_id", "tail_no", "side", "source", "carried", "other_columns"}
 _KNOWN = attrgetter(*(f.name for f in fields(Inspection) if f.name not in _IDENTITY))
-
-
-def _with_consequences(a: Assessment, cases: Cases, table: IndexTable) -> Assessment:
-    """Add what follows each outcome of the next action."""
-
-    def judge(rows: list[Inspection]) -> list[Assessment]:
-        hypothetical = Cases.of(cases.gear, rows, fleet=cases.fleet)
-        return _assess_valid(hypothetical, table, advice=False)
-
-    then = consequences(a, cases.gear, judge)
-    return replace(a, plan=replace(a.plan, then=then))
 
 
 # From the best to the worst.

@@ -108,8 +108,7 @@ def choose(
     allowed &= (codes & must[:, None] == must[:, None]) & sets.any(axis=1)
     allowed &= ~more | (out < 0.5 * causes[:, :1])
 
-    nothing = np.zeros_like(over)
-    read = minutes_of(gear, asked[starts], nothing)[0]
+    read = minutes_of(gear, asked[starts], np.zeros_like(over))[0]
     minutes = minutes_of(gear, sets, asked[:, None])[1]
     check = gear.rigging_check.value
     after = gear.plunger_reading.value + gear.retraction.value
@@ -263,6 +262,8 @@ class _PlanBuilder:
         self.opened: Mask = np.zeros(len(self.numbers), bool)
         self.over_limit = self._joints(self.cases.over_limit[row])
         self.over = self._joints(self.cases.must_restore[row])
+        # Whether something over its limit must wait for its spare.
+        self.waits = self.over != self.over_limit
         self.read_plunger = bool(np.isfinite(self.cases.plunger_in[row]))
         self.looked = self.inspection.rigging_checked not in (None, RiggingCheck.NO)
 
@@ -316,7 +317,7 @@ class _PlanBuilder:
         """
         i = self.row
         self._restore_over_limit()
-        if self.over != self.over_limit:
+        if self.waits:
             return self._stop_for_today()
         if self.judged.verdicts[i] is Verdict.WITHIN_MARGIN and not (
             self.over and self.judged.bases[i] is Basis.MEASURED
@@ -390,8 +391,7 @@ class _PlanBuilder:
             return self._try(choice.restore)
         if self.over:
             return self._try(self.cases.over_limit[self.row])
-        explained = joints > rigging + elsewhere
-        return self._end(End.CANNOT_CLEAR if explained else End.NOT_EXPLAINED)
+        return self._end(End.CANNOT_CLEAR if joints > rigging + elsewhere else End.NOT_EXPLAINED)
 
     def _read_and_restore(self, places: tuple[int, ...]) -> Plan:
         """Read joints, then the expected repair."""
@@ -410,21 +410,15 @@ class _PlanBuilder:
             return self._restore_over_limit()._stop_for_today(without)
         return self._try(joints, expected=True)
 
-    def _left_unread(self) -> list[int]:
-        """Joints that nobody read and that no step reads."""
-        asked = {n for step in self.steps for n in step.joints}
-        return [n for n in self._joints(~self.cases.measured[self.row]) if n not in asked]
-
     def _try(self, members: Mask, *, expected: bool = False) -> Plan:
         """Restore, read the plunger, retract the gear: done. Where something over its limit must
         wait for its spare, that comes after it.
         """
-        waits = self.over != self.over_limit
-        if waits and not expected:
+        if self.waits and not expected:
             self.tried = None
             return self._restore_over_limit()._stop_for_today()
         self._restore(self._joints(members), expected=expected)
-        if waits:
+        if self.waits:
             return self._stop_for_today()
         self._read_the_plunger()
         return self._retract()
@@ -453,19 +447,19 @@ class _PlanBuilder:
         return self._joints(unread | ~cases.restorable[i] if cases.failed[i] else unread)
 
     def _done(self) -> Plan:
-        if self.over != self.over_limit:
+        if self.waits:
             return self._stop_for_today()
         restored = any(step.action is Action.RESTORE for step in self.steps)
-        text = sentences.done(
-            len(self._left_unread()), repaired=restored or self.inspection.is_repaired
-        )
+        asked = {n for step in self.steps for n in step.joints}
+        left = {*self._joints(~self.cases.measured[self.row])} - asked
+        text = sentences.done(len(left), repaired=restored or self.inspection.is_repaired)
         end = End.DONE
-        if len(self.steps) == 0 and self.judged.bases[self.row] is Basis.PREDICTED:
+        if not self.steps and self.judged.bases[self.row] is Basis.PREDICTED:
             end = End.WITHIN
         self._step(Action.DONE, 0.0, text, required=False)
         return Plan(tuple(self.steps), end)
 
-    def _check_rigging(self, *, again: bool = False) -> _PlanBuilder:
+    def _check_rigging(self, *, again: bool = False) -> None:
         checked = any(step.action is Action.CHECK_RIGGING for step in self.steps)
         if not checked and (again or not self.looked):
             as_new = self._joints(
@@ -477,7 +471,6 @@ class _PlanBuilder:
                 () if self.inspection.is_repaired or not self.cases.failed[self.row] else as_new,
             )
             self._step(Action.CHECK_RIGGING, self.gear.rigging_check.value, text)
-        return self
 
     def _end(self, where: End) -> Plan:
         """Go on: the plan ends."""
@@ -527,13 +520,12 @@ class _PlanBuilder:
         self._step(Action.RESTORE, minutes, text, joints)
         self.opened = np.zeros_like(self.opened)
 
-    def _reread(self) -> bool:
-        """Take the readings in doubt again, once in a plan; whether there are any."""
+    def _reread(self) -> None:
+        """Take the readings in doubt again, once in a plan."""
         doubted = self._joints(self.doubted)
         if doubted and not self.taken_again:
             self._measure(doubted, BETTER_GAUGES_IN[-1])
             self.taken_again = True
-        return self.taken_again
 
     def _restore_over_limit(self) -> _PlanBuilder:
         """Restore what can be today; a reading in doubt is taken again also where it cannot."""
@@ -712,18 +704,27 @@ _WELL_WITHIN, _BEYOND = 0.4, 1.4
 _REPAIR_DAY, _LATER = date(9999, 12, 1), date(9999, 12, 2)
 
 
-def consequences(
-    a: Assessment, gear: Gear, judge: Callable[[list[Inspection]], list[Assessment]]
-) -> tuple[Consequence, ...]:
-    """Judge a gear once more for each outcome of its next action."""
-    cases = list(_outcomes(a, gear))
-    rows = [replace(a.inspection, **changed) for _outcome, changed in cases]
-    found = []
-    for (outcome, _changed), judged in zip(cases, judge(rows) if rows else [], strict=True):
-        step = judged.next_action
+def with_consequences(
+    found: Sequence[Assessment], cases: Cases, judge: Callable[[Cases], list[Assessment]]
+) -> list[Assessment]:
+    """Add to each plan what follows each outcome of its next action, judged by the same rule."""
+    each = [[*_outcomes(a, cases.gear)] for a in found]
+    rows = [
+        replace(a.inspection, **changed)
+        for a, outcomes in zip(found, each, strict=True)
+        for _outcome, changed in outcomes
+    ]
+    judged = iter(judge(Cases.of(cases.gear, rows, fleet=cases.fleet)) if rows else ())
+
+    def follows(outcome: str) -> Consequence:
+        step = next(judged).next_action
         text = f"IF {outcome}, THEN {step.text[0].lower()}{step.text[1:]}"
-        found.append(Consequence(outcome, step.action, step.joints, step.minutes, text))
-    return tuple(found)
+        return Consequence(outcome, step.action, step.joints, step.minutes, text)
+
+    return [
+        replace(a, plan=replace(a.plan, then=tuple(follows(outcome) for outcome, _ in outcomes)))
+        for a, outcomes in zip(found, each, strict=True)
+    ]
 
 
 def _outcomes(a: Assessment, gear: Gear) -> Iterator[tuple[str, dict[str, Any]]]:

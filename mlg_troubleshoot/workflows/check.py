@@ -117,8 +117,8 @@ class CheckOptions(TableOptions):
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
     advice : bool or None
-        Compute what is looked at for one gear: re-rigging, worn joints; None does so
-        for a single one.
+        Compute what is looked at for one gear: re-rigging, worn joints, what follows each outcome
+        of NEXT; None does so for a single one.
     extension : Extension or None
         An extension of the model.
     workers : int

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pypdf
 
-from .conftest import mlg
+from .conftest import Table, mlg, row
 
 
 def written(folder: Path) -> str:
@@ -25,6 +25,14 @@ def test_a_report_of_a_check_stands_in_the_unit_to_show(tmp_path: Path) -> None:
     mlg("check", *gear, "--show", "thou", "--report", tmp_path, "--format", "html")
     assert "47.2 thou" in written(tmp_path)
     assert "0.0472 in" not in written(tmp_path)
+
+
+def test_each_report_of_a_table_says_what_follows_next(tmp_path: Path, table: Table) -> None:
+    blank = {f"clearance_{n}_in": "" for n in range(2, 11)}
+    rows = [row(record_id=f"R{n}", tail_no=f"N{n}", outcome="FAILED", **blank) for n in (1, 2)]
+    mlg("check", table(*rows), "--report", tmp_path / "out", "--format", "html")
+    for page in (tmp_path / "out").glob("mlg-N*.html"):
+        assert "IF the plunger is within its margin, THEN" in page.read_text(encoding="utf-8")
 
 
 def test_a_form_to_fill_in_by_hand_has_the_paper_and_the_unit_asked_for(tmp_path, monkeypatch):

@@ -139,11 +139,11 @@ def test_every_row_is_judged_once_in_its_order_with_invalid_rows_between(gear, t
 
 def test_a_batch_judges_each_gear_as_if_it_were_alone(gear, table, judge):
     cases = [every_joint(0.001), FAILURE, every_joint(0.002), {1: 0.001}, every_joint(0.05)]
-    batch = assess([inspected(case) for case in cases], gear, table)
+    batch = assess([inspected(case) for case in cases], gear, table, advice=True)
     for found, case in zip(batch, cases, strict=True):
         assert isinstance(found, Assessment)
-        alone = judge(case)
-        assert (found.verdict, found.next_action) == (alone.verdict, alone.next_action)
+        alone = judge(case, advice=True)
+        assert (found.verdict, found.plan) == (alone.verdict, alone.plan)
         assert found.probability_within_margin == pytest.approx(
             alone.probability_within_margin, abs=1e-12
         )
