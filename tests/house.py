@@ -28,7 +28,7 @@ WAYS = {
         ("workflows/check.py", "check_files"),
         ("records/read.py", "read_many"),
         ("records/tables.py", "read_table"),
-        ("records/layout.py", "Columns"),
+        ("records/tables.py", "Columns"),
         ("records/rows.py", "RowReader"),
         ("records/values.py", "read_length"),
         ("decision/inspection.py", "Inspection"),

@@ -210,7 +210,7 @@ class MeasuredTables:
     def declared(self) -> dict[str, Any]:
         """What a task receives of them."""
         from mlg_troubleshoot.cli.output import say
-        from mlg_troubleshoot.records.dates import DateOrder
+        from mlg_troubleshoot.records.values import DateOrder
         from mlg_troubleshoot.workflows.header_file import read_header_file
 
         for name, used in (("MLG_UNIT", self.unit), ("MLG_CONVENTION", self.convention)):

@@ -22,7 +22,6 @@ __all__ = [
     "SheetLayout",
     "admit",
     "annotate",
-    "dates",
     "expand",
     "frames",
     "gate",

@@ -24,14 +24,16 @@ NO_VALUE_TEXT = "(formula without a result)"
 
 
 class OddKind(StrEnum):
-    """Kinds of cell that are neither blank nor text nor a plain number."""
+    """Kinds of cell that are neither blank nor text nor a plain number, as the codes of the problem
+    that each may be.
+    """
 
-    ERROR = "error"
-    DATE = "date"
-    BOOLEAN = "boolean"
-    NO_VALUE = "formula without a result"
+    ERROR = "cell_error"
+    DATE = "cell_is_date"
+    BOOLEAN = "cell_is_boolean"
+    NO_VALUE = "formula_without_value"
     PADDED = "number shown with leading zeros"
-    WORDED = "number shown with words"
+    WORDED = "number_shown_otherwise"
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, NumberedRow, Sheet, typed
 from mlg_troubleshoot.records.gate import cells_of
 from mlg_troubleshoot.records.headers import Joints, parse_canonical, recognise
-from mlg_troubleshoot.records.layout import Header
+from mlg_troubleshoot.records.tables import Header
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:

@@ -29,8 +29,8 @@ from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.gear.gear import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.records.cells import typed
 from mlg_troubleshoot.records.headers import Joints
-from mlg_troubleshoot.records.layout import Columns, Header
 from mlg_troubleshoot.records.rows import ReadOptions, Row, RowReader, TableInHand
+from mlg_troubleshoot.records.tables import Columns, Header
 from mlg_troubleshoot.records.values import CellFaultError, read_text
 from mlg_troubleshoot.units import LengthUnit
 

@@ -296,6 +296,7 @@ def suspect(header: str, joints: Joints) -> tuple[str | None, bool]:
     ), sure
 
 
+@lru_cache(4096)
 def asks_outcome(header: str) -> bool | None:
     """Whether an unread header asks what the gear did; None if it asks for something else."""
     said = {*_TOKEN.findall(tidy(header).replace("_", " "))}
@@ -379,34 +380,19 @@ def _snake(name: str) -> str:
     return re.sub(r"[\s\-]+", "_", tidy(name))
 
 
-def parse_target(name: str, joints: Joints) -> Field | None:
-    text = _snake(name)
-    if text == "carry":
-        return None
-    field = parse_canonical(text, joints)
-    if field is None:
-        names = filter(None, (near_miss(text, joints).nearest, *BY_NAME))
-        raise UsageError(
-            f"--map: {name!r} is not a column of the inspection table",
-            f"Give a column, or carry to leave it unread.{nearest(text, [*names])}",
-        )
-    return field
-
-
-def column_named(name: str, joints: Joints) -> str:
-    """The header of the column that a person names by its own or a short name, or by its joint."""
+def parse_target(name: str, joints: Joints) -> Field:
+    """The column that a person names by its own or a short name, or by its joint."""
     text = name.strip().lstrip("#")
-    if text.isdecimal():
-        return CLEARANCE.header(int(text))
-    found = recognise(_SHORT.get(text.lower(), text), joints)
+    text = CLEARANCE.header(int(text)) if text.isdecimal() else _SHORT.get(text.lower(), text)
+    found = recognise(text, joints)
     if found.field is None:
-        text = _snake(found.nearest or text)
-        known = [*_SHORT, *BY_NAME, *map(CLEARANCE.header, joints.numbers)]
+        meant = found.nearest or near_miss(text, joints).nearest or text
+        known = [*_SHORT, *BY_NAME, *map(CLEARANCE.header, joints.numbers), *({meant} - {text})]
         raise UsageError(
             f"{name!r} is not a column of the inspection table",
-            f"Give a joint or a column.{nearest(text, known)}",
+            f"Give a joint or a column.{nearest(meant, known)}",
         )
-    return found.field.name
+    return found.field
 
 
 def nearest(name: str, names: Collection[str]) -> str:

@@ -1,4 +1,8 @@
-"""From files to inspections: every data row exactly once, every bad cell named."""
+"""From files to inspections: every data row exactly once, every bad cell named.
+
+Rows compared with each other: record ids and clearances that stand twice, tails that look alike,
+and the order of time.
+"""
 
 from __future__ import annotations
 
@@ -13,26 +17,33 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, cast
 
+from mlg_troubleshoot.decision.columns import DATE, LANDINGS, RECORD_ID, Column
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, plain_tail
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.life.state import GearVisit, Moment, contradictions
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.cells import (
     FileRefusedError,
     NumberedRow,
     Sheet,
     Workbook,
+    column_letters,
+    quote,
     show,
     writable,
 )
 from mlg_troubleshoot.records.csvfile import csv_book
 from mlg_troubleshoot.records.frames import FRAME, FrameSheet, as_frame, in_frame, is_frame
-from mlg_troubleshoot.records.layout import Header, find_header, header_score
-from mlg_troubleshoot.records.row_consistency import (
-    copies,
-    one_aircraft,
-    order_warnings,
-    settle_duplicates,
+from mlg_troubleshoot.records.rows import FileRead, ReadOptions, ReadResult, SheetLayout
+from mlg_troubleshoot.records.tables import (
+    Collected,
+    Form,
+    Header,
+    find_form,
+    find_header,
+    header_score,
+    read_table,
 )
-from mlg_troubleshoot.records.rows import FileRead, ReadOptions, ReadResult
-from mlg_troubleshoot.records.tables import Collected, Form, find_form, read_form, read_table
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.records.frames import Frame
@@ -291,16 +302,10 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
 def _read_book(book: Workbook, options: ReadOptions, label: str, found: Collected) -> None:
     chosen = _choose(book, options, found)
     for candidate in chosen:
-        sheet, header = candidate.sheet, candidate.header
+        sheet, header, rows = candidate.sheet, candidate.header, candidate.rows
         if header is None:
             raise _no_header([candidate])
-        if isinstance(header, Form):
-            part = read_form(
-                header, options, file=label, sheet=sheet.name, delimiter=book.delimiter
-            )
-        else:
-            rows = candidate.rows
-            part = read_table(sheet, header, rows, options, file=label, delimiter=book.delimiter)
+        part = read_table(sheet, header, rows, options, file=label, delimiter=book.delimiter)
         found.join(part, f"sheet {sheet.name!r}: " if len(chosen) > 1 else "")
 
 
@@ -437,3 +442,146 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         tuple(out.unread),
         tuple(out.unread_sheets),
     )
+
+
+def settle_duplicates(
+    rows: list[Inspection | InvalidRow], layouts: Sequence[SheetLayout]
+) -> list[Problem]:
+    """Warn of rows that are the same inspection again, and refuse rows that share an id and
+    differ.
+    """
+    named: dict[tuple[str | None, str], list[int]] = {}
+    for place, row in enumerate(rows):
+        if row.record_id is not None:
+            named.setdefault((row.source.file, row.record_id), []).append(place)
+    problems: list[Problem] = []
+    for (_, record_id), places in named.items():
+        if len(places) == 1:
+            continue
+        found = [rows[place] for place in places]
+        said = [_content(row) for row in found]
+        is_same = all(each == said[0] for each in said)
+        for place, row in list(zip(places, found, strict=True))[is_same:]:
+            if is_same:
+                note = f"the same inspection as {where(found[0].source)}"
+                rows[place] = replace(row, warnings=(*row.warnings, note))
+                continue
+            other = where(found[row is found[0]].source)
+            other += f" and {len(found) - 2} more" if len(found) > 2 else ""
+            header, cell = cell_of(row.source, layouts, RECORD_ID)
+            expected = f"a record id that no other inspection of the file has; {other} also has it"
+            remedy = "Keep the right row, or give each inspection its own record id."
+            at = row.source.file, row.source.sheet, row.source.row, header, cell
+            problems.append(Problem("record_id_duplicate", *at, record_id, expected, remedy))
+            identity = row.record_id, row.tail_no, row.side
+            bad = row
+            if isinstance(bad, Inspection):
+                bad = InvalidRow(*identity, (), row.warnings, row.source, bad)
+            rows[place] = replace(bad, correct=tuple(dict.fromkeys((header, *bad.correct))))
+    return problems
+
+
+def _content(row: Inspection | InvalidRow) -> tuple[object, ...]:
+    """What a row says, without its place."""
+    known, correct = (row.understood, row.correct) if isinstance(row, InvalidRow) else (row, ())
+    if known is not None:
+        known = replace(known, source=RowSource(), warnings=(), entered={})
+    return row.tail_no, row.side, correct, known
+
+
+def where(source: RowSource) -> str:
+    sheet = f" of sheet {source.sheet!r}" if source.sheet is not None else ""
+    return f"row {source.row}{sheet} of {source.file or 'the input'}"
+
+
+def cell_of(
+    source: RowSource, layouts: Sequence[SheetLayout], wanted: Column
+) -> tuple[str, str | None]:
+    """Header of a column as it was written, and its cell in a row or a form; no cell if the table
+    does not have it.
+    """
+    for layout in layouts:
+        is_there = (layout.file, layout.sheet) == (source.file, source.sheet)
+        for column in layout.columns if is_there else ():
+            if column.read_as == wanted.name:
+                return column.header, f"{column_letters(column.index)}{column.row or source.row}"
+    return wanted.name, None
+
+
+Rows = Sequence[Inspection | InvalidRow]
+
+
+# So many different clearances are not read again exactly: a reading agrees with the one before to
+# within its gauge's error only. Assumed. [1]
+_DIFFERENT = 5
+
+
+def copies(rows: Rows) -> dict[int, str]:
+    """Name the rows, by their place, that repeat every clearance of an earlier row of the gear."""
+    first: dict[object, Inspection] = {}
+    found: dict[int, str] = {}
+    for place, row in enumerate(rows):
+        # Rows after a repair are of one reading of the clearances.
+        if not isinstance(row, Inspection) or row.is_repaired:
+            continue
+        if len({value for value in row.clearance_in.values() if value > 0.0}) < _DIFFERENT:
+            continue
+        before = first.setdefault((row.tail_no, row.side, *row.clearance_in.items()), row)
+        if before is row or before.record_id == row.record_id:
+            continue
+        said = "copied from that sheet?"
+        if before.inspection_date == row.inspection_date:
+            said = "the same inspection, entered twice?"
+        found[place] = f"all clearances are those of {where(before.source)}: {said}"
+    return found
+
+
+def one_aircraft(rows: list[Inspection | InvalidRow]) -> list[str]:
+    """Give rows whose tail numbers differ only in how they are spelt the first spelling; say which
+    they are, each with a row of it.
+    """
+    tails: dict[str, RowSource] = {}
+    for row in rows:
+        if row.tail_no is not None:
+            tails.setdefault(row.tail_no, row.source)
+    spelt: dict[str, list[str]] = {}
+    for tail in tails:
+        spelt.setdefault(plain_tail(tail), []).append(tail)
+    several = [same for same in spelt.values() if len(same) > 1]
+    first = {tail: same[0] for same in several for tail in same[1:]}
+    for place, row in enumerate(rows):
+        if row.tail_no in first:
+            rows[place] = replace(row, tail_no=first[row.tail_no])
+    notes = []
+    for same in several:
+        named = " and ".join(f"{quote(tail, 40)!r} ({where(tails[tail])})" for tail in same)
+        notes.append(f"tails {named} are taken as one aircraft: if they are two, correct them")
+    return notes
+
+
+def order_warnings(rows: Rows, layouts: Sequence[SheetLayout]) -> dict[int, str]:
+    """Name the rows of one gear whose landings run backwards as its dates go on, each with its
+    cell.
+    """
+    gears: dict[tuple[str, str], list[int]] = {}
+    moments: dict[int, Moment] = {}
+    for place, row in enumerate(rows):
+        if isinstance(row, Inspection):
+            moments[place] = Moment.of(GearVisit(row))
+            gears.setdefault((row.tail_no, row.side), []).append(place)
+    found: dict[int, str] = {}
+    for (tail, side), places in gears.items():
+        if len(places) == 1:
+            continue
+
+        def name(n: int, places: list[int] = places) -> str:
+            source = rows[places[n]].source
+            cells = [cell_of(source, layouts, column)[1] for column in (LANDINGS, DATE)]
+            return ", ".join([where(source), *filter(None, cells)])
+
+        for n, said in contradictions([moments[place] for place in places], name).items():
+            found[places[n]] = (
+                f"{tail} {side}: {said}. Unless the gear was overhauled in between, correct the"
+                " landings or the date."
+            )
+    return found

@@ -22,7 +22,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import date, timedelta
-from enum import StrEnum
+from enum import IntEnum
 from functools import cache, lru_cache
 from operator import itemgetter
 from pathlib import PurePath
@@ -69,7 +69,6 @@ from mlg_troubleshoot.records.cells import (
     show,
     writable,
 )
-from mlg_troubleshoot.records.dates import DateOrder, find_day, readings
 from mlg_troubleshoot.records.headers import (
     UNKNOWN,
     Field,
@@ -83,8 +82,11 @@ from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
     AmbiguousDateError,
     CellFaultError,
+    DateOrder,
     answers_outcome,
     convention_word,
+    days_of,
+    find_day,
     is_no_name,
     may_be_outcome,
     read_date,
@@ -97,23 +99,13 @@ from mlg_troubleshoot.records.values import (
 )
 from mlg_troubleshoot.results import JsonOutput
 from mlg_troubleshoot.units import (
-    MM_PER_IN,
     SLIPS,
-    THOU_PER_IN,
     UNIT_SPELLINGS,
     ClearanceConvention,
     Length,
     LengthUnit,
     Sentence,
 )
-
-
-class Kind(StrEnum):
-    """What a heading says of the numbers below it."""
-
-    READING = "reading"
-    REFERENCE = "reference"
-    UNSAID = "unsaid"
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,9 +126,13 @@ ONE_VISIT = Occasion()
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """A heading taken apart; `rest` is what the words of readings and visits leave of it."""
+    """A heading taken apart; `rest` is what the words of readings and visits leave of it.
 
-    kind: Kind
+    is_reading: whether it names what was found, not a number that is given next to it; None if it
+    does not say.
+    """
+
+    is_reading: bool | None = None
     visit: Occasion = ONE_VISIT
     rest: str = ""
 
@@ -147,7 +143,7 @@ class Heading:
 
     @property
     def is_said(self) -> bool:
-        return self.kind is not Kind.UNSAID or self.visit != ONE_VISIT
+        return self.is_reading is not None or self.visit != ONE_VISIT
 
 
 _FILLERS = "value|values|gear|side|mlg|at|on|the|of|wert|column"
@@ -194,12 +190,8 @@ def take_apart(text: str) -> Heading:
         r"[\s(\[,;:/-]+$|^[\s)\],;:/-]+|\(\s*\)", "", " ".join(_SIDE.sub(" ", rest).split())
     )
     if len(sides) > 1 or is_reference + is_reading + is_left > 1:
-        return Heading(Kind.UNSAID, rest=rest)
-    kind = Kind.UNSAID
-    if is_reference:
-        kind = Kind.REFERENCE
-    elif is_reading or is_left:
-        kind = Kind.READING
+        return Heading(rest=rest)
+    kind = not is_reference if is_reference or is_reading or is_left else None
     return Heading(kind, Occasion(next(iter(sides), None), day, is_left), rest)
 
 
@@ -207,13 +199,13 @@ def visits_of(headings: Sequence[Heading]) -> list[Occasion | None]:
     """The visit that each of several columns of one quantity is a reading of, None for a number
     that is only given next to it; empty where that cannot be decided.
     """
-    read = [each for each in headings if each.kind is not Kind.REFERENCE]
+    read = [each for each in headings if each.is_reading is not False]
     visits = {each.visit for each in read}
     sides = {visit.side for visit in visits}
     is_clear = len(headings) == 1 or all(each.is_said for each in read)
     if not read or not is_clear or len(visits) < len(read) or (None in sides and len(sides) > 1):
         return []
-    return [None if each.kind is Kind.REFERENCE else each.visit for each in headings]
+    return [None if each.is_reading is False else each.visit for each in headings]
 
 
 _WORDS: Mapping[str, Callable[[str], object]] = {
@@ -332,14 +324,10 @@ class ReadOptions(TableOptions):
 
     @classmethod
     def of(cls, gear: Gear, tables: TableOptions | None = None, **declared: Any) -> ReadOptions:
-        given = (
-            {}
-            if tables is None
-            else {each.name: getattr(tables, each.name) for each in fields(TableOptions)}
-        )
+        given = tables or TableOptions()
+        names = [each.name for each in fields(TableOptions)]
         return cls(
-            **given,
-            **declared,
+            **{name: getattr(given, name) for name in names} | declared,
             joints=Joints.of(gear),
             new_part_in={joint.number: joint.new_part.value for joint in gear.joints},
             margin_in=gear.margin.value,
@@ -490,16 +478,13 @@ _SMALLEST_IN = 0.0001
 CONFIRM_SMALL = "Correct the unit, or confirm the readings: yes in a column small_readings_true."
 
 
-class UnitFit(StrEnum):
+class UnitFit(IntEnum):
     """How the readings of a row fit the unit that is stated: what matters most stands last."""
 
-    FITS = "fits"
-    LARGE = "large"
-    DOUBTFUL = "doubtful"
-    TOO_SMALL = "too small"
-
-
-_SEVERITY = tuple(UnitFit)
+    FITS = 0
+    LARGE = 1
+    DOUBTFUL = 2
+    TOO_SMALL = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -537,9 +522,7 @@ def judge_unit(
         )
         for unit in dict.fromkeys(units.values())
     ]
-    return max(
-        fits, key=lambda fit: (_SEVERITY.index(fit.scale), len(fit.joints)), default=RowUnit()
-    )
+    return max(fits, key=lambda fit: (fit.scale, len(fit.joints)), default=RowUnit())
 
 
 def _judge_stated(
@@ -680,43 +663,26 @@ def scale_slip(
     range.
     """
     entered = unit.from_inches(value_in * convention.per_radial)
-    inches = unit is LengthUnit.INCH
-    thou = entered / THOU_PER_IN
+    slips = [
+        (
+            factor,
+            f"{entered:.4g} {other} would be {entered / factor:.4g} {unit}: was it read in"
+            f" {other.words} (factor {factor:.4g})?",
+        )
+        for other in LengthUnit
+        if (factor := other.per_inch / unit.per_inch) > 1.0
+        and (other is not LengthUnit.THOU or entered >= 1.0)
+    ]
+    if halves and convention is ClearanceConvention.RADIAL:
+        question = "Is it a diametral clearance or total play (factor 2)? Then say so in"
+        slips.append((SLIPS["convention"].factor, f"{question} clearance_convention."))
     ten = SLIPS["point"].factor
-    slips = (
-        (
-            inches and entered >= 1.0,
-            THOU_PER_IN,
-            f"{entered:.4g} thou would be {thou:.4g} in: was it read in thou (factor 1000)?",
-        ),
-        (
-            inches,
-            MM_PER_IN,
-            f"{entered:.4g} mm would be {entered / MM_PER_IN:.4g} in: was it read in millimetres"
-            " (factor 25.4)?",
-        ),
-        (
-            unit is LengthUnit.MILLIMETRE and entered >= 1.0,
-            THOU_PER_IN / MM_PER_IN,
-            f"{entered:.4g} thou would be {thou * MM_PER_IN:.4g} mm: was it read in thou?",
-        ),
-        (
-            halves and convention is ClearanceConvention.RADIAL,
-            SLIPS["convention"].factor,
-            "Is it a diametral clearance or total play (factor 2)? Then say so in"
-            " clearance_convention.",
-        ),
-        (
-            True,
-            ten,
-            f"Is the decimal point misplaced (factor {ten:g})? It would be {entered / ten:.4g}"
-            f" {unit.value}.",
-        ),
-    )
+    question = f"Is the decimal point misplaced (factor {ten:g})? It would be"
+    slips.append((ten, f"{question} {entered / ten:.4g} {unit}."))
     return " ".join(
         question
-        for may_be, factor, question in slips
-        if may_be and _SMALLEST_IN <= value_in / factor <= plausible_max_in
+        for factor, question in slips
+        if _SMALLEST_IN <= value_in / factor <= plausible_max_in
     )
 
 
@@ -732,7 +698,7 @@ _MISSING_CONVENTION = (
 _FIELDS = frozenset(each.name for each in fields(Inspection))
 
 
-# What no word of an outcome, a convention or a unit is.
+# What no word of an outcome, a convention or a unit is: one with a digit, such as a work order.
 _CODE = re.compile(r"(?=..)\S*\d\S*")
 _MONTHS = 12
 _A_DAY = timedelta(days=1)
@@ -764,7 +730,8 @@ def _tells_failure(header: str, cell: Filled) -> bool:
 @lru_cache(4096)
 def _spoken(cell: Filled) -> tuple[ClearanceConvention | None, LengthUnit | None]:
     """The convention or the unit that a cell is."""
-    text = plain_text(cell).lower() if isinstance(cell, str) else ""
+    is_word = isinstance(cell, str) and not _CODE.fullmatch(cell)
+    text = plain_text(show(cell)).lower() if is_word else ""
     return convention_word(text), UNIT_SPELLINGS.get(text)
 
 
@@ -1189,32 +1156,36 @@ class RowReader:
         name = PurePath(self._table.file or "-").stem
         return f"{'stdin' if name == '-' else name}-{self._row.number}-{content:08x}"
 
-    def _read_convention(self) -> ClearanceConvention | None:
-        index = self._at.get(CONVENTION)
-        found: ClearanceConvention | None = self._options.convention
-        if index is not None and self._cells[index] is not None:
-            found = self._read_how(index, CONVENTION)
-        elif found is None and index is not None:
-            self._fault(index, CellFaultError("convention_missing", *_MISSING_CONVENTION))
-        elif found is None:
-            self._bad.add(-1)
-            place = CellPlace(self._row.number, CONVENTION.name)
-            self._table.tell("convention_missing", None, *_MISSING_CONVENTION, place)
-        return found
-
-    def _read_how(self, index: int, column: Column) -> Any:
-        """Read a cell that says how to read the others, or note its fault."""
+    def _read_how(self, column: Column, declared: Any) -> Any:
+        """Read the cell that says how to read the others, or note its fault; without one take what
+        is declared.
+        """
+        index = self._at.get(column)
+        if index is None or self._cells[index] is None:
+            return declared
         try:
             return self._one_value(index, column, self._cells[index])
         except CellFaultError as fault:
             self._fault(index, fault)
             return None
 
+    def _read_convention(self) -> ClearanceConvention | None:
+        found: ClearanceConvention | None = self._read_how(CONVENTION, self._options.convention)
+        index = self._at.get(CONVENTION)
+        fault = CellFaultError("convention_missing", *_MISSING_CONVENTION)
+        if found is None and index is None:
+            self._bad.add(-1)
+            self._table.tell_fault(fault, None, CellPlace(self._row.number, CONVENTION.name))
+        elif found is None and index is not None and self._cells[index] is None:
+            self._fault(index, fault)
+        return found
+
     def _read_row_unit(self) -> LengthUnit | None:
+        declared = self._options.unit
+        unit: LengthUnit | None = self._read_how(UNIT, declared)
         index = self._at.get(UNIT)
         if index is None or self._cells[index] is None:
-            return self._options.unit
-        unit: LengthUnit | None = self._read_how(index, UNIT)
+            return declared
         for i, of, _ in self._lengths if unit else ():
             if of.unit not in (None, unit) and self._cells[i] is not None:
                 expected = f"{of.unit}, as the header {self._placed[i].header!r} says"
@@ -1222,8 +1193,8 @@ class RowReader:
                     "The row and the header name different units. Correct the one that is wrong."
                 )
                 self._fault(index, CellFaultError("unit_contradiction", expected, remedy))
-                return self._options.unit
-        return unit or self._options.unit
+                return declared
+        return unit or declared
 
     def _one_length(
         self,
@@ -1334,7 +1305,9 @@ class RowReader:
         unread.
         """
         texts = [plain_text(cell) for cell in self._days if isinstance(cell, str)]
-        written = [{*found} for text in texts if (found := readings(text))]
+        found = [*filter(None, map(days_of, texts))]
+        # A day with its month as a word, or a year first, is the same in every order.
+        written = [{*days} for days in found if len(days) < 3 or len({*days.values()}) > 1]
         typed = [cell.day.day for cell in self._days if isinstance(cell, OddCell) and cell.day]
         if written and typed and max(typed) <= _MONTHS:
             # A program that expects the other order makes dates of those only that fit both.
@@ -1380,6 +1353,6 @@ class RowReader:
         plunger = {plunger_question(value, unit, self._options) for value, unit in found.plunger}
         asked = sorted(plunger - {""})
         found.warnings += asked
-        if fit.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL):
+        if fit.scale >= UnitFit.DOUBTFUL:
             asked.insert(0, fit.question)
         return asked

@@ -1,15 +1,16 @@
 """Cell values read as lengths, numbers, names and dates; what cannot be read is a fault with its
-remedy.
+remedy. The day and the month of a date are never guessed.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from datetime import date, datetime, time
 from enum import StrEnum
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, TypeVar
 
 from mlg_troubleshoot.decision.columns import OUTCOME, Column, Holds
@@ -24,9 +25,93 @@ from mlg_troubleshoot.records.cells import (
     show,
     show_number,
 )
-from mlg_troubleshoot.records.dates import DateOrder, readings, written_day
 from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.units import MINUS, ClearanceConvention, LengthUnit, parse_length, vanishes
+
+
+class DateOrder(StrEnum):
+    """The order of day, month and year in a date that is written as numbers."""
+
+    DMY = "dmy"
+    MDY = "mdy"
+    YMD = "ymd"
+
+    @property
+    def words(self) -> str:
+        """The order in full."""
+        names = {"d": "day", "m": "month", "y": "year"}
+        return "-".join(names[letter] for letter in self.value)
+
+    @classmethod
+    def parse(cls, text: str) -> DateOrder:
+        """Read an order as a flag states it."""
+        try:
+            return cls(text.strip().lower())
+        except ValueError:
+            raise UsageError(
+                f"--dates {text!r} is not an order of dates", "Give dmy, mdy or ymd."
+            ) from None
+
+
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_MONTH = (
+    r"jan(?:uary)?|feb(?:ruary)?|mar(?:ch)?|apr(?:il)?|may|june?|july?|aug(?:ust)?|sept?(?:ember)?|oct(?:ober)?"
+    r"|nov(?:ember)?|dec(?:ember)?"
+)
+_WORDED_DAY = re.compile(
+    rf"(?:(?<!\w)(?P<day>\d{{1,2}})[\s.\-/]*(?P<month>{_MONTH})|(?P<first>{_MONTH})[\s.\-/]*(?P<second>\d{{1,2}}),?\s)"
+    r"[\s.,\-/]*(?P<year>\d{4}|\d{2})",
+    re.IGNORECASE | re.ASCII,
+)
+_MONTH_ALONE = re.compile(
+    rf"\b(?:{_MONTH})\b(?:[\s.\-/']*\d{{2,4}}\b)?|\b\d{{4}}-\d{{2}}\b", re.IGNORECASE | re.ASCII
+)
+_CLOCK = r"(?:[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d+)?)?(?:Z|[+\-]\d{2}:?\d{2})?)?"
+_ISO_DAY = re.compile(rf"(\d{{4}}-\d{{2}}-\d{{2}}){_CLOCK}|((?:19|20)\d{{6}})", re.ASCII)
+_NUMBERS = re.compile(rf"(\d{{1,4}})([./\-])(\d{{1,2}})\2(\d{{1,4}}){_CLOCK}", re.ASCII)
+
+
+def find_day(text: str) -> str:
+    """The part of a text that is a day, or only a month; empty without one."""
+    patterns = _ISO_DAY, _WORDED_DAY, _NUMBERS, _MONTH_ALONE
+    found = next(filter(None, (p.search(text) for p in patterns)), None)
+    return found[0] if found is not None else ""
+
+
+def days_of(text: str) -> dict[DateOrder, date] | None:
+    """The days that a text may mean, by the order of its numbers: of every order where it says
+    which number is which, none where the calendar does not have it; None for another text.
+    """
+    numbers = _NUMBERS.fullmatch(text)
+    worded = _WORDED_DAY.fullmatch(text)
+    if iso := _ISO_DAY.fullmatch(text):
+        day = (iso[1] or iso[2]).replace("-", "")
+        orders = dict.fromkeys(DateOrder, (day[:4], day[4:6], day[6:]))
+    elif worded is not None:
+        month = _MONTHS.index((worded["month"] or worded["first"])[:3].lower()) + 1
+        day = worded["day"] or worded["second"]
+        orders = dict.fromkeys(DateOrder, (worded["year"], f"{month}", day))
+    elif numbers is not None:
+        first, sign, second, third = numbers.groups()
+        orders = {DateOrder.YMD: (first, second, third)}
+        if len(first) <= 2:
+            orders = {DateOrder.DMY: (third, second, first), DateOrder.MDY: (third, first, second)}
+            # Nobody writes a short year first with points between.
+            if len(third) <= 2 and sign != ".":
+                orders[DateOrder.YMD] = (first, second, third)
+    else:
+        return None
+    days = {}
+    for order, (year, month_no, day_no) in orders.items():
+        with suppress(ValueError):
+            if len(year) in (2, 4):
+                days[order] = date(_year(year), int(month_no), int(day_no))
+    return days
+
+
+def _year(text: str) -> int:
+    return int(text) + (2000 if len(text) <= 2 else 0)
+
 
 _T = TypeVar("_T")
 
@@ -103,12 +188,6 @@ NOT_MEASURED = frozenset(_BLANK_WORDS.split("|"))
 # What they write for a tail that they do not know; NA and NONE may be tails.
 _NO_NAME = frozenset(("n/a", "n.a.", "unknown", "not known", "tbd", "tba"))
 
-_ODD_CELLS = {
-    OddKind.WORDED: "number_shown_otherwise",
-    OddKind.NO_VALUE: "formula_without_value",
-    OddKind.DATE: "cell_is_date",
-}
-
 
 def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
     """Return the fault of a cell that holds an error, a date, a truth value or nothing that was
@@ -121,7 +200,7 @@ def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
             expected,
             f"{said} Enter the value, or empty the cell if it was not measured.",
         )
-    return CellFaultError(_ODD_CELLS.get(cell.kind, "cell_is_boolean"), expected)
+    return CellFaultError(cell.kind if cell.kind in _USUAL else "cell_is_boolean", expected)
 
 
 def _number_of(cell: float | OddCell, expected: str) -> float:
@@ -144,17 +223,8 @@ def read_length(
     """Read a length in its own unit or that of its column, which must agree, or else in the
     declared one.
     """
-    if isinstance(cell, str):
-        text = plain_text(cell)
-        value, written = _written_length(text, decimal_comma, expected, unit)
-    else:
-        text = show(cell)
-        value = _number_of(cell, expected)
-        written = None
-        if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED:
-            _, written = _written_length(cell.text, False, expected, unit)
-    if not math.isfinite(value):
-        raise CellFaultError("not_finite", expected)
+    text = plain_text(show(cell))
+    value, written = _parse(cell, decimal_comma, expected, partial(_length, expected, unit))
     if value < 0 and not signed:
         raise CellFaultError("length_negative", expected)
     if written is not None and unit is not None and written is not unit:
@@ -176,26 +246,46 @@ def read_length(
     return found.to_inches(value), found, text
 
 
-def _with_point(text: str, decimal_comma: bool) -> tuple[str, bool]:
-    """A number as text without its sign and with a point; and whether it is negative."""
-    sign = _SIGNED.match(text)
-    body = text if sign is None else text[sign.end() :]
-    if decimal_comma and _COMMA_NUMBER.fullmatch(body):
-        body = body.replace(",", ".")
-    return body, sign is not None and sign[1] != "+"
-
-
-def _written_length(
-    text: str, decimal_comma: bool, expected: str, unit: LengthUnit | None
+def _parse(
+    cell: Filled,
+    decimal_comma: bool,
+    expected: str,
+    parse: Callable[[str, str], tuple[float, LengthUnit | None]],
 ) -> tuple[float, LengthUnit | None]:
-    if _NOT_FINITE.fullmatch(text):
+    """The number of a cell, and the unit that `parse` finds next to it in the text that is entered
+    or shown, which it takes whole and without a sign and with a point.
+    """
+    value = math.nan
+    unit = None
+    shown = cell if isinstance(cell, str) else ""
+    if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED:
+        shown = cell.text
+        decimal_comma = False
+    if shown:
+        text = plain_text(shown)
+        if _NOT_FINITE.fullmatch(text):
+            raise CellFaultError("not_finite", expected)
+        sign = _SIGNED.match(text)
+        body = text if sign is None else text[sign.end() :]
+        if decimal_comma and _COMMA_NUMBER.fullmatch(body):
+            body = body.replace(",", ".")
+        value, unit = parse(text, body)
+        value = value if sign is None or sign[1] == "+" else -value
+    if not isinstance(cell, str):
+        value = _number_of(cell, expected)
+    if not math.isfinite(value):
         raise CellFaultError("not_finite", expected)
-    body, is_negative = _with_point(text, decimal_comma)
+    return value, unit
+
+
+def _length(
+    expected: str, unit: LengthUnit | None, text: str, body: str
+) -> tuple[float, LengthUnit | None]:
     try:
         written = parse_length(body)
     except UsageError:
         raise _length_fault(text, body, expected, unit) from None
-    return (-written.value if is_negative else written.value), written.unit
+    return written.value, written.unit
 
 
 _EXAMPLES = {LengthUnit.INCH: "0.013", LengthUnit.THOU: "13", LengthUnit.MILLIMETRE: "0.33"}
@@ -240,7 +330,7 @@ def read_value(
             column.high,
             decimal_comma=decimal_comma,
             expected=column.asked,
-            units=tuple(filter(None, (column.unit.lstrip("°").lower(),))),
+            unit=column.unit.lstrip("°").lower(),
         )
     if column.holds is Holds.YES_NO:
         if (answer := _yes_no(cell)) is None:
@@ -264,29 +354,23 @@ def read_number(
     *,
     decimal_comma: bool,
     expected: str,
-    units: tuple[str, ...],
+    unit: str,
 ) -> float:
-    if isinstance(cell, str):
-        value = _written_number(plain_text(cell), decimal_comma, expected, units)
-    else:
-        value = _number_of(cell, expected)
-        if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED:
-            _written_number(cell.text, False, expected, units)
-    if not math.isfinite(value):
-        raise CellFaultError("not_finite", expected)
+    unclear = decimal_comma and isinstance(cell, str)
+    value, _ = _parse(cell, decimal_comma, expected, partial(_number, expected, unit, unclear))
     if not low <= value <= high:
         raise CellFaultError("out_of_range", expected)
-    if units == ("landings",) and (value % 1.0 or _UNCLEAR_GROUP.fullmatch(show(cell).strip())):
+    if unit == "landings" and (value % 1.0 or _UNCLEAR_GROUP.fullmatch(show(cell).strip())):
         remedy = "Landings are whole: enter them without a separator for thousands."
         raise CellFaultError("ambiguous_number", expected, remedy)
     return value
 
 
-def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[str, ...]) -> float:
-    for unit in units:
-        if text.lower().endswith(unit):
-            text = text[: -len(unit)].rstrip("° ")
-    body, is_negative = _with_point(text, decimal_comma)
+def _number(
+    expected: str, unit: str, decimal_comma: bool, text: str, body: str
+) -> tuple[float, None]:
+    if unit and text.lower().endswith(unit):
+        text, body = (each[: -len(unit)].rstrip("° ") for each in (text, body))
     if ("," in text or decimal_comma) and _UNCLEAR_GROUP.fullmatch(text):
         remedy = (
             f"{text!r} may be a thousand or a fraction. Enter it without a separator for thousands."
@@ -294,11 +378,9 @@ def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[
         raise CellFaultError("ambiguous_number", expected, remedy)
     if _COMMA_NUMBER.fullmatch(body):
         raise _comma_fault(text, expected)
-    if _NOT_FINITE.fullmatch(text):
-        raise CellFaultError("not_finite", expected)
     if not _PLAIN.fullmatch(body) or vanishes(body, float(body)):
         raise CellFaultError("not_a_number", expected)
-    return -float(body) if is_negative else float(body)
+    return float(body), None
 
 
 def is_no_name(cell: Filled) -> bool:
@@ -417,17 +499,17 @@ def may_be_outcome(cell: Filled, *, asked: bool | None) -> bool:
 
 def answers_outcome(header: str, cell: Filled) -> bool:
     """Whether a header asks what the gear did, and a cell says yes or no to it."""
-    return re.search(r"fail|retract", in_words(header)) is not None and _yes_no(cell) is not None
+    return _yes_no(cell) is not None and re.search(r"fail|retract", in_words(header)) is not None
 
 
 def written_number(cell: Filled, *, decimal_comma: bool) -> tuple[float, LengthUnit | None]:
     """The number in a cell with its unit, NaN where it is not a plain number or a length."""
     if isinstance(cell, OddCell):
         return (math.nan if cell.number is None else cell.number), None
-    if not isinstance(cell, str):
-        return cell, None
+    if isinstance(cell, str):
+        cell = plain_text(cell).lstrip("<>=≤≥ ")
     try:
-        return _written_length(plain_text(cell).lstrip("<>=≤≥ "), decimal_comma, "", None)
+        return _parse(cell, decimal_comma, "", partial(_length, "", None))
     except CellFaultError:
         return math.nan, None
 
@@ -471,7 +553,7 @@ class AmbiguousDateError(CellFaultError):
     days: the day by each order.
     """
 
-    def __init__(self, days: Mapping[DateOrder | None, date], expected: str) -> None:
+    def __init__(self, days: Mapping[DateOrder, date], expected: str) -> None:
         super().__init__("date_ambiguous", expected)
         self.days = days
 
@@ -489,9 +571,16 @@ def read_date(cell: Filled, order: DateOrder | None = None, latest: date = date.
     if isinstance(cell, OddCell):
         if cell.kind is not OddKind.DATE:
             raise odd_cell_fault(cell, expected)
-        days: dict[DateOrder | None, date] = {} if cell.day is None else {order: cell.day}
+        days = {} if cell.day is None else {DateOrder.YMD: cell.day}
     else:
-        days = _written_days(plain_text(cell), order, expected)
+        known = days_of(plain_text(cell))
+        if known is None:
+            raise CellFaultError("date_invalid", expected)
+        days = {each: day for each, day in known.items() if order in (None, each)}
+        if not days:
+            in_order = f" in the order {order.words}" if order and known else ""
+            no_such_day = "The calendar does not have this day."
+            raise CellFaultError("date_invalid", f"{expected}{in_order}", no_such_day)
         # A day to come is not one that was meant, where another reading is.
         days = {each: day for each, day in days.items() if day <= latest} or days
     if len(set(days.values())) > 1:
@@ -502,29 +591,6 @@ def read_date(cell: Filled, order: DateOrder | None = None, latest: date = date.
     if day > latest:
         raise CellFaultError("date_in_the_future", f"{expected}, not after {latest.isoformat()}")
     return day
-
-
-def _written_days(
-    text: str, order: DateOrder | None, expected: str
-) -> dict[DateOrder | None, date]:
-    """The days that a text may mean, in the order that is stated or else by each order."""
-    no_such_day = "The calendar does not have this day."
-    try:
-        day = written_day(text)
-    except ValueError:
-        raise CellFaultError("date_invalid", expected, no_such_day) from None
-    days = readings(text)
-    if day is not None:
-        return {order: day}
-    if days is None:
-        raise CellFaultError("date_invalid", expected)
-    fitting: dict[DateOrder | None, date] = {
-        each: found for each, found in days.items() if order in (None, each)
-    }
-    if not fitting:
-        in_order = "" if order is None else f" in the order {order.words}"
-        raise CellFaultError("date_invalid", f"{expected}{in_order}", no_such_day)
-    return fitting
 
 
 def read_moment(cell: Filled, order: DateOrder | None = None, latest: date = date.max) -> date:

@@ -8,8 +8,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.records import ReadOptions, read_many
-from mlg_troubleshoot.records.dates import DateOrder
-from mlg_troubleshoot.records.values import AmbiguousDateError, CellFaultError, read_date
+from mlg_troubleshoot.records.values import AmbiguousDateError, CellFaultError, DateOrder, read_date
 from tests.cli.conftest import mlg
 
 HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in,inspection_date"

@@ -105,7 +105,7 @@ def test_a_row_to_correct_names_its_cells() -> None:
 
 @pytest.mark.parametrize(
     ("typed", "meant"),
-    [("plunger_in", "plunger_displacement"), ("clearence_4_mm", "clearance_4_mm")],
+    [("plunjer_disp", "plunger_displacement"), ("clearence_4_mm", "clearance_4_mm")],
 )
 def test_a_column_that_is_not_one_brings_the_nearest(typed: str, meant: str) -> None:
     with pytest.raises(UsageError) as refused:
