@@ -83,7 +83,9 @@ frame.onload = () => {{
   }});
   const out = document.createElement("pre");
   out.id = "result";
-  out.textContent = JSON.stringify({{found, count, wide: page.documentElement.scrollWidth}});
+  const states = [...page.querySelectorAll(".ranked .state")];
+  const cut = states.filter(each => each.getBoundingClientRect().right > {width}).length;
+  out.textContent = JSON.stringify({{found, count, cut, wide: page.documentElement.scrollWidth}});
   document.body.append(out);
 }};
 frame.srcdoc = {document};
@@ -183,6 +185,8 @@ def overlaps(html: str, folder: Path, width: int) -> list[list[str]]:
     result = json.loads(unescape(re.findall(r'<pre id="result">(.*?)</pre>', dumped, re.DOTALL)[0]))
     assert result["count"] > 20
     assert result["wide"] <= width
+    # Whether a joint is over its limit is seen without scrolling.
+    assert result["cut"] == 0
     return list(result["found"])
 
 
