@@ -32,16 +32,21 @@ def plain(value: Any) -> Any:
     """Return a value as JSON can hold it: records as objects, arrays as lists, names as text, and
     null for what is not a finite number.
     """
-    return msgspec.json.decode(msgspec.json.encode(_named(value), enc_hook=_parts))
+    return json.loads(json.dumps(_values(value)), parse_constant=lambda _name: None)
 
 
 def as_text(value: Any) -> str:
-    """Write a value as JSON: what `plain` makes of it, twice as fast."""
-    parts = msgspec.to_builtins(_named(value), enc_hook=_parts)
+    """Write a value as JSON: what `plain` makes of it, faster."""
+    values = _values(value)
     try:
-        return _ENCODED(parts)
+        return _ENCODED(values)
     except ValueError:
-        return _ENCODED(plain(parts))
+        return _ENCODED(plain(values))
+
+
+def _values(value: Any) -> Any:
+    """A value without records; its texts may hold what no encoding has."""
+    return msgspec.to_builtins(_named(value), enc_hook=_parts)
 
 
 _ENCODED = json.JSONEncoder(allow_nan=False, check_circular=False).encode
