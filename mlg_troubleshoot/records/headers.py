@@ -254,8 +254,9 @@ def _taken_apart(text: str) -> tuple[list[str], list[str], _Units]:
 
 @lru_cache(maxsize=4096)
 def recognise(header: str, joints: Joints) -> Recognition:
-    text = _YES_NO.sub("", tidy(header))
-    if not text or len(text) > 120:
+    # Any cell may be asked whether it is a header: what is too long for one is not searched.
+    text = _YES_NO.sub("", tidy(header[:200]))
+    if not text or len(header) > 120:
         return UNKNOWN
     field = parse_canonical(_snake(text), joints)
     if field is not None:
@@ -281,7 +282,8 @@ def suspect(header: str, joints: Joints) -> tuple[str | None, bool]:
     plain = {word for word in said if not word.isdigit()} - _JOINT_WORDS
     if plain and plain <= _REFERENCE_WORDS:
         return None, False
-    numbers = {int(n) for n in re.findall(r"\d+", text)} & {*joints.numbers}
+    digits = {each.lstrip("0") for each in re.findall(r"\d+", text)}
+    numbers = {number for number in joints.numbers if str(number) in digits}
     is_plunger = _PLUNGER.search(text) is not None
     is_reading = bool(said & (_CLEARANCE_WORDS | _CONVENTION_WORDS | _READING_WORDS))
     named = len(said) > 1 and said <= joints.vocabulary
@@ -383,7 +385,8 @@ def _snake(name: str) -> str:
 def parse_target(name: str, joints: Joints) -> Field:
     """The column that a person names by its own or a short name, or by its joint."""
     text = name.strip().lstrip("#")
-    text = CLEARANCE.header(int(text)) if text.isdecimal() else _SHORT.get(text.lower(), text)
+    is_joint = re.fullmatch(r"\d{1,9}", text)
+    text = CLEARANCE.header(int(text)) if is_joint else _SHORT.get(text.lower(), text)
     found = recognise(text, joints)
     if found.field is None:
         meant = found.nearest or near_miss(text, joints).nearest or text

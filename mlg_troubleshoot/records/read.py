@@ -123,8 +123,8 @@ def read_many(
     finally:
         if is_collected:
             gc.enable()
-    passed_over = [note for source in given if (note := _subfolders_note(source))]
-    return replace(read, notes=(*passed_over, *read.notes))
+    passed_over = tuple(note for source in given if (note := _subfolders_note(source)))
+    return replace(read, notes=passed_over + read.notes, unread=passed_over + read.unread)
 
 
 def _subfolders_note(source: Source) -> str:

@@ -761,7 +761,7 @@ class Folder:
             cell = cells[self._joint.index]
             text = tidy(plain_text(show(cell)))
             match = _JOINT_TEXT.fullmatch(text)
-            joint = self._joints.get(text if match is None else str(int(match[1])))
+            joint = self._joints.get(text if match is None else match[1].lstrip("0"))
             if joint is None and (cell is not None or readings):
                 code = "joint_missing" if cell is None else "joint_unknown"
                 expected = f"a joint number from {self._table.options.joints.span}"

@@ -301,7 +301,7 @@ def _comma_fault(text: str, expected: str) -> CellFaultError:
 def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) -> CellFaultError:
     if _COMMA_NUMBER.fullmatch(body):
         return _comma_fault(text, expected)
-    fraction = re.fullmatch(r"(\d+)\s*/\s*(\d*[1-9]\d*)(.*)", body)
+    fraction = re.fullmatch(r"(\d{1,9})\s*/\s*(\d{0,8}[1-9]\d{0,8})(\D.*)?", body)
     if fraction:
         thou = LengthUnit.THOU.from_inches(int(fraction[1]) / int(fraction[2]))
         value = f"{fraction[1]}/{fraction[2]} in = {thou:.1f} thou"
@@ -615,12 +615,14 @@ def read_moment(cell: Filled, order: DateOrder | None = None, latest: date = dat
 def read_joints(cell: Filled, numbers: Collection[int]) -> tuple[int, ...]:
     """Read joint numbers in any of the ways people list them: ``3 5``, ``#3, #5``, ``3;5``."""
     expected = f"numbers of joints from {min(numbers)} to {max(numbers)}, for example 3 5"
+    # Looked up as text: int refuses thousands of digits.
+    known = {str(number): number for number in numbers}
     words = re.split(r"[\s,;#]+|\band\b", plain_text(show(cell)))
     found = [word for word in words if word]
-    unknown = [word for word in found if not word.isdecimal() or int(word) not in numbers]
+    unknown = [word for word in found if word.lstrip("0") not in known]
     if isinstance(cell, OddCell) and cell.kind is not OddKind.PADDED:
         raise odd_cell_fault(cell, expected)
     if unknown:
         remedy = f"{unknown[0]!r} is not a joint of this gear. Enter numbers with blanks between."
         raise CellFaultError("joints_unknown", expected, remedy)
-    return tuple(sorted({int(word) for word in found}))
+    return tuple(sorted({known[word.lstrip("0")] for word in found}))

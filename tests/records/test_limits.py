@@ -79,6 +79,22 @@ def test_thousands_of_rows_of_one_record_id_are_each_named_in_linear_time() -> N
     assert "row 3 of t.csv and 15998 more" in result.problems[0].expected
 
 
+ENDLESS = ("\u0301" * 60_000, "1" * 5000, "0" * 5000 + "6", "1/" + "1" * 5000)
+
+
+@pytest.mark.parametrize("text", ENDLESS, ids=["marks", "digits", "zeros", "fraction"])
+@pytest.mark.parametrize("place", ["header", "tail_no", "margin_in", "restored_joints", "remarks"])
+def test_a_text_without_end_is_read_or_refused_in_linear_time(place: str, text: str) -> None:
+    header, cell = (text, "0.06") if place == "header" else (place, text)
+    columns = dict(zip(HEADER.strip().split(","), GOOD.strip().split(","), strict=True))
+    columns[header] = cell
+    data = "\n".join(map(",".join, (columns, columns.values()))).encode()
+    start = time.process_time()
+    result = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv")
+    assert len(result.rows) == 1
+    assert time.process_time() - start < 2 * SLOWER
+
+
 @pytest.mark.parametrize("rows", [6_000, 99_000])
 def test_a_table_of_problems_only_is_refused_with_the_first_of_them(rows: int) -> None:
     data = (HEADER + ",,,,,x\n" * rows).encode()

@@ -100,5 +100,5 @@ def test_folders_in_a_folder_that_hold_tables_are_named(folder):
     (folder / "old").mkdir()
     (folder / "old" / "e.csv").write_text(HEADER + "E1,N1,LH,RADIAL,0.013\n")
     (folder / "pictures").mkdir()
-    (note,) = [note for note in read_many([folder], ReadOptions()).notes if "not read" in note]
+    (note,) = [note for note in read_many([folder], ReadOptions()).unread if "not read" in note]
     assert note.endswith("folders in it were not read: old")
