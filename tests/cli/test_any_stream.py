@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.cli import output
+from mlg_troubleshoot.json_form import as_text
 from tests.cli.conftest import DATA, FAILURE, FLEET, ROOT
 
 STORE = ROOT / "tests" / "store" / "data" / "version-1.sqlite"
@@ -93,8 +94,11 @@ def test_every_command_ends_as_documented_on_every_stream(command, stream, tmp_p
     as_documented(command, stream, tmp_path)
 
 
-def test_json_holds_every_character_on_a_stream_that_cannot(monkeypatch):
+@pytest.mark.parametrize(
+    "write", [output.write_json, lambda found: output.write_pieces([as_text(found)])]
+)
+def test_json_holds_every_character_on_a_stream_that_cannot(write, monkeypatch):
     plain = io.TextIOWrapper(io.BytesIO(), encoding="ascii", write_through=True)
     monkeypatch.setattr(sys, "stdout", plain)
-    output.write_json({"tail": "Größe–1\udcff"})
+    write({"tail": "Größe–1\udcff"})
     assert json.loads(plain.buffer.getvalue()) == {"tail": "Größe–1\udcff"}
