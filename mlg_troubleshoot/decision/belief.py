@@ -53,7 +53,7 @@ _OTHERS = 64
 # weights, and what stands for where its pin rests. [1]
 _LEFT = (np.arange(32)[::-1] + 0.5) / 32
 _QUANTILES = 1.0 - _LEFT**2
-_SUMS = (np.tri(32) * _LEFT).T
+_SUMS = (np.tri(32) * _LEFT).T.astype(np.float32)
 _TURNS = np.mod(np.arange(1, 33) * 0.5 * np.sqrt(5.0), 1.0)
 _SCORES = np.array([NormalDist().inv_cdf(turn) for turn in _TURNS.tolist()])
 
@@ -140,9 +140,10 @@ def _share_within(margin_in: Array | float) -> Array:
     return np.asarray(np.clip((margin_in - np.abs(_AT)) / _CELL_IN + 0.5, 0.0, 1.0))
 
 
-def _products_before(factors: Array) -> Array:
-    """Product of the factors before each one along the second axis."""
-    before = np.ones_like(factors)
+def _products_before(factors: Array, first: Array | float = 1.0) -> Array:
+    """Product of the factors before each one along the second axis, and of one before them all."""
+    before = np.empty_like(factors)
+    before[:, 0] = first
     for j in range(factors.shape[1] - 1):
         before[:, j + 1] = before[:, j] * factors[:, j]
     return before
@@ -182,8 +183,8 @@ class Belief:
         self._wear = wear
         # By pins, joints and levels.
         self._transforms = (wear @ _by_wear(gear)).view(complex)
-        self._before = _products_before(self._transforms)
-        self._stands = _density(self._before[:, -1] * self._transforms[:, -1] * _LINKAGE)
+        self._before = _products_before(self._transforms, _LINKAGE)
+        self._stands = _density(self._before[:, -1] * self._transforms[:, -1])
         y, u = float(cases.plunger_in[row]), float(np.hypot(cases.plunger_u_in[row], 1e-4))
         seen, of_rigging = np.ones(_CELLS), 1.0
         if np.isfinite(y):
@@ -226,7 +227,7 @@ class Belief:
         seen = np.fft.rfft(self._seen_at)
         seen[..., 1:-1] *= 2.0
         weighed = np.einsum("cpk,cpf->pkf", self._factors, np.conj(seen))
-        others = self._before * after * (_LINKAGE * weighed)[:, None]
+        others = self._before * after * weighed[:, None]
         # Parseval.
         by_wear = np.conj(others).view(float) @ _by_wear(self.gear).swapaxes(2, 3)
         found = np.maximum(np.einsum("pjks,jks->js", by_wear, self._wear), 1e-300)
@@ -290,9 +291,13 @@ class Belief:
         likely = self._stands[pins, levels] * self._seen_at[cause, pins] + 1e-300
         place = _drawn(likely, context, even[1])
         stands = _AT[place] + _CELL_IN * (even[2] - 0.5)
-        before = _density(self._before[pins, :, levels] * _LINKAGE)
+        before = _density(self._before[pins, :, levels])
         before = before.swapaxes(0, 1)
-        before = np.concatenate([before[..., half:], before, before[..., :half]], axis=2)
+        # In single precision: a draw needs no more, and half of the time.
+        before = np.concatenate(
+            [before[..., half:], before, before[..., :half]], axis=2, dtype=np.float32
+        )
+        share = even[3:, :, None].astype(np.float32)
         is_worn, at_in = self._points(pins, levels)
         # The cells go round: from half of them below to half above.
         cell = (np.rint(at_in / _CELL_IN).astype(int) + half) % _CELLS - half
@@ -301,8 +306,7 @@ class Belief:
         for j in range(joints - 1, -1, -1):
             left = (first + place)[:, None] - cell[j].take(context, axis=0)
             steps = before[j].take(left) @ _SUMS
-            below = steps < even[3 + j, :, None] * steps[:, -1:]
-            chosen[j] = below.view(np.int8).sum(axis=1, dtype=np.int8)
+            chosen[j] = np.argmax(steps >= share[j] * steps[:, -1:], axis=1)
             place = (place - cell[j, context, chosen[j]]) % _CELLS
         at = np.arange(joints)[:, None], context, chosen
         moved, worn = at_in[at].T, is_worn[at].T

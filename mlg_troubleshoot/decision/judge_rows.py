@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import date
-from functools import cache, partial
+from functools import lru_cache, partial
 from itertools import chain
 from operator import attrgetter
 from typing import Any
@@ -418,7 +418,7 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
         p_lower,
         lower.standard_uncertainty(cases.margin_u_in),
     )
-    belief = cache(partial(Belief, cases))
+    belief = lru_cache(4)(partial(Belief, cases))
     planned, tried = plans(cases, judged, belief)
     sets = repair_sets(cases, upper, np.flatnonzero(wanted), tried, belief)
     asked = belief if advice else None

@@ -92,16 +92,16 @@ def choose(
     asked, found = _patterns(groups, len(over))
     rows = np.arange(len(asked))
     code = 1 << np.arange(len(over))
-    matches = (states.worn @ code & (asked @ code)[:, None] == (found @ code)[:, None]).astype(
-        float
-    )
+    matches = states.worn @ code & (asked @ code)[:, None] == (found @ code)[:, None]
+    matches = matches.astype(np.float32)
     causes = matches @ states.causes.T
 
     fixed = over & ~doubted
     bits = _bits(belief, (worn | unread & spare | doubted) & ~fixed, doubted)
     codes = np.arange(bits.sum() + 1)
     sets = ((codes[:, None] & bits) > 0) | fixed
-    out = matches[:, :STATES] @ (states.stays_out(sets) * states.causes[0, :STATES, None])
+    # Failures of the joints weigh the same.
+    out = states.causes[0, 0] * (matches[:, :STATES] @ states.stays_out(sets).astype(np.float32))
     must = np.where(asked, found, over) @ bits
     more = codes != must[:, None]
     allowed = codes & ~(np.where(asked, spare, worn | over) @ bits)[:, None] == 0
@@ -404,7 +404,7 @@ class _PlanBuilder:
         # What is over its limit already does not suffice, or there would be nothing to read: one
         # joint more is restored on average.
         joints = self.cases.must_restore[self.row].copy()
-        joints[max(places, key=lambda j: float(worn[j]))] = True
+        joints[max(places, key=lambda j: round(float(worn[j]), 6))] = True
         without = self._joints(joints & ~self.cases.restorable[self.row])
         if without:
             return self._restore_over_limit()._stop_for_today(without)
