@@ -201,7 +201,9 @@ class Belief:
         elsewhere = before / (1.0 - often) / PRIORS.joints_for_one_elsewhere
         # By cause, pins and levels; by cause, pins and cells.
         self._factors = np.array([before / often, elsewhere])
-        self._seen_at = np.array([_both_senses(seen * each) for each in (1.0 - within, within)])
+        likely = seen * np.array([1.0 - within, within])
+        # Held pins may rest with either sign.
+        self._seen_at = np.stack([likely, 0.5 * (likely + likely[:, -_PLACES])], axis=1)
         fits = np.einsum("pkx,cpx->cpk", self._stands, self._seen_at)
         free, held = (fits.sum(axis=0) @ levels).tolist()
         self.held = held / max(free, 1e-300)
@@ -280,7 +282,7 @@ class Belief:
         """
         causes = np.repeat([0, 1], [STATES, _OTHERS])
         n, joints, half = len(causes), len(self.gear.joints), _CELLS // 2
-        even, turns, misrigged = _even(joints + 3, n), *_random(joints)
+        even, (turns, of_level, of_joint) = _even(joints + 3, n), _random(joints)
         # A context is a cause with pins and a level.
         shape = self._weights.shape
         drawn = _drawn(self._weights.reshape(2, -1), causes, even[0])
@@ -310,7 +312,6 @@ class Belief:
             place = (place - cell[j, context, chosen[j]]) % _CELLS
         at = np.arange(joints)[:, None], context, chosen
         moved, worn = at_in[at].T, is_worn[at].T
-        of_level, of_joint = misrigged
         level = _drawn(self._rigging_levels[None], np.zeros(_OTHERS, int), of_level)
         rigging = of_joint < self._left_worn[:, level].T
         fresh = turns[pins[context[:STATES]], np.arange(STATES)]
@@ -351,24 +352,17 @@ def _even(dimensions: int, n: int) -> Array:
 
 
 @lru_cache(maxsize=4)
-def _random(joints: int) -> tuple[Array, tuple[Array, Array]]:
+def _random(joints: int) -> tuple[Array, Array, Array]:
     """Random numbers that every gear has in common: cosines of the pins of new joints, free and
     held (4), (2, STATES, joints); and what draws the level and the worn joints of a wrong rigging.
     [1]
     """
     rng = np.random.default_rng(1)
-    misrigged = rng.random(_OTHERS), rng.random((_OTHERS, joints))
+    of_level, of_joint = rng.random(_OTHERS), rng.random((_OTHERS, joints))
     mean, spread = PRIORS.cosine
     held = mean + spread * rng.standard_normal((STATES, joints))
     free = np.cos(2.0 * np.pi * rng.random((STATES, joints)))
-    return np.array([free, held]), misrigged
-
-
-def _both_senses(likelihood: Array) -> Array:
-    """A likelihood with free pins, and with held ones, which may rest with either sign; shape
-    (2, cells). [1]
-    """
-    return np.array([likelihood, 0.5 * (likelihood + likelihood[-_PLACES])])
+    return np.array([free, held]), of_level, of_joint
 
 
 def _drawn(weights: Array, rows: Places, share: Array) -> Places:

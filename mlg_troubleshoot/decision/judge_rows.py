@@ -5,11 +5,11 @@ What is looked at first: of the joints of a gear, of the gears of a batch.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import date
 from functools import lru_cache, partial
-from itertools import chain
 from operator import attrgetter
 from typing import Any
 
@@ -61,8 +61,8 @@ from mlg_troubleshoot.decision.prediction import (
     responses,
 )
 from mlg_troubleshoot.decision.verdict_rule import verdict, with_reading
-from mlg_troubleshoot.gear.gear import DEFAULT_PLUNGER_U_IN, ROUNDING_IN, Gear
-from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.gear.gear import DEFAULT_PLUNGER_U_IN, ROUNDING_IN, Gear, JointSpec
+from mlg_troubleshoot.indices.index_table import IndexTable, JointIndices
 from mlg_troubleshoot.units import Length, Sentence
 
 # Two readings differ for sure where they do by this many standard uncertainties of the difference:
@@ -106,39 +106,43 @@ def rank_joints(
         )
         first = np.minimum(first, 1 + above.sum(axis=1))
         last = np.maximum(last, above.shape[1] - above.sum(axis=2))
-    best = first.tolist()
-    worst = last.tolist()
-    # There are few ranges: a large batch holds each of them once.
-    ranges: dict[tuple[int, int], tuple[int, int]] = {}
-    ranks = places[:, 0].tolist()
-    known = clearance_in.tolist()
-    above = over.tolist()
-    room = np.full(clearance_in.shape, np.nan) if allowance_in is None else allowance_in
-    allowed = np.where(np.isfinite(room), room, np.nan).tolist()
+    room = np.full(over.shape, np.nan) if allowance_in is None else allowance_in
 
-    def finding(i: int, j: int) -> JointFinding:
-        joint = gear.joints[j]
-        indices = table.joints[j]
-        clearance = known[i][j] if measured[i, j] else None
+    def finding(
+        joint: JointSpec,
+        indices: JointIndices,
+        clearance: float,
+        is_over: bool,
+        rank: int,
+        best: int,
+        worst: int,
+        left: float,
+    ) -> JointFinding:
         return JointFinding(
             joint=joint.number,
             name=joint.name,
-            clearance_in=clearance,
+            clearance_in=_number_or_none(clearance),
             limit_in=joint.limit.value,
-            over_limit=above[i][j],
-            contribution_in=(
-                None if clearance is None else indices.plunger_amplification * clearance
-            ),
+            over_limit=is_over,
+            contribution_in=_number_or_none(indices.plunger_amplification * clearance),
             first_order=indices.first_order,
             total_order=indices.total_order,
             plunger_amplification=indices.plunger_amplification,
-            rank=ranks[i][j],
-            rank_range=ranges.setdefault((span := (best[i][j], worst[i][j])), span),
+            rank=rank,
+            rank_range=(best, worst),
             acts_like=gear.alike[joint.number],
-            allowance_in=None if allowed[i][j] != allowed[i][j] else allowed[i][j],
+            allowance_in=_number_or_none(left),
         )
 
-    return [tuple(finding(i, j) for j in range(len(gear.joints))) for i in range(len(clearance_in))]
+    of_each = (clearance_in, over, places[:, 0], first, last, room)
+    return [
+        tuple(map(finding, gear.joints, table.joints, *row))
+        for row in zip(*(each.tolist() for each in of_each), strict=True)
+    ]
+
+
+def _number_or_none(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def _surely_above(
@@ -284,20 +288,7 @@ def assess(
     """Judge rows: verdict, plan, repair sets and allowances; with `advice` re-rigging and
     the joints that are likely worn. `fleet` is what other gears teach.
     """
-    parts = [rows[start : start + AT_ONCE] for start in range(0, len(rows), AT_ONCE)]
-    task = partial(_judge_part, gear, table, advice, extension, fleet)
-    return tuple(chain.from_iterable(map(task, parts)))
-
-
-def _judge_part(
-    gear: Gear,
-    table: IndexTable,
-    advice: bool,
-    extension: Extension | None,
-    fleet: Fleet | None,
-    part: Sequence[Inspection | InvalidRow],
-) -> tuple[Judgement, ...]:
-    valid = [row for row in part if isinstance(row, Inspection)]
+    valid = [row for row in rows if isinstance(row, Inspection)]
     # Gears of which the same is known are judged once; to an extension it matters whose they are.
     known: list[object] = [
         n
@@ -306,17 +297,21 @@ def _judge_part(
         for n, row in enumerate(valid)
     ]
     alike = dict(zip(known, valid, strict=True))
+    different = [*alike.values()]
+    found: list[Assessment] = []
     # Products of this size take twice as long where they wait for other threads.
     with threadpool_limits(1, "blas"):
-        cases = Cases.of(gear, [*alike.values()], fleet=fleet)
-        found = _assess_valid(cases, table, advice) if valid else []
-        if extension is not None and valid:
-            extended = _assess_valid(replace(cases, extension=extension), table, advice)
-            approval = extension.approval
-            found = [_worse(*both, approval) for both in zip(found, extended, strict=True)]
-        if advice:
-            judge = partial(_assess_valid, table=table, advice=False)
-            found = with_consequences(found, cases, judge)
+        for start in range(0, len(different), AT_ONCE):
+            cases = Cases.of(gear, different[start : start + AT_ONCE], fleet=fleet)
+            part = _assess_valid(cases, table, advice)
+            if extension is not None:
+                extended = _assess_valid(replace(cases, extension=extension), table, advice)
+                approval = extension.approval
+                part = [_worse(*both, approval) for both in zip(part, extended, strict=True)]
+            if advice:
+                judge = partial(_assess_valid, table=table, advice=False)
+                part = with_consequences(part, cases, judge)
+            found += part
     judged = dict(zip(alike, found, strict=True))
     unjudged = tuple(UnjudgedJoint(joint.number, joint.name) for joint in gear.joints)
     assessed = (
@@ -328,7 +323,7 @@ def _judge_part(
             if isinstance(row, Inspection)
             else Rejected(row, unjudged, correct(row), row.warnings)
         )
-        for row in part
+        for row in rows
     )
 
 
@@ -470,8 +465,8 @@ def _assessment(
     # unknown.
     known = closes and bool(np.isfinite(judged.u_in[i]))
 
-    def number_or_none(value: Any, when: bool = closes) -> float | None:
-        return float(value) if when and np.isfinite(value) else None
+    def number_or_none(value: float, when: bool = closes) -> float | None:
+        return _number_or_none(value) if when else None
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.lower, cases, i) if known else None
@@ -611,7 +606,17 @@ def _warnings(
         warnings.append(sentences.LIMITS_WRITTEN)
     elif len(read) >= sentences.LEAST_ALIKE and len(set(read)) == 1 and read[0] > 0.0:
         warnings.append(sentences.one_value(read[0]))
-    warnings += _down_lock(cases, i)
+    at = inspection.plunger_down_lock_in
+    if at is not None and cases.off_down_lock[i]:
+        low, high = gear.down_lock_range
+        warnings.append(
+            Sentence.of(
+                "Plunger at Down Lock {} is outside {} to {}: check the rigging first.",
+                Length(at),
+                Length(low, 2, named=False),
+                Length(high, 2),
+            )
+        )
     if not np.all(np.isfinite(worst_in)):
         warnings.append(
             "With these clearances the linkage does not close in every direction: check the"
@@ -623,9 +628,7 @@ def _warnings(
             " unknown."
         )
     elif inspection.clearance_in:
-        differs = plunger_reading.disagreement(inspection, *worst_in, u)
-        if differs is not None:
-            warnings.append(differs)
+        warnings += filter(None, [plunger_reading.disagreement(inspection, *worst_in, u)])
     if inspection.gauge_u_is_default and inspection.clearance_in:
         warnings.append(
             Sentence.of(
@@ -646,21 +649,6 @@ def _warnings(
         over = [f.joint for f in findings if f.over_limit]
         warnings += sentences.older_than_the_repair(inspection, over)
     return tuple(warnings)
-
-
-def _down_lock(cases: Cases, i: int) -> list[str]:
-    at = cases.inspections[i].plunger_down_lock_in
-    if at is None or not cases.off_down_lock[i]:
-        return []
-    low, high = cases.gear.down_lock_range
-    return [
-        Sentence.of(
-            "Plunger at Down Lock {} is outside {} to {}: check the rigging first.",
-            Length(at),
-            Length(low, 2, named=False),
-            Length(high, 2),
-        )
-    ]
 
 
 def allowances(cases: Cases, lower: Prediction) -> Array:

@@ -65,12 +65,6 @@ class Response:
     amplification: Array
     worst_curvature: Array
 
-    def displacement(self, links: Array) -> Array:
-        """Displacement by the components of the virtual links. [in]"""
-        return np.asarray(
-            links @ self.gradient + 0.5 * np.sum((links @ self.curvature) * links, axis=-1)
-        )
-
     def worst(self, clearance_in: Array) -> tuple[Array, Array]:
         """Worst displacement of both senses. [in]"""
         first = clearance_in @ self.amplification
@@ -322,7 +316,6 @@ class Cases:
     plunger_in: Array
     plunger_u_in: Array
     failed: Mask
-    retracted: Mask
     reachable: Mask
     restorable: Mask
     fleet: Fleet
@@ -357,7 +350,6 @@ class Cases:
             plunger_in=np.array([each for each, _u in plunger]),
             plunger_u_in=np.array([u for _each, u in plunger]),
             failed=np.array([i.standing_outcome is Outcome.FAILED for i in rows]),
-            retracted=np.array([i.standing_outcome is Outcome.RETRACTED for i in rows]),
             reachable=flags(lambda i, n: n not in i.cannot_reach),
             restorable=flags(lambda i, n: n not in i.cannot_reach and n not in i.no_spare),
             fleet=fleet or Fleet(),
