@@ -14,18 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC
 from functools import cached_property
 from inspect import signature
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cholesky, orth
-from scipy.optimize import least_squares
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial.distance import cdist
 from scipy.special import stdtrit
 from threadpoolctl import threadpool_limits
 
@@ -83,17 +78,15 @@ def read_measured(measured: Any) -> tuple[Array, list[str]]:
     return data, names
 
 
-def read_covariates(covariates: Any, n: int) -> dict[str, Array]:
-    """Each covariate as a column, shape (n, 1)."""
-    columns = {name: read_numbers(covariates[name], name) for name in covariates or ()}
-    for name, values in columns.items():
-        if values.shape != (n,) or not np.isfinite(values).all():
-            raise UsageError(
-                f"covariate {name!r} has shape {values.shape} for {n} rows, or values that are not"
-                " finite",
-                "give one number for each row",
-            )
-    return {str(name): values[:, None] for name, values in columns.items()}
+def read_rows(values: Any, n: int, name: str) -> Array:
+    """One number for each row."""
+    column = read_numbers(values, name)
+    if column.shape != (n,) or not np.isfinite(column).all():
+        raise UsageError(
+            f"{name} has shape {column.shape} for {n} rows, or values that are not finite",
+            "give one number or one date for each row",
+        )
+    return column
 
 
 def read_labels(labels: ArrayLike | None, n: int, name: str) -> Wholes:
@@ -110,15 +103,10 @@ def read_times(time: ArrayLike | None, chain: Wholes) -> Array:
     """When each row was read, in usual steps of a series; without time in the order given."""
     given = np.arange(len(chain)) if time is None else np.asarray(time)
     if given.dtype == object:
-        given = np.array([_without_zone(moment) for moment in given])
+        given = np.asarray(time, "datetime64[us]")
     if given.dtype.kind == "M":
         given = np.divide(given - given.min(), np.timedelta64(1, "s"))
-    when = read_numbers(given, "time")
-    if when.shape != chain.shape or not np.isfinite(when).all():
-        raise UsageError(
-            f"time has shape {when.shape} for {len(chain)} rows, or values that are not finite",
-            "give one number or one date for each row",
-        )
+    when = read_rows(given, len(chain), "time")
     order = np.lexsort((when, chain))
     step = np.diff(when[order])[np.diff(chain[order]) == 0]
     if np.any(step <= 0.0):
@@ -127,13 +115,6 @@ def read_times(time: ArrayLike | None, chain: Wholes) -> Array:
             "give each a time of its own, or a series of its own",
         )
     return when / (np.median(step) if len(step) else 1.0)
-
-
-def _without_zone(moment: Any) -> Any:
-    """A date with a time zone as NumPy's in UTC."""
-    if getattr(moment, "tzinfo", None) is not None:
-        moment = moment.astimezone(UTC).replace(tzinfo=None)
-    return np.datetime64(moment) if hasattr(moment, "tzinfo") else moment
 
 
 def check_predict(predict: Callable[..., Any]) -> None:
@@ -150,55 +131,49 @@ def check_predict(predict: Callable[..., Any]) -> None:
         return
 
 
-def read_declared(reading_u: ArrayLike | None, data: Array) -> Array | None:
+def read_declared(reading_u: ArrayLike, run: Runner) -> Array:
     """Standard uncertainty of each reading."""
-    if reading_u is None:
-        return None
     declared = read_numbers(reading_u, "reading_u")
-    if declared.shape not in {(), data.shape[1:], data.shape} or not np.all(declared > 0.0):
+    if declared.shape not in {(), run.shape[1:], run.shape} or not np.all(declared > 0.0):
         raise UsageError(
-            f"reading_u has shape {declared.shape}, the readings have shape {data.shape};"
+            f"reading_u has shape {declared.shape}, the readings have shape {run.shape};"
             f" least value: {np.min(declared)}, not above 0",
             "give a positive number for each output, or for each reading",
         )
-    return np.broadcast_to(declared, data.shape)[np.isfinite(data)]
+    return np.broadcast_to(declared, run.shape)[run.row, run.output]
 
 
-def check_suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect], data: Array) -> None:
-    """Refuse parameters that cannot be, and more of them than readings could tell."""
-    if not suspects:
-        raise UsageError("No suspects were given", "name at least one parameter that may be wrong")
-    every = [*suspects, *nuisance]
+def read_suspects(every: Sequence[Suspect], readings: int, count: int) -> Array:
+    """Nominal value, trial, bounds and standard deviation of each parameter, shape (5, p), the
+    first so many of them suspects; refuse parameters that cannot be, and more than readings tell.
+    """
+    if not count or readings < len(every) - count + 3:
+        raise UsageError(
+            f"No suspects were given, or too few readings: {readings}, nuisance parameters:"
+            f" {len(every) - count}",
+            "name one suspect at least, and measure three readings more than nuisance parameters",
+        )
+    numbers = []
     for s in every:
         if not isinstance(s, Suspect):
             raise UsageError(
                 f"{s!r} is not a Suspect", "write Suspect(name, nominal, trial) for each parameter"
             )
-    names = [s.name for s in every]
-    for s in every:
-        if not all(isinstance(value, Real) for value in (s.nominal, s.trial)):
-            raise UsageError(
-                f"{s.name}: nominal {s.nominal!r}, trial {s.trial!r}", "both must be numbers"
-            )
         low, high = (-np.inf if s.low is None else s.low, np.inf if s.high is None else s.high)
-        sd = 1.0 if s.prior_sd is None else s.prior_sd
-        finite = np.isfinite([s.nominal, s.trial]).all() and s.trial
-        wrong = {
-            "is named twice": names.count(s.name) > 1,
-            f"nominal {s.nominal}, trial {s.trial}: not finite, or a trial of 0": not finite,
-            f"nominal {s.nominal} is not between low {low} and high {high}": not (
-                low <= s.nominal <= high and low < high
-            ),
-            f"prior_sd {sd} is not above 0": not sd > 0.0,
-        }
-        if any(wrong.values()):
-            says = next(text for text, is_wrong in wrong.items() if is_wrong)
-            raise UsageError(f"{s.name} {says}", "correct this suspect or nuisance parameter")
-    if np.sum(np.isfinite(data)) < len(nuisance) + 3:
-        raise UsageError(
-            f"too few readings: {np.sum(np.isfinite(data))}, nuisance parameters: {len(nuisance)}",
-            f"measure {len(nuisance) + 3} at least",
-        )
+        own = read_numbers([s.nominal, s.trial, low, high, s.prior_sd], s.name)
+        nominal, trial, low, high, sd = own.tolist()
+        is_within = low <= nominal <= high and low < high
+        if not is_within or not np.isfinite(trial) or not trial or sd <= 0.0:
+            raise UsageError(
+                f"{s.name}: nominal {nominal:g}, trial {trial:g}, low {low:g}, high {high:g},"
+                f" prior_sd {sd:g}",
+                "give a nominal value between low and high, a finite trial other than 0, and a"
+                " prior_sd above 0",
+            )
+        if [each.name for each in every].count(s.name) > 1:
+            raise UsageError(f"{s.name} is named twice", "give each parameter its own name")
+        numbers.append(own)
+    return np.transpose(numbers)
 
 
 Predict = Callable[[Mapping[str, float]], Any]
@@ -218,23 +193,18 @@ class Runner:
     """
 
     def __init__(
-        self,
-        predict: Predict,
-        measured: Array,
-        suspects: Sequence[Suspect],
-        channels: Sequence[str],
+        self, predict: Predict, measured: Any, suspects: Sequence[Suspect], count: int
     ) -> None:
         self.predict = predict
-        self.channels = channels
-        self.shape = measured.shape
-        self.row, self.output = np.nonzero(np.isfinite(measured))
-        self.reading = measured[self.row, self.output]
+        data, self.channels = read_measured(measured)
+        self.shape = data.shape
+        self.row, self.output = np.nonzero(np.isfinite(data))
+        self.reading = data[self.row, self.output]
         self.suspects = suspects
+        self.count = count
+        numbers = read_suspects(suspects, len(self.row), count)
+        self.nominal, self.trial, self.low, self.high, self.prior_sd = numbers
         self.names = [s.name for s in suspects]
-        numbers = [(s.nominal, s.trial, s.low, s.high) for s in suspects]
-        self.nominal, self.trial, self.low, self.high = np.array(numbers, float).T
-        self.low = np.nan_to_num(self.low, nan=-np.inf)
-        self.high = np.nan_to_num(self.high, nan=np.inf)
         self.calls = 0
         self.failures: list[str] = []
         self._known: dict[bytes, Array] = {}
@@ -296,45 +266,11 @@ class Runner:
                 if self.low[k] <= moved[k] <= self.high[k]:
                     usable.append((self.at(moved) - self.at(values)) / change)
             usable = [slope for slope in usable if np.isfinite(slope).all()]
-            if usable:
+            if np.any(usable):
                 both = np.mean(usable, axis=0)
                 even = np.linalg.norm(both) < _EVEN * np.linalg.norm(usable[0])
-                if np.any(usable):
-                    return usable[0] if even else both
+                return usable[0] if even else both
         return np.zeros(len(self.row))
-
-    def fit(self, values: Array, chosen: list[int], white: Callable[[Array], Array]) -> Array:
-        """Fit some parameters within their bounds by least squares: all values.
-
-        white: makes columns of readings independent and of unit scatter.
-        """
-
-        def there(some: Array) -> Array:
-            moved = values.copy()
-            moved[chosen] = some
-            return moved
-
-        if not chosen:
-            return values
-        low, high, trial = (own[chosen] for own in (self.low, self.high, self.trial))
-
-        def residual(some: Array) -> Array:
-            return white(self.reading - self.at(there(some)))
-
-        def slopes(some: Array) -> Array:
-            return np.asarray(-white(self.columns(there(some), chosen)) / trial)
-
-        found = least_squares(
-            residual,
-            values[chosen],
-            slopes,
-            (low, high),
-            x_scale=np.abs(trial),
-            ftol=1e-6,
-            max_nfev=30,
-        )
-        at_bound = np.where(found.active_mask < 0, low, high)
-        return there(np.where(found.active_mask, at_bound, found.x))
 
 
 # What is tried of a size that nobody knows, over the usual one.
@@ -351,8 +287,6 @@ _DIGITS = 1e-9
 # Share of its effect that a suspect keeps given the nuisance parameters, below which it cannot be
 # tested; given another suspect, below which the two are one.
 _TESTABLE = 0.03
-# Share of spare readings below which the residual of all columns says nothing of the noise.
-_SPARE = 0.25
 # Rows that stand for all in a smooth shape; lengths in units of the median distance of the rows.
 _LANDMARKS = 60
 _LENGTHS = 1 / 2 ** np.arange(2, -1, -1)
@@ -428,17 +362,18 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
         gives no number.
     """
     check_predict(predict)
-    data, channels = read_measured(measured)
-    check_suspects(suspects, nuisance, data)
-    declared = read_declared(reading_u, data)
-    group = read_labels(groups, len(data), "groups")
-    chain = read_labels(series, len(data), "series")
+    run = Runner(predict, measured, [*suspects, *nuisance], len(suspects))
+    n = run.shape[0]
+    group = read_labels(groups, n, "groups")
+    chain = read_labels(series, n, "series")
     when = read_times(time, chain)
     if series is None and time is not None:
         raise UsageError(
             "time was given without series", "say with series= which rows follow each other"
         )
-    run = Runner(predict, data, [*suspects, *nuisance], channels)
+    moving = dict(covariates) if covariates is not None else {}
+    known = {str(name): read_rows(own, n, repr(name)) for name, own in moving.items()}
+    declared = None if reading_u is None else read_declared(reading_u, run)
     bad = np.flatnonzero(~np.isfinite(run.at(run.nominal)))
     if len(bad):
         raise UsageError(
@@ -447,12 +382,10 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
             f" (counted from 0); {run.failures[0]}",
             "set these readings to NaN or correct the simulation",
         )
+    follow = None if series is None else (chain, when)
     # The matrices are small: threads that wait for each other cost several times what they save.
     with threadpool_limits(1, "blas"):
-        follow = None if series is None else (chain, when)
-        known = read_covariates(covariates, len(data))
-        study = _Study(run, len(suspects), group, follow, declared, beliefs or Beliefs(), known)
-        return study.diagnosis()
+        return _Study(run, group, follow, declared, beliefs or Beliefs(), known).diagnosis()
 
 
 @dataclass(frozen=True)
@@ -472,7 +405,15 @@ class _Point:
     whole: Array
     noise: NoiseModel
     classes: list[list[int]]
-    follows: Conclusion
+    effects: Effects
+    contexts: Sequence[Context]
+    beliefs: Beliefs
+
+    @cached_property
+    def follows(self) -> Conclusion:
+        """What the readings say here."""
+        given = self.noise, self.whole, self.effects, self.contexts, self.beliefs
+        return Conclusion(posterior(*given, (), _MOST), self.beliefs)
 
     @property
     def likeliest(self) -> Explanation:
@@ -483,7 +424,7 @@ class _Point:
         """Fit changes of some suspects in their trials; noise with a discrepancy, and with the
         scatter between groups that they leave.
         """
-        noise = self.noise.with_effects(self.follows.posterior.contexts[context].shared_in)
+        noise = self.noise.with_effects(self.contexts[context].shared_in)
         found = fit(noise, self.columns[:, list(chosen)], self.whole)
         return found, noise.with_tails(found.tail_ratio)
 
@@ -497,7 +438,6 @@ class _Study:
     """A simulation, its readings and what is believed: suspects come first, then nuisance."""
 
     run: Runner
-    count: int
     group: Wholes
     follow: tuple[Wholes, Array] | None
     declared: Array | None
@@ -507,7 +447,7 @@ class _Study:
     @property
     def nuisance(self) -> list[int]:
         """Places of the nuisance parameters."""
-        return list(range(self.count, len(self.run.names)))
+        return list(range(self.run.count, len(self.run.names)))
 
     @property
     def outputs(self) -> list[Wholes]:
@@ -519,18 +459,18 @@ class _Study:
         """Nothing, or a smooth discrepancy of some size, each output by itself."""
         run = self.run
         n = len(self.group)
-        moves = np.zeros((n, run.shape[1], self.count))
-        moves[run.row, run.output] = run.columns(run.nominal, range(self.count))
+        moves = np.zeros((*run.shape, run.count))
+        moves[run.row, run.output] = run.columns(run.nominal, range(run.count))
         features = {
             "prediction": np.nan_to_num(run.call(run.nominal)),
-            "effects of the suspects": moves.reshape(n, -1),
-            _ORDER: np.arange(n, dtype=float)[:, None],
+            "effects of the suspects": moves,
+            _ORDER: np.arange(n, dtype=float),
             **self.covariates,
         }
         shapes = [
             (name, shape)
             for name, own in features.items()
-            for shape in _smooth_shapes(own, self.group, name == _ORDER)
+            for shape in _smooth_shapes(own.reshape(n, -1), self.group, name == _ORDER)
         ]
         sizes = self.beliefs.shape_size * np.array(Beliefs().sizes)
         share = self.beliefs.expected * self.beliefs.unlisted / max(len(shapes) * len(sizes), 1)
@@ -562,23 +502,6 @@ class _Study:
         least = _DIGITS * np.max(np.abs([*self.run.reading, *self.run.at(self.run.nominal)]))
         return np.asarray(np.maximum(relative * np.maximum(level, size / FAR), least))
 
-    def first_scale(self, values: Array) -> Array:
-        """The same before anything is explained: from what all columns leave, or those of nuisance
-        parameters where rows are too few for all.
-        """
-        columns = self.run.columns(values, range(len(values)))
-        rest = self.run.reading - self.run.at(values)
-        scale = np.ones(len(rest)) if self.declared is None else self.declared
-        for _ in range(6):
-            basis = _basis_of(columns / scale[:, None], 1e-4)
-            spare = 1.0 - basis.shape[1] / len(rest)
-            if spare < _SPARE:
-                columns = columns[:, self.nuisance]
-                continue
-            left = rest - scale * (basis @ (basis.T @ (rest / scale)))
-            scale = self.scale(left, spare)
-        return scale
-
     def noise(self, scale: Array, free: Array, correlation: float) -> tuple[NoiseModel, Array]:
         """Noise over the scatter of each output, free columns absorbed, and these scatters."""
         run = self.run
@@ -603,29 +526,30 @@ class _Study:
         )
         return noise, unit
 
-    def point(self, values: Array, scale: Array) -> _Point:
-        """Linearise the simulation and judge it, rows that follow each other as alike as all
-        explanations together make likeliest; beforehand those that forget soon are likelier.
-        """
+    def linearised(self, values: Array, scale: Array, correlation: float) -> _Point:
+        """Linearise the simulation, rows that follow each other so much alike."""
         run = self.run
         columns = run.columns(values, range(len(values)))
-        change = ((values - run.nominal) / run.trial)[: self.count]
+        change = ((values - run.nominal) / run.trial)[: run.count]
         rest = run.reading - run.at(values)
-        whole = rest + columns[:, : self.count] @ change
-        classes = _alias_classes(columns / scale[:, None], self.count)
+        whole = rest + columns[:, : run.count] @ change
+        classes = _alias_classes(columns / scale[:, None], run.count)
+        noise, unit = self.noise(scale, columns[:, self.nuisance], correlation)
+        seen = columns / unit[:, None]
+        effects = self.effects([own[0] for own in classes], seen)
         beliefs = replace(self.beliefs, sizes=tuple(_SIZES.tolist()))
+        given = noise, classes, effects, self.contexts, beliefs
+        return _Point(values, unit, rest / unit, seen, whole / unit, *given)
 
-        def judged(correlation: float) -> _Point:
-            noise, unit = self.noise(scale, columns[:, self.nuisance], correlation)
-            seen = columns / unit[:, None]
-            effects = self.effects([own[0] for own in classes], seen)
-            data = whole / unit
-            found = posterior(noise, data, effects, self.contexts, beliefs, (), _MOST)
-            follows = Conclusion(found, beliefs)
-            return _Point(values, unit, rest / unit, seen, data, noise, classes, follows)
-
+    def point(self, values: Array, scale: Array) -> _Point:
+        """The same with rows as alike as all explanations together make likeliest; beforehand those
+        that forget soon are likelier.
+        """
         return max(
-            map(judged, _CORRELATIONS if self.follow else [0.0]),
+            (
+                self.linearised(values, scale, own)
+                for own in _CORRELATIONS[: None if self.follow else 1]
+            ),
             key=lambda at: at.follows.posterior.log_evidence + np.log1p(-(at.noise.correlation**2)),
         )
 
@@ -634,7 +558,7 @@ class _Study:
         run = self.run
         own = columns[:, first]
         acting = np.sqrt(np.sum(own**2, axis=0) / np.sum(own != 0.0, axis=0))
-        stated = np.array([run.suspects[k].prior_sd for k in first], float) / abs(run.trial[first])
+        stated = (run.prior_sd / abs(run.trial))[first]
         # A suspect whose nominal value is one of its bounds can move in one way only.
         way = (run.nominal == run.low).astype(float) - (run.nominal == run.high)
         often = self.beliefs.expected * (1.0 - self.beliefs.unlisted) / max(len(first), 1)
@@ -655,17 +579,51 @@ class _Study:
         return sorted(self.run.names.index(str(name)) for what, name in names if what != UNLISTED)
 
     def fit(self, at: _Point, chosen: list[int], context: int = 0) -> Array:
-        """Fit some suspects and all nuisance parameters, the other suspects nominal."""
+        """Fit some suspects and all nuisance parameters within their bounds by least squares, the
+        other suspects nominal: all values.
+        """
+        run = self.run
         free = [*chosen, *self.nuisance]
+        start = np.where(np.isin(np.arange(len(at.values)), free), at.values, run.nominal)
+        if not free:
+            return start
+        # Only where it is needed: the diagnosis of a fleet starts without it.
+        from scipy.optimize import least_squares
+
         _found, noise = at.linear(chosen, context)
         bare = replace(noise, loadings=noise.loadings[:, noise.absorbed :], absorbed=0)
         root = cholesky(bare.precision_times(np.eye(len(at.unit)), bare.tail_ratios[0])[0])
-        start = np.where(np.isin(np.arange(len(at.values)), free), at.values, self.run.nominal)
-        return self.run.fit(start, free, lambda columns: root @ (columns.T / at.unit).T)
+        white = root / at.unit
+
+        def there(some: Array) -> Array:
+            moved = start.copy()
+            moved[free] = some
+            return moved
+
+        def residual(some: Array) -> Array:
+            return np.asarray(white @ (run.reading - run.at(there(some))))
+
+        def slopes(some: Array) -> Array:
+            return np.asarray(-white @ run.columns(there(some), free) / trial)
+
+        low, high, trial = (own[free] for own in (run.low, run.high, run.trial))
+        found = least_squares(
+            residual,
+            start[free],
+            slopes,
+            (low, high),
+            x_scale=np.abs(trial),
+            ftol=1e-6,
+            max_nfev=30,
+        )
+        at_bound = np.where(found.active_mask < 0, low, high)
+        return there(np.where(found.active_mask, at_bound, found.x))
 
     def search(self, values: Array) -> _Point:
-        """Judge, fit what is likeliest and linearise there, until the same is likeliest again."""
-        scale = self.first_scale(values)
+        """Judge, fit what is likeliest and linearise there, until the same is likeliest again; at
+        first all that is left is scatter.
+        """
+        scale = self.scale(self.run.reading - self.run.at(values), 1.0)
         tried = set[tuple[int, ...]]()
         while True:
             at = self.point(values, scale)
@@ -684,7 +642,8 @@ class _Study:
         """Say what is wrong, what may be, what that gains, and how residuals look."""
         run = self.run
         names = run.names
-        start = self.fit(self.point(run.nominal, self.first_scale(run.nominal)), [])
+        first = self.scale(run.reading - run.at(run.nominal), 1.0)
+        start = self.fit(self.linearised(run.nominal, first, 0.0), [])
         at = self.search(start)
         follows = at.follows
         verdict = follows.verdict
@@ -694,7 +653,8 @@ class _Study:
             # Held-out rows veto what these rows name.
             verdict = Verdict.AMBIGUOUS
             open_ = self.chosen(follows.sure)
-        final = self.point(self.fit(at, causes), at.unit * at.noise.relative)
+        scale = at.unit * at.noise.relative
+        final = self.linearised(self.fit(at, causes), scale, at.noise.correlation)
         # What would only move beyond its bound is not a cause.
         causes = [k for k in causes if final.values[k] != run.nominal[k]]
         best = at if verdict is Verdict.AMBIGUOUS else final
@@ -720,7 +680,7 @@ class _Study:
             aliases=tuple(tuple(names[k] for k in own) for own in at.classes if len(own) > 1),
             why_untestable={
                 names[k]: reason[bool(self.nuisance and at.columns[:, k].any())]
-                for k in range(self.count)
+                for k in range(run.count)
                 if k not in testable
             },
             p_nothing=follows.posterior.nothing,
@@ -777,34 +737,32 @@ class _Study:
                 at.whole - held_out_part(noise, at.columns[:, own], at.whole, fold, None)
                 for own in (others, causes)
             )
-            sure = abs(found.values[0]) > self.reach(at, k, others)
+            sure = abs(found.values[0]) > self.reach(at, k, others)[1]
             if not (sure and likelier(noise, before, after, fold)):
                 causes = others
         return causes
 
-    def reach(self, at: _Point, k: int, others: Sequence[int]) -> float:
-        """Half the 95 % interval of a suspect's change, what looks like a discrepancy being one.
+    def reach(self, at: _Point, k: int, others: Sequence[int]) -> tuple[float, float]:
+        """A suspect's change and half its 95 % interval, what looks like a discrepancy being one.
         [trials]
         """
         found, noise = at.linear([k, *others], at.follows.reported([self.key(k)]).context)
         degrees = max(noise.worth - noise.absorbed - len(others) - 1, 1.0)
-        return float(stdtrit(degrees, 0.975) * found.errors[0])
+        return float(found.values[0]), float(stdtrit(degrees, 0.975) * found.errors[0])
 
     def describe(self, at: _Point, final: _Point, k: int, causes: Sequence[int]) -> SuspectFound:
         """Describe a cause, or what may be one in addition to the causes."""
         run = self.run
-        others = [j for j in causes if j != k]
-        change = at.linear([k, *others], at.likeliest.context)[0].values[0] * run.trial[k]
+        change, half = self.reach(at, k, [j for j in causes if j != k])
         if k in causes:
-            change = final.values[k] - run.nominal[k]
-        half = self.reach(at, k, others) * abs(run.trial[k])
-        ends = run.nominal[k] + change + half * np.arange(-1, 2)
+            change = (final.values[k] - run.nominal[k]) / run.trial[k]
+        ends = run.nominal[k] + run.trial[k] * change + abs(run.trial[k]) * half * np.arange(-1, 2)
         low, value, high = np.clip(ends, run.low[k], run.high[k]).tolist()
         return SuspectFound(
             suspect=run.suspects[k],
             value=value,
             interval=(low, high),
-            effect_rms=rms(final.less_nuisance(final.columns[:, k] * change / run.trial[k])),
+            effect_rms=rms(final.less_nuisance(final.columns[:, k] * change)),
             probability=min(at.follows.listed.get(self.key(k), 0.0), 1.0),
             aliases=tuple(run.names[j] for own in at.classes if k in own for j in own if j != k),
         )
@@ -830,10 +788,10 @@ class _Study:
             )
 
 
-def _basis_of(columns: Array, tolerance: float = 1e-7) -> Array:
+def _basis_of(columns: Array) -> Array:
     """Orthonormal basis of what some columns of equal worth span."""
     size = np.linalg.norm(columns, axis=0)
-    return np.asarray(orth(columns / np.where(size > 0.0, size, 1.0), tolerance))
+    return np.asarray(orth(columns / np.where(size > 0.0, size, 1.0), 1e-7))
 
 
 def _alias_classes(columns: Array, count: int) -> list[list[int]]:
@@ -846,6 +804,8 @@ def _alias_classes(columns: Array, count: int) -> list[list[int]]:
     size, own = np.linalg.norm([whole, left], axis=1)
     seen = np.flatnonzero((own > _TESTABLE * size) & (size > 1e-9 * size.max()))
     unit = left[:, seen] / own[seen]
+    from scipy.sparse.csgraph import connected_components
+
     number, label = connected_components(1.0 - (unit.T @ unit) ** 2 < _TESTABLE**2)
     return [seen[label == k].tolist() for k in range(number)]
 
@@ -861,6 +821,8 @@ def _smooth_shapes(feature: Array, group: Wholes, alone: bool) -> Iterator[Array
     many = [len(np.unique(np.round(own / (np.ptp(own) or 1.0), 6))) > 5 for own in feature.T]
     if n < 8 or not any(many):
         return
+    from scipy.spatial.distance import cdist
+
     z = feature[:, many] / feature[:, many].std(axis=0)
     landmarks = np.unique(np.linspace(0, n - 1, min(n, _LANDMARKS)).astype(np.int64))
     apart = cdist(z, z[landmarks])

@@ -148,8 +148,8 @@ def test_what_does_nothing_at_the_nominal_values_is_asked_for_where_it_does() ->
 @pytest.mark.parametrize(
     ("suspect", "says"),
     [
-        (Suspect("size", 1.0, 0.1, low=2.0), "not between"),
-        (Suspect("size", 1.0, 0.1, low=1.0, high=1.0), "not between"),
+        (Suspect("size", 1.0, 0.1, low=2.0), "low 2"),
+        (Suspect("size", 1.0, 0.1, low=1.0, high=1.0), "high 1"),
         (Suspect("size", 1.0, 0.1, prior_sd=0.0), "prior_sd 0"),
     ],
 )
