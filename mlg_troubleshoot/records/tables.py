@@ -319,12 +319,11 @@ class Columns:
 
     def left_unread(self) -> list[str]:
         """Say which columns that bear a verdict the caller leaves unread, or reads as others."""
-        meanings = [
-            (p, "left unread" if p.field is None else f"read as {p.field.name}")
-            for p in self.placed
-        ]
         return [
-            f'"{p.header}" is {meaning}, as --map says' for p, meaning in meanings if p.is_misread
+            f'"{p.header}" is {f"read as {p.field.name}" if p.field else "left unread"},'
+            " as --map says"
+            for p in self.placed
+            if p.is_misread
         ]
 
     def _doubt_readings(self) -> None:
@@ -834,11 +833,6 @@ class Collected:
             kept: list[Any] = getattr(self, own.name)
             kept += [said + each if said else each for each in getattr(part, own.name)]
 
-    def leave_unread(self, notes: Sequence[str]) -> None:
-        """Take notes that say what was not read."""
-        self.notes += notes
-        self.unread += notes
-
     def tell(self, problem: Problem) -> None:
         """Take a problem; a table that has far too many of them is refused, with the first."""
         self.problems.append(problem)
@@ -890,14 +884,15 @@ def read_table(
             table.take(number, cells)
     if form is not None:
         out.rows += map(table.reader.read, form.upright(columns, visits))
-    table.finish()
+    about = "; ".join(table.finish())
     read, carried = columns.notes()
     read = "; ".join(filter(None, (placed * (header.row > 1), read, said)))
-    about = "; ".join(table.notes())
     which = "" if form is None else form.note(visits)
     against = _against_title(titles, options.convention)
     out.notes += filter(None, (against, read, carried, about, which))
-    out.leave_unread(columns.left_unread())
+    left = columns.left_unread()
+    out.notes += left
+    out.unread += left
     kind = "long" if columns.is_long else "wide"
     if len(columns.visits) > 1:
         kind = "visits"
@@ -1035,7 +1030,6 @@ class _Table:
         self._filled_in = 0
         self._repeated = 0
         self._aside: list[tuple[int, str, Cells]] = []
-        self._dates = ""
         # Whether ids begin with the sign of a comment, as the first of them does.
         self._is_marked: bool | None = None
         self._second: FileRefusedError | None = None
@@ -1217,18 +1211,17 @@ class _Table:
         if known.outcome is Outcome.FAILED:
             yield "FAILED", 1.0
 
-    def finish(self) -> None:
-        """Read what could be read only with all rows at hand."""
+    def finish(self) -> list[str]:
+        """Read what could be read only with all rows at hand, and say what stood between the
+        inspections and how some cells were read.
+        """
         found = self._out.rows
         if self._folder is not None:
             found += map(self.reader.read, self._folder.rows.values())
             found.sort(key=lambda row: row.source.row or 0)
-        self._dates = self.reader.settle_dates(found)
+        dates = self.reader.settle_dates(found)
         if self._aside:
             self._judge_aside()
-
-    def notes(self) -> list[str]:
-        """Say what stood between the inspections, and how some cells were read."""
         facts = self._sheet.facts
         words = self.reader.not_measured
         named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
@@ -1256,4 +1249,4 @@ class _Table:
                 "long layout: one row is one joint's reading; rows with one record id are one"
                 " inspection"
             )
-        return [*notes, *filter(None, [self._dates])]
+        return [*notes, *filter(None, [dates])]

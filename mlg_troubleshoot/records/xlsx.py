@@ -207,8 +207,9 @@ class XlsxSheet(Sheet):
                 number = int(place if place.isdecimal() else place.removesuffix(".0"))
                 cells: list[Cell] = []
                 index = -1
+                row = str(number)
                 for each in element:
-                    index = self._index(each.get("r"), str(number), index + 1)
+                    index = self._index(each.get("r"), row, index + 1)
                     cell = self._cell(each, index)
                     if cell is None:
                         continue
