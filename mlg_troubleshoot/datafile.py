@@ -74,8 +74,8 @@ T = TypeVar("T")
 Place = tuple[str | int, ...]
 
 
-# No float holds a number so large, and no file half of a character.
-_REFUSED = (msgspec.ValidationError, OverflowError, UnicodeEncodeError)
+# No float holds a number so large, no text more than 4,300 digits, and no file half of a character.
+_REFUSED = (msgspec.ValidationError, OverflowError, ValueError)
 # By name, since a checker of types would otherwise ask for ``frozen`` at every kind of table.
 _STRICT: dict[str, Any] = {"frozen": True, "forbid_unknown_fields": True}
 

@@ -263,6 +263,7 @@ def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(edited, 
             r"value: expected one of value with tolerance, at_least, at_most",
         ),
         ("targets", "{ 3 = 0.013", "{ 3 = true", r"clearance_in\.3: expected a number"),
+        ("targets", "schema = 1", f"schema = 0x{'f' * 5000}", r"found a number of 20000 bits"),
         (
             "targets",
             "{ 3 = 0.013",
