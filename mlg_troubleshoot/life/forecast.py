@@ -28,7 +28,7 @@ from mlg_troubleshoot.decision.inspection import Fleet, Inspection
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
-from mlg_troubleshoot.life.folding import GearLife, TodaysVerdict
+from mlg_troubleshoot.life.folding import GearLife, TodaysVerdict, is_readable
 from mlg_troubleshoot.life.logbook import LogLine, log_of
 from mlg_troubleshoot.life.state import GearKey, Moment
 from mlg_troubleshoot.life.urgency import (
@@ -649,8 +649,10 @@ def expected_of(store: Store, gear: Gear) -> Fleet | None:
 
     joints = set(gear.joint_numbers)
     last: dict[GearKey, Inspection] = {}
+    voids = filter(is_readable, store.newest(RecordKind.VOID, _MOST))
+    void = {record.body["voids"] for record in voids}
     for record in store.newest(RecordKind.INSPECTION, _MOST):
-        if (record.tail_no, record.side) not in last:
+        if record.key not in void and (record.tail_no, record.side) not in last:
             row = inspection_from(record)
             # A visit at which no joint was read says nothing of wear.
             if row.clearance_in and set(row.clearance_in) <= joints:
