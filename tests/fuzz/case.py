@@ -21,7 +21,7 @@ ALLOWED = {0, 1, 2, 3, 5}
 SLOWEST_S, MOST_MB = 10.0, 500.0
 # A command that waits for something uses no processor time: it is ended after so many seconds of
 # the clock, of which other programs may take most.
-PATIENCE_S = 200
+PATIENCE_S = 900
 # What keeps the machine whole while a command asks for any amount of memory. [bytes]
 _MOST_SPACE = 3_000_000_000
 _SQLITE_LEAVES = ("-journal", "-wal", "-shm")
