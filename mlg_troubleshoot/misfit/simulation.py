@@ -620,18 +620,18 @@ class _Study:
         return there(np.where(found.active_mask, at_bound, found.x))
 
     def search(self, values: Array) -> _Point:
-        """Judge, fit what is likeliest and linearise there, until it was likeliest twice before; at
+        """Judge, fit what is likeliest and linearise there, until the same is likeliest again; at
         first all that is left is scatter.
         """
         scale = self.scale(self.run.reading - self.run.at(values), 1.0)
-        tried = list[tuple[int, ...]]()
+        tried = set[tuple[int, ...]]()
         while True:
             at = self.point(values, scale)
             chosen = self.chosen(at.follows.posterior.names_of(at.likeliest))
             state = (at.likeliest.context, *chosen)
-            if tried.count(state) > 1 or len(tried) == _ROUNDS:
+            if state in tried or len(tried) == _ROUNDS:
                 return at
-            tried.append(state)
+            tried.add(state)
             values = self.fit(at, chosen, at.likeliest.context)
             _found, noise = at.linear(chosen, at.likeliest.context)
             own, spare = noise.own_part((self.run.reading - self.run.at(values)) / at.unit)
