@@ -86,12 +86,13 @@ class PdfEngine:
         """
         body = html.encode("utf-8")
         dated = created.astimezone(UTC).strftime("D:%Y%m%d%H%M%SZ")
-        about = {
+        job = {
+            "length": len(body),
+            "page": page,
             "title": _found(_TITLE, html),
             "created": dated,
             "keywords": _found(_KEYWORDS, html),
         }
-        job = {"length": len(body), "page": page, **about}
         process = self.start()
         if process.stdin is None or process.stdout is None:
             raise PdfError("the PDF engine has no pipes")
@@ -111,7 +112,7 @@ class PdfEngine:
                 json.loads(line) if line else {"error": "it ended without an answer", "length": 0}
             )
             made = process.stdout.read(answer["length"])
-        except (BrokenPipeError, ConnectionResetError, OSError) as error:
+        except OSError as error:
             answer = {"error": str(error), "length": 0}
             made = b""
         finally:
@@ -193,14 +194,14 @@ def publish(
     """Write documents, the PDFs in one child process; files of documents that carry the same
     identity are numbered.
     """
-    unknown = sorted(set(formats) - set(FORMATS))
-    if unknown or page not in PAGES:
-        asked, known = (unknown[0], FORMATS) if unknown else (page, PAGES)
-        raise UsageError(
-            f"a report cannot be written as {asked!r}", f"Give one of {', '.join(known)}."
-        )
+    for asked, known in (*((each, FORMATS) for each in formats), (page, PAGES)):
+        if asked not in known:
+            raise UsageError(
+                f"a report cannot be written as {asked!r}", f"Give one of {', '.join(known)}."
+            )
     seen: Counter[str] = Counter()
     written: list[WrittenReport] = []
+    standing: list[str] = []
     with closing(PdfEngine()) as engine:
         if "pdf" in formats:
             # The child starts while the first page is being made; if it cannot, the job says so.
@@ -208,23 +209,22 @@ def publish(
                 engine.start()
         for document in documents:
             seen[document.stem] += 1
-            again = seen[document.stem]
-            file = directory / (document.stem if again == 1 else f"{document.stem}-{again}")
-            if not replace_files:
-                _require_new(file)
+            again = f"-{seen[document.stem]}".removesuffix("-1")
+            file = directory / f"{document.stem}{again}"
+            files = (os.path.realpath(f"{file}.{kind}") for kind in FORMATS)
+            old = [path for path in files if Path(path).exists()]
+            if old and not replace_files:
+                standing += old[:1]
+                continue
             written.append(_written(document, file, set(formats), page, engine))
             progress(len(written))
+    if standing:
+        raise UsageError(
+            f"--report {', '.join(standing)} exists: it was not replaced"
+            + "".join(f"\n{path} was written" for report in written for path in report.files),
+            "Give --report another folder, or --force to replace the files.",
+        )
     return written
-
-
-def _require_new(file: Path) -> None:
-    for kind in FORMATS:
-        old = Path(os.path.realpath(file)).with_suffix(f".{kind}")
-        if old.exists():
-            raise UsageError(
-                f"--report {old} exists: it was not replaced",
-                "Give --report another folder, or --force to replace the file.",
-            )
 
 
 def _written(

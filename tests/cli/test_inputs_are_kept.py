@@ -180,6 +180,23 @@ def test_a_report_is_replaced_with_force_only(suffix: str, tmp_path: Path) -> No
     assert report.read_bytes() != b"signed by an inspector"
 
 
+def test_rows_that_were_corrected_get_their_reports_beside_those_that_exist(tmp_path: Path) -> None:
+    table, out = tmp_path / "fleet.csv", tmp_path / "out"
+    rows = "record_id,tail_no,side,clearance_convention,clearance_3_in\nA,N1,LH,RADIAL,0.001\n"
+    command = ("check", table, "-q", "--format", "html", "--report", out)
+    table.write_text(f"{rows}B,N2,middle,RADIAL,0.001\nC,N3,LH,RADIAL,0.001\n")
+    mlg(*command)
+    before = {path: path.read_bytes() for path in out.iterdir()}
+    table.write_text(f"{rows}B,N2,RH,RADIAL,0.001\nC,N3,LH,RADIAL,0.001\n")
+    found = mlg(*command)
+    (new,) = {*out.iterdir()} - {*before}
+    assert (found.code, new.name.startswith("mlg-N2-RH-")) == (2, True)
+    assert {path: path.read_bytes() for path in before} == before
+    named = sorted(path.name[:9] for path in before if str(path) in found.err)
+    assert named == ["mlg-N1-LH", "mlg-N3-LH"]
+    assert f"{new} was written" in found.err
+
+
 @pytest.mark.parametrize(
     "command",
     [
