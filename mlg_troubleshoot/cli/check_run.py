@@ -347,7 +347,7 @@ def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, t
                 f"{flag}{pair!r} is not COLUMN=VALUE",
                 f"Write for example {flag}3=0.013in or {flag}outcome=FAILED.",
             )
-        column = headers.parse_target(name, joints).name
+        column = headers.parse_target(name, joints, f"{flag}{pair!r}").name
         if column in values:
             raise UsageError(f"{flag or 'amend '}gives {column} twice", "Give each column once.")
         values[column] = pair, text

@@ -58,7 +58,11 @@ from mlg_troubleshoot.misfit.simulation_result import MisfitVerdict as Verdict
 def read_numbers(values: Any, name: str) -> Array:
     """A copy of an array of numbers, NaN where it is masked."""
     try:
-        return np.array(np.ma.array(values, float).filled(np.nan))
+        # Text is no number, not even where one can be read in it.
+        numbers = np.ma.array(values)
+        if numbers.dtype.kind in "UO" and any(isinstance(each, str) for each in numbers.flat):
+            raise TypeError(f"{values!r} holds text")
+        return np.array(np.ma.filled(numbers.astype(float), np.nan))
     except (TypeError, ValueError) as error:
         raise UsageError(
             f"{name} is not an array of numbers: {error}", "give numbers, NaN where not read"

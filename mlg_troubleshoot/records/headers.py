@@ -382,18 +382,22 @@ def _snake(name: str) -> str:
     return re.sub(r"[\s\-]+", "_", tidy(name))
 
 
-def parse_target(name: str, joints: Joints) -> Field:
-    """The column that a person names by its own or a short name, or by its joint."""
+def parse_target(name: str, joints: Joints, where: str) -> Field:
+    """The column that a person names by its own or a short name, or by its joint; `where`: how the
+    message begins.
+    """
     text = name.strip().lstrip("#")
     is_joint = re.fullmatch(r"\d{1,9}", text)
     text = CLEARANCE.header(int(text)) if is_joint else _SHORT.get(text.lower(), text)
     found = recognise(text, joints)
     if found.field is None:
-        meant = found.nearest or near_miss(text, joints).nearest or text
-        known = [*_SHORT, *BY_NAME, *map(CLEARANCE.header, joints.numbers), *({meant} - {text})]
+        near = found.nearest or near_miss(text, joints).nearest or text
+        meant = near.split(" or ")
+        known = [*_SHORT, *BY_NAME, *map(CLEARANCE.header, joints.numbers), *({*meant} - {text})]
+        why = f": {found.reason}" if found.reason else ""
         raise UsageError(
-            f"{name!r} is not a column of the inspection table",
-            f"Give a joint or a column.{nearest(meant, known)}",
+            f"{where}: {name!r} is not a column of the inspection table{why}",
+            f"Give a joint or a column.{nearest(meant[0], known)}",
         )
     return found.field
 

@@ -133,7 +133,7 @@ def _understood(text: str, index: int, options: ReadOptions) -> tuple[Recognitio
     target = mapped_to(options, text, index)
     if target is None:
         return recognise(text, options.joints), False
-    named = None if tidy(target) == "carry" else parse_target(target, options.joints)
+    named = None if tidy(target) == "carry" else parse_target(target, options.joints, "--map")
     return Recognition(named), True
 
 
