@@ -106,7 +106,9 @@ def test_a_global_search_of_directions_and_stroke_finds_hardly_more_than_the_rul
 @given(clearance=clearances, direction=arrays(float, 10, elements=st.floats(-np.pi, np.pi)))
 def test_no_other_directions_go_beyond_the_worst_ones_by_more_than_that(gear, clearance, direction):
     worst = worst_case(gear.model, clearance)
-    assert worst.under_in[0] <= 0.0 <= worst.over_in[0]
+    # The mechanism closes to rounding only, and clearances of a rounding error are drawn as well.
+    assert worst.under_in[0] <= 1e-12
+    assert worst.over_in[0] >= -1e-12
     moved = float(gear.model.displacement(links_from(clearance, direction)))
     assert worst.under_in[0] * 1.0004 - 1e-9 <= moved <= worst.over_in[0] * 1.0004 + 1e-9
 
