@@ -237,9 +237,9 @@ def _show_joints(console: output.DataConsole, found: LifeAhead) -> None:
 
     headings = (
         "joint",
-        f"limit {console.unit}",
+        f"limit {console.unit} radial",
         "landings to its limit",
-        f"readings (landings: {console.unit})",
+        f"readings (landings: {console.unit} radial)",
     )
     rows = []
     for joint in found.joints:

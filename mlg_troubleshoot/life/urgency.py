@@ -135,7 +135,7 @@ def repair_sentence(lines: Sequence[LogLine]) -> str:
         else "the gear was not tried since"
     )
     when = f" on {done.date}" if done.date else ""
-    return Sentence.joined([f"{done.text.capitalize()}{when}", *parts, end], "; ") + "."
+    return Sentence.joined([f"{done.text.capitalize()}{when}", *parts, f"{end}."], "; ")
 
 
 def _worst_in(lines: Sequence[LogLine]) -> float | None:

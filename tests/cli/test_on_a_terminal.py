@@ -137,7 +137,6 @@ def test_a_batch_fits_the_terminal(start: Start) -> None:
     child.expect_exact("Model:")
     plain = [line for line in child.before.splitlines() if "258-" in line]
     assert len(plain) == 12
-    child.expect_exact("Not kept: --keep adds these inspections to the records.")
     finish(child)
 
 

@@ -33,6 +33,7 @@ def test_reports_are_announced_on_stderr(tmp_path: Path) -> None:
     found = mlg("check", FAILURE, "--format", "html", "--report", tmp_path)
     assert "Report:" in found.err
     assert "Report:" not in found.out
+    assert found.err.count("Not kept: --keep adds these inspections to the records.") == 1
 
 
 def test_quiet_leaves_stderr_empty(tmp_path: Path) -> None:
@@ -67,7 +68,7 @@ def closed_after_one_line(arguments: Sequence[object]) -> tuple[int, str]:
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [
-        pytest.param(("check", FLEET), 1, id="text"),
+        pytest.param(("check", FLEET, "--quiet"), 1, id="text"),
         pytest.param(("check", FAILURE, "--json"), 1, id="json", marks=pytest.mark.slow),
         pytest.param(("gear",), 0, id="gear", marks=pytest.mark.slow),
     ],

@@ -9,7 +9,7 @@ from datetime import datetime
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Rejected
-from mlg_troubleshoot.decision.inspection import RiggingCheck, Side
+from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.sentences import rigging_sentence
 from mlg_troubleshoot.errors import Problem
@@ -245,6 +245,18 @@ def test_an_invalid_row_without_a_side_shows_a_question_mark(rejected, make):
 def test_a_sound_gear_needs_no_repair(judge: Judge, make: Make) -> None:
     section = make(judge(SOUND), formats=("html",)).text.split("Repair sets")[1]
     assert "None needed" in section
+
+
+def test_a_gear_measured_within_its_margin_is_said_neither_to_fail_nor_to_lack_a_repair(
+    judge, make
+):
+    worn = {1: 0.004} | dict.fromkeys(range(2, 11), 0.0045)
+    within = judge(worn, readings_in=(0.006,), outcome=Outcome.RETRACTED)
+    text = make(within, formats=("html",)).text
+    assert within.verdict == "WITHIN_MARGIN"
+    assert "None needed" in text.split("Repair sets")[1]
+    assert "No set of joints" not in text
+    assert "has another cause" not in text
 
 
 def test_unread_joints_are_named_where_they_keep_a_repair_from_being_sure(judge, make):

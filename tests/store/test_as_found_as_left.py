@@ -65,7 +65,9 @@ def test_the_page_of_a_life_states_it_as_well(tmp_path: Path) -> None:
     store = ("--store", tmp_path / "s.sqlite")
     mlg("check", table(tmp_path, FOUND, LEFT), "--keep", "-q", *store)
     asked = ("--no-forecast", "--report", tmp_path, "--show", "thou", *store)
-    assert mlg("history", "N1", "LH", *asked).code == 0
+    screen = mlg("history", "N1", "LH", *asked)
+    assert screen.code == 0
+    assert "plunger +46 thou → +12 thou" in " ".join(screen.out.split())
     assert written(tmp_path, "mlg-life-*") == ROWS
 
 
