@@ -350,10 +350,12 @@ def _entered(record: Record) -> Inspection:
     return inspection_from(record)
 
 
-def add_typed(store: Store, typed: Sequence[Inspection], since: datetime) -> list[str]:
+def add_typed(
+    store: Store, typed: Sequence[Inspection], since: datetime
+) -> tuple[list[Record], list[str]]:
     """Add visits of one gear that were typed one after the other, all or none, under ids made of
     its day; without what was kept `since` a moment by a program that ended before it said so. The
-    records of the gear that disagree now are returned.
+    records that were added are returned, and which of the gear disagree now.
     """
     tail = as_spelt([typed[0].tail_no], store)[typed[0].tail_no]
     key = tail, typed[0].side.value
@@ -373,7 +375,7 @@ def add_typed(store: Store, typed: Sequence[Inspection], since: datetime) -> lis
             new.append(told.record)
             used.add(name)
     store.add(new)
-    return warnings_of(store, [key])
+    return new, warnings_of(store, [key])
 
 
 def amend(store: Store, gear: Gear, wrong: Record, changes: Mapping[str, str]) -> Record:

@@ -157,6 +157,16 @@ def test_a_joint_is_named_to_jump_to_it_or_to_give_its_reading(sit: Sit, life: L
     assert life().inspections[-1].inspection.clearance_in == {9: 0.0025, 10: 0.0035}
 
 
+@pytest.mark.parametrize(
+    ("typed", "read"),
+    [(("#3", ""), {3: 0.004}), (("#3 none",), {}), (("#3", "none"), {}), (("#5", ""), {3: 0.004})],
+)
+def test_enter_keeps_a_reading_and_none_clears_it(sit: Sit, life: Life, typed, read) -> None:
+    terminal = sit(*gear("f", "46", "8", *typed, "done"), "")
+    assert any("(Enter: 8 thou" in each for each in terminal.prompts) == (typed[0] == "#3")
+    assert life().inspections[-1].inspection.clearance_in == read
+
+
 def test_readings_of_another_unit_are_asked_about_before_they_are_judged(sit, life):
     tight = ["0.4"] * 10
     terminal = sit(*gear("f", "46", *[each for x in tight for each in (x, "y")]), "y", "")

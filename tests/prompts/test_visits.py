@@ -262,3 +262,26 @@ def test_a_corrected_tail_or_side_moves_the_inspection(sit, begun, life, line, g
     sit("N1 LH", line, "")
     assert len(life(*gear).inspections) == 1
     assert life().inspections == ()
+
+
+@pytest.mark.parametrize(("line", "gear"), [("side RH", ("RH", "N1")), ("tail N2", ("LH", "N2"))])
+@pytest.mark.parametrize(
+    "typed",
+    [("#5 7", "p 38", "LINE"), ("#5 7", "#3 4", "LINE", "y"), ("#5 7", "y", "LINE", "9", "done")],
+)
+def test_a_corrected_tail_or_side_is_that_of_all_that_was_typed_here(
+    sit, begun, life, line, gear, typed, capsys
+):
+    begun(*failed("8", "done"))
+    lines = [each.replace("LINE", line) for each in typed]
+    sit("N1 LH", *lines, "")
+    assert (len(life(*gear).inspections), len(life().inspections)) == (2, 1)
+    assert f" entries from N1 LH to {gear[1]} {gear[0]}." in capsys.readouterr().err
+
+
+def test_an_undo_takes_a_corrected_side_back(sit, begun, life, capsys):
+    begun(*failed("8", "done"))
+    screen = sit("N1 LH", "#5 7", "p 38", "side RH", "u", "").screen
+    assert "u = undo the move to N1 RH" in screen
+    assert "Undone: the move to N1 RH." in capsys.readouterr().err
+    assert len(life().inspections) == 3

@@ -102,7 +102,7 @@ class EntryInterruptedError(KeyboardInterrupt):
 class Asker:
     """Asks for one sitting, and for what follows its result.
 
-    visit: the kept state of a gear.
+    visit: the kept state of a gear. known: that of the gear of the entry.
     """
 
     gear: Gear
@@ -111,7 +111,7 @@ class Asker:
     visit: Callable[[str, Side], Visit | None] = lambda _tail, _side: None
     entry: Entry = field(init=False)
     _jump: str = ""
-    _known: Visit | None = None
+    known: Visit | None = None
     _unfinished: list[Entry] = field(default_factory=list)
     _day: str = ""
     _messages: set[str] = field(default_factory=set)
@@ -121,7 +121,7 @@ class Asker:
         self._unfinished, damaged = self.saved.unfinished(self.gear.id)
         for message in damaged:
             self._once(message)
-        self._known = None
+        self.known = None
         self._day = ""
         self.entry = Entry.new(self.gear, dict(given))
         if tail := given.get(TAIL_NO.name):
@@ -136,7 +136,7 @@ class Asker:
         """Ask for what follows a result: another entry, another gear, or a word for what to show;
         empty for the end. An entry without a finding corrects the last one.
         """
-        self._known = visit
+        self.known = visit
         day = f" on {self._day}" * bool(self._day)
         keys = [f"y = I did NEXT{day}"] * bool(visit.todo) + ["d = details", "report"]
         keys += [f"u = undo {visit.undoes}"] * bool(visit.undoes)
@@ -185,17 +185,17 @@ class Asker:
         if begun:
             self._resume(max(begun, key=lambda each: len(each.cells)), gear)
             return self._ask_all()
-        self._known = self.visit(*self.entry.gear_key)
-        if self._known is None:
+        self.known = self.visit(*self.entry.gear_key)
+        if self.known is None:
             return self._ask_all()
         self.saved.discard(self.entry.id)
-        return self._known
+        return self.known
 
     def _resume(self, saved: Entry, gear: Mapping[str, str]) -> None:
         self.saved.discard(self.entry.id)
         self.entry = saved
         saved.cells = {**gear, **saved.cells}
-        self._known = self.visit(*saved.gear_key)
+        self.known = self.visit(*saved.gear_key)
         begun = f"{saved.started:%Y-%m-%d %H:%M}"
         self._say(f"Continued: {saved.identity}, begun {begun}. new = begin anew.", "green")
 
@@ -345,7 +345,8 @@ class Asker:
     def _answer_joint(self, name: str, typed: str) -> None:
         """Take a clearance; one that can hardly be is confirmed."""
         number = joint_of(name) or 0
-        if not typed:
+        typed = typed or self.entry.cells.get(name, "")
+        if typed.lower() in ("", "none"):
             self._jump = ""
             self.entry.give(name, "")
             self._say(f"– #{number} not read", "dim")
@@ -430,20 +431,19 @@ class Asker:
         joint = self.gear.joint(number)
         unit, kind = self.entry.unit, self.entry.convention
         limit = self._length(joint.limit.value * kind.per_radial)
-        last = self._known.last.get(number) if self._known else None
+        last = self.known.last.get(number) if self.known else None
         prompt = f"#{number} {joint.name}, limit {limit}" + f", last {last}" * (last is not None)
-        area = next(each.description for each in self.gear.areas if each.name == joint.area)
-        alike = " and ".join(f"#{other}" for other in self.gear.alike.get(number, ()))
+        typed = self.entry.cells.get(CLEARANCE.header(number))
+        prompt += f" (Enter: {typed}; or none)" * bool(typed)
         lines = [
-            f"{joint.label}. {joint.location}. Area: {joint.area} ({area}).",
+            f"{joint.label}. {joint.location}. Area: {joint.area}.",
             f"Limit {limit} {_plain(kind)} = {unit.shown(joint.limit.value)} {unit} radial,"
             f" {joint.limit.kind.value}.",
             f"How: {_HOW[kind]} Only play across the pin counts.",
-            f"Moves the plunger like {alike}: the other end of the same link." * bool(alike),
             "Make the gear safe as the maintenance manual says before you reach in.",
             "Enter: not read. done: no more joints. #7: joint 7. #7 13: its reading.",
         ]
-        return prompt, "\n".join(filter(None, lines))
+        return prompt, "\n".join(lines)
 
     def _enters(self, name: str) -> str:
         """What Enter answers: for a tail number, the gear of the last unfinished entry."""
@@ -455,8 +455,8 @@ class Asker:
             return ", ".join(known) if len(known) == 2 else ""
         if name == REPAIR_DATE:
             return self.entry.day.isoformat()
-        if name == RESTORED_JOINTS.name and self._known:
-            return " ".join(map(str, self._known.step.joints))
+        if name == RESTORED_JOINTS.name and self.known:
+            return " ".join(map(str, self.known.step.joints))
         return self.saved.offered().get(name, "") if name in LAST else ""
 
     def _unusual(self) -> str:
@@ -468,13 +468,13 @@ class Asker:
         found = [self.entry.unit_question(self.gear)]
         for name, text in self.entry.cells.items():
             number = joint_of(name)
-            if number and text and self._known:
-                was_in = self._known.row.clearance_in.get(number)
+            if number and text and self.known:
+                was_in = self.known.row.clearance_in.get(number)
                 is_in = self._judged(name).clearance_in[number]
                 # Two combined standard uncertainties of the readings.
-                apart_in = 2.0 * math.sqrt(2.0) * self._known.row.gauge_u_of(number)
+                apart_in = 2.0 * math.sqrt(2.0) * self.known.row.gauge_u_of(number)
                 if was_in and is_in < was_in - apart_in and number not in self._restored():
-                    last = self._known.last[number]
+                    last = self.known.last[number]
                     found.append(f"#{number} {text} is tighter than {last}: restored?")
         return " ".join(filter(None, found))
 

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import webbrowser
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.prompts.ask import Asker
-from mlg_troubleshoot.cli.prompts.entry import Entry
+from mlg_troubleshoot.cli.prompts.entry import HEADING, Entry
 from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit, continued, find_visit
-from mlg_troubleshoot.decision.columns import CONVENTION, SIDE, TAIL_NO, UNIT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.judge_rows import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.life.state import GearState, key_of
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.life.state import GearKey, key_of
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.keep import add_typed, amend, move, voids
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.cli.check_run import Run
-    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.store import Record, Store
 
 # Where the prompts write reports that were not asked for by a flag.
 _REPORTS = Path("report")
@@ -37,102 +38,134 @@ class Sitting:
         self._gear = load_gear(run.asked.gear)
         saved = SavedEntries(place.place)
         self._asker = Asker(self._gear, Terminal(), saved, self._visit)
+        # The ids of what was typed here.
+        self._own: set[str] = set()
 
     def hold(self, tail: str | None) -> task.CheckResult:
         """Ask until the user ends; what was found last is returned."""
         asked = self._run.asked
-        flags = {
-            TAIL_NO.name: tail,
-            SIDE.name: asked.side,
-            UNIT.name: asked.unit,
-            CONVENTION.name: asked.convention,
-        }
-        given = {name: str(text) for name, text in flags.items() if text is not None}
+        flags = (tail, asked.side, asked.unit, asked.convention)
+        named = zip(HEADING, flags, strict=True)
+        given = {name: str(text) for name, text in named if text is not None}
         found: Entry | Visit | str = self._asker.begin(given)
         visit: Visit | None = None
         while True:
             if isinstance(found, Entry):
-                visit = self._keep(found, visit)
+                # What is typed for another gear corrects nothing of the one before.
+                visit = self._keep(found, visit if self._asker.known is visit else None)
                 if self._run.stops_after_one:
                     return visit.result
             elif isinstance(found, Visit):
                 visit = found
-                self._run.publish(visit.result, visit.row.unit_entered)
+                self._publish(visit)
                 self._show_other_side(visit)
             elif visit is None:
                 raise TypeError("a sitting begins with a gear")
             elif not found:
                 return visit.result
             elif found == "u":
-                self._place.add([voids(visit.record, "taken back at the prompts")])
-                visit = self._published(*key_of(visit.row))
+                visit = self._undo(visit)
             else:
-                self._show(found, visit.result, visit.row.unit_entered)
+                self._show(found, visit)
             found = self._asker.follow(visit)
 
     def _visit(self, tail: str, side: Side | str) -> Visit | None:
         """What is kept of a gear; records that cannot be read do not prevent a new entry."""
+        judge = partial(task.check_gear, options=self._run.asked, store=self._place)
         try:
-            return find_visit(self._place, self._gear, tail, Side(side), self._judged)
+            return find_visit(self._place, self._gear, tail, Side(side), judge)
         except OutputError as error:
             output.say(f"The records of {tail} {side} cannot be read: {error}. {error.remedy}")
             return None
 
-    def _judged(self, state: GearState) -> task.CheckResult:
-        return task.check_gear(state, self._run.asked, self._place)
-
     def _keep(self, entry: Entry, known: Visit | None) -> Visit:
-        """Keep an entry, and show the verdict; the entry stays open until then."""
+        """Keep an entry, and show the verdict; the entry stays open until then. A tail or side that
+        was corrected in it is that of everything that was typed here for the gear `known`.
+        """
         key = entry.gear_key
-        if not entry.has_findings and known is not None:
-            self._correct(entry, known)
+        moved: list[Record] = []
+        if known is not None and entry.todo is not None and key != key_of(known.row):
+            own = [each for each in known.records if each.record_id in self._own]
+            moved = self._move(known, own or known.records[-1:] * (not entry.has_findings), key)
+        if known is not None and not entry.has_findings:
+            self._amend(entry, (moved or known.records)[-1])
         else:
-            known = self._visit(*key)
-            rows = entry.visits(self._gear)
-            if known is not None:
-                rows = [continued(known, row, entry) for row in rows]
-            try:
-                warnings = add_typed(self._place, rows, entry.started)
-            except TroubleshootError:
-                # What was found is said, whatever becomes of the records.
-                result = task.check_inspection(rows[-1], self._run.asked, self._place)
-                self._run.publish(result, entry.unit)
-                raise
-            for warning in warnings:
-                output.say(f"Warning: {warning}")
+            moved = []
+            self._add(entry)
         visit = self._published(*key)
         self._asker.saved.finish(entry)
-        return visit
+        if known is None or not moved:
+            return visit
+        ids = frozenset(each.record_id for each in moved)
+        return replace(
+            visit, undoes=f"the move to {entry.identity}", moved=(key_of(known.row), ids)
+        )
 
-    def _correct(self, entry: Entry, known: Visit) -> None:
+    def _add(self, entry: Entry) -> None:
+        """Keep what was found."""
+        known = self._visit(*entry.gear_key)
+        rows = entry.visits(self._gear)
+        if known is not None:
+            rows = [continued(known, row, entry) for row in rows]
+        try:
+            added, warnings = add_typed(self._place, rows, entry.started)
+        except TroubleshootError:
+            # What was found is said, whatever becomes of the records.
+            result = task.check_inspection(rows[-1], self._run.asked, self._place)
+            self._run.publish(result, entry.unit)
+            raise
+        self._own |= {each.record_id for each in added}
+        for warning in warnings:
+            output.say(f"Warning: {warning}")
+
+    def _move(self, visit: Visit, records: Sequence[Record], key: GearKey) -> list[Record]:
+        """Move visits to the gear that they are of; the records there are returned."""
+        why = "tail or side corrected at the prompts"
+        moved = [move(self._place, each, key, why) for each in records]
+        self._own |= {each.record_id for each in moved}
+        if moved:
+            of = f"{len(moved)} of {len(visit.records)} entries"
+            output.say(f"Moved {of} from {' '.join(key_of(visit.row))} to {' '.join(key)}.")
+        return moved
+
+    def _amend(self, entry: Entry, record: Record) -> None:
         """Correct what does not belong to one finding in the visit that was recorded last."""
-        record = known.record
-        tail, side = entry.gear_key
-        if (tail, side.value) != (record.tail_no, record.side):
-            why = "tail or side corrected at the prompts"
-            record = move(self._place, record, (tail, side.value), why)
-        gear = (TAIL_NO.name, SIDE.name)
-        changes = {name: entry.cells[name] for name in entry.typed if name not in gear}
+        changed = [name for name in entry.typed if name not in HEADING[:2]]
+        changes = {name: entry.cells[name] for name in changed}
         try:
             if changes:
                 amend(self._place, self._gear, record, changes)
         except UsageError as error:
             output.say(f"Not changed: {error.message}. {error.remedy}")
 
+    def _undo(self, visit: Visit) -> Visit:
+        """Take the last visit back, or the move of visits to this gear."""
+        key, ids = visit.moved or (key_of(visit.row), ())
+        if ids:
+            self._move(visit, [each for each in visit.records if each.record_id in ids], key)
+        else:
+            self._place.add([voids(visit.records[-1], "taken back at the prompts")])
+        output.say(f"Undone: {visit.undoes}.")
+        return self._published(*key)
+
     def _published(self, tail: str, side: Side | str) -> Visit:
         """What stands of a gear now, shown and written."""
         visit = self._visit(tail, side)
         if visit is None:
             raise TypeError(f"no records of {tail} {side} that were just kept")
-        self._run.publish(visit.result, visit.row.unit_entered)
+        self._publish(visit)
         return visit
 
-    def _show(self, word: str, result: task.CheckResult, unit: LengthUnit) -> None:
+    def _publish(self, visit: Visit) -> None:
+        self._run.publish(visit.result, visit.row.unit_entered)
+
+    def _show(self, word: str, visit: Visit) -> None:
+        unit = visit.row.unit_entered
         if word == "d":
-            self._run.show(result, unit, detail=True)
+            self._run.show(visit.result, unit, detail=True)
             return
         try:
-            paths = self._run.write_reports(result, _REPORTS, unit)
+            paths = self._run.write_reports(visit.result, _REPORTS, unit)
         except TroubleshootError as error:
             output.say(f"No report was written: {error.message}. {error.remedy}")
             return

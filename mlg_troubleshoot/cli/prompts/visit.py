@@ -38,7 +38,7 @@ from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import as_spelt, lives_of
 from mlg_troubleshoot.life.logbook import shortened, visit_lines
-from mlg_troubleshoot.life.state import GearState, state_now
+from mlg_troubleshoot.life.state import GearKey, GearState, state_now
 from mlg_troubleshoot.store import Draft, Drafts, Record, Store, login
 from mlg_troubleshoot.units import said_in
 from mlg_troubleshoot.workflows.check import CheckResult, load_index_table
@@ -60,15 +60,17 @@ _MOST_NAMED = 3
 class Visit:
     """What stands of a gear, and what is said of it today.
 
-    row: what stands. record: the visit that was recorded last. last: the last reading of each joint
-    with its day. undoes: what an undo takes back, which is that visit; empty if nothing.
+    row: what stands. records: its visits in the order of their entry. last: the last reading of
+    each joint with its day. undoes: what an undo takes back, which is the last visit; empty if
+    nothing. moved: or the gear that visits were moved from, with their ids.
     """
 
-    record: Record
+    records: tuple[Record, ...]
     row: Inspection
     result: CheckResult
     last: Mapping[int, str]
     undoes: str = ""
+    moved: tuple[GearKey, frozenset[str]] | None = None
 
     @property
     def step(self) -> Step:
@@ -94,7 +96,7 @@ def find_visit(
     state = None if life is None else state_now(life.visits, gear)
     if life is None or state is None or not life.inspections:
         return None
-    newest = max(life.inspections, key=lambda each: each.place)
+    visits = sorted(life.inspections, key=lambda each: each.place)
     last = {
         joint: f"{entered} on {visit.at}" if visit.at else str(entered)
         for visit in life.visits
@@ -102,11 +104,11 @@ def find_visit(
     }
     row = state.inspection
     undoes = ""
-    if len(life.visits) > 1 and newest.inspection.source.file is None:
-        lines = [*shortened(visit_lines(newest.inspection, gear))]
+    if len(life.visits) > 1 and visits[-1].inspection.source.file is None:
+        lines = [*shortened(visit_lines(visits[-1].inspection, gear))]
         undoes = ", ".join(said_in(line.text, row.unit_entered) for line in lines[:_MOST_NAMED])
         undoes += " …" * (len(lines) > _MOST_NAMED)
-    return Visit(newest.kept, row, judge(state), last, undoes)
+    return Visit(tuple(each.kept for each in visits), row, judge(state), last, undoes)
 
 
 def continued(known: Visit, row: Inspection, entry: Entry) -> Inspection:
