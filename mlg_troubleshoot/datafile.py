@@ -225,16 +225,19 @@ def _label(entry: Any, index: int) -> str | int:
     """Return what an entry of a list calls itself, or which one it is."""
     named = entry if isinstance(entry, dict) else {}
     label = named.get("name", named.get("joint"))
-    is_shown = is_name(label) if isinstance(label, str) else isinstance(label, int)
+    is_number = isinstance(label, int) and abs(label) <= LARGEST
+    is_shown = is_name(label) if isinstance(label, str) else is_number
     return str(label) if is_shown else index + 1
 
 
 def _shown(value: Any) -> str:
     if isinstance(value, dict | list) and len(value) > 4:
         return f"{len(value)} entries"
-    # More than 4,300 digits cannot be printed at all.
-    large = isinstance(value, int) and abs(value) > LARGEST
-    text = f"a number of {value.bit_length()} bits" if large else repr(value)
+    try:
+        text = repr(value)
+    except ValueError:
+        # More than 4,300 digits cannot be printed at all.
+        text = "a number of more than 4,300 digits"
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
 

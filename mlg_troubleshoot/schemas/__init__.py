@@ -122,7 +122,9 @@ def _form(kind: Any) -> Any:
         return kind | None
     if origin is ClassVar:
         return _form(*arguments)
-    if origin is np.ndarray:
+    # Newer NumPy names its arrays by an alias.
+    alias = getattr(origin, "__value__", origin)
+    if np.ndarray in (alias, get_origin(alias)):
         return list[float | None]
     if origin in (Union, UnionType):
         # What is null but for its names is described apart.
