@@ -738,6 +738,6 @@ def _falls(table: DiagnosisTable) -> Iterator[DataCondition]:
             "landings_fall",
             f"gear{'s' * (len(fell) > 1)} {first_few(fell)}",
             len(fell) / len(visits(table)),
-            "a slip or an overhaul that cannot be recognised: wear before and after is one",
+            "an entry error, or an overhaul that was not recognised: all wear counts as one",
             "landings since overhaul, and the date of the overhaul",
         )

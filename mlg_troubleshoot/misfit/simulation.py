@@ -58,7 +58,7 @@ from mlg_troubleshoot.misfit.simulation_result import MisfitVerdict as Verdict
 def read_numbers(values: Any, name: str) -> Array:
     """A copy of an array of numbers, NaN where it is masked."""
     try:
-        # Text is no number, not even where one can be read in it.
+        # Text is not a number, even where one could be read from it.
         numbers = np.ma.array(values)
         if numbers.dtype.kind in "UO" and any(isinstance(each, str) for each in numbers.flat):
             raise TypeError(f"{values!r} holds text")

@@ -62,7 +62,7 @@ def run_script(seed: int, folder: Path) -> None:
     gear = load_gear()
     typist = Typist(seed)
     with pytest.MonkeyPatch.context() as patch:
-        # The order of the joints is none of the errors, and a plan takes its time.
+        # The order of the joints is not an error here, and a plan takes its time.
         patch.setattr("mlg_troubleshoot.cli.prompts.ask.reading_order", lambda *_: ())
         entry = Asker(gear, typist, SavedEntries(folder / f"{seed}.sqlite")).begin({})
     for (prompt, word), (following, _) in pairwise(typist.asked):

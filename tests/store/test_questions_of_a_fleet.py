@@ -118,7 +118,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[tuple[st
     rows = sorted((r for t in truth.values() for r in t.rows), key=lambda r: r["inspection_date"])
     parts = 5
     for n in range(parts):
-        # Each workbook is first kept with slips, in one of two stores that are merged at the end.
+        # Each workbook is first kept with entry errors, in one of two stores that are then merged.
         store = folder / ("s.sqlite", "other.sqlite")[n % 2]
         own = rows[n * len(rows) // parts : (n + 1) * len(rows) // parts]
         slips = {rng.randrange(len(own)): f"clearance_{rng.randrange(1, 11)}_in" for _ in range(6)}
