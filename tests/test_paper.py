@@ -16,7 +16,7 @@ from mlg_troubleshoot.gear.linkage import chance_beyond, links_from, worst_case
 from mlg_troubleshoot.indices.index_table import Amplification, IndexTable, amplification
 from mlg_troubleshoot.indices.variance import tensor_indices, worst_directions
 
-from .geometry.vectors import locate_joint
+from .geometry.test_vectors import locate_joint
 
 FAILURE = np.array([[0, 0, 0.013, 0, 0.007, 0, 0, 0, 0, 0]])
 NUMBERS = tuple(range(1, 11))

@@ -10,7 +10,7 @@ What goes into reading a table, and what comes out of it.
 Readings whose size fits another unit better: a pin hardly has less play than in new parts.
 
 A row is compared with the play of new parts that the gear file states, by the mean ratio of its
-non-zero readings. What each number costs and catches: `python -m tests.records.unit_confusions`.
+non-zero readings; `tests/records/test_unit_confusions.py` counts what the numbers catch.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -11,25 +12,29 @@ from typing import Any
 
 import pytest
 
+from mlg_troubleshoot.datafile import LONGEST_LINE, MOST_BYTES
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear, SourceKind
 from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
+from mlg_troubleshoot.paper.verification import targets_file, verify
+from tests.machine import SLOWER
 
-Edit = Callable[[str, str], Path]
+Edit = Callable[..., Path]
 
 
 @pytest.fixture
 def edited(gear: Gear, tmp_path: Path) -> Edit:
-    """A copy of the shipped gear file with one text replaced, its ensemble beside it."""
+    """A copy of the shipped gear and what lies beside it, with one text of one file replaced."""
 
-    def edit(old: str, new: str) -> Path:
-        text = gear.path.read_text(encoding="utf-8")
+    def edit(old: str, new: str, file: str = "") -> Path:
+        for each in gear.path.parent.glob("hawker-800xp*"):
+            shutil.copy(each, tmp_path)
+        path = tmp_path / f"hawker-800xp{file and '-'}{file}.toml"
+        text = path.read_text(encoding="utf-8")
         assert old in text
-        shutil.copy(gear.path.with_name("hawker-800xp-ensemble.toml"), tmp_path)
-        path = tmp_path / "copy.toml"
         path.write_text(text.replace(old, new, 1), encoding="utf-8")
-        return path
+        return tmp_path / "hawker-800xp.toml"
 
     return edit
 
@@ -131,51 +136,38 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
     assert DEFAULT_GEAR in caught.value.remedy
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
+IN_THE_FOLDER = r"\.json file in the same folder"
+NAME = "expected a name of 1 to 40 printable"
+TWO = "expected two numbers"
+DEEP = "nested more than 24 deep"
+LONG_HEX = "0x" + "f" * 5000
+# What is replaced in a file of the gear, and what is said of it.
+REFUSED: dict[str, list[tuple[str, str, str]]] = {
+    "": [
         # a key that nobody reads, with the nearest name
-        (
-            'provenance = "rec',
-            'provenence = "x"\nprovenance = "rec',
-            r"provenence: .*did you mean 'provenance'",
-        ),
-        (
-            "drawn_at = 0.687",
-            "drawn_at = 0.687\ndrawn = 1",
-            r"input\.drawn: .*did you mean 'drawn_at'",
-        ),
+        ('provenance = "', 'provenence = "x"\nprovenance = "', r"provenence: .*did.* 'provenance'"),
+        ("drawn_at = 0.687", "drawn_at = 0.687\ndrawn = 1", r"input\.drawn: .*did.* 'drawn_at'"),
         ('area = "sidestay"\n', 'area = "sidestay"\nlimt = 1\n', r"joints\.1\.limt: .*'limit'"),
+        ("schema = 2", "schema = 2\nseen = 2024-01-01", r"seen: expected a known key"),
         # a source that is missing or unknown
         ('margin = "margin"', 'margin = "hearsay"', r"source_of\.margin: .*'hearsay'"),
-        (
-            '{ limit = "limit"',
-            '{ limt = "limit"',
-            r"joints\.1\.source_of: expected the keys of numbers",
-        ),
+        ('{ limit = "limit"', '{ limt = "limit"', r"joints\.1\.source_of: .* keys of numbers"),
         ('source = "reconstruction"\n', "", r"source: expected a name .*found nothing"),
-        (
-            'source = "calibration"',
-            'source = "hearsay"',
-            r"calibration\.source: expected one of the sources .*'hearsay'",
-        ),
-        (
-            'kind = "technical order"',
-            'kind = "a friend"',
-            r"sources\.calibration\.kind: .*'a friend'",
-        ),
+        ('source = "calibration"', 'source = "hearsay"', r"calibration\.source: .*'hearsay'"),
+        ('kind = "technical order"', 'kind = "a friend"', r"calibration\.kind: .*'a friend'"),
         # bad numbers
-        ("F = [-1.8, -11.85]", "F = [nan, -11.85]", r"ground\.F: expected two numbers"),
-        ("F = [-1.8, -11.85]", "F = [-1.8]", r"ground\.F: expected two numbers"),
-        ("travel = [0.0, 0.687]", "travel = [0.0, inf]", r"input\.travel: expected two numbers"),
+        ("F = [-1.8, -11.85]", "F = [nan, -11.85]", rf"ground\.F: {TWO}"),
+        ("F = [-1.8, -11.85]", "F = [-1.8]", rf"ground\.F: {TWO}"),
+        ("F = [-1.8, -11.85]", "F = [1e5, -11.85]", rf"ground\.F: {TWO} from -10000 to 10000"),
+        ("F = [-1.8, -11.85]", f"F = [1{'0' * 400}, 1]", rf"ground\.F: {TWO}"),
+        ("travel = [0.0, 0.687]", "travel = [0.0, inf]", rf"input\.travel: {TWO}"),
+        ("travel = [0.0, 0.687]", "travel = [1, 1]", r"input\.travel: .* two different numbers"),
+        ("[0.01, 0.05]", "[0.05, 0.01]", rf"down_lock_range: {TWO}, the smaller one first"),
+        ("dihedral_deg = 48.92", "dihedral_deg = 1e9", r"dihedral_deg: .* from -720 to 720"),
         ("margin = 0.03\n", "margin = -0.03\n", r"margin: expected a number above 0"),
         ("margin = 0.03\n", "margin = true\n", r"margin: expected a number"),
         ("limit = 0.0075\n", "limit = 0\n", r"joints\.1\.limit: expected a number above 0"),
-        (
-            "new_part = 0.0005\n",
-            "new_part = -1\n",
-            r"joints\.1\.new_part: expected a number from 0 to 10000",
-        ),
+        ("new_part = 0.0005\n", "new_part = -1\n", r"joints\.1\.new_part: .* from 0 to 10000"),
         # wrong types
         ("schema = 2\n", "schema = 3\n", r"schema: expected 2, found 3"),
         ("critical = true", 'critical = "yes"', r"joints\.1\.critical: expected true or false"),
@@ -184,25 +176,72 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         ('position_of = "10"', 'speed_of = "10"', r"output\.speed_of: expected .*known key"),
         ('id = "hawker-800xp"', "id = 800", r"id: expected a name of 1 to 40 .*found 800"),
         ("stages = [", "stages = 4\nstates = [", r"cycle\.stages: expected an array of tables"),
-        (
-            'plunger = "in", flow',
-            "plunger = 1, flow",
-            r"cycle\.valve\[1\]\.plunger: expected a text",
-        ),
+        ('plunger = "in", flow', "plunger = 1, flow", r"cycle\.valve\[1\]\.plunger: .* a text"),
         # what does not fit together
         ("[joints.10]", "[joints.11]", r"joints\.11: expected one of the points"),
         ("ground = { 8 =", "ground = { 6 = [0, 0], 8 =", r"moving\.6: expected a point that has"),
         ('area = "sidestay"', 'area = "cockpit"', r"joints\.1\.area: .*'cockpit'"),
         ('hinge_point = "6"\n', "", r"planes\.link_assembly\.hinge_point: expected a name"),
         ("dihedral_deg = 48.92\n", "", r"planes\.link_assembly\.dihedral_deg: expected a number"),
-        ("schema = 2", "schema = = 2", r"copy\.toml: cannot be read as TOML"),
+        # names and texts that nobody could read, and files elsewhere
+        ("F = [-1.8", r'"F\u202e" = [-1.8', NAME),
+        ('name = "locking pin"', f'name = "{"p" * 41}"', rf"joints\.2\.name: {NAME}"),
+        ('provenance = "', r'provenance = "\u001b[31m', r"provenance: .* a text .* printable"),
+        ('ensemble = "hawker', 'ensemble = "../hawker', "ensemble: .* file in the same folder"),
+        ('indices = "hawker', 'indices = "/etc/hawker', rf"indices: .*{IN_THE_FOLDER}"),
+        ('indices = "hawker', r'indices = "a\\hawker', rf"indices: .*{IN_THE_FOLDER}"),
+        ('indices = "hawker-800xp-indices.json"', 'indices = "mlg.toml"', IN_THE_FOLDER),
+        ('indices = "hawker', f'indices = "{"h" * 300}', rf"indices: .*{IN_THE_FOLDER}"),
+        # no TOML, and TOML without end
+        ("schema = 2", "schema = = 2", r"800xp\.toml: cannot be read as TOML"),
+        ("schema = 2", f"schema = 2\nx = {'[' * 5000}{']' * 5000}", f"{DEEP}|a line has"),
+        ("schema = 2", "schema = 2\nx = " + "[\n" * 5000 + "]" * 5000, DEEP),
+        ("schema = 2", f"schema = 2\nx = {'{a=' * 30}1{'}' * 30}", DEEP),
+        ("schema = 2", f"schema = 2\n{'a.' * LONGEST_LINE}a = 1", r"a line has \d+ characters"),
+        ("schema = 2", "schema = 2\n# " + "x\n# " * MOST_BYTES, r"at most 2000000 are read"),
+        ("schema = 2", "schema = 2" + "\n[[steps]]" * 300, r"steps: .* at most 200 entries"),
     ],
+    "ensemble": [
+        (
+            "dihedral_deg = 48.656",
+            'dihedral_deg = "flat"',
+            r"B: planes\.link_.*dihedral_deg: .* a nu",
+        ),
+        ("dihedral_deg = 48.656", "dihedral_deg = nan", r"dihedral_deg: .* a number .*, found nan"),
+        ("drawn_at = 0.576", "drawn_at = true", r"member B: input\.drawn_at: expected a number"),
+        ("drawn_at = 0.576", "drawn = 0.576", r"members\.B\.input\.drawn: expected a key of"),
+        ("F = [-1.243", "Z = [-1.243", r"members\.B\.ground\.Z: .* a key of the gear file"),
+        ("[members.B.ground]", "[members.B.grund]", r"members\.B\.grund: expected a key of"),
+        ("[members.B]\ninput", '[members."B\\u202e"]\ninput', NAME),
+        ("source = ", "spurce = ", "source: expected a text, found nothing"),
+        ("[4.2709, -0.0]", f"[{LONG_HEX}, 1]", rf"{TWO} .*, found"),
+    ],
+    "targets": [
+        ("value = 0.0472", "value = nan", r"targets\[1\]\.value: expected a number"),
+        ("value = 0.0472", "value = 0.0472\nat_most = 0.05", "one of value with tol.*, at_most"),
+        ("tolerance = 0.00005", "tolerence = 0.00005", "tolerance|tolerence"),
+        *(("= 0.00005", f"= {wide}", "tolerance: .* above 0") for wide in ("0.0", "-0.1", "1e-30")),
+        ("{ 3 = 0.013", "{ 3 = true", r"clearance_in\.3: expected a number"),
+        ("{ 3 = 0.013", "{ 3 = -0.013", r"clearance_in\.3: expected a number from 0 to 1"),
+        ("{ 3 = 0.013", '{ "²" = 0.013', r"clearance_in\.²: expected the number of a joint"),
+        ("schema = 1", f"schema = {LONG_HEX}", r"found a number of more than 4,300"),
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "words"), [(file, *each) for file in REFUSED for each in REFUSED[file]]
 )
-def test_what_is_wrong_with_a_gear_file_is_named_with_its_place(edited, old, new, words):
+def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(
+    edited, file, old, new, words
+):
+    path = edited(old, new, file)
+    began = time.process_time()
     with pytest.raises(GearFileError, match=words) as caught:
-        load_gear(edited(old, new))
-    assert caught.value.message.startswith(("copy.toml: ", str(edited(old, new))))
+        verify(load_gear(path), targets_file(load_gear(path)))
+    assert f"hawker-800xp{file and '-'}{file}.toml" in caught.value.message
     assert caught.value.remedy
+    assert time.process_time() - began < 5 * SLOWER
 
 
 @pytest.mark.parametrize(
@@ -219,33 +258,18 @@ def test_a_linkage_that_cannot_be_assembled_is_a_mechanism_error_that_names_the_
         _ = load_gear(edited(old, new)).model
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        (
-            "dihedral_deg = 48.656",
-            'dihedral_deg = "flat"',
-            ", member B: planes.link_assembly.dihedral_deg: expected a number",
-        ),
-        ("drawn_at = 0.576", "drawn = 0.576", ": members.B.input.drawn: expected a key of"),
-        ("F = [-1.243", "Z = [-1.243", ": members.B.ground.Z: expected a key of the gear file"),
-        ("[members.B.ground]", "[members.B.grund]", ": members.B.grund: expected a key of"),
-        ("source = ", "spurce = ", ": source: expected a text, found nothing"),
-    ],
-)
-def test_what_is_wrong_with_an_ensemble_is_named_with_its_member(edited, old, new, words):
-    path = edited("schema = 2", "schema = 2 ")
-    ensemble = path.with_name("hawker-800xp-ensemble.toml")
-    text = ensemble.read_text(encoding="utf-8")
-    assert old in text
-    ensemble.write_text(text.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(GearFileError) as caught:
-        load_gear(path)
-    assert f"hawker-800xp-ensemble.toml{words}" in caught.value.message
+def test_code_in_place_of_a_name_does_not_run(edited: Edit, tmp_path: Path) -> None:
+    mark = tmp_path / "ran"
+    path = edited("[joints.10]", f"[joints.\"0\\nopen({str(mark)!r},'w')\"]")
+    with pytest.raises(GearFileError, match=r"expected a name of 1 to 40"):
+        _ = load_gear(path).model
+    assert not mark.exists()
 
 
 def test_a_gear_file_of_an_earlier_version_is_refused_with_the_page_that_tells_the_change(edited):
-    with pytest.raises(GearFileError, match=r"copy\.toml: is written as 0\.2\.0 read it") as caught:
+    with pytest.raises(
+        GearFileError, match=r"800xp\.toml: is written as 0\.2\.0 read it"
+    ) as caught:
         load_gear(edited("schema = 2", "schema = 1"))
     page, heading = re.findall(r"(docs/\S+\.md), \"([^\"]+)\"", caught.value.remedy)[0]
     assert f"## {heading}\n" in (Path(__file__).parents[2] / page).read_text(encoding="utf-8")

@@ -12,6 +12,7 @@ import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import LinkageModel, worst_case
+from tests.hidden_effect.simulator import linkage as simulator
 
 ACHIEVED = {
     "A": (0.48717, 0.01379, 0.04722, -0.04286, 0.10532, -0.09195),
@@ -151,3 +152,29 @@ def test_up_to_15_thou_everything_closes_over_the_whole_stroke_on_every_linkage(
 def test_the_reference_loses_closure_only_with_all_ten_clearances_near_46_thou(gear: Gear) -> None:
     worst = worst_case(gear.model, np.array([[0.044] * 10, [0.0475] * 10]))
     assert np.isfinite(worst.over_in).tolist() == [True, False]
+
+
+@each_linkage
+def test_every_joint_stands_where_a_solver_of_the_whole_chain_puts_it_in_space(gear, name):
+    """The simulator's solver shares nothing with the package: fifteen equations, by Newton."""
+    model, geometry = model_of(gear, name), simulator.load(name)
+    rng = np.random.default_rng(ord(name))
+    stroke = np.concatenate([np.linspace(*model.stroke, 5), rng.uniform(*model.stroke, 45)])
+    links = simulator.clearance_vectors(
+        rng.uniform(0, 0.015, (50, 10)), rng.uniform(0, 2 * np.pi, (50, 10))
+    )
+    build = simulator.Build.nominal(geometry, len(stroke))
+    placed = np.repeat(geometry.start[None], len(stroke), axis=0)
+    # Followed from mid-position, so that no branch is changed.
+    for share in np.linspace(0.0, 1.0, 13)[1:]:
+        build.length("F1")[:] = geometry.lengths[simulator.LENGTHS.index("F1")] + share * (
+            stroke - geometry.stroke
+        )
+        placed = simulator.close(build, share * links, placed)
+    flat = [links[:, joint, axis] for joint in range(10) for axis in range(2)]
+    found = model.kernel.positions(stroke, flat)
+    for joint, at in zip("1235679", np.split(placed[:, :14], 7, axis=1), strict=True):
+        assert np.transpose(found[joint]) == pytest.approx(at, abs=1e-9)
+    assert np.std(placed[:, 14]) > 0.05
+    assert model.kernel.output(stroke, flat) == pytest.approx(placed[:, 14], abs=1e-9)
+    assert geometry.rate == pytest.approx(model.rate, rel=1e-8)

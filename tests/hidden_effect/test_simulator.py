@@ -4,12 +4,12 @@ it tests.
 
 from __future__ import annotations
 
+import ast
 import csv
 import json
-from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from scipy.optimize import minimize
 
 from . import simulator
 from .simulator import (
+    BLEMISHES,
     CATALOGUE,
     COLUMNS,
     KINDS,
@@ -24,6 +25,7 @@ from .simulator import (
     OFF_CATALOGUE,
     EffectSpec,
     FleetSpec,
+    blemished_fleet,
     draw_fleet,
     follow_up,
     linkage,
@@ -31,11 +33,11 @@ from .simulator import (
     simulate_fleet,
     write_csv,
 )
+from .simulator.blemishes import UNSEEN, Rows, Truth
 from .simulator.generate import _ALIAS_CAUSES
 from .simulator.records import CLEARANCES, DISPLACEMENTS
 
 FOLDER = Path(simulator.__file__).parent
-Rows = Callable[[dict[str, Any], dict[str, Any]], np.ndarray]
 QUIET = FleetSpec(rows=120, blank_share=0.0)
 
 
@@ -58,14 +60,6 @@ def _misfit(fleet: simulator.Fleet) -> np.ndarray:
         [fleet.table[name] for name in DISPLACEMENTS if name in fleet.table], dtype=float
     )
     return readings.mean(axis=0) - physics.worst_case(linkage.load(fleet.spec.geometry), clearance)
-
-
-def _changed(one: simulator.Fleet, other: simulator.Fleet) -> np.ndarray:
-    """Rows in which any cell differs."""
-    rows = len(one.table["record_id"])
-    return np.array(
-        [any(one.table[c][r] != other.table[c][r] for c in one.table) for r in range(rows)]
-    )
 
 
 def _hide(*effects: EffectSpec, **changes: object) -> FleetSpec:
@@ -95,14 +89,6 @@ def test_every_loop_closes_to_a_ten_billionth_of_an_inch() -> None:
     )
 
 
-def test_a_linkage_that_cannot_close_is_not_a_number() -> None:
-    build = linkage.Build.nominal(linkage.load("A"), 2)
-    build.length("35")[1] += 5.0
-    unknown = linkage.close(build, np.zeros((2, 10, 2)))
-    assert np.isfinite(unknown[0]).all()
-    assert np.isnan(unknown[1]).all()
-
-
 @pytest.mark.parametrize("name", linkage.names())
 def test_no_row_falls_into_another_assembly_when_its_pins_scatter(name: str) -> None:
     sizes = _worn(400)
@@ -113,22 +99,6 @@ def test_no_row_falls_into_another_assembly_when_its_pins_scatter(name: str) -> 
     drop = linkage.reading(build, unknown) - linkage.reading(build, moved)
     assert drop.min() > 0.0
     assert drop.max() < 0.01
-
-
-def test_the_gradient_is_the_slope_of_the_reading() -> None:
-    geometry = linkage.load("A")
-    build = linkage.Build.nominal(geometry, 20)
-    build.lever_tilt[:], build.link_offset[:] = 0.02, 0.08
-    at = np.random.default_rng(3).normal(0.0, 0.004, (20, 10, 2))
-    gradient = linkage.plunger_gradient(build, at, linkage.close(build, at))
-    for joint in range(10):
-        for axis in range(2):
-            step = np.zeros_like(at)
-            step[:, joint, axis] = 1e-5
-            up, down = (
-                linkage.reading(build, linkage.close(build, at + s * step)) for s in (1, -1)
-            )
-            assert np.allclose((up - down) / 2e-5, gradient[:, joint, axis], atol=1e-6)
 
 
 def test_no_other_directions_push_the_plunger_further() -> None:
@@ -153,19 +123,6 @@ def test_no_other_directions_push_the_plunger_further() -> None:
             for _ in range(3)
         )
         assert found[row] == pytest.approx(best, abs=1e-7)
-
-
-def test_uniform_growth_of_all_parts_scales_the_reading_and_does_nothing_else() -> None:
-    geometry = linkage.load("A")
-    build = linkage.Build.nominal(geometry, 1)
-    build.lengths *= 1.001
-    build.spread[:] = 0.001
-    vectors = linkage.clearance_vectors(_worn(1), geometry.angles)
-    plain = linkage.Build.nominal(geometry, 1)
-    grown = linkage.reading(build, linkage.close(build, vectors * 1.001))
-    assert grown == pytest.approx(
-        1.001 * linkage.reading(plain, linkage.close(plain, vectors)), rel=1e-9
-    )
 
 
 def _gears() -> physics.Gears:
@@ -235,80 +192,6 @@ def test_a_sound_fleet_carries_noise_and_nothing_else(null: str) -> None:
     assert len(fleet.table["record_id"]) == (500 if null == "n500" else 200)
 
 
-@pytest.mark.parametrize(
-    ("cause", "column"),
-    [
-        ("gauge_bias", "gauge_id"),
-        ("technician_bias", "technician_id"),
-        ("rigging_offset", "tail_no"),
-    ],
-)
-def test_a_cause_of_one_identity_changes_its_rows_only(cause: str, column: str) -> None:
-    sound = simulate_fleet(QUIET, 9)
-    fleet = simulate_fleet(_hide(EffectSpec(cause, strength=15.0)), 9)
-    name = (fleet.label.causes[0][1] or "").split()[1]
-    changed = _changed(sound, fleet)
-    own = np.array([value == name for value in fleet.table[column]])
-    if cause == "rigging_offset":
-        effect = fleet.label.effects[0]
-        own &= np.array(fleet.table["inspection_date"]) >= (effect.parameters["from_date"] or "")
-        if len((effect.target or "").split()) == 3:
-            own &= np.array(fleet.table["side"]) == (effect.target or "").split()[2]
-    assert np.array_equal(changed, own)
-
-
-@pytest.mark.parametrize(
-    ("cause", "own"),
-    [
-        ("side_difference", lambda table, _: np.array(table["side"]) == "RH"),
-        ("approach_hysteresis", lambda table, _: np.array(table["approach"]) == "RETRACTING"),
-        ("date_step", lambda table, step: np.array(table["inspection_date"]) >= step["from_date"]),
-    ],
-)
-def test_a_cause_of_some_rows_changes_these_and_no_other(cause: str, own: Rows) -> None:
-    parameters = {"calibrated_at": 0.0} if cause == "approach_hysteresis" else {}
-    fleet = simulate_fleet(_hide(EffectSpec(cause, strength=15.0, parameters=parameters)), 9)
-    rows = own(fleet.table, fleet.label.effects[0].parameters)
-    assert np.array_equal(_changed(simulate_fleet(QUIET, 9), fleet), rows)
-
-
-@pytest.mark.parametrize("cause", ["direction_not_worst_case", "oval_wear"])
-@pytest.mark.parametrize("target", ["joint 4", "joint 9"])
-def test_a_cause_of_one_joint_grows_with_that_joints_clearance(cause: str, target: str) -> None:
-    fleet = simulate_fleet(_hide(EffectSpec(cause, target, 10.0)), 2)
-    truth = fleet.label.truth_term
-    clearance = fleet._world.design.clearance
-    agreement = [abs(np.corrcoef(truth, clearance[:, joint])[0, 1]) for joint in range(10)]
-    assert int(np.argmax(agreement)) == int(target.split()[1]) - 1
-    assert np.sign(truth.sum()) == (1.0 if cause == "oval_wear" else -1.0)
-
-
-def test_contact_costs_displacement_and_never_adds_any() -> None:
-    truth = simulate_fleet(
-        _hide(EffectSpec("joint_contact", "joints 3,5", 10.0)), 2
-    ).label.truth_term
-    assert truth.max() < 1e-6
-    assert truth.min() < -0.001
-
-
-def test_heat_and_pressure_act_relative_to_rigging_and_calibration() -> None:
-    heat = simulate_fleet(_hide(EffectSpec("thermal_growth", strength=10.0)), 2)
-    warmer = heat._world.design.temperature - 20.0
-    assert np.corrcoef(heat.label.truth_term, warmer)[0, 1] ** 2 > 0.98
-    assert np.abs(heat.label.truth_term / warmer).max() < 0.001
-    press = simulate_fleet(_hide(EffectSpec("elastic_compliance", strength=10.0)), 2)
-    below = press._world.design.pressure - 3000.0
-    slope, at_full = np.polyfit(below, press.label.truth_term, 1)
-    assert np.corrcoef(press.label.truth_term, below)[0, 1] ** 2 > 0.95
-    assert abs(at_full) < 0.05 * abs(slope) * 3000.0
-
-
-def test_two_causes_are_each_as_strong_as_requested() -> None:
-    label = draw_fleet(6, "double", strength=12.0).label
-    assert len({cause for cause, _ in label.causes}) == 2
-    assert [effect.strength for effect in label.effects] == pytest.approx([12.0, 12.0], rel=0.1)
-
-
 @pytest.mark.parametrize("alias", sorted(_ALIAS_CAUSES))
 def test_an_aliased_fleet_lists_the_causes_that_touch_the_same_rows(alias: str) -> None:
     for cause in _ALIAS_CAUSES[alias]:
@@ -332,15 +215,6 @@ def test_a_further_reading_separates_an_aliased_pair() -> None:
     assert more.table["technician_id"][-1] == person
     assert np.abs(new[0::2]).min() > 1e-4
     assert len(set(more.table["record_id"])) == fleet.spec.rows + 8
-
-
-@pytest.mark.parametrize(
-    "cause", sorted(name for name, cause in CATALOGUE.items() if cause.columns)
-)
-def test_a_needed_column_can_be_missing(cause: str) -> None:
-    fleet = draw_fleet(12, "missing_column", cause=cause)
-    assert fleet.label.removed_columns
-    assert not set(fleet.label.removed_columns) & set(fleet.table)
 
 
 def test_every_fault_of_the_label_stands_in_the_table_and_no_other() -> None:
@@ -372,3 +246,73 @@ def test_the_table_has_the_columns_of_the_interface_and_nothing_of_the_label(tmp
         assert rows[0] == list(fleet.table)
         assert len(rows) == fleet.spec.rows + 1
         assert rows[1][0] == "R0001"
+
+
+SEED = 41
+
+
+@cache
+def drawn(case: str, form: str = "strong") -> tuple[Rows, Truth]:
+    return blemished_fleet(case, form, SEED, rows=120)
+
+
+@pytest.mark.parametrize("case", BLEMISHES)
+def test_a_blemish_changes_the_table_tells_nothing_of_itself_and_leaves_unseen_rows(case):
+    rows, truth = drawn(case)
+    assert (rows != drawn("sound")[0]) == (case != "sound")
+    assert set(rows[0]) - {"mod_status", "base"} == set(drawn("sound")[0][0])
+    assert len(truth.unseen) == UNSEEN
+    assert all(isinstance(row[joint], float) for row in truth.unseen for joint in CLEARANCES)
+
+
+@pytest.mark.parametrize("case", ["sound", "gonogo", "dup", "walk", "worn_repair"])
+def test_the_same_seed_gives_the_same_fleet(case: str) -> None:
+    assert drawn.__wrapped__(case) == drawn(case)
+
+
+@pytest.mark.parametrize("cause", CATALOGUE)
+def test_any_listed_cause_stands_beside_a_blemish(cause: str) -> None:
+    _, truth = blemished_fleet("round", "mild", SEED, beside=cause, rows=120)
+    assert [name for name, _target in truth.causes] == [cause]
+
+
+ROOT = Path(__file__).parents[2]
+SIMULATOR = sorted((Path(__file__).parent / "simulator").glob("*.py"))
+PRODUCT = sorted((ROOT / "mlg_troubleshoot").rglob("*.py"))
+
+
+def imported(file: Path) -> set[str]:
+    """First names of the modules that a file imports from outside its own package."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            found.add(str(node.module).split(".")[0])
+        elif isinstance(node, ast.ImportFrom) and node.level > 1:
+            found.add("a package above its own")
+    return found
+
+
+def test_the_simulator_imports_nothing_of_the_product() -> None:
+    allowed = "__future__ collections csv dataclasses datetime functools itertools json math numpy"
+    for file in SIMULATOR:
+        assert imported(file) <= {*allowed.split(), "pathlib", "scipy", "typing"}, file.name
+
+
+def test_the_simulator_names_no_file_of_the_product_and_imports_nothing_by_a_name() -> None:
+    words = ("mlg", "__import__", "import_module", "exec(", "eval(")
+    assert not [
+        (f.name, word) for f in SIMULATOR for word in words if word in f.read_text(encoding="utf-8")
+    ]
+
+
+def test_the_product_imports_nothing_of_the_tests() -> None:
+    assert not [
+        f for f in PRODUCT if imported(f) & {"tests", "simulator", "hidden_effect", "conftest"}
+    ]
+
+
+def test_the_product_names_no_file_of_the_tests() -> None:
+    words = ("hidden_effect", "coordinates.json", "truth_term", "simulate_fleet")
+    assert not [f for f in PRODUCT if any(word in f.read_text(encoding="utf-8") for word in words)]

@@ -56,12 +56,6 @@ def test_a_joint_that_the_gear_does_not_have_is_named(gear: Gear, tmp_path: Path
         verify(gear, path)
 
 
-def test_a_misspelt_key_is_named(gear: Gear, tmp_path: Path) -> None:
-    path = _changed(gear, tmp_path, "tolerance = 0.00005", "tolerence = 0.00005")
-    with pytest.raises(GearFileError, match=r"tolerance|tolerence"):
-        load_targets(path)
-
-
 def test_a_gear_without_targets_is_told_so(tmp_path: Path) -> None:
     with pytest.raises(GearFileError, match="no printed numbers"):
         load_targets(tmp_path / "none.toml")
