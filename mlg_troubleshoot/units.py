@@ -232,6 +232,9 @@ class Length:
         """With as many decimals as the number has, to four digits."""
         return cls(value_in, len(f"{value_in:.4g}".partition(".")[2]))
 
+    def __str__(self) -> str:
+        return self.said_in(LengthUnit.INCH)
+
     def said_in(self, unit: LengthUnit) -> str:
         decimals = self.decimals
         if unit is not LengthUnit.INCH:
@@ -251,7 +254,7 @@ class Sentence(str):
     @classmethod
     def of(cls, template: str, *facts: object) -> Sentence:
         """Make a sentence; each ``{}`` stands for a `Length`, another sentence or a text."""
-        made = cls(template.format(*(said_in(fact, LengthUnit.INCH) for fact in facts)))
+        made = cls(template.format(*facts))
         made._template = template
         made._facts = facts
         return made

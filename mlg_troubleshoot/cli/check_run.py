@@ -187,7 +187,9 @@ class Run:
             joint = chain(("",), repeat(",\n"))
             outputs.append(
                 task.BlockOutput(
-                    task.json_lines, lambda block: output.write_pieces((next(joint), block))
+                    task.json_lines,
+                    lambda block: output.write_pieces((next(joint), block)),
+                    sets=True,
                 )
             )
         if wanted.csv is not None:
@@ -203,7 +205,7 @@ class Run:
 
             outputs.append(task.BlockOutput(told_by, found.entries.extend))
         if total == 1 or wanted.report is not None:
-            outputs.append(task.BlockOutput(tuple, found.held.extend))
+            outputs.append(task.BlockOutput(tuple, found.held.extend, sets=True))
         return outputs
 
     def _ask(self) -> task.CheckResult:
@@ -298,12 +300,12 @@ class Run:
             noun = "inspection" if added.new == 1 else "inspections"
             known = f", {added.known} known already" if added.known else ""
             output.say(f"{added.new} {noun} kept in {self._place.place}{known}.")
-        gears = [(each.record.tail_no, each.record.side) for each in found]
+        gears = [each.key for each in found]
         # After --amend or --keep-old what is kept of a visit is not what its row says.
         is_settled = self._wanted.amend is not None
         seen = Counter(dict.fromkeys(gears, 0)) if is_settled else Counter(gears)
-        against = task.attention_of_kept(seen, self._place, load_gear(self.asked.gear))
-        for warning in (*added.warnings, *against):
+        warnings, against = task.look_at_kept(seen, self._place, load_gear(self.asked.gear))
+        for warning in (*added.warnings, *warnings, *against):
             output.say(f"Warning: {warning}")
         return against
 

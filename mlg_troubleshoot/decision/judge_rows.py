@@ -282,11 +282,12 @@ def assess(
     table: IndexTable,
     *,
     advice: bool = False,
+    sets: bool = True,
     extension: Extension | None = None,
     fleet: Fleet | None = None,
 ) -> tuple[Judgement, ...]:
-    """Judge rows: verdict, plan, repair sets and allowances; with `advice` re-rigging and
-    the joints that are likely worn. `fleet` is what other gears teach.
+    """Judge rows: verdict, plan and allowances; with `advice` re-rigging and the joints that are
+    likely worn, with `sets` the repair sets. `fleet` is what other gears teach.
     """
     valid = [row for row in rows if isinstance(row, Inspection)]
     # Gears of which the same is known are judged once; to an extension it matters whose they are.
@@ -303,13 +304,13 @@ def assess(
     with threadpool_limits(1, "blas"):
         for start in range(0, len(different), AT_ONCE):
             cases = Cases.of(gear, different[start : start + AT_ONCE], fleet=fleet)
-            part = _assess_valid(cases, table, advice)
+            part = _assess_valid(cases, table, advice, sets)
             if extension is not None:
-                extended = _assess_valid(replace(cases, extension=extension), table, advice)
+                extended = _assess_valid(replace(cases, extension=extension), table, advice, sets)
                 approval = extension.approval
                 part = [_worse(*both, approval) for both in zip(part, extended, strict=True)]
             if advice:
-                judge = partial(_assess_valid, table=table, advice=False)
+                judge = partial(_assess_valid, table=table, advice=False, sets=False)
                 part = with_consequences(part, cases, judge)
             found += part
     judged = dict(zip(alike, found, strict=True))
@@ -380,7 +381,7 @@ def _worse(plain: Assessment, extended: Assessment, approval: str) -> Assessment
     )
 
 
-def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessment]:
+def _assess_valid(cases: Cases, table: IndexTable, advice: bool, sets: bool) -> list[Assessment]:
     lower, upper = cases.predict_bounds()
     p_lower, p_upper = (
         each.probability_within(cases.margin_in, cases.margin_u_in) for each in (lower, upper)
@@ -394,7 +395,7 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
         chance[unread] = chance_random(cases, unread)
     verdicts = _verdicts(cases, p_lower, p_upper, known)
     found = [verdict for verdict, _basis in verdicts]
-    wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes
+    wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes & sets
     findings = rank_joints(
         cases.gear,
         table,
@@ -415,10 +416,10 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool) -> list[Assessm
     )
     belief = lru_cache(4)(partial(Belief, cases))
     planned, tried = plans(cases, judged, belief)
-    sets = repair_sets(cases, upper, np.flatnonzero(wanted), tried, belief)
+    repairs = repair_sets(cases, upper, np.flatnonzero(wanted), tried if sets else {}, belief)
     asked = belief if advice else None
     return [
-        _assessment(cases, judged, i, findings[i], planned[i], sets[i], asked)
+        _assessment(cases, judged, i, findings[i], planned[i], repairs[i], asked)
         for i in range(len(cases))
     ]
 

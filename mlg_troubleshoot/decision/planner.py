@@ -502,7 +502,7 @@ class _PlanBuilder:
 
     def _measure(self, joints: tuple[int, ...], needed: float | None = None) -> None:
         """Measure joints; again where it is said how well."""
-        places = np.isin(self.numbers, joints)
+        places = np.array([number in joints for number in self.numbers])
         minutes = float(minutes_of(self.gear, places, self.opened)[0])
         self.opened = self.opened | places
         if needed is None:
@@ -515,7 +515,8 @@ class _PlanBuilder:
         """Restore joints; where a reading over the limit is in doubt it is taken again first."""
         if not expected:
             self._reread()
-        minutes = float(minutes_of(self.gear, np.isin(self.numbers, joints), self.opened)[1])
+        places = np.array([number in joints for number in self.numbers])
+        minutes = float(minutes_of(self.gear, places, self.opened)[1])
         text = sentences.RESTORE_WORN if expected else sentences.restore(joints, self.over)
         self._step(Action.RESTORE, minutes, text, joints)
         self.opened = np.zeros_like(self.opened)

@@ -7,10 +7,10 @@ Margin, limits, repairs, version and correction of an inspection are thus always
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
-from functools import cached_property, lru_cache
+from functools import cached_property
 from operator import itemgetter
 
 from mlg_troubleshoot.decision.assessment import Action, Assessment, Verdict
@@ -38,7 +38,6 @@ from mlg_troubleshoot.life.state import (
     states,
 )
 from mlg_troubleshoot.store import (
-    Judge,
     Record,
     RecordKind,
     Store,
@@ -50,28 +49,11 @@ from mlg_troubleshoot.units import ClearanceConvention
 # Letters of a hash by which a record may be named. [1]
 LEAST_OF_A_HASH = 6
 _WORK = (RecordKind.REPAIR, RecordKind.RERIG)
-# Contents that stay unpacked: those of the gears that are being worked on, not of a fleet. [1]
-_UNPACKED = 4096
+_ENTERED = (RecordKind.INSPECTION, RecordKind.CORRECTION)
+# Gears that are read at once. [1]
+_AT_ONCE = 25
 # What a clock counts in. [s]
 _TICK_S = 1e-6
-
-
-# Who judges is not part of what a record says, but decides whether it can be read.
-@lru_cache(_UNPACKED)
-def _unpacked(record: Record, _judge: Judge | None) -> tuple[Inspection, Mapping[str, str]]:
-    """The inspection of a record, and what else it says: what it supersedes, or where and when it
-    was entered before it was moved.
-    """
-    body = record.body
-    return inspection_from(record, body), {n: v for n, v in body.items() if n != "inspection"}
-
-
-def inspection_of(record: Record) -> Inspection:
-    return _unpacked(record, record.judge)[0]
-
-
-def more_of(record: Record) -> Mapping[str, str]:
-    return _unpacked(record, record.judge)[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +76,13 @@ class TodaysVerdict:
 
 @dataclass(frozen=True, slots=True)
 class LogEntry:
-    """A record in the log of a gear, the version of its inspection before it, and whether it
-    counts; what was recorded in two chains before they were merged is one entry.
+    """A record in the log of a gear, its inspection and the version of that before it, and whether
+    it counts; what was recorded in two chains before they were merged is one entry.
     """
 
     record: Record
-    before: Record | None
+    row: Inspection | None
+    before: Inspection | None
     counts: bool
 
 
@@ -181,6 +164,14 @@ def lives_of(store: Store, keys: Collection[GearKey]) -> dict[GearKey, GearLife]
     return _lives(each for each in records if (each.tail_no, each.side) in wanted)
 
 
+def in_turn(store: Store, keys: Sequence[GearKey]) -> Iterator[GearLife | None]:
+    """The life of each of many gears, None of one without records: few stand in memory."""
+    for first in range(0, len(keys), _AT_ONCE):
+        part = keys[first : first + _AT_ONCE]
+        found = lives_of(store, part)
+        yield from map(found.get, part)
+
+
 def _lives(records: Iterable[Record]) -> dict[GearKey, GearLife]:
     by_gear: dict[GearKey, list[Record]] = {}
     for record in records:
@@ -259,6 +250,8 @@ def is_readable(record: Record) -> bool:
 def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     places = _by_clock(_readable_or_not_void(records))
     one = _first_keys(places)
+    bodies = {record.key: record.body for record in places if record.kind in _ENTERED}
+    rows = {r.key: inspection_from(r, bodies[r.key]) for r in places if r.key in bodies}
     # The visit that each version of it is of, and the last version of each.
     roots: dict[str, Record] = {}
     last: dict[Record, Record] = {}
@@ -270,7 +263,7 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
         if record.kind is RecordKind.INSPECTION:
             last.setdefault(roots.setdefault(own, record), record)
         elif record.kind is RecordKind.CORRECTION:
-            root = roots.get(one.get(more_of(record)["supersedes"], ""))
+            root = roots.get(one.get(bodies[record.key]["supersedes"], ""))
             if root is not None and own not in roots:
                 roots[own] = root
                 before[own] = last[root]
@@ -284,7 +277,8 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     entries = tuple(
         LogEntry(
             record,
-            before.get(record.key),
+            rows.get(record.key),
+            rows[before[record.key].key] if record.key in before else None,
             roots[record.key] not in void
             if record.key in roots
             else record.key in others or record.kind is RecordKind.VOID,
@@ -295,8 +289,8 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     visits = []
     for root, record in last.items():
         if root not in void:
-            row = inspection_of(record)
-            entered = more_of(root).get("entered")
+            row = rows[record.key]
+            entered = bodies[root.key].get("entered")
             place = places[root] if entered is None else float(entered)
             visits.append(GearVisit(row, place, row.source.file is None, record))
     moments = [at for visit in visits for at in _moments(visit)]
@@ -458,7 +452,8 @@ _NOW = ""
 def _judged(
     states: Sequence[GearState], gear: Gear, table: IndexTable, fleet: Fleet | None
 ) -> list[TodaysVerdict]:
-    each = assess([state.inspection for state in states], gear, table, fleet=fleet)
+    rows = [state.inspection for state in states]
+    each = assess(rows, gear, table, sets=False, fleet=fleet)
     return [
         TodaysVerdict(
             found.verdict,

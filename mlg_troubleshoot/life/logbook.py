@@ -11,12 +11,11 @@ from typing import Any
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.life.folding import GearLife, inspection_of
+from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.store import Record, RecordKind
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
 _RERIGGED = "rigging corrected"
-_VISITS = (RecordKind.INSPECTION, RecordKind.CORRECTION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,11 +138,9 @@ def log_of(life: GearLife, gear: Gear, joints: Collection[int] | None = None) ->
             "hash": record.digest,
             "counts": entry.counts,
         }
-        if record.kind in _VISITS:
-            row = inspection_of(record)
-            about["gear_landings"] = row.gear_landings
-            before = None if entry.before is None else inspection_of(entry.before)
-            found = visit_lines(row, gear, before, joints) + _verdict(life, record)
+        if entry.row is not None:
+            about["gear_landings"] = entry.row.gear_landings
+            found = visit_lines(entry.row, gear, entry.before, joints) + _verdict(life, record)
         else:
             about["gear_landings"] = record.body.get("landings")
             found = _other_lines(record)

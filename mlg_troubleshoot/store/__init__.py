@@ -8,6 +8,7 @@ from mlg_troubleshoot.store.database import (
     RecordKind,
     Store,
     StoreError,
+    canonical,
     files_of,
     login,
     packed,
@@ -17,9 +18,10 @@ from mlg_troubleshoot.store.inspections import (
     RETIRED,
     Draft,
     Drafts,
-    content_of,
     inspection_from,
     inspection_record,
+    record_of,
+    said_of,
 )
 
 __all__ = [
@@ -34,10 +36,12 @@ __all__ = [
     "RecordKind",
     "Store",
     "StoreError",
-    "content_of",
+    "canonical",
     "files_of",
     "inspection_from",
     "inspection_record",
     "login",
     "packed",
+    "record_of",
+    "said_of",
 ]

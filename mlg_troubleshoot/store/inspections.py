@@ -10,14 +10,14 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, fields
 from datetime import date, datetime
 from enum import Enum
-from hashlib import sha256
+from functools import lru_cache
 from typing import Any
 
 import sqlalchemy as sql
 
-from mlg_troubleshoot.decision.columns import COLUMNS, Holds
+from mlg_troubleshoot.decision.columns import COLUMNS, DATE, Holds
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, RowSource
-from mlg_troubleshoot.store.database import DRAFTS, Record, RecordKind, Store, canonical, packed
+from mlg_troubleshoot.store.database import DRAFTS, Record, RecordKind, Store, packed
 from mlg_troubleshoot.units import LengthUnit
 
 # What says where and how an inspection was entered, not what was found.
@@ -47,27 +47,29 @@ def _plain(value: Any) -> Any:
     return [_plain(each) for each in value] if isinstance(value, tuple) else value
 
 
-def inspection_record(
-    inspection: Inspection, kind: RecordKind = RecordKind.INSPECTION, **more: Any
-) -> Record:
-    """Return an inspection as a record; what is at its default is left out."""
-    day = inspection.inspection_date.isoformat() if inspection.inspection_date else ""
-    body = {}
+def said_of(inspection: Inspection) -> dict[str, Any]:
+    """Return an inspection as plain JSON values; what is at its default is left out."""
+    said = {}
     for name, default in _FIELDS:
         value = getattr(inspection, name)
         if value is not default and value != default and value not in ({}, ()):
-            body[name] = _plain(value)
-    body.update({name: _plain(value) for name, value in inspection.other_columns.items()})
-    identity = (inspection.record_id, inspection.tail_no, inspection.side.value, day)
-    return Record(
-        kind,
-        inspection.record_id,
-        inspection.tail_no,
-        inspection.side.value,
-        day,
-        packed({"inspection": body, **more}),
-        identity if kind is RecordKind.INSPECTION else (),
-    )
+            said[name] = _plain(value)
+    return said | {name: _plain(value) for name, value in inspection.other_columns.items()}
+
+
+def inspection_record(
+    inspection: Inspection, kind: RecordKind = RecordKind.INSPECTION, **more: Any
+) -> Record:
+    return record_of(said_of(inspection), kind, **more)
+
+
+def record_of(
+    said: Mapping[str, Any], kind: RecordKind = RecordKind.INSPECTION, **more: Any
+) -> Record:
+    """Return what an inspection says as a record."""
+    filed = said["record_id"], said["tail_no"], said["side"], said.get(DATE.filled, "")
+    identity = filed if kind is RecordKind.INSPECTION else ()
+    return Record(kind, *filed, packed({"inspection": said, **more}), identity)
 
 
 def _moment(text: str) -> date:
@@ -75,15 +77,18 @@ def _moment(text: str) -> date:
     return datetime.fromisoformat(text) if "T" in text else date.fromisoformat(text)
 
 
+# Many readings of a gear were written alike.
+@lru_cache(1024)
+def _entered(text: str, unit: str, bound: str = "") -> EnteredClearance:
+    return EnteredClearance(text, LengthUnit(unit), bound)
+
+
 # How a field is read back where it does not stand in JSON as it is.
 _READ: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(
         _BY_JOINT, lambda found: {int(number): value for number, value in found.items()}
     ),
-    "entered": lambda found: {
-        int(n): EnteredClearance(text, LengthUnit(unit), *bound)
-        for n, (text, unit, *bound) in found.items()
-    },
+    "entered": lambda found: {int(number): _entered(*each) for number, each in found.items()},
     "source": lambda found: RowSource(*found),
     **{column.filled: date.fromisoformat for column in COLUMNS if column.holds is Holds.DATE},
     **{column.filled: _moment for column in COLUMNS if column.holds is Holds.MOMENT},
@@ -103,14 +108,6 @@ def inspection_from(record: Record, body: Any = None) -> Inspection:
     }
     other = {name: read.pop(name) for name in [*read] if name not in _NAMES}
     return Inspection(**{"clearance_in": {}, "other_columns": other, **read})
-
-
-def content_of(said: Mapping[str, Any], *left_out: str) -> bytes:
-    """Hash of what an inspection says was found at which gear, and of what else is not left out;
-    wherever it was entered and whatever it is called.
-    """
-    found = {n: v for n, v in said.items() if n not in NOT_CONTENT and n not in left_out}
-    return sha256(canonical(found).encode()).digest()
 
 
 _MOST_CHARACTERS = 1_000_000

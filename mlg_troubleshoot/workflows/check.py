@@ -10,11 +10,12 @@ import pickle
 import warnings
 import zlib
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from datetime import date
 from functools import partial
+from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
@@ -178,11 +179,12 @@ def exit_code_of(lines: Iterable[Listed], unread_files: Sequence[str] = ()) -> E
 class BlockOutput:
     """Something that is made of judgements block by block, so that a long table never stands in
     memory: `make` turns a block into what is written of it, where it was judged; `take` receives
-    that here, in the order of the rows.
+    that here, in the order of the rows. `sets`: whether it shows the repair sets.
     """
 
     make: Callable[[Sequence[Judgement]], Any]
     take: Callable[[Any], object]
+    sets: bool = False
 
 
 def json_around(result: CheckResult) -> tuple[str, str]:
@@ -454,9 +456,7 @@ def _judge(
             found = replace(found, notes=(*found.notes, _set_aside(len(blank))))
     total = len(rows)
     if counting is None:
-        keys = {key_of(row) for row in rows if isinstance(row, Inspection)}
-        kept = {} if store is None else _kept_lives(keys, store)
-        counting = _states(rows, found.gear, kept, typed=found.read is None)
+        counting = _states(rows, found.gear, store, typed=found.read is None)
     if total > 1:
         found = replace(found, notes=(*found.notes, *other_visits_count(counting)))
     blocks = [slice(start, start + AT_ONCE) for start in range(0, total, AT_ONCE)]
@@ -481,7 +481,9 @@ def _judge(
     if fleet is not None:
         found = replace(found, notes=(*found.notes, fleet.text))
     held: list[Judgement] = []
-    wanted = [BlockOutput(tuple, held.extend)] if outputs is None else outputs(found, total)
+    wanted = (
+        [BlockOutput(tuple, held.extend, sets=True)] if outputs is None else outputs(found, total)
+    )
     task = partial(
         _made,
         partial(
@@ -489,6 +491,7 @@ def _judge(
             gear=found.gear,
             table=load_index_table(found.gear),
             advice=total == 1 if options.advice is None else options.advice,
+            sets=any(output.sets for output in wanted),
             extension=options.extension,
             fleet=fleet,
         ),
@@ -539,36 +542,41 @@ def _set_aside(count: int) -> str:
     return f"{rows} without a reading or an outcome: nothing to judge, set aside and not kept"
 
 
-def attention_of_kept(seen: Counter[GearKey], store: Store, gear: Gear) -> list[str]:
-    """Say which of some gears need attention with all that is kept of them, where more is kept
-    than the visits that were just seen.
+def look_at_kept(seen: Counter[GearKey], store: Store, gear: Gear) -> tuple[list[str], list[str]]:
+    """Say which records of some gears disagree in dates and landings, and which of the gears need
+    attention with all that is kept of them, where that is more than the visits that were just seen.
     """
     from mlg_troubleshoot.life.folding import judge_lives
     from mlg_troubleshoot.life.forecast import expected_of
 
-    kept = _kept_lives(seen, store).items()
-    more = [life for key, life in kept if len(life.visits) > seen[key]]
-    return [
+    warnings: list[str] = []
+    more: list[GearLife] = []
+    for count, life in zip(seen.values(), _kept_lives(seen, store), strict=True):
+        warnings += life.warnings if life else ()
+        more += [life] if life and len(life.visits) > count else []
+    fleet = expected_of(store, gear) if more else None
+    judged = judge_lives(more, gear, load_index_table(gear), fleet=fleet)
+    return warnings, [
         f"{life.name}: with all that is kept of it: {life.now.next_action}"
-        for life in judge_lives(more, gear, load_index_table(gear), fleet=expected_of(store, gear))
+        for life in judged
         if not life.now.is_fine
     ]
 
 
-def _kept_lives(keys: Collection[GearKey], store: Store) -> dict[GearKey, GearLife]:
-    """What a store keeps of some gears, by their tails as they were given."""
-    from mlg_troubleshoot.life.folding import as_spelt, lives_of
+def _kept_lives(keys: Collection[GearKey], store: Store | None) -> Iterator[GearLife | None]:
+    """What a store keeps of each of some gears."""
+    if store is None:
+        return repeat(None, len(keys))
+    from mlg_troubleshoot.life.folding import as_spelt, in_turn
 
     tails = as_spelt((tail for tail, _side in keys), store)
-    kept_as = {key: (tails[key[0]], key[1]) for key in keys}
-    lives = lives_of(store, set(kept_as.values()))
-    return {key: lives[kept] for key, kept in kept_as.items() if kept in lives}
+    return in_turn(store, [(tails[tail], side) for tail, side in keys])
 
 
 def _states(
     rows: Sequence[Inspection | InvalidRow],
     gear: Gear,
-    kept: Mapping[GearKey, GearLife],
+    store: Store | None,
     *,
     typed: bool,
 ) -> list[GearState | None]:
@@ -578,12 +586,13 @@ def _states(
         if isinstance(row, Inspection):
             places.setdefault(key_of(row), []).append(place)
     found: list[GearState | None] = [None] * len(rows)
-    for key, own in places.items():
+    for own, life in zip(places.values(), _kept_lives(places, store), strict=True):
         new = [GearVisit(row, typed=typed) for n in own if isinstance(row := rows[n], Inspection)]
         # A visit that is kept already, or takes the place of one, is the one that is judged.
         ids = {each.inspection.record_id for each in new}
-        was = kept[key].visits if key in kept else ()
-        old = [each for each in was if each.inspection.record_id not in ids]
+        old = [
+            each for each in (life.visits if life else ()) if each.inspection.record_id not in ids
+        ]
         for place, state in zip(own, states([*old, *new], gear)[len(old) :], strict=True):
             is_alone = state.inspection is rows[place]
             found[place] = None if is_alone else state
@@ -697,8 +706,9 @@ def _found_and_left(result: CheckResult, store: Store | None) -> dict[int, list[
 
     gear = result.gear
     if store is not None:
-        lives = _kept_lives({key_of(row) for row in rows.values()}, store)
-        logs = {key: logbook.log_of(life, gear) for key, life in lives.items()}
+        keys = [*{key_of(row): None for row in rows.values()}]
+        lives = zip(keys, _kept_lives(keys, store), strict=True)
+        logs = {key: logbook.log_of(life, gear) for key, life in lives if life}
     else:
         logs = {}
         for row in rows.values():

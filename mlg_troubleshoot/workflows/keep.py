@@ -12,6 +12,7 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, 
 from dataclasses import dataclass, fields, replace
 from datetime import datetime
 from functools import lru_cache
+from hashlib import sha256
 from itertools import chain, count
 from typing import Annotated, Any, Literal
 
@@ -36,7 +37,7 @@ from mlg_troubleshoot.decision.columns import (
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.life.folding import GearLife, as_spelt, lives_of, warnings_of
+from mlg_troubleshoot.life.folding import GearLife, as_spelt, in_turn, lives_of, warnings_of
 from mlg_troubleshoot.life.state import GearKey, key_of
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records import ReadOptions, judge_again, made_record_id
@@ -49,10 +50,12 @@ from mlg_troubleshoot.store import (
     RecordKind,
     Store,
     StoreError,
-    content_of,
+    canonical,
     inspection_from,
     inspection_record,
     packed,
+    record_of,
+    said_of,
 )
 from mlg_troubleshoot.units import LengthUnit
 
@@ -63,8 +66,8 @@ _MOST_NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """How many inspections were new, and how many stood there already; and which records of these
-    gears now disagree in dates and landings.
+    """How many inspections were new, and how many stood there already; and what is to be known of
+    the table.
     """
 
     new: int
@@ -84,11 +87,21 @@ class Told:
     file: str | None
 
     @classmethod
-    def of(cls, record: Record) -> Told:
-        said = record.body["inspection"]
-        source = said.get("source", (None,))
-        contents = content_of(said), content_of(said, DATE.filled)
-        return cls(record, *contents, source[0])
+    def by(cls, inspection: Inspection, kind: RecordKind = RecordKind.INSPECTION) -> Told:
+        said = said_of(inspection)
+        return cls.of(record_of(said, kind), said)
+
+    @classmethod
+    def of(cls, record: Record, said: Mapping[str, Any] | None = None) -> Told:
+        said = said or record.body["inspection"]
+        found = {n: v for n, v in said.items() if n not in (*NOT_CONTENT, DATE.filled)}
+        text = canonical(found).encode()
+        contents = sha256(text + record.day.encode()).digest(), sha256(text).digest()
+        return cls(record, *contents, said.get("source", (None,))[0])
+
+    @property
+    def key(self) -> GearKey:
+        return self.record.tail_no, self.record.side
 
     @property
     def named(self) -> str:
@@ -99,46 +112,44 @@ class Told:
     def known_by(self) -> Iterator[Hashable]:
         """What another record of the same inspection has as well."""
         record = self.record
-        gear = record.tail_no, record.side
         yield self.content
         yield "found", self.without_day
-        yield "id", record.record_id, *gear
-        yield "id", record.record_id, *gear, record.day
+        yield "id", record.record_id
+        yield "id", record.record_id, record.day
         # What a table without ids said of a gear on a day.
         if is_made_for_row(record.record_id):
-            yield *gear, record.day
+            yield "day", record.day
 
 
 def told_by(judgements: Iterable[Judgement]) -> list[Told]:
     """What is kept of judgements: nothing of a row that was not judged or says nothing."""
     rows = (j.inspection for j in judgements if isinstance(j, Assessment))
-    return [Told.of(inspection_record(row)) for row in rows if not row.says_nothing]
+    return [Told.by(row) for row in rows if not row.says_nothing]
 
 
 class _KnownContents:
-    """What a store and the rows before say of the gears of a call: an inspection is known by its
-    gear, its day and what was found, and by its id where each of two states one. What was voided
-    is known as well, and stays void.
+    """What a store and the rows before say of one gear: an inspection is known by its day and what
+    was found, and by its id where each of two states one. What was voided is known as well, and
+    stays void.
     """
 
-    def __init__(self, lives: Iterable[GearLife]) -> None:
+    def __init__(self, life: GearLife | None) -> None:
         self._by: defaultdict[Hashable, list[Told]] = defaultdict(list)
         self._void: dict[tuple[object, ...], set[bytes]] = {}
-        for life in lives:
-            standing = {}
-            for visit in life.inspections:
-                told = standing[visit.kept.record_id] = Told.of(visit.kept)
-                self.add(told)
-            for entry in life.entries:
-                record, name = entry.record, entry.record.record_id
-                if record.kind is not RecordKind.INSPECTION:
-                    continue
-                if not entry.counts:
-                    self._void.setdefault(record.content[:4], set()).add(Told.of(record).content)
-                # A table that comes back may have the day that was corrected.
-                if name in standing:
-                    of_day = self._by["id", name, *life.key, record.day]
-                    of_day[:] = of_day or [standing[name]]
+        standing = {}
+        for visit in life.inspections if life else ():
+            told = standing[visit.kept.record_id] = Told.of(visit.kept)
+            self.add(told)
+        for entry in life.entries if life else ():
+            record, name = entry.record, entry.record.record_id
+            if record.kind is not RecordKind.INSPECTION:
+                continue
+            if not entry.counts:
+                self._void.setdefault(record.content[:4], set()).add(Told.of(record).content)
+            # A table that comes back may have the day that was corrected.
+            if name in standing:
+                of_day = self._by["id", name, record.day]
+                of_day[:] = of_day or [standing[name]]
 
     def add(self, told: Told) -> None:
         for key in told.known_by:
@@ -205,55 +216,58 @@ def keep(
     given = [*told]
     tails = as_spelt((each.record.tail_no for each in given), store)
     made = [_under(each, tails[each.record.tail_no]) for each in given]
-    spelt = {*tails.values()}
-    own = [key for key in store.gears() if key[0] in spelt]
-    known = _KnownContents(lives_of(store, own).values())
-    stand = {same.record.key for each in made if (same := known.same(each)) is not None}
-    records: list[Record] = []
+    places: dict[GearKey, list[int]] = {}
+    for place, each in enumerate(made):
+        places.setdefault(each.key, []).append(place)
+    stand: set[str] = set()
+    records: dict[int, Record] = {}
     changed: list[tuple[Told, Told]] = []
     new = 0
-    for done, each in enumerate(made, 1):
-        progress(done, len(made))
-        if known.same(each) is not None:
-            continue
-        other = known.otherwise(each, stand)
-        if other is None:
-            fresh = known.new(each)
-            if fresh is None:
+    for own, life in zip(places.values(), in_turn(store, [*places]), strict=True):
+        known = _KnownContents(life)
+        stand |= {same.record.key for n in own if (same := known.same(made[n])) is not None}
+        for place in own:
+            each = made[place]
+            if known.same(each) is not None:
                 continue
-            records.append(fresh)
-        else:
-            changed.append((other, each))
-            stand.add(other.record.key)
-            if amend and other.record.key:
-                row = replace(inspection_from(each.record), record_id=other.record.record_id)
-                kind = RecordKind.CORRECTION
-                records.append(inspection_record(row, kind, supersedes=other.record.key))
-        known.add(each)
-        new += other is None or bool(amend)
+            other = known.otherwise(each, stand)
+            if other is None:
+                fresh = known.new(each)
+                if fresh is None:
+                    continue
+                records[place] = fresh
+            else:
+                changed.append((other, each))
+                stand.add(other.record.key)
+                if amend and other.record.key:
+                    row = replace(inspection_from(each.record), record_id=other.record.record_id)
+                    kind = RecordKind.CORRECTION
+                    records[place] = inspection_record(row, kind, supersedes=other.record.key)
+            known.add(each)
+            new += other is None or bool(amend)
+        progress(own[-1] + 1, len(made))
     # Two rows of one call that contradict each other do not correct what is kept.
     if any(amend is None or (amend and not old.record.key) for old, _new in changed):
         raise _kept_otherwise(changed)
-    store.add(records)
+    store.add(records[place] for place in sorted(records))
     gone = _vanished(store, made, stand) if stand else []
     said = [f"{one} is kept as {kept}: one aircraft" for one, kept in tails.items() if one != kept]
-    gears = {(each.record.tail_no, each.record.side) for each in made}
-    return Kept(new, len(made) - new, (*said, *gone, *warnings_of(store, gears)))
+    return Kept(new, len(made) - new, (*said, *gone))
 
 
 def _under(told: Told, tail: str) -> Told:
     """An inspection under the tail number as the store spells it."""
     if told.record.tail_no == tail:
         return told
-    return Told.of(inspection_record(replace(inspection_from(told.record), tail_no=tail)))
+    return Told.by(replace(inspection_from(told.record), tail_no=tail))
 
 
 def _vanished(store: Store, made: Sequence[Told], stand: Collection[str]) -> list[str]:
     """Name the inspections that a file said when it was kept, and that its rows no longer say."""
     files = {each.file for each in made} - {None}
     contents = {each.content for each in made}
-    every = lives_of(store, store.gears()).values() if files else ()
-    kept = (Told.of(visit.kept) for life in every for visit in life.inspections)
+    every = in_turn(store, store.gears()) if files else ()
+    kept = (Told.of(visit.kept) for life in every if life for visit in life.inspections)
     gone = [
         each.named
         for each in kept
@@ -312,7 +326,7 @@ def _kept_of(store: Store, key: GearKey) -> list[Told]:
 
 def under_a_free_id(made: Inspection, store: Store) -> Inspection:
     """An inspection under an id that no other one of its gear has."""
-    content = Told.of(inspection_record(made)).content
+    content = Told.by(made).content
     others = [told for told in _kept_of(store, key_of(made)) if told.content != content]
     return replace(made, record_id=_free_id(made.record_id, {t.record.record_id for t in others}))
 
@@ -370,7 +384,7 @@ def add_typed(
     new = []
     for row in (replace(row, tail_no=tail) for row in typed):
         name = _free_id(made_record_id(row), used)
-        told = Told.of(inspection_record(replace(row, record_id=name)))
+        told = Told.by(replace(row, record_id=name))
         if told.content not in kept:
             new.append(told.record)
             used.add(name)

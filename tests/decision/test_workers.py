@@ -54,7 +54,7 @@ def told() -> Told:
         return [
             BlockOutput(places_of, told.rows.extend),
             BlockOutput(process_and_rows, told.made.append),
-            BlockOutput(list, told.judgements.extend),
+            BlockOutput(list, told.judgements.extend, sets=True),
         ]
 
     with pytest.MonkeyPatch.context() as patch:

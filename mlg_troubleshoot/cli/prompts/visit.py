@@ -127,7 +127,7 @@ def continued(known: Visit, row: Inspection, entry: Entry) -> Inspection:
 
 def reading_order(gear: Gear, entry: Entry) -> tuple[int, ...]:
     """The joints to read next, as the plan of an unfinished entry has them."""
-    (judged,) = assess([entry.inspection(gear)], gear, load_index_table(gear))
+    (judged,) = assess([entry.inspection(gear)], gear, load_index_table(gear), sets=False)
     step = next((s for s in judged.plan.steps if s.action is Action.MEASURE), None)
     return () if step is None else step.joints
 
