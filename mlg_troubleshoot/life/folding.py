@@ -49,7 +49,7 @@ from mlg_troubleshoot.units import ClearanceConvention
 # Letters of a hash by which a record may be named. [1]
 LEAST_OF_A_HASH = 6
 _WORK = (RecordKind.REPAIR, RecordKind.RERIG)
-_ENTERED = (RecordKind.INSPECTION, RecordKind.CORRECTION)
+ENTERED = (RecordKind.INSPECTION, RecordKind.CORRECTION)
 # Gears that are read at once. [1]
 _AT_ONCE = 25
 # What a clock counts in. [s]
@@ -76,14 +76,17 @@ class TodaysVerdict:
 
 @dataclass(frozen=True, slots=True)
 class LogEntry:
-    """A record in the log of a gear, its inspection and the version of that before it, and whether
-    it counts; what was recorded in two chains before they were merged is one entry.
+    """A record in the log of a gear, and whether it counts; what was recorded in two chains before
+    they were merged is one entry.
+
+    row: the inspection, of the last version of it. correction: the version that it corrects, and
+    what it says.
     """
 
     record: Record
-    row: Inspection | None
-    before: Inspection | None
     counts: bool
+    row: Inspection | None = None
+    correction: tuple[Inspection, Inspection] | None = None
 
 
 @dataclass(frozen=True)
@@ -250,7 +253,7 @@ def is_readable(record: Record) -> bool:
 def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     places = _by_clock(_readable_or_not_void(records))
     one = _first_keys(places)
-    bodies = {record.key: record.body for record in places if record.kind in _ENTERED}
+    bodies = {record.key: record.body for record in places if record.kind in ENTERED}
     rows = {r.key: inspection_from(r, bodies[r.key]) for r in places if r.key in bodies}
     # The visit that each version of it is of, and the last version of each.
     roots: dict[str, Record] = {}
@@ -274,17 +277,18 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
             others.pop(gone, None)
         elif record.kind is not RecordKind.ASSESSMENT:
             others.setdefault(own, record)
+    newest = {record.key for record in last.values()}
     entries = tuple(
         LogEntry(
             record,
-            rows.get(record.key),
-            rows[before[record.key].key] if record.key in before else None,
-            roots[record.key] not in void
-            if record.key in roots
-            else record.key in others or record.kind is RecordKind.VOID,
+            roots[own] not in void
+            if own in roots
+            else own in others or record.kind is RecordKind.VOID,
+            rows[own] if own in newest else None,
+            (rows[before[own].key], rows[own]) if own in before else None,
         )
         for record in places
-        if one[record.key] == record.key
+        if one[own := record.key] == own
     )
     visits = []
     for root, record in last.items():

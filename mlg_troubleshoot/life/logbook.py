@@ -11,8 +11,8 @@ from typing import Any
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.life.folding import GearLife
-from mlg_troubleshoot.store import Record, RecordKind
+from mlg_troubleshoot.life.folding import ENTERED, GearLife
+from mlg_troubleshoot.store import Record, RecordKind, cells_of, said_of
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
 _RERIGGED = "rigging corrected"
@@ -138,27 +138,15 @@ def log_of(life: GearLife, gear: Gear, joints: Collection[int] | None = None) ->
             "hash": record.digest,
             "counts": entry.counts,
         }
+        found = [*_corrected(*entry.correction)] if entry.correction else []
         if entry.row is not None:
             about["gear_landings"] = entry.row.gear_landings
-            found = visit_lines(entry.row, gear, entry.before, joints) + _verdict(life, record)
-        else:
+            found += visit_lines(entry.row, gear, joints) + _verdict(life, record)
+        elif record.kind not in ENTERED:
             about["gear_landings"] = record.body.get("landings")
             found = _other_lines(record)
         lines += [replace(line, **about) for line in found]
-    return _in_time(_without_corrected(lines))
-
-
-def _without_corrected(lines: Sequence[LogLine]) -> list[LogLine]:
-    """Lines, of which those that a correction took the place of no longer count."""
-    wrong: set[tuple[str | None, int]] = set()
-    kept = []
-    for line in reversed(lines):
-        at = [(line.record_id, joint) for joint in line.joints]
-        if line.kind == "correction":
-            wrong.update(at)
-        gone = line.kind == "reading" and at[0] in wrong
-        kept.append(replace(line, counts=False) if gone else line)
-    return kept[::-1]
+    return _in_time(lines)
 
 
 def _verdict(life: GearLife, record: Record) -> list[LogLine]:
@@ -210,60 +198,31 @@ def _other_lines(record: Record) -> list[LogLine]:
 
 
 def visit_lines(
-    row: Inspection,
-    gear: Gear,
-    before: Inspection | None = None,
-    joints: Collection[int] | None = None,
+    row: Inspection, gear: Gear, joints: Collection[int] | None = None
 ) -> list[LogLine]:
-    """The facts of a visit; with the version of it that stood before, what this one adds, and what
-    it corrects. `joints`: without readings of others.
-    """
-    old = before or replace(
-        row,
-        clearance_in={},
-        readings_in=(),
-        outcome=None,
-        restored_joints=(),
-        rigging_checked=None,
-    )
-    restored = tuple(n for n in row.restored_joints if n not in old.restored_joints)
-    fresh = [
-        n
-        for n in (row.clearance_in if joints is None else row.clearance_in.keys() & joints)
-        if row.clearance_in[n] != old.clearance_in.get(n)
-    ]
-    since = [n for n in fresh if n in row.restored_joints]
-    found = [*_corrected(row, old)] if before else []
-    after = [*_readings(row, gear, since)]
-    for number, reading in enumerate(row.readings_in):
-        if reading not in old.readings_in[number : number + 1]:
-            plunger = _plunger(row, reading)
-            (after if _is_after(row, gear, reading) else found).append(plunger)
-    if row.outcome is not None and (row.outcome is not old.outcome or _failed_again(row, old)):
+    """The facts of a visit. `joints`: without readings of others."""
+    read = row.clearance_in if joints is None else row.clearance_in.keys() & joints
+    left = {n for n in read if n in row.restored_joints}
+    found: list[LogLine] = []
+    after = [*_readings(row, gear, left)]
+    for reading in row.readings_in:
+        (after if _is_after(row, gear, reading) else found).append(_plunger(row, reading))
+    if row.outcome is not None:
         day = _day(row.outcome_date or row.inspection_date)
         tried = LogLine(row.outcome.value, row.outcome.value, date=day)
         newer = row.is_since_repair(row.outcome_date)
         newer = row.is_repaired and (newer or row.outcome is Outcome.RETRACTED)
         after.append(tried) if newer else found.insert(0, tried)
-    again = [n for n in fresh if n in old.clearance_in and n in row.measured_again]
-    found += _readings(row, gear, [n for n in fresh if n not in (*since, *again)])
-    found += _readings(row, gear, [n for n in again if n not in since], "measured again")
+    found += _readings(row, gear, {*read} - left)
     day = _day(row.repair_date or row.inspection_date)
-    if restored:
-        found.append(
-            LogLine("restored", f"restored {joint_list(restored)}", date=day, joints=restored)
-        )
-    checked = row.rigging_checked
-    if checked not in (None, RiggingCheck.NO, old.rigging_checked):
-        text = _RERIGGED if checked is RiggingCheck.CORRECTED else "rigging checked"
+    if restored := row.restored_joints:
+        text = f"restored {joint_list(restored)}"
+        found.append(LogLine("restored", text, date=day, joints=restored))
+    if row.rigging_checked not in (None, RiggingCheck.NO):
+        corrected = row.rigging_checked is RiggingCheck.CORRECTED
+        text = _RERIGGED if corrected else "rigging checked"
         found.append(LogLine("rigging", text, date=day))
     return [*found, *after]
-
-
-def _failed_again(row: Inspection, old: Inspection) -> bool:
-    """Whether a later version of a visit says of an outcome that it followed the repair."""
-    newer = row.is_repaired and row.is_since_repair(row.outcome_date)
-    return bool(newer) and not (old.is_repaired and old.is_since_repair(old.outcome_date))
 
 
 def _plunger(row: Inspection, reading: float) -> LogLine:
@@ -287,45 +246,28 @@ def _is_after(row: Inspection, gear: Gear, reading: float) -> bool:
     return abs(reading) <= margin + ROUNDING_IN if newer is None else newer
 
 
-def _corrected(row: Inspection, old: Inspection) -> Iterator[LogLine]:
+def _corrected(old: Inspection, row: Inspection) -> Iterator[LogLine]:
     """What a later version of a visit says instead of the one before."""
-
-    def line(what: str, was: object, now: object, *joints: int) -> LogLine:
-        text = f"correction: {what} {was} → {now}"
-        return LogLine("correction", text, date=_day(row.inspection_date), joints=joints)
-
-    names = {"inspection_date": "date", "gear_landings": "landings", "technician_id": "measured by"}
-    for name, what in names.items():
-        was, now = getattr(old, name), getattr(row, name)
-        if was is not None and was != now:
-            yield line(what, _shown(was), _shown(now))
-    for joint, was in old.clearance_in.items():
-        now = row.clearance_in.get(joint)
-        if now != was and joint not in (*row.restored_joints, *row.measured_again):
-            yield line(f"#{joint}", _entered(old, joint), _entered(row, joint), joint)
-    if old.outcome is not None and row.outcome is None:
-        yield line("outcome", old.outcome.value, "none")
-
-
-def _shown(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    was, now = (cells_of(said_of(each)) for each in (old, row))
+    day = _day(row.inspection_date)
+    for what in dict.fromkeys((*was, *now)):
+        if was.get(what) != now.get(what):
+            both = (each.get(what, "blank") for each in (was, now))
+            shown = (Length(x) if what[0] == "#" and x != "blank" else x for x in both)
+            text = Sentence.of("correction: {} {} → {}", what, *shown)
+            yield LogLine("correction", text, date=day)
 
 
 def _entered(row: Inspection, joint: int) -> str:
     """A reading as it was entered, or in inches where that is not known."""
-    if joint not in row.clearance_in:
-        return "not read"
-    entered = row.entered.get(joint)
-    return str(entered or f"{row.clearance_in[joint]:.4f} in")
+    return str(row.entered.get(joint) or f"{row.clearance_in[joint]:.4f} in")
 
 
-def _readings(
-    row: Inspection, gear: Gear, joints: Sequence[int], again: str = ""
-) -> Iterator[LogLine]:
+def _readings(row: Inspection, gear: Gear, joints: Collection[int]) -> Iterator[LogLine]:
     """Readings as they were entered, with the limit as it would read where it is exceeded."""
     convention = row.convention.value.replace("_", " ").lower()
     by = f"measured by {row.technician_id}" if row.technician_id else ""
-    how = ", ".join(filter(None, (again, convention, by)))
+    how = ", ".join(filter(None, (convention, by)))
     # What is over its limit stands first.
     over_first = {n: not gear.joint(n).is_over_limit(row.clearance_in[n]) for n in sorted(joints)}
     for joint in sorted(over_first, key=over_first.__getitem__):

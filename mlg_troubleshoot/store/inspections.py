@@ -110,6 +110,14 @@ def inspection_from(record: Record, body: Any = None) -> Inspection:
     return Inspection(**{"clearance_in": {}, "other_columns": other, **read})
 
 
+def cells_of(said: Mapping[str, Any]) -> dict[str, Any]:
+    """What an inspection says, by its words in a sentence."""
+    clearance = sorted(said.get("clearance_in", {}).items(), key=lambda each: int(each[0]))
+    left_out = (*NOT_CONTENT, "clearance_in")
+    others = {n.replace("_", " "): value for n, value in said.items() if n not in left_out}
+    return {f"#{joint}": value for joint, value in clearance} | others
+
+
 _MOST_CHARACTERS = 1_000_000
 
 

@@ -37,7 +37,14 @@ from mlg_troubleshoot.decision.columns import (
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.life.folding import GearLife, as_spelt, in_turn, lives_of, warnings_of
+from mlg_troubleshoot.life.folding import (
+    ENTERED,
+    GearLife,
+    as_spelt,
+    in_turn,
+    lives_of,
+    warnings_of,
+)
 from mlg_troubleshoot.life.state import GearKey, key_of
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records import ReadOptions, judge_again, made_record_id
@@ -51,6 +58,7 @@ from mlg_troubleshoot.store import (
     Store,
     StoreError,
     canonical,
+    cells_of,
     inspection_from,
     inspection_record,
     packed,
@@ -59,7 +67,6 @@ from mlg_troubleshoot.store import (
 )
 from mlg_troubleshoot.units import LengthUnit
 
-_ENTERED = (RecordKind.INSPECTION, RecordKind.CORRECTION)
 # Inspections that one sentence names at most.
 _MOST_NAMED = 6
 
@@ -295,21 +302,13 @@ def _kept_otherwise(changed: Sequence[tuple[Told, Told]]) -> StoreError:
 
 def _difference(kept: Told, new: Told) -> str:
     """Name an inspection, and what of it was kept and what a table says."""
-    was, says = (_cells(told.record.body["inspection"]) for told in (kept, new))
+    was, says = (cells_of(told.record.body["inspection"]) for told in (kept, new))
     cells = [
         f"{what} was {was.get(what, 'blank')}, the table says {says.get(what, 'blank')}"
         for what in dict.fromkeys((*was, *says))
         if was.get(what) != says.get(what)
     ]
     return ": ".join(filter(None, (kept.named, ", ".join(cells))))
-
-
-def _cells(said: Mapping[str, Any]) -> dict[str, Any]:
-    """What an inspection says, by its words in a sentence."""
-    clearance = sorted(said.get("clearance_in", {}).items(), key=lambda each: int(each[0]))
-    left_out = (*NOT_CONTENT, "clearance_in")
-    others = {n.replace("_", " "): value for n, value in said.items() if n not in left_out}
-    return {f"#{joint}": value for joint, value in clearance} | others
 
 
 def _free_id(made: str, used: Collection[str]) -> str:
@@ -359,7 +358,7 @@ def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
 
 def _entered(record: Record) -> Inspection:
     """The inspection of a record; another kind of record is refused."""
-    if record.kind not in _ENTERED:
+    if record.kind not in ENTERED:
         raise UsageError(f"record {record.record_id!r} is a {record.kind}", "Give an inspection.")
     return inspection_from(record)
 
