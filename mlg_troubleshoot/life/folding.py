@@ -392,23 +392,13 @@ def _disagreements(key: GearKey, moments: Sequence[Moment]) -> tuple[str, ...]:
         what = f"{record.kind} " if moments[place].is_alone else ""
         return f"{what}{record.record_id}, ".lstrip(", ") + record.digest[:10]
 
-    by_sentence: dict[str, list[int]] = {}
-    for place, sentence in contradictions(moments, name).items():
-        by_sentence.setdefault(sentence, []).append(place)
-    warnings = []
-    for sentence, places in by_sentence.items():
-        record = visits[places[0]].kept.digest[:10] if len(places) == 1 else "RECORD"
-        remedy = f"mlg history void {record} --why TEXT"
-        if any(moments[place].is_alone for place in places):
-            remedy += ", then mlg history repair"
-        else:
-            remedy = f"mlg history amend {record} COLUMN=VALUE, or {remedy}"
-        gear = " ".join(key)
-        warnings.append(
-            f"{gear}: {sentence}. No forecast until this is corrected: {remedy}. After an overhaul"
-            f" record its joints: mlg history repair {gear} --joint N --date D"
-        )
-    return tuple(warnings)
+    gear = " ".join(key)
+    return tuple(
+        f"{gear}: {sentence}. No forecast until this is corrected: mlg history amend RECORD"
+        " COLUMN=VALUE, or mlg history void RECORD --why TEXT. After an overhaul record its"
+        f" joints: mlg history repair {gear} --joint N --date D"
+        for sentence in dict.fromkeys(contradictions(moments, name).values())
+    )
 
 
 def judge_lives(

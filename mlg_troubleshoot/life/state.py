@@ -11,8 +11,6 @@ When the inspections and repairs of one gear took place, by their dates and thei
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime, timedelta
@@ -704,66 +702,18 @@ def _restored(
 
 
 def contradictions(moments: Sequence[Moment], name: Callable[[int], str]) -> dict[int, str]:
-    """Say of each record that may be wrong how its date and its landings disagree with those of the
-    others between the same overhauls.
-
-    Suspect is what has to go so that the landings of the others never fall as time goes on: the
-    fewest records that do. Where several choices are as few, every record of any of them is a
-    suspect, and they share one sentence.
+    """Say of each record whose landings are fewer than those of the one before it, and of that one,
+    that they cannot both be right; overhauls lie between none of them.
     """
-    placed = _placed(moments)
-    begins = [0, *(placed.index(place) for place in overhauls(moments)), len(placed)]
+    anew = overhauls(moments)
     found: dict[int, str] = {}
-    for start, end in pairwise(begins):
-        found |= _disagreements(moments, placed[start:end], name)
+    for one, two in pairwise(_placed(moments)):
+        was, now = moments[one], moments[two]
+        if two in anew or (was.landings or 0.0) <= (now.landings or 0.0):
+            continue
+        listed = " and ".join(
+            f"{moments[n].landings:g} landings on {moments[n].day} ({name(n)})" for n in (one, two)
+        )
+        found[two] = f"{listed} cannot both be right: landings never fall"
+        found.setdefault(one, found[two])
     return found
-
-
-def _disagreements(
-    moments: Sequence[Moment], placed: Sequence[int], name: Callable[[int], str]
-) -> dict[int, str]:
-    """The contradictions of the records between two overhauls."""
-    landings = [moments[i].landings or 0.0 for i in placed]
-    if landings == sorted(landings):
-        return {}
-    up_to = _longest_rising(landings)
-    onwards = _longest_rising([-each for each in reversed(landings)])[::-1]
-    longest = max(up_to)
-    through = [before + after - 1 for before, after in zip(up_to, onwards, strict=True)]
-    in_some = [n for n, length in enumerate(through) if length == longest]
-    alone = Counter(up_to[n] for n in in_some)
-    trusted = [n for n in in_some if alone[up_to[n]] == 1]
-    suspects = [n for n in range(len(placed)) if n not in set(trusted)]
-
-    def said(n: int) -> str:
-        moment = moments[placed[n]]
-        return f"{moment.landings:g} landings on {moment.day} ({name(placed[n])})"
-
-    if len(trusted) < longest:
-        listed = ", ".join(map(said, suspects[:_MOST_NAMED])) + (
-            " …" if len(suspects) > _MOST_NAMED else ""
-        )
-        return dict.fromkeys(
-            (placed[n] for n in suspects), f"{listed} cannot all be right: landings never fall"
-        )
-    found = {}
-    for n in suspects:
-        earlier = [m for m in trusted if m < n and landings[m] > landings[n]]
-        other = (
-            earlier[-1]
-            if earlier
-            else next(m for m in trusted if m > n and landings[m] < landings[n])
-        )
-        found[placed[n]] = f"{said(n)} disagree with {said(other)}: landings never fall"
-    return found
-
-
-def _longest_rising(values: Sequence[float]) -> list[int]:
-    """Length of the longest series that never falls and ends at each value."""
-    least: list[float] = []
-    lengths = []
-    for value in values:
-        at = bisect_right(least, value)
-        least[at : at + 1] = [value]
-        lengths.append(at + 1)
-    return lengths

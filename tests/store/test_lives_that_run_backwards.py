@@ -99,18 +99,18 @@ def words_of(page: Path) -> str:
 
 def test_a_check_names_row_and_cell_of_landings_that_fall(tmp_path: Path) -> None:
     file = years(tmp_path, SLIP)
-    said = (
-        f"240 landings on 2026-03-01 (row 5 of {file}, P5, O5) disagree with 1672 landings on"
-        " 2025-03-01"
-    )
+    said = f"240 landings on 2026-03-01 (row 5 of {file}, P5, O5) cannot both be right"
     assert said in mlg("check", file).err
 
 
-def test_the_row_whose_landings_fall_carries_the_warning_in_json(tmp_path: Path) -> None:
+def test_the_rows_between_which_landings_fall_carry_the_warning_in_json(tmp_path: Path) -> None:
     rows = mlg("check", years(tmp_path, SLIP), "--json").json["inspections"]
     assert [any("landings never fall" in text for text in each["warnings"]) for each in rows] == [
-        False
-    ] * 3 + [True]
+        False,
+        False,
+        True,
+        True,
+    ]
 
 
 def test_a_date_that_runs_backwards_is_named_as_landings_are(tmp_path: Path) -> None:
@@ -118,9 +118,7 @@ def test_a_date_that_runs_backwards_is_named_as_landings_are(tmp_path: Path) -> 
     file.write_text(
         file.read_text(encoding="utf-8").replace("2025-03-01", "2022-03-01"), encoding="utf-8"
     )
-    assert (
-        f"1672 landings on 2022-03-01 (row 4 of {file}, P4, O4) disagree" in mlg("check", file).err
-    )
+    assert f"1672 landings on 2022-03-01 (row 4 of {file}, P4, O4) and" in mlg("check", file).err
 
 
 def test_a_life_in_order_is_not_warned_of(tmp_path: Path) -> None:
@@ -193,7 +191,7 @@ def test_every_view_names_the_record_and_how_to_correct_it(tmp_path, command, fo
     else:
         text = re.sub(r"\s+", " ", mlg(*command).out)
     assert f"240 landings on 2026-03-01 (S4, {wrong})" in text
-    assert f"mlg history amend {wrong} COLUMN=VALUE" in text
+    assert "mlg history amend RECORD COLUMN=VALUE" in text
 
 
 def test_a_correction_brings_the_forecast_back(tmp_path: Path) -> None:
@@ -220,14 +218,6 @@ def test_a_repair_whose_landings_contradict_the_inspections_is_named(tmp_path: P
 def test_a_life_that_contradicts_itself_teaches_the_fleet_nothing(tmp_path: Path) -> None:
     kept(tmp_path, SLIP)
     assert fit_fleet(lives(Store()).values(), load_gear()) is None
-
-
-def test_of_two_inspections_neither_is_called_the_right_one(tmp_path: Path) -> None:
-    mlg("check", years(tmp_path, SLIP, only=[2, 3]), "--keep")
-    (said,) = life("--no-forecast")["warnings"]
-    assert "1672 landings on 2025-03-01 (S3" in said
-    assert "240 landings on 2026-03-01 (S4" in said
-    assert "mlg history amend RECORD COLUMN=VALUE" in said
 
 
 # The order of time.
