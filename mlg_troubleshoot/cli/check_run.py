@@ -64,8 +64,6 @@ class Run:
             flags, files = replace(flags, tail=files[0], side=files[1]), []
         if wanted.annotate is not None and (len(files) != 1 or files[0] == "-"):
             raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
-        if wanted.formats and wanted.report is None:
-            output.say("Note: --format is for reports: without --report DIR none is written.")
         extensions = wanted.extension or ()
         causes = wanted.causes or ()
         self._files = files
@@ -73,8 +71,6 @@ class Run:
         self._wanted = wanted
         self._page = options.paper_size()
         self._asks = not (files or flags.values)
-        # A script asked for the result of one entry.
-        self.stops_after_one = wanted.report is not None or wanted.as_json
         output.claim(
             tables.gear,
             [*files, *extensions, *causes, *tables.map_files],
@@ -114,7 +110,7 @@ class Run:
         try:
             against = self._keep(result.judgements)
         finally:
-            self.publish(result, LengthUnit.INCH)
+            self.publish(result, typed.unit_entered or self.asked.unit)
         return task.exit_code_of(listed(result.judgements), against)
 
     def _check_files(self) -> int:
@@ -136,7 +132,6 @@ class Run:
             if near:
                 output.say(f"There is no file {file}. Did you mean {file.with_name(near[0])}?")
         wanted = self._wanted
-        unit = wanted.unit()
         # On one terminal a bar would stand between the lines of the result.
         quiet = wanted.quiet or (wanted.as_json and sys.stdout.isatty())
         with ExitStack() as files:
@@ -151,6 +146,7 @@ class Run:
                     outputs=partial(self._outputs, found, files),
                 )
             result = replace(result, judgements=tuple(found.held))
+            unit = wanted.unit(*(line.unit for line in found.lines))
             if found.end:
                 output.write_pieces((found.end,))
             elif wanted.as_json:
@@ -222,7 +218,7 @@ class Run:
 
         return Sitting(self, self._place).hold(self._flags.tail)
 
-    def publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
+    def publish(self, result: task.CheckResult, entered_in: LengthUnit | None) -> None:
         """Show and write one gear that was entered by hand."""
         wanted = self._wanted
         unit = wanted.unit(entered_in)

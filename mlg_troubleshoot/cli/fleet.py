@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from datetime import date
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -21,13 +21,6 @@ def _day(text: str) -> str:
         return date.fromisoformat(text).isoformat()
     except ValueError:
         raise UsageError(f"--since {text!r} is not a date", "Give it as 2026-05-01.") from None
-
-
-def _shown(**given: Any) -> options.Shown:
-    """What is written; the unit of a fleet is that of the environment."""
-    unit = os.environ.get("MLG_SHOW")
-    show = None if unit is None else LengthUnit.parse(unit)
-    return options.Shown(show=show, **given)
 
 
 @options.flat
@@ -65,7 +58,9 @@ def fleet(
     from mlg_troubleshoot.workflows.history import show_fleet
 
     known = load_gear(records.gear)
-    shown = _shown(report=report, force=force, as_json=as_json, quiet=quiet)
+    unit = os.environ.get("MLG_SHOW")
+    show = LengthUnit.parse(unit) if unit else None
+    shown = options.Shown(report, force, show, as_json, quiet)
     if joint is not None:
         known.require_joints([joint], "--joint")
     outputs = [("--csv", csv)]
@@ -86,10 +81,11 @@ def fleet(
     for line in found.lines:
         if line.suggestion and not shown.quiet:
             output.say(f"Note: {line.suggestion}")
+    entered_in = shown.unit(*(line.unit for line in everything.lines))
     if shown.as_json:
         output.write_json(found)
     elif found.lines:
-        history.show_gears(found, shown.unit(), ahead=not no_forecast, within=within, joint=joint)
+        history.show_gears(found, entered_in, ahead=not no_forecast, within=within, joint=joint)
     elif everything.lines:
         what = "failed" if failed else "changed"
         output.console().print(f"No gear {what}{'' if since is None else f' since {since}'}.")
@@ -97,7 +93,7 @@ def fleet(
         output.console().print(history.no_records(records.kept.place))
     if csv is not None:
         found.write_csv(csv)
-    history.write_pages(found, records.kept, shown, shown.unit(), fleet=True)
+    history.write_pages(found, records.kept, shown, entered_in, fleet=True)
 
 
 app = options.alone(fleet, EPILOG)

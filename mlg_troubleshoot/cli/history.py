@@ -81,7 +81,8 @@ def show(
         if shown.as_json:
             output.write_json(everything)
         elif everything.lines:
-            show_gears(everything, shown.unit(), ahead=False)
+            unit = shown.unit(*(line.unit for line in everything.lines))
+            show_gears(everything, unit, ahead=False)
         else:
             output.console().print(no_records(place.place))
         return
@@ -89,13 +90,11 @@ def show(
         ahead = not no_forecast
         found = history.show_lives(place, known, tail, side, ahead=ahead, progress=bar)
     if shown.as_json and len(found.lives) != 1:
-        tail = found.lives[0].key[0]
         raise UsageError(
             f"{tail} has two gears here, and JSON shows one", f"Run: mlg history {tail} LH --json"
         )
     rows = [kept.inspection for kept in found.lives[0].inspections]
-    units = [row.unit_entered for row in rows if row.entered]
-    unit = shown.unit(units[-1] if units else LengthUnit.INCH)
+    unit = shown.unit(*[row.unit_entered for row in rows if row.entered][-1:])
     for life, line in zip(found.lives, found.lines, strict=True):
         if shown.as_json:
             output.write_json(LifeAhead(life, line.ahead, known))
@@ -145,26 +144,22 @@ def show_gears(
         *("tail", "side", why, f"{worst_in}>", "by when", "last seen", "landings>"),
         *("verdict", "failed", "next action"),
     )
-    rows: list[list[Cell]] = []
-    for line in lines:
-        verdict = line.now.verdict or "-"
-        worst = line.now.predicted_displacement_in
-        rows.append(
-            [
-                output.word(line.tail_no),
-                line.side,
-                "; ".join(line.changed) or said_in(line.urgency.why, console.unit),
-                "-" if worst is None else console.length(worst),
-                line.by_when(found.gear),
-                str(line.inspection_date or "no date"),
-                _count(line.gear_landings),
-                verdict.removesuffix("_MARGIN"),
-                ", ".join(line.failed) or "-",
-                line.now.next_action or "-",
-            ]
-        )
-    gears = "1 gear" if len(lines) == 1 else f"{len(lines)} gears"
-    console.print(f"{gears}, the most urgent first.")
+    rows: list[list[Cell]] = [
+        [
+            output.word(line.tail_no),
+            line.side,
+            "; ".join(line.changed) or said_in(line.urgency.why, console.unit),
+            console.length(line.now.predicted_displacement_in),
+            line.by_when(found.gear),
+            str(line.inspection_date or "no date"),
+            _count(line.gear_landings),
+            line.now.title or "-",
+            ", ".join(line.failed) or "-",
+            line.now.next_action or "-",
+        ]
+        for line in lines
+    ]
+    console.print("The most urgent gear first.")
     _show_warnings(console, (said for line in found.lines for said in line.warnings))
     spare = ("landings", "last seen", "failed", worst_in, "verdict", "next action")
     output.print_table(console, headings, rows, spare, "--json lists all of them", folded=why)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from enum import StrEnum
 from functools import partial, wraps
 from inspect import Parameter, Signature, signature
@@ -170,9 +171,10 @@ class Shown:
     as_json: Json = False
     quiet: Quiet = False
 
-    def unit(self, entered_in: LengthUnit = LengthUnit.INCH) -> LengthUnit:
-        """The unit that lengths are shown in; where none is asked for, that of the entry."""
-        return self.show or entered_in
+    def unit(self, *entered_in: LengthUnit | None) -> LengthUnit:
+        """The unit that lengths are shown in; where none is asked for, that of most entries."""
+        entered = Counter(filter(None, entered_in)).most_common(1)
+        return self.show or (entered[0][0] if entered else LengthUnit.INCH)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +221,7 @@ class MeasuredTables:
         shared: dict[str, str] = {}
         for file in self.map_files:
             shared.update(read_header_file(Path(file)))
-        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        own = asdict(self)
         if own.get("dates") is not None:
             own["dates"] = DateOrder.parse(own["dates"])
         return {

@@ -116,8 +116,8 @@ class DataConsole(Console):
     unit = LengthUnit.INCH
     asks = False
 
-    def length(self, value_in: float, *, sign: bool = False) -> str:
-        return self.unit.shown(value_in, sign=sign)
+    def length(self, value_in: float | None) -> str:
+        return "-" if value_in is None else self.unit.shown(value_in)
 
     def said(self, sentence: str) -> str:
         """Say a sentence of this program, its lengths in the unit that the user reads."""
@@ -312,25 +312,11 @@ def stages(*, quiet: bool) -> Iterator[Advance]:
     if quiet or is_plain() or not sys.stderr.isatty():
         yield lambda _name, _done, _total: None
         return
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TaskID,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID
 
     tasks: dict[str, TaskID] = {}
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as bar:
+    columns = "{task.description}", BarColumn(), MofNCompleteColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
 
         def advance(name: str, done: int, total: int | None) -> None:
             if name not in tasks:

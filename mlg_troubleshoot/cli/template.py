@@ -28,7 +28,6 @@ def template(
     ] = "usual",
 ) -> None:
     """Write an empty inspection workbook, or a one-page form (.pdf, .html) to fill in by hand."""
-    from mlg_troubleshoot.cli.output import claim
     from mlg_troubleshoot.workflows import check as task
 
     if file.suffix.lower() not in (".xlsx", ".pdf", ".html"):
@@ -38,7 +37,7 @@ def template(
         )
     if columns not in ("usual", "all"):
         raise UsageError(f"--columns {columns!r} is not known", "Give usual or all.")
-    claim(gear, (), [("the template", file)], force=force)
+    output.claim(gear, (), [("the template", file)], force=force)
     task.write_template(
         file,
         gear,
@@ -47,10 +46,9 @@ def template(
         convention=convention,
         every_column=columns == "all",
     )
-    if file.suffix.lower() == ".xlsx":
-        output.write(f"Written: {file}. Fill it in, then: mlg check {file} --report DIR")
-    else:
-        output.write(f"Written: {file}. Print it, fill it in, then enter it: mlg check")
+    is_book = file.suffix.lower() == ".xlsx"
+    then = f"mlg check {file} --report DIR" if is_book else "mlg check"
+    output.write(f"Written: {file}. Fill it in, then: {then}")
 
 
 app = options.alone(

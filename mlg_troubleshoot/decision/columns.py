@@ -190,7 +190,7 @@ class Column:
 def _convention_hints() -> dict[str, str]:
     return {
         **dict.fromkeys(("radius", "rad", "offset"), "RADIAL"),
-        **dict.fromkeys(("dia", "diameter", "diametrical"), "DIAMETRAL"),
+        **dict.fromkeys(("dia", "diameter", "diametrical", "bore"), "DIAMETRAL"),
         **dict.fromkeys(("play", "total", "tir", "dial"), "TOTAL_PLAY"),
     }
 

@@ -319,10 +319,10 @@ class Inspection(Result):
         )
 
     @property
-    def unit_entered(self) -> LengthUnit:
-        """The unit of most readings."""
+    def unit_entered(self) -> LengthUnit | None:
+        """The unit of most readings; None without one."""
         units = Counter(entered.unit for entered in self.entered.values())
-        return units.most_common(1)[0][0] if units else LengthUnit.INCH
+        return units.most_common(1)[0][0] if units else None
 
     @property
     def is_repaired(self) -> bool:

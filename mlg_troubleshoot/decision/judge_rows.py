@@ -63,7 +63,7 @@ from mlg_troubleshoot.decision.prediction import (
 from mlg_troubleshoot.decision.verdict_rule import verdict, with_reading
 from mlg_troubleshoot.gear.gear import DEFAULT_PLUNGER_U_IN, ROUNDING_IN, Gear, JointSpec
 from mlg_troubleshoot.indices.index_table import IndexTable, JointIndices
-from mlg_troubleshoot.units import Length, Sentence
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
 # Two readings differ for sure where they do by this many standard uncertainties of the difference:
 # 90 % intervals. [1]
@@ -173,7 +173,8 @@ class Listed:
     """What a list of many says of one judgement, and what orders it: a fraction of its memory.
 
     worst_in, margin_in, chance: of the prediction; None of a row that was not judged, and the first
-    also where no joint was read or the linkage does not close. [in, in, 1]
+    also where no joint was read or the linkage does not close. [in, in, 1] unit: that most readings
+    were entered in.
     """
 
     record_id: str | None
@@ -190,6 +191,7 @@ class Listed:
     worst_in: float | None
     margin_in: float | None
     chance: float | None
+    unit: LengthUnit | None
 
     @classmethod
     def of(cls, judgement: Judgement) -> Listed:
@@ -215,6 +217,7 @@ class Listed:
             a.deciding_in if a is not None and a.inspection.clearance_in else None,
             None if a is None else a.margin_in,
             None if a is None else a.probability_exceed_random_directions,
+            None if a is None else a.inspection.unit_entered,
         )
 
     @property

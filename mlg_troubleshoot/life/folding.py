@@ -60,11 +60,12 @@ _TICK_S = 1e-6
 class TodaysVerdict:
     """What a check says of a gear today; the defaults of one that cannot be judged.
 
-    worst_joint: the joint to look at first. next_action: in brief. minutes, restore: of the plan.
-    is_fine: whether nothing needs attention.
+    title: the verdict in words. worst_joint: the joint to look at first. next_action: in brief.
+    minutes, restore: of the plan. is_fine: whether nothing needs attention.
     """
 
     verdict: Verdict | None = None
+    title: str = ""
     predicted_displacement_in: float | None = None
     margin_in: float | None = None
     worst_joint: int | None = None
@@ -451,6 +452,7 @@ def _judged(
     return [
         TodaysVerdict(
             found.verdict,
+            found.title,
             found.predicted_displacement_in,
             found.margin_in,
             found.ranked[0].joint,

@@ -40,6 +40,7 @@ from mlg_troubleshoot.life.urgency import (
 )
 from mlg_troubleshoot.results import JsonOutput
 from mlg_troubleshoot.store import RecordKind, Store, inspection_from
+from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.wear import (
     Samples,
     WearModel,
@@ -447,7 +448,8 @@ class FleetLine:
     """One gear of a fleet as every output shows it: its latest inspection, what is said of it
     today, and its landings left.
 
-    inspections, repairs: how many count. Numbers stand as they did in the record.
+    inspections, repairs: how many count. Numbers stand as they did in the record. unit: that most
+    readings were entered in.
     """
 
     json_names = """
@@ -475,6 +477,7 @@ class FleetLine:
     suggestion: str
     changed: tuple[str, ...]
     readings: tuple[Reading, ...]
+    unit: LengthUnit | None
 
     @classmethod
     def of(cls, life: GearLife, asked: Asked, ahead: Forecast) -> FleetLine:
@@ -502,6 +505,7 @@ class FleetLine:
                 for e in lines
                 if e.counts and e.kind == "reading" and e.joints == (asked.joint,)
             ),
+            None if life.state is None else life.state.inspection.unit_entered,
         )
 
     def by_when(self, gear: Gear) -> str:

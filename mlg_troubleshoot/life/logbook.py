@@ -154,13 +154,12 @@ def _verdict(life: GearLife, record: Record) -> list[LogLine]:
     said = life.judged.get(record.digest)
     if said is None or said.verdict is None:
         return []
-    text = f"verdict: {said.verdict.value.replace('_', ' ')}"
     # It is zero only where no joint has play, or none was read.
-    if said.predicted_displacement_in:
-        text = Sentence.of("{}, worst case {}", text, Length(said.predicted_displacement_in))
     worst = said.predicted_displacement_in
-    found = said.verdict.value
-    return [LogLine("verdict", text, date=record.day or None, value_in=worst, verdict=found)]
+    how = Sentence.of("worst case {}", Length(worst)) if worst else ""
+    text = f"verdict: {said.title}"
+    day = record.day or None
+    return [LogLine("verdict", text, how, day, value_in=worst, verdict=said.verdict.value)]
 
 
 def up_to(lines: Iterable[LogLine], row: Inspection) -> list[LogLine]:

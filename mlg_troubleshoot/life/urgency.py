@@ -40,11 +40,11 @@ def urgency_of(life: GearLife, lines: Sequence[LogLine], gear: Gear) -> Urgency:
     if failed and (again := recurrence(lines)):
         reasons.append((_AGAIN, share, again))
     far = max(row.standing_readings_in, key=abs, default=0.0)
+    measured = Sentence.of(
+        "measured {} of {}", Length(far, sign=True, named=False), Length(now.margin_in)
+    )
     if abs(far) > now.margin_in + ROUNDING_IN:
-        text = Sentence.of(
-            "measured {} of {}", Length(far, sign=True, named=False), Length(now.margin_in)
-        )
-        reasons.append((_OUTSIDE, abs(far) / now.margin_in, text))
+        reasons.append((_OUTSIDE, abs(far) / now.margin_in, measured))
     if failed:
         day = next((line.date for line in reversed(lines) if line.kind == "FAILED"), None)
         reasons.append((_FAILED, share, f"FAILED on {day}" if day else "FAILED"))
@@ -66,8 +66,9 @@ def urgency_of(life: GearLife, lines: Sequence[LogLine], gear: Gear) -> Urgency:
     )
     known = {Verdict.OUTSIDE_MARGIN: _COULD, Verdict.WITHIN_MARGIN: _FINE}
     rank = _OPEN if now.verdict is None else known.get(now.verdict, _OPEN)
-    reasons.append((rank, share, worst_case))
-    # A reason that is more urgent says it all of the worst case.
+    is_measured = rank == _FINE and row.standing_readings_in
+    reasons.append((rank, share, measured if is_measured else worst_case))
+    # A reason that is more urgent says it all.
     words = [why for _rank, _size, why in (reasons[:-1] or reasons)]
     return Urgency(*reasons[0][:2], Sentence.joined(words, "; "))
 
@@ -102,10 +103,10 @@ def changes_since(life: GearLife, lines: Sequence[LogLine], day: str) -> tuple[s
         if line.kind in (*Outcome, "restored") or line.text == "rigging corrected":
             said.append(f"{line.text} on {line.date}")
     before = [line for line in lines if line.verdict and (line.date or "") < day]
-    now = life.now.verdict
-    was = before[-1].verdict if before else "not inspected"
-    if now is not None and now != was:
-        said.append(f"{was} → {now}".replace("_MARGIN", ""))
+    now = life.now.title
+    was = before[-1].text.removeprefix("verdict: ") if before else "not inspected"
+    if now and now != was:
+        said.append(f"{was} → {now}")
     return tuple(said)
 
 

@@ -9,7 +9,9 @@ import hashlib
 import io
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -53,6 +55,8 @@ from mlg_troubleshoot.records.xlsx import XlsxFile
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _ROWS = 500
+# Those whose convention is filled in: they fit on one printed page.
+_STATED_ROWS = 50
 # The columns that people fill in; the others stand there on request.
 USUAL = (TAIL_NO, SIDE, CONVENTION, CLEARANCE, DATE, OUTCOME, PLUNGER_DISPLACEMENT)
 # The fonts and the colour of headers of what this program writes into workbooks.
@@ -107,14 +111,38 @@ def write_template(
     gear: Gear,
     *,
     unit: LengthUnit = LengthUnit.INCH,
+    convention: ClearanceConvention | None = None,
     every_column: bool = True,
 ) -> None:
-    """Write the workbook of a gear: columns in a unit, and in it the numbers that explain them."""
+    """Write the workbook of a gear: columns in a unit, and in it the numbers that explain them;
+    made for a convention, it states it.
+    """
     book = Workbook()
     book.properties.title = "Main landing gear: joint clearance inspections"
     _instructions(book, gear.joints)
-    _table(book, gear, unit, every_column=every_column)
-    _form(book, gear, unit, every_column=every_column)
+    explained = partial(
+        _explain, gear=gear, unit=unit, way=convention or ClearanceConvention.RADIAL
+    )
+    lines = [
+        Field(column, number)
+        for column in (COLUMNS if every_column else (*USUAL, UNIT))
+        if column.in_template
+        for number in _numbers_of(column, gear, column.copies if every_column else 1)
+    ]
+    columns = [
+        replace(line, unit=unit if line.column.is_length else None)
+        for line in lines
+        if line.column is not UNIT
+    ]
+    names = [
+        f"{gear.joint(each.number).label}, {unit}"
+        if each.column is CLEARANCE and each.number and not every_column
+        else each.name
+        for each in columns
+    ]
+    stated = {CONVENTION: convention, UNIT: unit} if convention else {}
+    _table(book, columns, names, explained, stated)
+    _form(book, lines, explained, stated)
     book.active = 1
     write_book(path, book)
 
@@ -125,27 +153,13 @@ def write_book(path: str | Path, book: Workbook) -> None:
     write_bytes(path, buffer.getvalue())
 
 
-def _fields(gear: Gear, unit: LengthUnit | None, *, every_column: bool) -> list[Field]:
-    """Return the columns in one unit, or the lines of the form: these say their unit on a line of
-    its own.
-    """
-    wanted = COLUMNS if every_column else (*USUAL, UNIT)
-    return [
-        Field(column, number, unit if column.is_length else None)
-        for column in wanted
-        if column.in_template and (column is not UNIT or unit is None)
-        for number in _numbers_of(column, gear, every_column=every_column)
-    ]
-
-
-def _numbers_of(column: Column, gear: Gear, *, every_column: bool) -> Sequence[int | None]:
+def _numbers_of(column: Column, gear: Gear, copies: int) -> Sequence[int | None]:
     if column.needs_joint:
         return gear.joint_numbers
-    copies = column.copies if every_column else 1
     return range(1, copies + 1) if column.copies > 1 else (None,)
 
 
-def _explain(field: Field, gear: Gear, unit: LengthUnit) -> str:
+def _explain(field: Field, gear: Gear, unit: LengthUnit, way: ClearanceConvention) -> str:
     low, high = (_length(end, unit) for end in gear.down_lock_range)
     text = field.column.explained(
         gauge_u=_length(DEFAULT_GAUGE_U_IN, unit),
@@ -156,7 +170,8 @@ def _explain(field: Field, gear: Gear, unit: LengthUnit) -> str:
         return text
     joint = gear.joint(field.number)
     if field.column is CLEARANCE:
-        text += f" Limit: {_length(joint.limit.value, unit)} radial."
+        limit = _length(joint.limit.value * way.per_radial, unit)
+        text += f" Limit: {limit} {way.lower().replace('_', ' ')}."
     return f"Joint {joint.number}: {joint.name}. {joint.location}. {text}"
 
 
@@ -192,25 +207,29 @@ def _fit_to_width(sheet: Worksheet) -> None:
     sheet.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
 
 
-def _table(book: Workbook, gear: Gear, unit: LengthUnit, *, every_column: bool) -> None:
+def _table(
+    book: Workbook,
+    fields: Sequence[Field],
+    names: Sequence[str],
+    explained: Callable[[Field], str],
+    stated: Mapping[Column, str],
+) -> None:
     sheet = book.create_sheet("Inspections")
-    fields = _fields(gear, unit, every_column=every_column)
     for index, field in enumerate(fields):
         letters = column_letters(index)
-        name = field.name
-        if field.column is CLEARANCE and field.number is not None and not every_column:
-            name = f"{gear.joint(field.number).label}, {unit}"
-        cell = sheet.cell(1, index + 1, name)
+        cell = sheet.cell(1, index + 1, names[index])
         cell.font = BOLD
         cell.fill = PatternFill(
             "solid", fgColor=_REQUIRED_FILL if _is_must(field.column) else HEADER_FILL
         )
         cell.alignment = Alignment(wrap_text=True, vertical="center", horizontal="center")
         cell.border = Border(bottom=_LINE, right=_LINE)
-        cell.comment = Comment(_explain(field, gear, unit), "mlg", width=320, height=120)
+        cell.comment = Comment(explained(field), "mlg", width=320, height=120)
         sheet.column_dimensions[letters].width = 30 if field.column is REMARKS else 13
         for row in range(2, _ROWS + 2) if field.column.holds in _FORMATS else ():
             sheet.cell(row, index + 1).number_format = _FORMATS[field.column.holds]
+        for row in range(2, _STATED_ROWS + 2) if field.column in stated else ():
+            sheet.cell(row, index + 1, stated[field.column])
         _validate(sheet, field.column, f"{letters}2:{letters}{_ROWS + 1}")
     sheet.row_dimensions[1].height = 45
     sheet.freeze_panes = "D2"
@@ -248,7 +267,12 @@ def _validate(sheet: Worksheet, column: Column, cells: str) -> None:
     rule.add(cells)
 
 
-def _form(book: Workbook, gear: Gear, unit: LengthUnit, *, every_column: bool) -> None:
+def _form(
+    book: Workbook,
+    fields: Sequence[Field],
+    explained: Callable[[Field], str],
+    stated: Mapping[Column, str],
+) -> None:
     sheet = book.create_sheet("Form")
     sheet["A1"] = FORM_TITLE
     sheet["A1"].font = _TITLE
@@ -257,9 +281,9 @@ def _form(book: Workbook, gear: Gear, unit: LengthUnit, *, every_column: bool) -
     )
     for letters, width in (("A", 28), ("B", 24), ("C", 66)):
         sheet.column_dimensions[letters].width = width
-    for row, field in enumerate(_fields(gear, None, every_column=every_column), 4):
+    for row, field in enumerate(fields, 4):
         label = sheet.cell(row, 1, field.label)
-        value = sheet.cell(row, 2)
+        value = sheet.cell(row, 2, stated.get(field.column))
         hint = sheet.cell(row, 3)
         must = _is_must(field.column)
         value.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if must else "FFFFFFFF")
@@ -267,7 +291,7 @@ def _form(book: Workbook, gear: Gear, unit: LengthUnit, *, every_column: bool) -
         value.number_format = _FORMATS.get(field.column.holds, "General")
         value.alignment = label.alignment = Alignment(horizontal="left", vertical="top")
         label.font = Font(name=FONT, bold=must)
-        hint.value = _explain(field, gear, unit)
+        hint.value = explained(field)
         hint.data_type = "s"
         hint.alignment = _WRAPPED
         hint.font = Font(name=FONT, size=9, color="FF52606D")

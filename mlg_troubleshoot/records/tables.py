@@ -306,7 +306,10 @@ class Columns:
                 if meant and not p.is_settled:
                     named += f' (if it means {meant}, pass --map "{p.header}={meant}")'
                 carried.append(named)
-            elif p.is_settled or p.header not in (p.field.name, p.field.label):
+            elif p.is_settled or not (
+                p.header in (p.field.name, p.field.label)
+                or re.fullmatch(rf"#{p.field.number} .+, {p.field.unit}", p.header)
+            ):
                 mapped.append(f"{named} {p.field.name}")
         read = ["each header was read as: " + ", ".join(mapped)] * bool(mapped)
         if not self.at(RECORD_ID):
@@ -1038,9 +1041,14 @@ class _Table:
             i: column for column in (RECORD_ID, TAIL_NO, JOINT) for i in columns.at(column)
         }
         self._evidence = columns.at(CLEARANCE, PLUNGER_DISPLACEMENT, OUTCOME)
+        self._stated = {*columns.at(CONVENTION, UNIT)}
 
     def take(self, number: int, cells: Cells) -> None:
         if self._begins_again(number, cells):
+            return
+        filled = [i for i, cell in enumerate(cells) if cell is not None]
+        if filled and self._stated.issuperset(filled):
+            # A line of a template that nobody filled in.
             return
         name = self._stands_aside(cells)
         if name:

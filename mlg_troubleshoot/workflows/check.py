@@ -748,7 +748,13 @@ def write_template(
         return
     from mlg_troubleshoot.records.annotate import write_template as write
 
-    write(file, loaded, unit=unit or LengthUnit.INCH, every_column=every_column)
+    write(
+        file,
+        loaded,
+        unit=unit or LengthUnit.INCH,
+        convention=convention,
+        every_column=every_column,
+    )
 
 
 # Wrong cells that an error names at most.

@@ -40,7 +40,7 @@ def test_a_check_of_a_good_file_and_one_that_cannot_be_read_exits_1(bad, table):
     assert mlg("check", good).code == 0
     found = mlg("check", good, bad, "-q")
     assert found.code == 1
-    assert "1 file was given and not read" in " ".join(found.out.split())
+    assert "Files given and not read (1): " in " ".join(found.out.split())
     assert mlg("check", good, bad, "--json").code == 1
 
 
@@ -48,7 +48,7 @@ def test_in_a_folder_as_well(bad: Path, table: Table) -> None:
     shutil.copy(table(row(), row(record_id="R2", tail_no="N2")), bad.with_name("first.csv"))
     found = mlg("check", bad.parent)
     is_there = bad.exists() or bad.is_symlink()
-    assert (found.code, "1 file was given and not read" in found.out) == (is_there, is_there)
+    assert (found.code, "Files given and not read (1): " in found.out) == (is_there, is_there)
 
 
 def test_a_diagnosis_of_a_good_file_and_one_that_cannot_be_read_exits_1(tmp_path: Path) -> None:
@@ -56,7 +56,7 @@ def test_a_diagnosis_of_a_good_file_and_one_that_cannot_be_read_exits_1(tmp_path
     assert mlg("diagnose", good).code == 0
     found = mlg("diagnose", good, tmp_path / "missing.csv")
     assert found.code == 1
-    assert "1 file was given and not read" in " ".join(found.out.split())
+    assert "Files given and not read (1): " in " ".join(found.out.split())
 
 
 def test_a_file_alone_that_cannot_be_read_exits_3(bad: Path) -> None:

@@ -97,10 +97,6 @@ def test_a_file_of_headers_that_is_not_one_is_refused_with_words(text, tmp_path)
     assert "headers.toml" in found.err
 
 
-def test_a_format_without_a_report_is_said() -> None:
-    assert "without --report DIR none is written" in mlg("check", FAILURE, "--format", "html").err
-
-
 def test_a_file_that_lies_in_the_folder_changes_nothing(tmp_path, monkeypatch):
     (tmp_path / "mlg.toml").write_text('show = "mm"\n[headers]\noutcome = "carry"', "utf-8")
     before = mlg("check", DATA / "fleet_batch.csv", "-q")

@@ -69,13 +69,14 @@ def fleet() -> Run:
     return mlg("check", FLEET)
 
 
-def test_a_batch_has_one_line_for_each_gear_with_its_latest_inspection(fleet: Run) -> None:
+def test_a_batch_has_one_line_for_each_gear_with_its_latest_inspection(monkeypatch) -> None:
+    shown = at_width(monkeypatch, 100, "check", FLEET).out
     rows = list(csv.DictReader(FLEET.read_text(encoding="utf-8").splitlines()))
     latest = {
         (r["tail_no"], r["side"]): r["inspection_date"]
         for r in sorted(rows, key=lambda r: r["inspection_date"])
     }
-    lines = [line for line in fleet.out.splitlines() if VERDICT_LINE.match(line)]
+    lines = [line for line in shown.splitlines() if VERDICT_LINE.match(line)]
     for (tail, side), day in latest.items():
         assert sum(re.search(rf" {tail} +{side} +{day} ", line) is not None for line in lines) == 1
     assert len(lines) == len(latest)
@@ -105,7 +106,7 @@ def test_the_worst_gear_of_a_batch_stands_first(table: Table) -> None:
         if VERDICT_LINE.match(line)
     ]
     assert [line.split()[0] for line in lines] == ["!", "="]
-    assert "OUT, MEASURED" in lines[0]
+    assert "OUTSIDE MARGIN, MEASURED" in lines[0]
 
 
 def test_a_gear_of_which_nothing_was_read_has_no_worst_case_in_a_batch(table: Table) -> None:
@@ -127,7 +128,8 @@ def test_a_batch_counts_its_verdicts(fleet: Run) -> None:
     counts = " ".join(fleet.out.split())
     assert fleet.code == 1
     assert counts.startswith(
-        "46 inspections: 9 outside margin · 1 incomplete · 31 within margin · 5 inconclusive"
+        "46 inspections: 6 OUTSIDE MARGIN, MEASURED · 3 COULD BE OUTSIDE · 5 CLOSE TO THE MARGIN"
+        " · 1 NOT ENOUGH READ · 9 WITHIN MARGIN, MEASURED · 22 WITHIN MARGIN"
     )
 
 

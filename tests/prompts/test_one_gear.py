@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
 from datetime import date, timedelta
 
@@ -73,7 +74,7 @@ def test_readings_keep_the_unit_that_they_were_typed_in(sit: Sit, life: Life) ->
 def test_a_change_of_unit_or_convention_is_said(sit: Sit) -> None:
     sit(*failed("done"), "")
     screen = sit("N2 LH", "mm radial", "r", "", "done", "", "", "").screen
-    assert "Readings are in mm, radial (last time: thou, total play)." in screen
+    assert "Readings are in mm, radial (before: thou, total play)." in screen
 
 
 @pytest.mark.parametrize("typed", ["p 41 p 22", "plunger 41; 22", "p 0.041 in p 22", "p 41"])
@@ -139,10 +140,13 @@ def test_a_reading_that_can_hardly_be_is_confirmed_or_typed_again(sit: Sit, life
     assert sorted(map(str, found.entered.values())) == ["8.5 thou", "<2 thou"]
 
 
+@pytest.mark.parametrize(
+    ("typed", "said"), [("460", "at most"), ("0.046", "was it read in inches, not in thou?")]
+)
 @pytest.mark.parametrize("again", [(), ("n",), ("u",)])
-def test_a_plunger_that_joints_cannot_cause_is_asked_for_again(sit, life, again):
-    terminal = sit(*gear("f", "460", *again, "46", "done"), "")
-    assert "at most" in terminal.screen
+def test_a_plunger_that_can_hardly_be_is_asked_for_again(sit, life, again, typed, said):
+    terminal = sit(*gear("f", typed, *again, "46", "done"), "")
+    assert said in terminal.screen
     assert life().inspections[-1].inspection.readings_in == (0.046,)
 
 
@@ -155,6 +159,45 @@ def test_undo_says_what_it_takes_back_and_asks_for_it_again(sit: Sit, life: Life
 def test_a_joint_is_named_to_jump_to_it_or_to_give_its_reading(sit: Sit, life: Life) -> None:
     sit(*gear("f", "46", "#9", "5", "#10 7", "done"), "")
     assert life().inspections[-1].inspection.clearance_in == {9: 0.0025, 10: 0.0035}
+
+
+@pytest.mark.parametrize(
+    ("typed", "asked"),
+    [
+        (("14", "#3 25", "#10 3"), ["#3", "#5", "#5", "#5"]),
+        (("14", "#3", "#10", "3", "25", "4"), ["#3", "#5", "#3", "#10", "#3", "#5", "#2"]),
+    ],
+)
+def test_a_joint_that_waits_is_asked_for_after_the_others(sit: Sit, typed, asked) -> None:
+    terminal = sit(*gear("f", "46", *typed, "done"), "")
+    joints = [prompt.split()[0] for prompt in terminal.prompts if prompt.startswith("#")]
+    assert joints == asked
+    assert "✓ #3 25.0 thou total play = 12.5 thou radial, was 14 thou" in terminal.screen
+
+
+def test_a_joint_prompt_says_what_enter_does_and_what_ends_the_joints(sit: Sit) -> None:
+    terminal = sit(*gear("f", "46", "#1 none", "14", "#3 none", "done"), "")
+    assert all("(Enter: not read; done)" in p for p in terminal.prompts if p.startswith("#"))
+    for said in ("– #1 not read\n", "– #3 not read, was 14 thou"):
+        assert said in terminal.screen
+
+
+@pytest.mark.parametrize("line", ["unit mm", "unit mm #5 0.2", "#5 0.2 unit mm", "0.2"])
+def test_a_unit_is_changed_at_any_question_for_what_is_typed_from_there_on(sit, life, line):
+    typed = ["unit mm", "0.2"] if line == "unit mm" else [line]
+    typed = ["unit mm", line] if line == "0.2" else typed
+    screen = sit(*gear("f", "46", "8", *typed, "done"), "").screen
+    assert "Readings are in mm, total play (before: thou, total play); what was typed" in screen
+    found = life().inspections[-1].inspection
+    assert {n: str(each) for n, each in found.entered.items()} == {3: "8 thou", 5: "0.2 mm"}
+    assert found.readings_in == (0.046,)
+
+
+def test_a_convention_is_not_changed_below_readings_of_another(sit: Sit, life: Life) -> None:
+    typed = ("convention radial", "8", "convention play", "u", "convention play", "9", "done")
+    screen = sit(*gear("f", "46", *typed), "").screen
+    assert "✗ #3 8 thou was read as radial. u takes it back" in screen
+    assert life().inspections[-1].inspection.clearance_in == {3: 0.0045}
 
 
 @pytest.mark.parametrize(
@@ -203,6 +246,16 @@ def test_help_is_of_the_question_and_lists_the_words(sit: Sit) -> None:
     assert "with the Down Lock released" in screen
     assert "Make the gear safe as the maintenance manual says" in screen
     assert screen.count("restored 3 5 on 25 Nov") == 2
+
+
+def test_help_leaves_the_question_on_a_screen_of_24_rows(sit: Sit, begun) -> None:
+    begun(*failed("8", "done"))
+    asked = ("?", "thou, play", "?", "f", "?", "46", "?", "done", "?", "A", "?", "G", "")
+    screens = [sit("N1 LH", "?", "").screen, sit("N2 LH", *asked).screen]
+    for shown in (part for screen in screens for part in screen.split(" > ?\n")[1:]):
+        lines = shown.partition(" > ")[0].splitlines()
+        assert sum(len(textwrap.wrap(line, 80)) for line in lines) <= 23
+        assert "side RH" in shown
 
 
 @pytest.mark.parametrize("end", [EOFError, KeyboardInterrupt])

@@ -93,6 +93,8 @@ def test_five_visits_lead_to_done_with_few_keys(sit, now, capsys):
     assert 2 in found.restored_joints
     assert (found.outcome, found.standing_readings_in) == ("RETRACTED", (0.012,))
     assert "NEXT: Sign the repair off" in capsys.readouterr().out
+    assert "✗" not in sit("N1 LH", "y", "").screen
+    assert "report writes what is to be signed" in capsys.readouterr().err
 
 
 def test_a_failure_after_the_repair_on_its_day_counts(sit, begun, life, capsys):
@@ -179,12 +181,12 @@ def test_an_undo_says_what_it_will_take_back(sit, begun, now, line, undone):
         assert getattr(now(), field) == getattr(before, field)
 
 
-def test_undo_goes_back_visit_by_visit_to_the_first_one(sit, begun, life, now):
+def test_undo_goes_back_visit_by_visit_to_the_first_one(sit, begun, life, now, capsys):
     begun(*LIMIT)
     sit("N1 LH", "restored 2", "", "4", "")
     assert [repair.joints for repair in life().repairs] == [frozenset({2})]
-    screen = sit("N1 LH", "u", "u", "u", "").screen
-    assert "Nothing is left to undo" in screen
+    sit("N1 LH", "u", "u", "u", "")
+    assert "Nothing is left to undo" in capsys.readouterr().err
     assert life().repairs == ()
     assert now().clearance_in[2] == 0.013
 
@@ -233,6 +235,17 @@ def test_another_gear_follows_without_a_new_start(sit: Sit, life: Life) -> None:
     sit(*failed("8", "done"), "gear", "N2 LH", "", "f", "", "9", "done", "", "", "")
     assert life().key == ("N1", "LH")
     assert life(tail="N2").key == ("N2", "LH")
+
+
+def test_a_unit_changed_at_a_result_is_that_of_all_that_is_shown_and_typed_next(
+    sit, begun, life, capsys
+):
+    begun(*failed("8", "done"))
+    sit("N1 LH", "unit mm", "d", "#5 0.3", "p 1.1", "")
+    assert " of 0.762 mm" in capsys.readouterr().out.rpartition("N1 LH")[2]
+    found = [visit.inspection for visit in life().inspections]
+    assert str(found[1].entered[5]) == "0.3 mm"
+    assert found[2].readings_in == pytest.approx((1.1 / 25.4,))
 
 
 def test_what_only_a_table_said_of_a_gear_stands(sit: Sit, now: Now, tmp_path: Path) -> None:

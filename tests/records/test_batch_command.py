@@ -80,15 +80,6 @@ def records(run):
     return [i["record_id"] for i in run.json["inspections"]]
 
 
-def test_an_undated_or_invalid_row_is_not_counted_as_a_gear(tmp_path):
-    days = ("2024-03-04", "2025-03-04", "2099-03-04")
-    header = [*HEADER, "inspection_date"]
-    rows = [header, *(sound(f"R{n}", inspection_date=day) for n, day in enumerate(days))]
-    file = workbook(tmp_path / "days.xlsx", ("Inspections", rows))
-    said = "1 gear, the latest inspection of each (or the worst of its day); --csv or --json lists"
-    assert said in " ".join(mlg("check", file).out.split())
-
-
 def test_joints_over_their_limit_are_counted_over_the_batch(mixed):
     assert "Joints over their limit (number of gears): #10 (1)." in mlg("check", mixed).out
 

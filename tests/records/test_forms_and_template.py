@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import shutil
 
 import openpyxl
@@ -13,6 +14,7 @@ from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.annotate import annotate_workbook, write_template
+from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.units import LengthUnit
 from tests.cli.conftest import mlg
 from tests.records.reading import read_inspections
@@ -340,3 +342,22 @@ def test_the_workbook_has_the_columns_that_people_fill_in_and_reads_back(tmp_pat
     book.save(path)
     found = mlg("check", path, "--json").one
     assert found["joints"][2]["clearance_in"] == pytest.approx(0.013)
+
+
+def test_a_template_for_a_convention_says_its_limits_in_it_and_states_it(tmp_path):
+    path = tmp_path / "t.xlsx"
+    mlg("template", path, "--unit", "thou", "--convention", "TOTAL_PLAY")
+    limit = f"Limit: {GEAR.joint(3).limit.value * 2000:.1f} thou total play."
+    (said,) = (text for name, text in headers_and_comments(path).items() if name.startswith("#3 "))
+    assert limit in said
+    book = openpyxl.load_workbook(path)
+    form = {label: (value, hint) for label, value, hint in book["Form"].values}
+    assert limit in form["Clearance #3"][1]
+    assert (form["Clearance convention"][0], form["Unit"][0]) == ("TOTAL_PLAY", "thou")
+    # What nobody filled in is no inspection, and headers of the program's own need no note.
+    fill_table(book["Inspections"], 2, {"tail_no": "N1", "side": "LH"})
+    book["Inspections"]["F2"] = 9
+    book.save(path)
+    read = read_inspections(path, ReadOptions(joints=Joints.of(GEAR)))
+    assert (read.problems, len(read.rows), read.rows[0].clearance_in) == ((), 1, {3: 0.0045})
+    assert not re.search("each header was read as|set aside", " ".join(read.notes))

@@ -87,14 +87,14 @@ def test_a_row_of_the_day_of_a_kept_repair_keeps_what_it_found(tmp_path: Path) -
     mlg("history", "repair", "N1", "LH", "--joint", "6", "--date", "2026-01-05", *place)
     bad = visit("R1", "2026-01-05", plunger_displacement_in=FAR, clearance_6_in=WORN)
     assert mlg("check", table(tmp_path, bad), "--keep", *place).code == 1
-    assert "OUTSIDE" in mlg("fleet", *place).out
+    assert "measured" in mlg("fleet", *place).out
 
 
 def test_of_two_rows_on_one_day_the_worse_is_on_the_screen(tmp_path: Path) -> None:
     rows = KINDS["a second row on the day of the repair"]
     third = visit("R3", "2026-01-05")
     shown = mlg("check", table(tmp_path, *rows, third)).out
-    assert "OUT, MEASURED" in shown
+    assert "OUTSIDE MARGIN, MEASURED" in shown
 
 
 def test_what_may_be_older_than_a_repair_is_said_above_a_list(tmp_path: Path) -> None:

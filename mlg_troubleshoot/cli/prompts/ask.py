@@ -15,7 +15,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     LAST,
     PLUNGER,
     REPAIR_DATE,
-    WORDS,
+    WORD_HELP,
     Entry,
     column_of,
     joint_of,
@@ -41,11 +41,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, with_unit
 
-_FOLLOW_HELP = (
-    "y: you did NEXT; only its answers are asked for. report writes the report and shows where;"
-    " open opens it. u takes the last answers back. new: a new inspection of this gear. gear:"
-    " another gear. f, r and the words below add an answer."
-)
+_FOLLOW_HELP = "new: a new inspection of this gear. gear: another gear. open: opens the report."
 _UNUSUAL = "unusual"
 _YES = ("y", "yes")
 _HOW = {
@@ -55,11 +51,9 @@ _HOW = {
     ClearanceConvention.TOTAL_PLAY: "set a dial indicator on the part next to the pin and move the"
     " joint by hand from one stop to the other, across the pin; type the whole reading.",
 }
-_CONVENTIONS = {
-    "radial": ClearanceConvention.RADIAL,
-    **dict.fromkeys(("diametral", "bore"), ClearanceConvention.DIAMETRAL),
-    **dict.fromkeys(("play", "total", "total_play", "dial", "tir"), ClearanceConvention.TOTAL_PLAY),
-}
+_CONVENTIONS = {kind.lower(): kind.value for kind in ClearanceConvention} | {**CONVENTION.hints}
+# What is typed once for all that follows of a gear.
+_STATED = (UNIT.name, CONVENTION.name, DATE.name)
 # Questions that Enter leaves open.
 _OPTIONAL = (PLUNGER, *LAST)
 _QUESTIONS = {
@@ -110,10 +104,12 @@ class Asker:
     saved: SavedEntries
     visit: Callable[[str, Side], Visit | None] = lambda _tail, _side: None
     entry: Entry = field(init=False)
-    _jump: str = ""
     known: Visit | None = None
+    # Joints that were named before their turn; the last one is asked for.
+    _named: list[str] = field(default_factory=list)
     _unfinished: list[Entry] = field(default_factory=list)
-    _day: str = ""
+    # Unit, convention and day that were typed for the gear.
+    _stated: dict[str, str] = field(default_factory=dict)
     _messages: set[str] = field(default_factory=set)
 
     def begin(self, given: Mapping[str, str]) -> Entry | Visit:
@@ -122,7 +118,7 @@ class Asker:
         for message in damaged:
             self._once(message)
         self.known = None
-        self._day = ""
+        self._stated = {name: given[name] for name in _STATED if name in given}
         self.entry = Entry.new(self.gear, dict(given))
         if tail := given.get(TAIL_NO.name):
             self.entry.cells[TAIL_NO.name] = self.entry.accepted(self.gear, TAIL_NO.name, tail)
@@ -137,35 +133,32 @@ class Asker:
         empty for the end. An entry without a finding corrects the last one.
         """
         self.known = visit
-        day = f" on {self._day}" * bool(self._day)
-        keys = [f"y = I did NEXT{day}"] * bool(visit.todo) + ["d = details", "report"]
+        day = self._stated.get(DATE.name)
+        keys = ["y = I did NEXT" + f" on {day}" * bool(day), "d = details", "report"]
         keys += [f"u = undo {visit.undoes}"] * bool(visit.undoes)
         self._say("   ".join([*keys, "new", "gear", "?"]), "dim")
         while True:
             try:
-                typed = self._typed("Enter ends", f"{visit.step.how} {_FOLLOW_HELP}".strip())
+                typed = self._typed("Enter ends", f"{visit.step.how}\n{_FOLLOW_HELP}".strip())
                 word = typed.lower()
-                if word in ("", "d", "report", "open"):
+                if word in ("", "d", "report", "open") or (word == "y" and not visit.todo):
                     return word
                 if word == "gear":
                     return self.begin({})
                 self.entry = self._next_entry(visit, word)
-                if not (word == "new" or (word == "y" and visit.todo) or self._take(typed)):
+                if not (word in ("new", "y") or self._take(typed)):
                     raise UsageError(f"{typed!r} is not understood", "Type ? for the words.")
             except (EOFError, KeyboardInterrupt):
                 self._say("")
                 return ""
             except BackError:
-                if visit.undoes:
-                    return "u"
-                self._say("   Nothing is left to undo.", "magenta")
-                continue
+                return "u"
             except UsageError as error:
                 self._refuse(error)
                 continue
-            if self.entry.typed == [DATE.name]:
-                self._day = self.entry.cells[DATE.name]
-            elif self.entry.typed and not (self.entry.has_findings or self._jump):
+            if word not in ("new", "y") and {*self.entry.typed} <= {*_STATED} and not self._named:
+                self._state()
+            elif self.entry.typed and not (self.entry.has_findings or self._named):
                 return self.entry
             else:
                 with self._interrupted():
@@ -182,33 +175,37 @@ class Asker:
         """Continue the unfinished entry of the gear, show its records, or ask on."""
         gear = {name: self.entry.cells[name] for name in HEADING[:2]}
         begun = [each for each in self._unfinished if each.cells | gear == gear | each.cells]
-        if begun:
-            self._resume(max(begun, key=lambda each: len(each.cells)), gear)
-            return self._ask_all()
         self.known = self.visit(*self.entry.gear_key)
-        if self.known is None:
-            return self._ask_all()
-        self.saved.discard(self.entry.id)
-        return self.known
-
-    def _resume(self, saved: Entry, gear: Mapping[str, str]) -> None:
-        self.saved.discard(self.entry.id)
-        self.entry = saved
-        saved.cells = {**gear, **saved.cells}
-        self.known = self.visit(*saved.gear_key)
-        begun = f"{saved.started:%Y-%m-%d %H:%M}"
-        self._say(f"Continued: {saved.identity}, begun {begun}. new = begin anew.", "green")
+        if begun or self.known:
+            self.saved.discard(self.entry.id)
+        if begun:
+            self.entry = max(begun, key=lambda each: len(each.cells))
+            self.entry.cells = {**gear, **self.entry.cells}
+            at = f"{self.entry.started:%Y-%m-%d %H:%M}"
+            self._say(f"Continued: {self.entry.identity}, begun {at}. new = begin anew.", "green")
+        elif self.known:
+            return self.known
+        return self._ask_all()
 
     def _next_entry(self, visit: Visit, word: str) -> Entry:
         """An entry that adds to the records of a gear, or a new inspection of it."""
         cells = {TAIL_NO.name: visit.row.tail_no, SIDE.name: visit.row.side.value}
-        if self._day:
-            cells[DATE.name] = self._day
         if word == "new":
-            return Entry.new(self.gear, cells)
-        cells |= {UNIT.name: visit.row.unit_entered.value, CONVENTION.name: visit.row.convention}
-        cells |= self.saved.offered()
+            return Entry.new(self.gear, cells | self._stated)
+        cells |= self.offered(visit)
         return Entry.new(self.gear, cells, [*visit.todo] if word == "y" else [])
+
+    def offered(self, visit: Visit) -> dict[str, str]:
+        """Unit, convention, day, name and gauge of what is typed next for a gear."""
+        row = visit.row
+        unit = row.unit_entered or LengthUnit.INCH
+        last = {UNIT.name: unit.value, CONVENTION.name: row.convention.value}
+        return last | self.saved.offered() | self._stated
+
+    def _state(self) -> None:
+        """Let unit, convention and day of the entry stand for what is typed next for its gear."""
+        cells = self.entry.cells
+        self._stated |= {name: cells[name] for name in _STATED if name in cells}
 
     def _ask_all(self) -> Entry:
         """Ask what is open, then confirm what is unusual; the entry is complete."""
@@ -226,15 +223,14 @@ class Asker:
                     raise
                 self._undo()
             else:
-                # What is typed next was found on that day as well.
-                self._day = self.entry.cells.get(DATE.name, self._day)
+                self._state()
                 return self.entry
 
     def _open(self) -> str:
         """The next open question; empty if none is."""
         cells = self.entry.cells
-        if self._jump:
-            return self._jump
+        if self._named:
+            return self._named[-1]
         columns: list[str] = [*HEADING]
         if self.entry.todo is None:
             columns += [*FIRST, *self._joints(), *LAST]
@@ -268,8 +264,12 @@ class Asker:
                 cells = self.entry.cells
                 kept = {name: cells[name] for name in HEADING[:2] if name in cells}
                 self.entry = Entry.new(self.gear, kept)
+                self._named.clear()
             else:
                 self._answer(name, typed)
+                # The joint that was asked for waits until it is answered.
+                if joint_of(name) and name not in (*self.entry.cells, *self._named):
+                    self._named.insert(0, name)
         except BackError:
             self._undo()
         except UsageError as error:
@@ -282,13 +282,13 @@ class Asker:
             return
         name = self.entry.typed[-1]
         text = self.entry.cells.pop(name)
-        self._jump = ""
+        self._named.clear()
         self._say(f"– undone: {label_of(name)} {text or 'no answer'}", "magenta")
 
     def _answer(self, name: str, typed: str) -> None:
         """Take an answer; a line of words counts at every question but those of a name."""
         if joint_of(name) and typed.lower() == "done":
-            self._jump = ""
+            self._named.clear()
             for each in self._joints():
                 if each not in self.entry.cells:
                     self.entry.give(each, "")
@@ -327,38 +327,51 @@ class Asker:
 
     def _answer_unit(self, typed: str) -> None:
         """Take a unit, a convention or both; what is not typed is that of the last entry."""
-        offered = self.saved.offered()
-        found = {name: offered[name] for name in HEADING[2:] if name in offered}
-        before = f" (last time: {', '.join(map(_plain, found.values()))})" * bool(found)
+        cells = self.entry.cells
+        last = {**self.saved.offered(), **cells}
+        found = {name: last[name] for name in HEADING[2:] if name in last}
+        was = _heading(found)
         for word in typed.lower().replace(",", " ").split():
             if word in _CONVENTIONS:
-                found[CONVENTION.name] = _CONVENTIONS[word].value
+                found[CONVENTION.name] = _CONVENTIONS[word]
             else:
                 found[UNIT.name] = LengthUnit.parse(word).value
-        if UNIT.name not in {**self.entry.cells, **found}:
+        if UNIT.name not in found:
             raise UsageError("the unit is still missing", "Type in, thou or mm.")
-        for name, text in found.items():
+        read = [name for name, text in cells.items() if text and _is_length(name)]
+        joints = ", ".join(f"{label_of(name)} {cells[name]}" for name in filter(joint_of, read))
+        changed = {name: text for name, text in found.items() if cells.get(name) != text}
+        if CONVENTION.name in changed and joints:
+            raise UsageError(
+                f"{joints} was read as {_plain(cells[CONVENTION.name])}",
+                "u takes it back; or end this entry with done before you change.",
+            )
+        for name, text in changed.items():
             self.entry.give(name, text)
-        known = [self.entry.cells[name] for name in HEADING[2:] if name in self.entry.cells]
-        self._say(f"   Readings are in {', '.join(map(_plain, known))}{before}.")
+        said = "; what was typed before keeps its unit" * bool(read)
+        now = _heading(found)
+        before = f" (before: {was})" * (was not in ("", now))
+        self._say(f"   Readings are in {now}{before}{said}.")
 
     def _answer_joint(self, name: str, typed: str) -> None:
         """Take a clearance; one that can hardly be is confirmed."""
         number = joint_of(name) or 0
-        typed = typed or self.entry.cells.get(name, "")
+        before = self.entry.cells.get(name, "")
+        was = f", was {before}" * bool(before and typed)
+        typed = typed or before
         if typed.lower() in ("", "none"):
-            self._jump = ""
+            self._named = [each for each in self._named if each != name]
             self.entry.give(name, "")
-            self._say(f"– #{number} not read", "dim")
+            self._say(f"– #{number} not read{was}", "dim")
             return
         read, said = self.entry.judge(self.gear, name, with_unit(typed, self.entry.unit))
         if said and (again := self._instead(f"#{number}: {said}", typed)):
             self._answer(name, again)
             return
-        self._jump = ""
+        self._named = [each for each in self._named if each != name]
         entered = read.entered.get(number)
         self.entry.give(name, str(entered) if entered else "")
-        self._echo(number, read)
+        self._echo(number, read, was)
 
     def _instead(self, said: str, typed: str) -> str:
         """Say what is unusual; what is typed instead of it, empty if it is right."""
@@ -371,6 +384,8 @@ class Asker:
     def _take(self, line: str) -> bool:
         """Take a line of words; false if it is not one."""
         words = split_words(line)
+        if units := [text for name, text in words if name in HEADING[2:]]:
+            self._answer_unit(" ".join(units))
         for name, text in words:
             number = joint_of(name)
             if number is None:
@@ -378,10 +393,10 @@ class Asker:
             if number not in self.gear.joint_numbers:
                 raise UsageError(f"there is no joint #{number}", "Type for example #3 13.")
             self.entry.require_untyped(name)
-            self._jump = name
+            self._named = [*(each for each in self._named if each != name), name]
             if text:
                 self._answer_joint(name, text)
-        others = [each for each in words if not joint_of(each[0])]
+        others = [each for each in words if not joint_of(each[0]) and each[0] not in HEADING[2:]]
         if others:
             self._give(others)
         return bool(words)
@@ -390,7 +405,7 @@ class Asker:
         """Give columns, and say what was taken."""
         before = {**self.entry.cells}
         taken = self.entry.take(self.gear, words)
-        said = self._too_far() if PLUNGER in taken else ""
+        said = self._doubted() if PLUNGER in taken else ""
         if said and (again := self._instead(said, "")):
             self.entry.cells = before
             self._give([(PLUNGER, again)])
@@ -398,12 +413,14 @@ class Asker:
         given = (f"{column_of(name).said} {self.entry.cells[name] or 'none'}" for name in taken)
         self._say(f"✓ {', '.join(given)}", "green")
 
-    def _too_far(self) -> str:
-        """What is said of a plunger reading beyond what all joints at their limits could cause."""
-        readings_in = self._judged(PLUNGER).readings_in
+    def _doubted(self) -> str:
+        """What is said of a plunger reading beyond what all joints at their limits could cause, or
+        in another unit.
+        """
+        read = self._judged(PLUNGER)
         most_in = float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
-        if max(map(abs, readings_in)) <= most_in:
-            return ""
+        if max(map(abs, read.readings_in)) <= most_in:
+            return read.unit_question
         return (
             f"Plunger {self.entry.cells[PLUNGER]}: all joints at their limits could move it"
             f" {self._length(most_in)} at most."
@@ -434,14 +451,14 @@ class Asker:
         last = self.known.last.get(number) if self.known else None
         prompt = f"#{number} {joint.name}, limit {limit}" + f", last {last}" * (last is not None)
         typed = self.entry.cells.get(CLEARANCE.header(number))
-        prompt += f" (Enter: {typed}; or none)" * bool(typed)
+        prompt += f" (Enter: {f'{typed}; or none' if typed else 'not read'}; done)"
         lines = [
             f"{joint.label}. {joint.location}. Area: {joint.area}.",
             f"Limit {limit} {_plain(kind)} = {unit.shown(joint.limit.value)} {unit} radial,"
             f" {joint.limit.kind.value}.",
             f"How: {_HOW[kind]} Only play across the pin counts.",
             "Make the gear safe as the maintenance manual says before you reach in.",
-            "Enter: not read. done: no more joints. #7: joint 7. #7 13: its reading.",
+            "done: no more joints are read. #7: joint 7. #7 13: its reading.",
         ]
         return prompt, "\n".join(lines)
 
@@ -450,9 +467,7 @@ class Asker:
         if name == TAIL_NO.name:
             return self._unfinished[0].identity if self._unfinished else ""
         if name == UNIT.name:
-            found = self.saved.offered()
-            known = [_plain(found[each]) for each in HEADING[2:] if each in found]
-            return ", ".join(known) if len(known) == 2 else ""
+            return _heading(self.saved.offered())
         if name == REPAIR_DATE:
             return self.entry.day.isoformat()
         if name == RESTORED_JOINTS.name and self.known:
@@ -482,14 +497,14 @@ class Asker:
         given = self.entry.cells.get(RESTORED_JOINTS.name)
         return self._judged(RESTORED_JOINTS.name).restored_joints if given else ()
 
-    def _echo(self, number: int, read: Inspection) -> None:
+    def _echo(self, number: int, read: Inspection, was: str) -> None:
         joint = self.gear.joint(number)
         radial_in = read.clearance_in[number]
         factor = self.entry.convention.per_radial
         shown = f"✓ #{number} {self._length(radial_in * factor)}"
         if factor != 1.0:
             shown += f" {_plain(self.entry.convention)} = {self._length(radial_in)} radial"
-        self._say(shown, "green")
+        self._say(shown + was, "green")
         if joint.is_over_limit(radial_in):
             self._say(
                 f"  Over the limit of {self._length(joint.limit.value * factor)}"
@@ -514,17 +529,12 @@ class Asker:
             elif word in ("u", "undo", "b", "back"):
                 raise BackError
             elif word in ("?", "help"):
-                self._say(f"{help_text}\n{self._word_help()}")
+                self._say(f"{help_text}\n{WORD_HELP}")
             else:
                 return typed
 
-    def _word_help(self) -> str:
-        rows = (f"  {f'{w} {example}':<26}{meaning}" for w, _, example, meaning in WORDS)
-        return "\n".join(("At any question:", *rows))
-
     def _refuse(self, error: UsageError) -> None:
-        said = f"{error.message[:1].upper()}{error.message[1:]}"
-        self._say(f"✗ {said}. {error.remedy}", "red")
+        self._say(f"✗ {error.message[:1].upper()}{error.message[1:]}. {error.remedy}", "red")
 
     def _save(self) -> None:
         if self.entry.typed:
@@ -551,6 +561,11 @@ class Asker:
             else:
                 self._say("\nNothing was typed. Begin again with: mlg check")
             raise EntryInterruptedError from None
+
+
+def _heading(cells: Mapping[str, str]) -> str:
+    """Unit and convention, in words."""
+    return ", ".join(_plain(cells[name]) for name in HEADING[2:] if name in cells)
 
 
 def _plain(text: str) -> str:

@@ -56,26 +56,37 @@ FIRST = (*HEADING, OUTCOME.name, PLUNGER)
 LAST = (TECHNICIAN_ID.name, GAUGE_ID.name)
 OUTCOMES = {"f": "FAILED", "failed": "FAILED", "r": "RETRACTED", "retracted": "RETRACTED"}
 OUTCOMES |= {"n": "", "not tried": ""}
-# What is typed at any prompt: the word, its column, an example, and what it says.
-WORDS = (
-    ("plunger", PLUNGER, "0.041 in", "a plunger reading, + over-travel; also p"),
-    ("date", DATE.name, "20 Nov", "the day of what is typed here; else today"),
-    ("landings", LANDINGS.name, "4000", "landings since overhaul"),
-    ("order", WORK_ORDER.name, "WO-17", "the work order"),
-    ("restored", RESTORED_JOINTS.name, "3 5 on 25 Nov", "joints that were restored"),
-    ("rigging", RIGGING_CHECKED.name, "yes", "rigging and roller checked; or corrected"),
-    ("cannot reach", "cannot_reach", "3 5", "joints out of reach today; none: in reach"),
-    ("no spare", "no_spare", "3", "joints without a spare today; none: at hand"),
-    ("margin", MARGIN.name, "0.028 in", "this gear's own margin, as found at rigging"),
-    ("temperature", TEMPERATURE.name, "21", "degrees Celsius"),
-    ("pressure", PRESSURE.name, "3000", "hydraulic pressure, psi"),
-    ("name", TECHNICIAN_ID.name, "J. Smith", "who measured"),
-    ("gauge", GAUGE_ID.name, "G-03", "the gauge set"),
-    ("remarks", REMARKS.name, "oil seen", "goes to the report"),
-    ("tail", TAIL_NO.name, "N123AB", "another tail number"),
-    ("side", SIDE.name, "RH", "the other side"),
-)
-_COLUMNS = {word: column for word, column, _, _ in WORDS} | {"p": PLUNGER}
+# What is typed at any prompt, and its column.
+_COLUMNS = {
+    **dict.fromkeys(("plunger", "p"), PLUNGER),
+    "restored": RESTORED_JOINTS.name,
+    "rigging": RIGGING_CHECKED.name,
+    "date": DATE.name,
+    "unit": UNIT.name,
+    "convention": CONVENTION.name,
+    "side": SIDE.name,
+    "tail": TAIL_NO.name,
+    "cannot reach": "cannot_reach",
+    "no spare": "no_spare",
+    "landings": LANDINGS.name,
+    "order": WORK_ORDER.name,
+    "name": TECHNICIAN_ID.name,
+    "gauge": GAUGE_ID.name,
+    "remarks": REMARKS.name,
+    "margin": MARGIN.name,
+    "temperature": TEMPERATURE.name,
+    "pressure": PRESSURE.name,
+}
+WORD_HELP = """At any question:
+  #7 13, p 46      joint 7, the plunger; #7 none clears it, #7 goes to it
+  f, r, n          failed, retracted, not tried
+  restored 3 5 on 25 Nov, rigging yes (checked and right; or corrected)
+  date 20 Nov, unit mm, convention play      for what is typed from here on
+  side RH, tail N123AB                       corrects the gear of what was typed
+  cannot reach 3 5, no spare 3 (none: no longer), landings 4000, margin 28
+  order WO-17, name J. Smith, gauge G-03, remarks oil seen
+  temperature 21 (Celsius), pressure 3000 (psi)
+  u takes the last answer back; q stops, every answer is saved"""
 _NAMES = "|".join(sorted((*_COLUMNS, *OUTCOMES), key=len, reverse=True))
 _WORD = re.compile(rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w)[\s=:]*", re.IGNORECASE)
 _NEXT_WORD = re.compile(rf"(?<![\w#])(?:{_NAMES})(?!\w)", re.IGNORECASE)
@@ -157,7 +168,7 @@ class Entry(msgspec.Struct, kw_only=True):
     def judge(self, gear: Gear, name: str, text: str) -> tuple[Inspection, str]:
         """Let the gate of tables judge an answer: what it reads, and what it wants confirmed."""
         is_joint = joint_of(name) is not None
-        options = ReadOptions.of(gear, unit=self.unit, convention=self.convention, asks=is_joint)
+        options = ReadOptions.of(gear, unit=self.unit, convention=self.convention, asks=True)
         rows = []
         for each in text.split(";") if name == PLUNGER else [text]:
             read, problems = judge_length(name, each.strip(), options)
@@ -306,7 +317,7 @@ def split_words(line: str) -> list[tuple[str, str]]:
         number = word.lstrip("# ")
         name = CLEARANCE.header(int(number)) if number.isdecimal() else _COLUMNS.get(word, "")
         free = name and column_of(name).holds is Holds.TEXT
-        ends = _NEXT_JOINT if name and joint_of(name) else _NEXT_WORD
+        ends = _NEXT_JOINT if name in HEADING or joint_of(name) else _NEXT_WORD
         following = None if free else ends.search(rest)
         end = following.start() if following else len(rest)
         text, line = rest[:end].strip(" ,;"), rest[end:]

@@ -13,11 +13,13 @@ from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.prompts.ask import Asker
 from mlg_troubleshoot.cli.prompts.entry import HEADING, Entry
 from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit, continued, find_visit
+from mlg_troubleshoot.decision.columns import UNIT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.judge_rows import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.state import GearKey, key_of
+from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.keep import add_typed, amend, move, voids
 
@@ -53,8 +55,6 @@ class Sitting:
             if isinstance(found, Entry):
                 # What is typed for another gear corrects nothing of the one before.
                 visit = self._keep(found, visit if self._asker.known is visit else None)
-                if self._run.stops_after_one:
-                    return visit.result
             elif isinstance(found, Visit):
                 visit = found
                 self._publish(visit)
@@ -130,7 +130,7 @@ class Sitting:
 
     def _amend(self, entry: Entry, record: Record) -> None:
         """Correct what does not belong to one finding in the visit that was recorded last."""
-        changed = [name for name in entry.typed if name not in HEADING[:2]]
+        changed = [name for name in entry.typed if name not in HEADING]
         changes = {name: entry.cells[name] for name in changed}
         try:
             if changes:
@@ -140,6 +140,9 @@ class Sitting:
 
     def _undo(self, visit: Visit) -> Visit:
         """Take the last visit back, or the move of visits to this gear."""
+        if not visit.undoes:
+            output.say("Nothing is left to undo.")
+            return visit
         key, ids = visit.moved or (key_of(visit.row), ())
         if ids:
             self._move(visit, [each for each in visit.records if each.record_id in ids], key)
@@ -157,10 +160,16 @@ class Sitting:
         return visit
 
     def _publish(self, visit: Visit) -> None:
-        self._run.publish(visit.result, visit.row.unit_entered)
+        self._run.publish(visit.result, self._unit(visit))
+
+    def _unit(self, visit: Visit) -> LengthUnit:
+        return LengthUnit(self._asker.offered(visit)[UNIT.name])
 
     def _show(self, word: str, visit: Visit) -> None:
-        unit = visit.row.unit_entered
+        unit = self._unit(visit)
+        if word == "y":
+            output.say("Nothing is typed for it. report writes what is to be signed; Enter ends.")
+            return
         if word == "d":
             self._run.show(visit.result, unit, detail=True)
             return

@@ -40,7 +40,7 @@ from mlg_troubleshoot.life.folding import as_spelt, lives_of
 from mlg_troubleshoot.life.logbook import shortened, visit_lines
 from mlg_troubleshoot.life.state import GearKey, GearState, state_now
 from mlg_troubleshoot.store import Draft, Drafts, Record, Store, login
-from mlg_troubleshoot.units import said_in
+from mlg_troubleshoot.units import LengthUnit, said_in
 from mlg_troubleshoot.workflows.check import CheckResult, load_index_table
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
@@ -52,8 +52,6 @@ _ASKS = {
 }
 _TO_READ = (Action.MEASURE, Action.MEASURE_AGAIN)
 _STANDS = (MARGIN, MARGIN_U, BY_NAME["cannot_reach"], BY_NAME["no_spare"])
-# Facts of a visit that an undo names at most.
-_MOST_NAMED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +103,9 @@ def find_visit(
     row = state.inspection
     undoes = ""
     if len(life.visits) > 1 and visits[-1].inspection.source.file is None:
-        lines = [*shortened(visit_lines(visits[-1].inspection, gear))]
-        undoes = ", ".join(said_in(line.text, row.unit_entered) for line in lines[:_MOST_NAMED])
-        undoes += " …" * (len(lines) > _MOST_NAMED)
+        lines = shortened(visit_lines(visits[-1].inspection, gear))
+        unit = row.unit_entered or LengthUnit.INCH
+        undoes = ", ".join(said_in(line.text, unit) for line in lines)
     return Visit(tuple(each.kept for each in visits), row, judge(state), last, undoes)
 
 
@@ -236,12 +234,15 @@ class Terminal:
 
     def ask(self, prompt: str) -> str:
         """Ask for one line, with the arrow keys where the terminal and the library can."""
-        shown = word(prompt, "bold")
+        *above, last = word(prompt.rstrip(), "bold").wrap(self._console, self._console.width)
+        for line in above:
+            self._console.print(line)
+        last.append(" ")
         try:
             if self._edits:
                 # The library must know the prompt: it draws the line again.
-                return input(shown.plain)
-            self._console.print(shown, end="", soft_wrap=True)
+                return input(last.plain)
+            self._console.print(last, end="", soft_wrap=True)
             self._console.file.flush()
             return input()
         except UnicodeDecodeError:

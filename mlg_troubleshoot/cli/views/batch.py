@@ -15,7 +15,7 @@ from rich.text import Text
 from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.output import DataConsole, print_table, word
 from mlg_troubleshoot.decision.assessment import Verdict, VerdictTone
-from mlg_troubleshoot.decision.judge_rows import Listed, latest_of_each_gear
+from mlg_troubleshoot.decision.judge_rows import Listed, latest_of_each_gear, worst_first
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.errors import Problem, ProblemGroup, grouped
 from mlg_troubleshoot.gear.gear import Gear
@@ -38,18 +38,15 @@ Cell = str | Text
 
 def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole) -> None:
     """Show a batch: how many of each verdict, worst gears first, the latest inspection of each."""
-    counts = Counter(line.verdict for line in lines)
-    said = " · ".join(
-        f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v]
-    )
+    places = worst_first(lines, range(len(lines)))
+    counts = Counter(lines[place].title for place in places)
+    said = " · ".join(f"{count} {title}" for title, count in counts.items())
     screen.print(f"{len(lines)} inspections: {said}")
     latest, earlier = latest_of_each_gear(lines)
     if earlier:
-        known = {(line.tail_no, line.side) for line in lines if line.tail_no and line.side}
-        gears = "1 gear" if len(known) == 1 else f"{len(known)} gears"
         screen.print(
-            f"{gears}, the latest inspection of each (or the worst of its day); --csv or --json"
-            " lists every one."
+            "The latest inspection of each gear (or the worst of its day); --csv or --json lists"
+            " every one."
         )
     ordered = [lines[place] for place in latest]
     margin = f"margin {screen.unit}"
@@ -71,25 +68,17 @@ def show(lines: Sequence[Listed], gear: Gear, screen: DataConsole) -> None:
     )
 
 
-# Titles that a narrow table has to shorten otherwise than to their first word.
-_SHORT = {"OUTSIDE MARGIN, MEASURED": "OUT, MEASURED", "COULD BE OUTSIDE": "COULD BE OUT"}
-
-
 def _cells(line: Listed, screen: DataConsole) -> list[Cell]:
-    def length(value_in: float | None) -> str:
-        return "-" if value_in is None else screen.length(value_in)
-
-    title = _SHORT.get(line.title, line.verdict.value.split("_")[0])
     is_open = line.margin_in is not None and line.worst_in is None and line.chance is None
     return [
         MARKS[line.verdict],
-        Text(title, style=TONES[line.tone]),
+        Text(line.title, style=TONES[line.tone]),
         word(line.tail_no),
         str(line.side or "?"),
         str(line.day or "-"),
         word(line.record_id),
-        "open" if is_open else length(line.worst_in),
-        length(line.margin_in),
+        "open" if is_open else screen.length(line.worst_in),
+        screen.length(line.margin_in),
         "-" if line.chance is None else percent(line.chance),
         line.in_brief,
     ]
@@ -97,7 +86,6 @@ def _cells(line: Listed, screen: DataConsole) -> list[Cell]:
 
 _LINES_OF_PROBLEMS = 40
 _LINES_OF_NOTES = (8, 4)
-_FILES = 6
 
 
 def show_notes(notes: Sequence[str]) -> None:
@@ -132,9 +120,7 @@ def show_problems(problems: Sequence[Problem]) -> None:
 def show_unread(files: Sequence[str], screen: output.DataConsole) -> None:
     """Count the files that were given and not read, where the result ends."""
     if files:
-        shown = ", ".join(files[:_FILES]) + " …" * (len(files) > _FILES)
-        noun = "1 file was" if len(files) == 1 else f"{len(files)} files were"
-        screen.print(f"{noun} given and not read: {shown}.", style="bold")
+        screen.print(f"Files given and not read ({len(files)}): {', '.join(files)}.", style="bold")
 
 
 def _show_problem(group: ProblemGroup) -> None:

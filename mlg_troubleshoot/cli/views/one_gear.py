@@ -48,7 +48,7 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
         screen.print(note)
     if not detail:
         more = len(notes) - shown
-        left = f"{more} more note{'s' if more > 1 else ''}, " * (more > 0)
+        left = f"more notes ({more}), " * (more > 0)
         screen.print(f"{'d' if screen.asks else '--detail'}: {left}all that is known", style="dim")
     for line in body:
         screen.print(line)
@@ -100,7 +100,7 @@ def _show_joints(a: Assessment, screen: DataConsole, most: int | None = None) ->
             "-" if is_radial else str(row.entered.get(f.joint, "-")),
             "unmeasured" if f.clearance_in is None else screen.length(f.clearance_in),
             screen.length(f.limit_in),
-            "-" if f.contribution_in is None else screen.length(f.contribution_in),
+            screen.length(f.contribution_in),
         )
         rows.append([text(cell, "bold" if f.over_limit else "") for cell in cells])
     print_table(screen, [*headings, "contri-\nbutes>"], rows, (), folded=joint)
