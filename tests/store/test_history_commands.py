@@ -328,7 +328,7 @@ def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(tmp_path, p
 
 def test_a_fleet_without_landings_has_no_forecast_and_says_null(tmp_path, place):
     keep(tmp_path, {k: v for k, v in visit(1, 0.001).items() if k != "gear_landings"})
-    assert mlg("fleet", "--no-forecast").out.startswith("1 gear, ")
+    assert mlg("fleet", "--no-forecast").out.startswith("The most urgent gear first.")
     (gear,) = mlg("fleet", "--json").json["gears"]
     assert gear["landings_to_limit"] is None
     assert gear["next_inspection_landings"] is None

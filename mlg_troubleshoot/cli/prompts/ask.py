@@ -393,7 +393,7 @@ class Asker:
             if number not in self.gear.joint_numbers:
                 raise UsageError(f"there is no joint #{number}", "Type for example #3 13.")
             self.entry.require_untyped(name)
-            self._named = [*(each for each in self._named if each != name), name]
+            self._named.append(name)
             if text:
                 self._answer_joint(name, text)
         others = [each for each in words if not joint_of(each[0]) and each[0] not in HEADING[2:]]
