@@ -6,6 +6,7 @@ from __future__ import annotations
 
 # ruff: noqa: E402 - what is imported after the first lines is to be kept compiled, or each worker
 # compiles all tests and hypothesis, and each ``mlg`` that a test starts the package.
+import gc
 import os
 import sys
 
@@ -26,6 +27,11 @@ settings.register_profile(
     "everyday", deadline=None, max_examples=40, derandomize=True, database=None
 )
 settings.load_profile("everyday")
+
+
+def pytest_collection_finish() -> None:
+    """What was collected stays to the end: no garbage collection looks through it again."""
+    gc.freeze()
 
 
 # What a user may have set that the program, or what it shows its pages with, reads.

@@ -131,7 +131,7 @@ def test_the_json_of_a_check_has_what_the_gear_did(outcome: str, said: str | Non
     "options",
     [
         (),
-        ("--design", "lhs", "--size", "4,20,2"),
+        ("--design", "lhs", "--size", "4,20,2", "--gear", FOUR_BAR),
         ("--design", "ccd", "--size", "4,0,2"),
     ],
     ids=["exact", "paper's design", "without total order"],

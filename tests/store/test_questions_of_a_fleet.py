@@ -112,7 +112,7 @@ def year_of_a_gear(rng: random.Random, key: tuple[str, str]) -> Truth:
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[tuple[str, str], Truth]]:
     rng = random.Random(80)
-    keys = [(f"N{800 + n}HK", side) for n in range(40) for side in ("LH", "RH")]
+    keys = [(f"N{800 + n}HK", side) for n in range(20) for side in ("LH", "RH")]
     truth = {key: year_of_a_gear(rng, key) for key in keys}
     folder = tmp_path_factory.mktemp("fleet")
     rows = sorted((r for t in truth.values() for r in t.rows), key=lambda r: r["inspection_date"])
