@@ -157,34 +157,10 @@ def test_an_output_in_an_input_folder_is_refused_where_it_is_one_of_its_files(tm
         claim_outputs([tmp_path], [("--csv", tmp_path / "a.csv")], force=True)
 
 
-def test_an_output_that_is_the_file_of_an_open_input_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "in.csv").write_text("x")
-    with (tmp_path / "in.csv").open() as file, pytest.raises(UsageError, match="standard input"):
-        claim_outputs([file.fileno()], [("--csv", tmp_path / "in.csv")], force=True)
-
-
-@pytest.mark.parametrize("second", ["a.csv", "no/../a.csv", "link.csv"])
-def test_two_outputs_are_two_files(tmp_path: Path, second: str) -> None:
-    (tmp_path / "link.csv").symlink_to("a.csv")
-    outputs = [("--csv", tmp_path / "a.csv"), ("--annotate", f"{tmp_path}/{second}")]
-    with pytest.raises(UsageError, match=r"--annotate .* is the file of --csv as well"):
-        claim_outputs([], outputs, force=True)
-
-
 def test_another_output_is_not_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x")
     outputs = [("--csv", tmp_path / "b.csv"), ("--annotate", None)]
     claim_outputs([tmp_path / "a.csv"], outputs)
-
-
-@pytest.mark.parametrize("held", ["", "a,b\n1,2\n"])
-def test_a_file_that_exists_is_replaced_with_force_only(tmp_path: Path, held: str) -> None:
-    (tmp_path / "o.csv").write_text(held)
-    outputs = [("--csv", tmp_path / "o.csv")]
-    with pytest.raises(UsageError, match=r"--csv .* exists: nothing was read") as refused:
-        claim_outputs([], outputs)
-    assert "--force" in refused.value.remedy
-    claim_outputs([], outputs, force=True)
 
 
 def test_a_database_is_not_replaced_with_force_either(tmp_path: Path) -> None:
@@ -193,8 +169,3 @@ def test_a_database_is_not_replaced_with_force_either(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is a database") as refused:
         claim_outputs([], [("--csv", tmp_path / "any")], force=True)
     assert "--force" not in refused.value.remedy
-
-
-def test_a_dash_is_not_the_name_of_an_output() -> None:
-    with pytest.raises(UsageError, match="--csv - is not the name of a file"):
-        claim_outputs([], [("--csv", Path("-"))])

@@ -138,8 +138,8 @@ class TestSection3Modelling:
 
     @pytest.mark.parametrize("later", NUMBERS)
     def test_later_joints_do_not_move_earlier_ones_except_the_pivot_eight_its_own_lever(
-        self, gear: Gear, later: int
-    ) -> None:
+        self, gear, later
+    ):
         """3.2: "clearances of later numbered joints did not affect the coordinates of earlier
         numbered joints."
 
@@ -247,8 +247,8 @@ class TestSection4Results:
         assert {entry.joint for entry in table.joints if entry.rank_range[1] <= 4} == {2, 3, 4, 5}
 
     def test_the_amplification_method_gives_joint_two_more_with_the_largest_indices(
-        self, gear: Gear, growth: Amplification, table: IndexTable
-    ) -> None:
+        self, gear, growth, table
+    ):
         """4.3: "similar to that found by the computational method, except that joint #2 recorded a
         higher sensitivity (Figure 13b)".
         """
@@ -257,8 +257,8 @@ class TestSection4Results:
         assert shares[1] > table.first_order[1] + 0.05
 
     def test_the_amplification_method_does_not_give_joint_two_more_with_the_local_indices(
-        self, gear: Gear, growth: Amplification, table: IndexTable
-    ) -> None:
+        self, gear, growth, table
+    ):
         """4.3, the same claim: not reproduced when the indices are taken where the plunger is
         judged.
         """

@@ -1,12 +1,14 @@
-"""Sentences of the program in the unit that the user reads."""
+"""Lengths as they are shown, and slopes of arrays."""
 
 from __future__ import annotations
 
 import copy
 import json
 
+import numpy as np
 import pytest
 
+from mlg_troubleshoot.arrays import central_slopes, central_steps
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence, parse_length, said_in, with_unit
 
@@ -71,3 +73,15 @@ def test_a_unit_may_end_with_a_full_stop_and_no_length_is_below_zero() -> None:
     assert (with_unit("0.013 in.", MM), with_unit("13", THOU)) == ("0.013 in.", "13 thou")
     with pytest.raises(UsageError):
         parse_length("-0.013 in")
+
+
+def test_the_slopes_of_a_curve_are_its_derivatives_to_second_order() -> None:
+    at = np.array([0.3, 1.1])
+    moved = np.sin((at + central_steps(2)) @ np.array([2.0, -1.0]))
+    expected = np.cos(2.0 * 0.3 - 1.1) * np.array([2.0, -1.0])
+    assert central_slopes(moved) == pytest.approx(expected, abs=1e-9)
+
+
+def test_values_along_another_axis_with_another_step_give_the_same_slopes() -> None:
+    moved = np.exp(0.1 + central_steps(1, 1e-3))
+    assert central_slopes(moved.T, 1e-3, axis=1)[0] == pytest.approx(np.exp(0.1), rel=1e-6)

@@ -11,7 +11,6 @@ import pytest
 
 from tests.cli.conftest import FAILURE, HAND, Run, Table, mlg, row
 
-PDF = b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n1 0 obj\n<< /Type /Catalog >>\nendobj\n"
 ONE_VALUE = (*HAND, "--convention", "RADIAL", "--set")
 
 
@@ -38,45 +37,21 @@ def test_a_file_of_no_bytes_is_called_empty(name: str, tmp_path: Path) -> None:
     refused(mlg("check", tmp_path / name), 3, name, "the file is empty", "No row could be judged.")
 
 
-def test_a_pdf_named_csv_is_called_a_pdf(tmp_path: Path) -> None:
-    path = tmp_path / "report.csv"
-    path.write_bytes(PDF)
-    refused(mlg("check", path), 3, "report.csv", "a PDF document")
-
-
-def test_a_folder_without_tables_says_so(tmp_path: Path) -> None:
-    refused(mlg("check", tmp_path), 3, tmp_path.name)
-
-
-BAD_CELLS = {
-    "text": ({"clearance_3_in": "worn"}, "clearance_3_in", "worn"),
-    "negative": ({"clearance_3_in": "-0.001"}, "clearance_3_in", "less than zero"),
-    "not a number": ({"clearance_3_in": "NaN"}, "clearance_3_in", "NaN"),
-    "infinite": ({"clearance_3_in": "inf"}, "clearance_3_in", "inf"),
-    "millimetres as inches": (
-        {"clearance_3_in": "0.33"},
-        "clearance_3_in",
-        "millimetres (factor 25.4)",
-    ),
-    "thou as inches": ({"clearance_3_in": "13"}, "clearance_3_in", "thou (factor 1000)"),
-    "decimal comma": ({"clearance_3_in": "0,013"}, "clearance_3_in", "--decimal-comma"),
-    "fraction": ({"clearance_3_in": "1/64"}, "clearance_3_in", "1/64 in = 15.6 thou"),
-    "no side": ({"side": ""}, "side", "LH or RH"),
-    "another side": ({"side": "LEFTISH"}, "side", "LH or RH"),
-    "another convention": ({"clearance_convention": "RADIUS"}, "clearance_convention", "RADIAL"),
-    "no tail": ({"tail_no": ""}, "tail_no", "tail"),
-    "no record": ({"record_id": ""}, "record_id", "record"),
-    "margin of nothing": ({"margin_in": "0"}, "margin_in", "margin"),
-}
-
-
-@pytest.mark.parametrize(("changes", "column", "said"), BAD_CELLS.values(), ids=BAD_CELLS)
+@pytest.mark.parametrize(
+    ("column", "value", "said"),
+    [
+        ("clearance_3_in", "worn", "worn"),
+        ("clearance_3_in", "0.33", "millimetres (factor 25.4)"),
+        ("clearance_3_in", "0,013", "--decimal-comma"),
+        ("side", "", "LH or RH"),
+        ("margin_in", "0", "margin"),
+    ],
+)
 def test_a_bad_cell_makes_its_row_invalid_and_says_why_and_good_rows_survive(
-    changes: dict[str, str], column: str, said: str, table: Table
-) -> None:
-    bad = row(**{"record_id": "B", "tail_no": "N9", **changes})
-    path = table(row(record_id="A"), bad, row(record_id="C", side="RH"))
-    found = mlg("check", path, "--json")
+    column, value, said, table
+):
+    bad = row(**{"record_id": "B", "tail_no": "N9", column: value})
+    found = mlg("check", table(row(record_id="A"), bad, row(record_id="C", side="RH")), "--json")
     assert found.code == 1
     verdicts = [i["verdict"] for i in found.json["inspections"]]
     assert verdicts == ["WITHIN_MARGIN", "INVALID", "WITHIN_MARGIN"]
@@ -93,17 +68,6 @@ def test_a_problem_names_file_cell_column_and_value(table: Table) -> None:
 def test_a_problem_is_one_line_of_a_file_however_long_it_is(table: Table) -> None:
     found = mlg("check", table(row(clearance_3_in="worn" * 40)))
     assert sum("worn" in line for line in found.err.splitlines()) == 1
-
-
-def test_an_invalid_row_carries_no_number(table: Table) -> None:
-    found = mlg("check", table(row(side="")), "--json").one
-    numbers = {
-        key: value
-        for key, value in found.items()
-        if key.endswith("_in") or key.startswith("probability")
-    }
-    assert len(numbers) == 14
-    assert set(numbers.values()) == {None}
 
 
 @pytest.mark.parametrize(
@@ -163,12 +127,6 @@ def test_what_was_restored_is_set_as_well(restored: str) -> None:
     day = ("--set", restored, "--set", "repair_date=2026-03-04", "--set", "landings=4000")
     found = mlg(*ONE_VALUE, "3=0.001in", *day, "--set", "date=2026-03-05", "--json")
     assert found.json["problems"] == []
-
-
-def test_convention_and_gear_are_set_as_columns_as_well() -> None:
-    whole = ("tail_no=N123", "side=LH", "clearance_convention=RADIAL", "3=0.001in")
-    found = mlg("check", *(word for pair in whole for word in ("--set", pair)), "--json")
-    assert found.one["tail_no"] == "N123"
 
 
 def test_an_empty_tail_number_is_refused() -> None:

@@ -1,7 +1,8 @@
-"""stdout carries results, stderr messages; a reader that goes away does not stop the work."""
+"""Streams: what stands on which, closed, full and plain ones."""
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import shlex
@@ -13,7 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import FAILURE, FLEET, ROOT, Run, Table, mlg, row
+from mlg_troubleshoot.cli import output
+from mlg_troubleshoot.json_form import as_text
+from tests.cli.conftest import DATA, FAILURE, FLEET, ROOT, Run, Table, mlg, row
 
 COMMAND = (sys.executable, "-m", "mlg_troubleshoot")
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs pipes of POSIX")
@@ -121,8 +124,8 @@ def in_a_shell(line: str, folder: Path) -> tuple[int, str, str]:
     ],
 )
 def test_a_stream_or_a_file_that_cannot_be_opened_ends_no_run_without_words(
-    line: str, code: int, words: str, tmp_path: Path
-) -> None:
+    line, code, words, tmp_path
+):
     found, _, err = in_a_shell(line, tmp_path)
     assert (found, "Internal error" in err, words in err) == (code, False, True)
 
@@ -164,3 +167,90 @@ def test_a_gear_file_with_a_name_that_no_file_can_have_ends_with_words(tmp_path:
     gear.write_text(text, encoding="utf-8")
     found = mlg("check", FAILURE, "--gear", gear)
     assert (found.code, "expected the name of a .json file" in found.err) == (2, True)
+
+
+STORE = ROOT / "tests" / "store" / "data" / "version-1.sqlite"
+COMMANDS = {
+    "help": (("--help",), 0),
+    "check help": (("check", "--help-all"), 0),
+    "check": (("check", str(FAILURE), "--detail"), 1),
+    "batch": (("check", str(FLEET)), 1),
+    "check json": (("check", str(FAILURE), "--json"), 1),
+    "refused": (("check", "Größe.csv"), 3),
+    "gear": (("gear",), 0),
+    "verify": (("gear", "verify"), 0),
+    "template": (("template", "neu–1.xlsx"), 0),
+    "study": (("study", "--design", "lhs", "--size", "2,20,2"), 0),
+    "history": (("history", "--store", str(STORE)), 0),
+    "fleet": (("fleet", "--no-forecast", "--store", str(STORE)), 0),
+    "diagnose": (("diagnose", str(DATA / "measured_pressure.csv")), 1),
+}
+STREAMS = {
+    "cp1252": {"PYTHONIOENCODING": "cp1252"},
+    "cp437": {"PYTHONIOENCODING": "cp437"},
+    "ascii": {"PYTHONIOENCODING": "ascii"},
+    "C": {"LC_ALL": "C"},
+}
+# Every command once, every stream several times; the whole table runs with the long tests.
+EVERYDAY = [
+    ("check help", "ascii"),
+    ("check", "cp1252"),
+    ("batch", "cp437"),
+    ("check json", "ascii"),
+    ("refused", "cp1252"),
+    ("gear", "C"),
+]
+ALL = [
+    (command, stream)
+    for command in COMMANDS
+    for stream in STREAMS
+    if (command, stream) not in EVERYDAY
+]
+
+
+def run(command: str, stream: str, folder: Path) -> tuple[int, bytes, bytes]:
+    environment = {
+        "PATH": os.environ["PATH"],
+        "HOME": str(folder),
+        "PYTHONPATH": str(ROOT),
+        **STREAMS[stream],
+    }
+    arguments, _code = COMMANDS[command]
+    done = subprocess.run(
+        [sys.executable, "-m", "mlg_troubleshoot", *arguments],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def as_documented(command: str, stream: str, folder: Path) -> None:
+    code, out, err = run(command, stream, folder)
+    assert code == COMMANDS[command][1], err
+    assert b"Traceback" not in err
+    assert b"Internal error" not in err
+    if stream != "C":
+        (out + err).decode(stream)
+
+
+@pytest.mark.parametrize(("command", "stream"), EVERYDAY, ids=lambda each: each)
+def test_a_command_ends_as_documented_on_a_plain_stream(command, stream, tmp_path):
+    as_documented(command, stream, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("command", "stream"), ALL, ids=lambda each: each)
+def test_every_command_ends_as_documented_on_every_stream(command, stream, tmp_path):
+    as_documented(command, stream, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "write", [output.write_json, lambda found: output.write_pieces([as_text(found)])]
+)
+def test_json_holds_every_character_on_a_stream_that_cannot(write, monkeypatch):
+    plain = io.TextIOWrapper(io.BytesIO(), encoding="ascii", write_through=True)
+    monkeypatch.setattr(sys, "stdout", plain)
+    write({"tail": "Größe–1\udcff"})
+    assert json.loads(plain.buffer.getvalue()) == {"tail": "Größe–1\udcff"}

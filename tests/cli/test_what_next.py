@@ -20,13 +20,6 @@ def said(*arguments: object) -> str:
     return " ".join(re.sub(r"[│╭╮╰╯─]", " ", mlg(*arguments).out).split())
 
 
-@pytest.fixture(scope="module")
-def incomplete() -> str:
-    """A gear of which four joints were measured, none of them worn."""
-    clearances = [flag for joint in (1, 2, 3, 4) for flag in ("--set", f"{joint}=0.001in")]
-    return said(*HAND, *clearances)
-
-
 FAILED = ("--set", "outcome=FAILED")
 
 
@@ -41,10 +34,6 @@ def explained() -> str:
 def failure() -> str:
     """The published failure."""
     return said("check", FAILURE, "--detail")
-
-
-def test_a_gear_without_a_complaint_is_offered_one_reading(incomplete: str) -> None:
-    assert "NEXT (12 min): Nothing is required. To show that the gear is within" in incomplete
 
 
 def test_what_the_plan_expects_stands_below_with_its_minutes_and_its_end(failure: str) -> None:
@@ -83,15 +72,6 @@ WORN = tuple(
 def test_flags_of_the_day_bind_next_and_say_what_stays_open() -> None:
     shown = said(*HAND, *WORN, *DAY, "--set", "no_spare=3")
     assert "OPEN: #3 is over the limit and cannot be restored today." in shown
-
-
-def test_a_repair_by_flags_leads_to_the_plunger_and_the_retraction() -> None:
-    restored = tuple("3=0.0005in" if flag == "3=0.013in" else flag for flag in WORN)
-    shown = said(
-        *HAND, *restored, *DAY, "--set", "restored=3", "--set", "repair_date=2026-03-04 08:00"
-    )
-    assert "NEXT (12 min): Read the plunger displacement at mid-position." in shown
-    assert "retract the gear (15 min)" in shown
 
 
 def test_a_joint_that_a_flag_of_the_day_names_must_exist() -> None:

@@ -72,8 +72,8 @@ def test_each_verdict_has_its_words_and_its_colour(judge, read, more, headline, 
     ],
 )  # fmt: skip
 def test_a_gear_is_within_by_a_reading_that_is_clear_and_newer_than_any_failure(
-    judge: Judge, more: dict[str, Any], within: bool
-) -> None:
+    judge, more, within
+):
     found = judge(THIRD, **more)
     assert ((found.verdict, found.basis) == (Verdict.WITHIN_MARGIN, Basis.MEASURED)) is within
 

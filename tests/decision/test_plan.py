@@ -29,17 +29,6 @@ def test_an_unmeasured_joint_may_explain_a_displacement_up_to_its_limit(judge: J
     assert some.explained_at_most_in == pytest.approx(min(0.030, some.predicted_upper_in or 0.0))
 
 
-def test_without_a_reading_nothing_is_explained(judge: Judge) -> None:
-    found = judge(every_joint(0.001))
-    assert (found.explained_at_most_in, found.unexplained_in) == (None, None)
-
-
-def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(judge):
-    form = judge({3: 0.013}).to_dict()
-    assert form["next_action"] == form["plan"][0]
-    assert form["end"] in set(End)
-
-
 def test_before_any_reading_one_joint_is_expected_to_be_restored(judge: Judge) -> None:
     steps = judge({}, outcome=Outcome.FAILED).plan.steps
     (restored,) = (step for step in steps if step.action is Action.RESTORE)

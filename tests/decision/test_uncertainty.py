@@ -101,8 +101,8 @@ def test_a_joint_with_an_uncertainty_of_its_own_carries_that_instead(gear: Gear)
 
 
 def test_the_part_of_the_geometry_is_the_sample_standard_deviation_over_the_ten_linkages(
-    gear: Gear, judge: Judge
-) -> None:
+    gear, judge
+):
     assert budget(judge(WORN)).geometry_in == pytest.approx(
         np.std(magnitudes(gear, WORN), ddof=1), rel=1e-3
     )
@@ -121,8 +121,8 @@ def test_the_geometry_spread_is_the_least_and_largest_prediction_of_the_ten_link
     ids=["actuator rod end", "locking pin", "link assembly"],
 )
 def test_the_linkages_disagree_on_what_the_paper_does_not_print(
-    gear: Gear, judge: Judge, joints: Sequence[int], share: float, tolerance: float
-) -> None:
+    gear, judge, joints, share, tolerance
+):
     worn = dict.fromkeys(joints, 0.02)
     found = budget(judge(worn)).geometry_in / magnitudes(gear, worn).mean()
     assert found == pytest.approx(share, abs=tolerance)
@@ -138,8 +138,8 @@ def test_the_linkages_agree_on_the_failure_case_to_which_they_were_fitted(judge:
     ids=["none", "small", "large"],
 )
 def test_the_model_uncertainty_is_half_a_thou_or_two_percent_of_the_prediction_if_that_is_more(
-    judge: Judge, clearance: float, expected: float | None
-) -> None:
+    judge, clearance, expected
+):
     found = judge(every_joint(clearance))
     share = 0.02 * (found.predicted_displacement_in or 0.0)
     assert budget(found).model_in == pytest.approx(share if expected is None else expected)
@@ -215,8 +215,8 @@ def loaded(judge: Judge) -> Assessment:
 
 
 def test_the_bound_is_the_worst_case_over_all_directions_whatever_an_extension_predicts(
-    judge: Judge, loaded: Assessment
-) -> None:
+    judge, loaded
+):
     bound = judge(WORN).predicted_displacement_in or 0.0
     assert loaded.bound_in == pytest.approx(bound, abs=1e-12)
     assert loaded.predicted_displacement_in == pytest.approx(0.4 * bound, rel=0.02)

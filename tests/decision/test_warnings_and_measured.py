@@ -74,8 +74,8 @@ def test_a_plunger_at_its_margin_is_not_beyond_it_in_any_unit(judge, unit):
     [(every_joint(0.001, j7=0.008), False), ({3: 0.013, 5: 0.007}, True)],
 )
 def test_a_failure_within_the_margin_is_not_explained_even_with_a_joint_above_its_limit(
-    judge: Judge, clearances: dict[int, float], explained: bool
-) -> None:
+    judge, clearances, explained
+):
     found = judge(clearances, outcome=Outcome.FAILED)
     assert (found.end is End.NOT_EXPLAINED) is not explained
     told = [step.text for step in found.plan.steps]
@@ -102,8 +102,8 @@ AS_TOTAL_PLAY = {"convention": ClearanceConvention.TOTAL_PLAY}
 )
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_an_entry_error_that_made_the_clearances_too_small_is_suggested(
-    factor: float, entry: dict[str, object], words: str, sense: float
-) -> None:
+    factor, entry, words, sense
+):
     text = disagreement(
         inspected({}, readings_in=(sense * 0.02 * factor,), **entry), 0.02, -0.02, 0.001
     )
@@ -122,8 +122,8 @@ def test_an_entry_error_that_this_entry_cannot_have_is_not_suggested(factor: flo
     ("off", "suggested"), [(0.96, True), (1.04, True), (0.9, False), (1.1, False)]
 )
 def test_an_entry_error_is_suggested_where_it_explains_the_displacement_to_a_twentieth(
-    off: float, suggested: bool
-) -> None:
+    off, suggested
+):
     text = disagreement(inspected({}, readings_in=(0.02 * 10.0 * off,)), 0.02, -0.02, 0.001)
     assert text is not None
     assert ("a misplaced decimal point" in text) == suggested
@@ -152,8 +152,8 @@ def test_a_default_gauge_uncertainty_is_shown_as_a_default(judge: Judge) -> None
     ("down_lock", "warned"), [(0.009, True), (0.01, False), (0.05, False), (0.051, True)]
 )
 def test_a_down_lock_position_outside_the_technical_order_is_a_matter_of_rigging(
-    judge: Judge, down_lock: float, warned: bool
-) -> None:
+    judge, down_lock, warned
+):
     assert (
         said(
             judge(every_joint(0.001), plunger_down_lock_in=down_lock).warnings, "check the rigging"

@@ -211,8 +211,8 @@ def test_steps_are_said_of_the_technician_who_rounds(gear: Gear) -> None:
 
 @pytest.mark.parametrize(("step_in", "doubtful"), [(0.001, False), (0.005, True)])
 def test_rounding_is_in_doubt_where_its_step_exceeds_the_spread_of_the_values(
-    gear: Gear, step_in: float, doubtful: bool
-) -> None:
+    gear, step_in, doubtful
+):
     def rounded(clearance: NDArray[np.float64], _readings: NDArray[np.float64]) -> None:
         clearance[:] = np.round(clearance / step_in) * step_in
 
@@ -248,8 +248,8 @@ def overhauled_while_others_are_parked(landings: NDArray[np.float64]) -> None:
     ],
 )
 def test_the_wear_of_a_gear_begins_anew_at_an_overhaul_and_not_at_a_mistyped_number(
-    gear: Gear, change: Callable[[NDArray[np.float64]], None], lives: int
-) -> None:
+    gear, change, lives
+):
     assert len(set(gears_of(with_landings(gear, change))[:6].tolist())) == lives
 
 

@@ -307,8 +307,8 @@ def test_where_nothing_is_named_there_is_neither_gain_nor_approval(nothing: Made
     ],
 )
 def test_a_cause_that_cannot_be_tested_is_a_rival_and_says_which_column_is_missing(
-    words: str, without_landings: Made
-) -> None:
+    words, without_landings
+):
     assert words in without_landings.text
 
 

@@ -73,8 +73,8 @@ def habits(gear: Gear, seed: int, column: str) -> DiagnosisTable:
 @every_day_and_slow
 @pytest.mark.parametrize("column", ["gauge_id", "technician_id", "tail_no"])
 def test_readers_and_aircraft_that_all_differ_a_little_are_not_a_cause(
-    column: str, seeds: range, allowed: int, gear: Gear
-) -> None:
+    column, seeds, allowed, gear
+):
     assert alarms(gear, lambda seed: habits(gear, seed, column), seeds) <= allowed
 
 
@@ -107,6 +107,6 @@ def worn_apart(gear: Gear, seed: int) -> DiagnosisTable:
 @pytest.mark.slow
 @every_day_and_slow
 def test_gears_that_wear_from_different_levels_at_different_rates_are_not_a_cause(
-    seeds: range, allowed: int, gear: Gear
-) -> None:
+    seeds, allowed, gear
+):
     assert alarms(gear, lambda seed: worn_apart(gear, seed), seeds) <= allowed

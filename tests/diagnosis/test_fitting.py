@@ -58,8 +58,8 @@ def test_the_inverse_covariance_is_that_of_the_whole_matrix(ratio, noise):
 
 @pytest.mark.parametrize("noise", NOISES)
 def test_the_length_of_each_column_is_that_under_the_inverse_whatever_it_is_kept_as(
-    noise: NoiseModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    noise, monkeypatch
+):
     monkeypatch.setattr("mlg_troubleshoot.misfit.columns._LARGE", 0)
     columns = RNG.standard_normal((N, 3)) * (np.arange(N)[:, None] < [N, 4, 7])
     inverse = [np.linalg.inv(dense(ratio, noise)) for ratio in noise.tail_ratios]

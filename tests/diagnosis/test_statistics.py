@@ -99,8 +99,8 @@ def test_the_share_removed_has_an_interval_of_95_percent_over_tails() -> None:
     [(0, 0.9092, 0.0151), (1, 0.7346, 0.1063), (2, 0.2912, 0.4187), (3, 0.0, 0.5)],
 )
 def test_directions_have_the_mean_and_variance_of_the_cosine_of_their_angles(
-    gear: Gear, k: int, mean: float, variance: float
-) -> None:
+    gear, k, mean, variance
+):
     # exp(-s^2/2) and (1 - exp(-s^2))^2 / 2 for normal angles of s = 25 and 45 degrees; 0 and 1/2
     # all around.
     scene, _rows = build_scene(gear.model, fleet(gear.model), gear.discrepancies)

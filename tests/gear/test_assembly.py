@@ -160,8 +160,8 @@ def test_clearance_of_a_lever_is_at_the_link_that_it_moves(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(("name", "times"), [("confirm_above", 2), ("hard_limit", 5)])
 def test_readings_are_asked_again_and_refused_at_multiples_of_the_largest_limit(
-    name: str, times: int, tmp_path: Path
-) -> None:
+    name, times, tmp_path
+):
     gear = gear_of(changed(joints=limits("A", "B") | limits("O2", limit=0.02)), tmp_path)
     assert getattr(gear, name).value == times * 0.02
     assert "assumed by the authors" in getattr(gear, name).source

@@ -50,8 +50,8 @@ def best_over_all_directions(model: LinkageModel, clearance: np.ndarray, sense: 
     ids=["all", "failure", "mixed"],
 )
 def test_the_sequential_rule_is_within_four_in_ten_thousand_of_the_global_optimum(
-    gear: Gear, clearance: np.ndarray, sense: float
-) -> None:
+    gear, clearance, sense
+):
     worst = worst_case(gear.model, clearance)
     found = (sense * (worst.over_in if sense > 0 else worst.under_in))[0]
     assert found == pytest.approx(best_over_all_directions(gear.model, clearance, sense), rel=4e-4)
@@ -93,8 +93,8 @@ def best_by_differential_evolution(
     ],
 )
 def test_a_global_search_of_directions_and_stroke_finds_hardly_more_than_the_rule(
-    name: str, members: slice, short_by: float, sense: float
-) -> None:
+    name, members, short_by, sense
+):
     known = load_gear(name)
     for model in known.ensemble_models[members]:
         worst = worst_case(model, known.limits_in)

@@ -54,8 +54,8 @@ def test_the_simulated_offsets_at_the_pins_give_the_simulated_rocker_angle(gear:
     ],
 )
 def test_nominal_angle_deviation_and_bound_are_the_published_ones(
-    gear: Gear, row: int, nominal: float, deviation: float, low: float, high: float
-) -> None:
+    gear, row, nominal, deviation, low, high
+):
     model = model_at(gear, STATES[row]["crank_rad"])
     worst = worst_case(model, np.full((1, 3), CLEARANCE))
     assert model.mid == pytest.approx(nominal, abs=5e-7)

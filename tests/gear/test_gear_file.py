@@ -252,8 +252,8 @@ def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(
     ],
 )
 def test_a_linkage_that_cannot_be_assembled_is_a_mechanism_error_that_names_the_step(
-    edited: Edit, old: str, new: str, words: str
-) -> None:
+    edited, old, new, words
+):
     with pytest.raises(MechanismError, match=words):
         _ = load_gear(edited(old, new)).model
 

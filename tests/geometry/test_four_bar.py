@@ -47,13 +47,6 @@ def rocker_turn(model: LinkageModel, coupler: float) -> float:
     return float(turned)
 
 
-def test_the_coordinates_give_the_links_seven_and_nine(model: LinkageModel) -> None:
-    numbers = dict(zip(model.kernel.parameter_names, model.kernel.parameters, strict=True))
-    assert (numbers["length.A-B"], numbers["length.B-O4"]) == pytest.approx(
-        (COUPLER, ROCKER), abs=1e-14
-    )
-
-
 def test_the_open_linkage_has_the_published_angles(model: LinkageModel) -> None:
     assert angles_deg(model, +1.0) == pytest.approx((88.8372413003, 117.2860678604), abs=1e-9)
 
@@ -72,14 +65,6 @@ def test_the_contribution_is_one_over_rocker_times_sine_of_the_transmission_angl
     assert model.plunger_amplification() == pytest.approx(
         np.full(4, 1 / (ROCKER * math.sin(rocker - coupler)))
     )
-
-
-def test_a_coupler_shorter_by_all_clearances_gives_the_published_worst_over_travel(model):
-    assert rocker_turn(model, COUPLER - 4 * CLEARANCE) == pytest.approx(WORST_OVER_RAD, abs=1e-10)
-
-
-def test_a_coupler_longer_by_all_clearances_gives_the_published_worst_under_travel(model):
-    assert rocker_turn(model, COUPLER + 4 * CLEARANCE) == pytest.approx(WORST_UNDER_RAD, abs=1e-10)
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
@@ -107,7 +92,3 @@ def test_no_directions_go_beyond_the_exact_worst_case(model: LinkageModel) -> No
     directions = np.random.default_rng(4).uniform(0, 2 * np.pi, (2000, 4))
     moved = model.displacement(links_from(np.full((2000, 4), CLEARANCE), directions))
     assert WORST_UNDER_RAD < moved.min() < moved.max() < WORST_OVER_RAD
-
-
-def test_both_ends_of_the_coupler_are_named_as_alike(four_bar: Gear) -> None:
-    assert four_bar.alike == {1: (), 2: (3,), 3: (2,), 4: ()}

@@ -93,19 +93,6 @@ def test_the_pin_stays_in_its_slot(gear: Gear) -> None:
     assert found == pytest.approx(np.full(n, opening(pin, arm)), abs=1e-12)
 
 
-def test_without_clearance_every_joint_stands_at_its_reference_coordinates(gear: Gear) -> None:
-    errors = []
-    for linkage, model in zip(gear.ensemble, gear.ensemble_models, strict=True):
-        place = model.kernel.positions(
-            linkage.mechanism.reference_input, model.kernel.no_clearance()
-        )
-        errors += [
-            np.hypot(place[p.name][0] - p.x, place[p.name][1] - p.y)
-            for p in linkage.mechanism.points
-        ]
-    assert max(errors) < 1e-12
-
-
 def moved(mechanism: Mechanism, turn: float, along: tuple[float, float]) -> Mechanism:
     """The whole mechanism turned and shifted in the base plane."""
     c, s = np.cos(turn), np.sin(turn)
@@ -135,12 +122,8 @@ def moved(mechanism: Mechanism, turn: float, along: tuple[float, float]) -> Mech
     direction=directions,
 )
 def test_a_rigid_motion_of_the_whole_mechanism_changes_nothing(
-    gear: Gear,
-    turn: float,
-    along: tuple[float, float],
-    clearance: np.ndarray,
-    direction: np.ndarray,
-) -> None:
+    gear, turn, along, clearance, direction
+):
     kernel = Kernel(moved(gear.reference.mechanism, turn, along))
     turned = direction + turn * (np.arange(10) < IN_BASE_PLANE)
     for stroke in gear.reference.stroke:

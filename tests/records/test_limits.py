@@ -1,7 +1,10 @@
-"""What is refused before it can cost time or memory, and texts that no file can carry."""
+"""What is refused before it can cost time or memory, what reading costs, and texts that no file
+can carry.
+"""
 
 from __future__ import annotations
 
+import gc
 import io
 import json
 import os
@@ -9,6 +12,8 @@ import random
 import subprocess
 import sys
 import time
+import tracemalloc
+import zipfile
 from dataclasses import asdict
 from pathlib import Path
 
@@ -22,10 +27,11 @@ from mlg_troubleshoot.records import ReadOptions, cells, csvfile, read, read_man
 from mlg_troubleshoot.records import csvfile as zipguard
 from mlg_troubleshoot.records.annotate import annotate_workbook
 from mlg_troubleshoot.reporting import publish as pdf
+from tests.benchmarks.made import HEADER, row
 from tests.machine import SLOWER
 from tests.records.reading import read_inspections
 
-HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in,clearance_5_in\n"
+TWO_JOINTS = "record_id,tail_no,side,clearance_convention,clearance_3_in,clearance_5_in\n"
 GOOD = "R1,N1,LH,RADIAL,0.013,0.007\n"
 _READ = """
 import sys, time
@@ -52,7 +58,7 @@ print(len(found.problems), time.process_time() - start, peak / 1000)
 )
 def test_a_monster_is_refused_within_10_s_and_500_mb(made: str) -> None:
     run = [sys.executable, "-c", _READ, made]
-    done = subprocess.run(run, input=(HEADER + GOOD).encode(), capture_output=True, check=True)
+    done = subprocess.run(run, input=(TWO_JOINTS + GOOD).encode(), capture_output=True, check=True)
     problems, seconds, megabytes = map(float, done.stdout.split())
     assert problems
     assert seconds < 10 * SLOWER
@@ -62,7 +68,7 @@ def test_a_monster_is_refused_within_10_s_and_500_mb(made: str) -> None:
 @pytest.mark.slow
 def test_a_stray_quotation_mark_in_every_row_is_named_within_10_s() -> None:
     run = [sys.executable, "-c", _READ, "stray quotes"]
-    done = subprocess.run(run, input=HEADER.encode(), capture_output=True, check=True)
+    done = subprocess.run(run, input=TWO_JOINTS.encode(), capture_output=True, check=True)
     problems, seconds, _ = map(float, done.stdout.split())
     assert problems >= 1
     assert seconds < 10 * SLOWER
@@ -71,7 +77,7 @@ def test_a_stray_quotation_mark_in_every_row_is_named_within_10_s() -> None:
 def test_thousands_of_rows_of_one_record_id_are_each_named_in_linear_time() -> None:
     rows = [f"R1,N{n},LH,RADIAL,0.013,0.00{n % 9}" for n in range(16_000)]
     # Lines as an old Macintosh ends them.
-    data = "\r".join([HEADER.strip(), *rows]).encode()
+    data = "\r".join([TWO_JOINTS.strip(), *rows]).encode()
     start = time.process_time()
     result = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv")
     assert time.process_time() - start < 10 * SLOWER
@@ -86,7 +92,7 @@ ENDLESS = ("\u0301" * 60_000, "1" * 5000, "0" * 5000 + "6", "1/" + "1" * 5000)
 @pytest.mark.parametrize("place", ["header", "tail_no", "margin_in", "restored_joints", "remarks"])
 def test_a_text_without_end_is_read_or_refused_in_linear_time(place: str, text: str) -> None:
     header, cell = (text, "0.06") if place == "header" else (place, text)
-    columns = dict(zip(HEADER.strip().split(","), GOOD.strip().split(","), strict=True))
+    columns = dict(zip(TWO_JOINTS.strip().split(","), GOOD.strip().split(","), strict=True))
     columns[header] = cell
     data = "\n".join(map(",".join, (columns, columns.values()))).encode()
     start = time.process_time()
@@ -97,7 +103,7 @@ def test_a_text_without_end_is_read_or_refused_in_linear_time(place: str, text: 
 
 @pytest.mark.parametrize("rows", [6_000, 99_000])
 def test_a_table_of_problems_only_is_refused_with_the_first_of_them(rows: int) -> None:
-    data = (HEADER + ",,,,,x\n" * rows).encode()
+    data = (TWO_JOINTS + ",,,,,x\n" * rows).encode()
     (problem,) = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv").problems
     assert problem.code == "problems_many"
     assert "the first in A2" in str(problem.value)
@@ -116,7 +122,7 @@ def fifo(tmp_path: Path) -> Path:
 
 
 def test_a_pipe_is_refused_as_argument_and_in_a_folder(fifo: Path) -> None:
-    (fifo.parent / "good.csv").write_text(HEADER + GOOD)
+    (fifo.parent / "good.csv").write_text(TWO_JOINTS + GOOD)
     for source in (fifo, fifo.parent, Path("/dev/zero")):
         result = read_many([source], ReadOptions())
         assert [(p.code, p.value) for p in result.problems] == [("file_kind", "a pipe or a device")]
@@ -137,7 +143,7 @@ STRANGE = ["\ufffe", "\x01", "\uffff"]
 @pytest.mark.parametrize("character", STRANGE)
 @pytest.mark.parametrize("column", ["record_id", "tail_no", "remarks", "gauge_id"])
 def test_a_character_that_no_file_can_carry_is_a_named_problem(character: str, column: str) -> None:
-    header = [*HEADER.strip().split(","), "gauge_id", "remarks"]
+    header = [*TWO_JOINTS.strip().split(","), "gauge_id", "remarks"]
     cells = [*GOOD.strip().split(","), "G", "fine"]
     cells[header.index(column)] = f"A{character}B"
     data = (",".join(header) + "\n" + ",".join(cells) + "\n").encode()
@@ -148,7 +154,7 @@ def test_a_character_that_no_file_can_carry_is_a_named_problem(character: str, c
 
 
 def test_a_column_of_the_user_s_own_keeps_such_a_character_visible() -> None:
-    data = (HEADER.strip() + ",tool\ufffebox\n" + GOOD.strip() + ",re\ufffed\n").encode()
+    data = (TWO_JOINTS.strip() + ",tool\ufffebox\n" + GOOD.strip() + ",re\ufffed\n").encode()
     (row,) = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv").rows
     assert isinstance(row, Inspection)
     assert dict(row.carried) == {"tool\\xfffebox": "re\\xfffed"}
@@ -176,7 +182,7 @@ def test_such_a_character_in_a_workbook_leaves_json_and_annotated_copy_whole(
 
 def test_a_file_name_that_is_not_text_is_shown_in_a_way_that_every_output_can_carry(tmp_path):
     name = os.fsencode(tmp_path) + b"/a\xff.csv"
-    Path(os.fsdecode(name)).write_text(HEADER + GOOD)
+    Path(os.fsdecode(name)).write_text(TWO_JOINTS + GOOD)
     result = read_many([Path(os.fsdecode(name))], ReadOptions())
     assert result.files[0].name.endswith("a\\xdcff.csv")
     result.files[0].name.encode("utf-8")
@@ -245,3 +251,120 @@ def test_what_would_pile_up_while_a_sheet_is_read_is_refused_within_10_s(
     assert problem.code == "file_too_large"
     assert "rows or texts" in problem.value or "one row or text" in problem.value
     assert time.process_time() - start < 10 * SLOWER
+
+
+MEASURE = """
+import json, sys, time
+start = time.process_time()
+from mlg_troubleshoot.records import ReadOptions, read_many
+result = read_many([sys.argv[1]], ReadOptions())
+judged = time.process_time() - start
+peak = int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0]) / 1024
+counts = len(result.inspections), len(result.problems)
+del result
+raw = library = None
+if sys.argv[1].endswith("xlsx"):
+    from mlg_troubleshoot.records.xlsx import XlsxFile
+    start = time.process_time()
+    rows = sum(1 for _ in XlsxFile(open(sys.argv[1], "rb").read()).sheets[0].rows())
+    raw = time.process_time() - start
+    import openpyxl
+    start = time.process_time()
+    book = openpyxl.load_workbook(sys.argv[1], read_only=True)
+    list(book.worksheets[0].iter_rows(values_only=True))
+    library = time.process_time() - start
+print(json.dumps([judged, peak, raw, library, *counts]))
+"""
+
+
+def write_workbook(path, package, rows):
+    """Write a large workbook by hand, which is quicker than by a library."""
+    from mlg_troubleshoot.records.cells import LETTERS
+
+    rng = random.Random(1)
+    lines = []
+    for number, written in enumerate([HEADER, *(row(n, rng, 0.0) for n in range(rows))], 1):
+        xml = "".join(
+            (
+                f'<c r="{LETTERS[i]}{number}" t="inlineStr"><is><t>{c}</t></is></c>'
+                if isinstance(c, str)
+                else f'<c r="{LETTERS[i]}{number}"><v>{c}</v></c>'
+            )
+            for i, c in enumerate(written)
+        )
+        lines.append(f'<row r="{number}">{xml}</row>')
+    path.write_bytes(package("".join(lines)))
+    assert zipfile.is_zipfile(path)
+
+
+def measure(path):
+    """Read a file in a fresh process and return the figures."""
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURE, str(path)], check=True, capture_output=True, timeout=300
+    )
+    return json.loads(done.stdout)
+
+
+@pytest.mark.slow
+def test_fifty_thousand_rows_of_forty_columns_are_read_in_time_and_memory(tmp_path, package):
+    path = tmp_path / "big.xlsx"
+    write_workbook(path, package, 50_000)
+    judged, peak, raw, library, rows, problems = measure(path)
+    print(
+        f"read and checked {judged:.1f} s, {peak:.0f} MB; reading alone {raw:.1f} s, openpyxl alone"
+        f" {library:.1f} s"
+    )
+    assert (rows, problems) == (50_000, 0)
+    assert judged < 4 * library
+    assert peak < 400
+    assert raw < library
+
+
+def csv_text(rows):
+    rng = random.Random(2)
+    return "\n".join(
+        ",".join(map(str, cells)) for cells in [HEADER, *(row(n, rng, 0.0) for n in range(rows))]
+    )
+
+
+def test_a_row_that_was_read_takes_two_and_a_half_thousand_bytes():
+    tables = [io.BytesIO(csv_text(800).encode()) for _time in range(2)]
+    # What is remembered of texts and formats is there already.
+    read_many(tables[:1], ReadOptions())
+    tracemalloc.start()
+    try:
+        read = read_many(tables[1:], ReadOptions())
+        assert len(read.rows) == 800
+        gc.collect()
+        assert tracemalloc.get_traced_memory()[0] < 800 * 2_500
+    finally:
+        tracemalloc.stop()
+
+
+def test_the_same_tail_in_many_rows_is_one_text():
+    first, second = read_many([io.BytesIO(csv_text(301).encode())], ReadOptions()).rows[::300]
+    assert first.tail_no is second.tail_no
+
+
+@pytest.mark.slow
+def test_ten_thousand_rows_of_csv_are_read_in_time(tmp_path):
+    path = tmp_path / "big.csv"
+    path.write_text(csv_text(10_000))
+    judged, peak, _, _, rows, problems = measure(path)
+    print(f"read and checked {judged:.1f} s, {peak:.0f} MB")
+    assert (rows, problems) == (10_000, 0)
+    assert judged < 6 * SLOWER
+
+
+def test_reading_a_table_loads_no_spreadsheet_library():
+    code = (
+        "import io, sys; from mlg_troubleshoot.records import ReadOptions,"
+        " read_many;"
+        "read_many([io.BytesIO(b'record_id,tail_no,side,clearance_3_in\\nR1,N1,LH,0.1\\n')],"
+        " ReadOptions());print([m for m in ('pandas', 'openpyxl', 'python_calamine') if m in"
+        " sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout.strip() == "[]"

@@ -5,7 +5,6 @@ finding.
 from __future__ import annotations
 
 import io
-from pathlib import Path
 
 import openpyxl
 import pytest
@@ -122,8 +121,8 @@ def test_words_without_a_reading_are_set_aside(name: str) -> None:
 
 @pytest.mark.parametrize(("cells", "code"), [("0.001", 0), ("0.0121", 1)])
 def test_what_was_set_aside_is_said_by_a_quiet_check_and_decides_its_exit_code(
-    tmp_path: Path, cells: str, code: int
-) -> None:
+    tmp_path, cells, code
+):
     header = "tail_no," + ",".join(f"clearance_{n}_in" for n in range(1, 11))
     file = tmp_path / "LH.csv"
     good = ",".join(["0.001"] * 10)

@@ -129,8 +129,8 @@ def test_a_long_table_repeats_its_header_on_each_page(judge, gear, provenance, t
 
 
 def test_a_batch_gets_its_summary_first_then_a_report_for_each_row_that_was_judged(
-    batch: list[Judgement], gear: Gear, tmp_path: Path
-) -> None:
+    batch, gear, tmp_path
+):
     seen: list[tuple[int, int]] = []
     written = write_reports(
         batch, gear, tmp_path, on_written=lambda done, total: seen.append((done, total))
@@ -195,8 +195,8 @@ def test_a_repair_hides_no_worse_inspection_of_its_day(judge: Judge) -> None:
 
 
 def test_a_gear_that_cannot_be_cleared_has_no_probability_that_would_clear_it(
-    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
+    judge, gear, provenance, tmp_path
+):
     open_joints = [
         judge({3: 0.001}, outcome=None, record_id=name, tail_no=name) for name in ("one", "two")
     ]

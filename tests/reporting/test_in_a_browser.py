@@ -9,7 +9,6 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
 from html import unescape
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from tests.cli.conftest import FLEET, mlg
 from tests.store.places import table
 from tests.store.test_history_commands import keep, visit
 
-from .conftest import FAILURE, SOUND, WORN, Judge, Made, write_reports
+from .conftest import FAILURE, SOUND, WORN, Made, write_reports
 
 pytestmark = pytest.mark.slow
 
@@ -138,8 +137,8 @@ def pages(pdf: bytes) -> int:
     "clearance", [FAILURE, WORN, SOUND, {1: 0.001}], ids=["failure", "worn", "sound", "incomplete"]
 )
 def test_chromium_prints_the_html_on_as_many_pages_as_the_pdf_has(
-    clearance: dict[int, float], page: str, judge: Judge, make: Callable[..., Made], tmp_path: Path
-) -> None:
+    clearance, page, judge, make, tmp_path
+):
     made = make(judge(clearance), page=page)
     (source,) = made.folder.glob("*.html")
     printed = tmp_path / "printed.pdf"

@@ -1,5 +1,5 @@
-"""The PDF: fonts inside, text to search, the same bytes every time, and no way out of
-the sandbox.
+"""The PDF: fonts inside, text to search, the same bytes every time, no way out of the sandbox, and
+a file name that is safe.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import re
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import closing
 from datetime import UTC, datetime
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -17,14 +18,16 @@ from pathlib import Path
 
 import pypdf
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import publish as pdf
 from mlg_troubleshoot.reporting.engine import check_fonts
-from mlg_troubleshoot.reporting.html import ReportProvenance, font_faces, provenance_of, render
+from mlg_troubleshoot.reporting.html import font_faces, provenance_of, render
 from mlg_troubleshoot.reporting.inspection_report import inspection_document
-from mlg_troubleshoot.reporting.publish import PdfEngine, PdfError
+from mlg_troubleshoot.reporting.publish import PdfEngine, PdfError, safe_stem
 
 from .conftest import FAILURE, Judge, Made, write_inspection_report
 
@@ -196,13 +199,8 @@ def test_an_engine_that_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize("formats", [("html", "pdf"), ("pdf",)])
 def test_without_an_engine_the_html_still_comes_and_a_note_says_how_to_print(
-    formats: tuple[str, ...],
-    judge: Judge,
-    gear: Gear,
-    provenance: ReportProvenance,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    formats, judge, gear, provenance, tmp_path, monkeypatch
+):
     monkeypatch.setattr(pdf, "engine_is_installed", lambda: False)
     written = write_inspection_report(
         judge(FAILURE), gear, tmp_path, provenance=provenance, formats=formats
@@ -213,3 +211,76 @@ def test_without_an_engine_the_html_still_comes_and_a_note_says_how_to_print(
     assert written.pdf is None
     assert written.html is not None
     assert written.html.is_file()
+
+
+@pytest.fixture
+def without_other_fonts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a computer that has no font for them: the PDF shows boxes."""
+    convert = PdfEngine.convert
+    monkeypatch.setattr(PdfEngine, "convert", lambda *given: (convert(*given)[0], True))
+
+
+@pytest.mark.usefixtures("without_other_fonts")
+def test_a_note_says_that_the_pdf_has_boxes_and_the_html_the_name(
+    judge, gear, provenance, tmp_path
+):
+    written = write_inspection_report(
+        judge(FAILURE, technician_id="김민수"),
+        gear,
+        tmp_path,
+        provenance=provenance,
+        formats=("pdf",),
+    )
+    assert "stand as boxes in the PDF" in written.notes[0]
+    assert written.html is not None
+    assert "김민수" in written.html.read_text(encoding="utf-8")
+
+
+def test_the_html_keeps_the_name_as_entered(judge: Judge, make: Callable[..., Made]) -> None:
+    assert "김민수" in make(judge(FAILURE, technician_id="김민수"), formats=("html",)).text
+
+
+def test_a_box_in_the_pdf_is_noticed() -> None:
+    # A private-use character that no font has.
+    with closing(PdfEngine()) as engine:
+        assert engine.convert(page_of("<p>a \U000f1234</p>"), "A4", NOW)[1]
+
+
+def test_ordinary_text_has_no_box(failure: Made) -> None:
+    assert not check_fonts(opened(failure.pdf))
+
+
+def test_ordinary_text_gives_no_note(judge, gear, provenance, tmp_path):
+    assert (
+        write_inspection_report(judge(FAILURE), gear, tmp_path, provenance=provenance).notes == ()
+    )
+
+
+@given(st.lists(st.one_of(st.none(), st.text()), min_size=1, max_size=4))
+def test_a_name_holds_letters_digits_and_hyphens_only(identity: list[str | None]) -> None:
+    assert re.fullmatch(r"[A-Za-z0-9-]{1,180}", safe_stem(*identity))
+
+
+@pytest.mark.parametrize("tail", ["../../x", "/etc/passwd", "C:\\x", "CON", "a\x00b", "..", ""])
+def test_a_report_stays_in_its_folder(tail: str, judge: Judge, make: Callable[..., Made]) -> None:
+    made = make(judge(FAILURE, tail_no=tail), formats=("html",))
+    assert len(list(made.folder.iterdir())) == 1
+    assert len(list(made.folder.parent.glob("*.html"))) == 0
+
+
+@given(st.lists(st.text(), min_size=2, max_size=2, unique=True))
+def test_different_texts_get_different_names(texts: list[str]) -> None:
+    assert safe_stem(texts[0]) != safe_stem(texts[1])
+
+
+def test_a_name_can_be_read_and_follows_from_the_fields() -> None:
+    name = safe_stem("N123AB", "LH", "R-1")
+    assert name.startswith("mlg-N123AB-LH-R-1-")
+    assert safe_stem("N123AB", "LH", "R-1") == name
+    assert safe_stem("a-", "b") != safe_stem("a", "-b")
+
+
+@pytest.mark.parametrize("wrong", [{"formats": ("docx",)}, {"page": "B7"}])
+def test_an_unknown_format_or_paper_is_refused(wrong, judge, make):
+    with pytest.raises(UsageError, match=r"docx|B7"):
+        make(judge(FAILURE), **wrong)

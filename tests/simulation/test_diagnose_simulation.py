@@ -10,7 +10,6 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import SimulationDiagnosis, Suspect, Verdict, diagnose_simulation
 from mlg_troubleshoot.errors import TroubleshootError
-from mlg_troubleshoot.misfit.simulation import Predict
 from tests.simulation.rigs import RIGS, Rig, readings, slider_crank, thermal, two_link
 
 
@@ -238,8 +237,8 @@ def test_what_helps_no_other_group_is_not_named_however_clearly_it_stands_out() 
 
 @pytest.mark.parametrize(("steps", "size", "found_too"), [(40, 0.02, False), (150, 0.06, True)])
 def test_what_is_small_beside_an_unlisted_curve_is_found_where_it_alternates_often_enough(
-    steps: int, size: float, found_too: bool
-) -> None:
+    steps, size, found_too
+):
     rng = np.random.default_rng(20)
     x, way = np.repeat(np.linspace(-1.0, 1.0, steps), 2), np.tile([-1.0, 1.0], steps)
     read = x + 0.5 * np.sin(5.0 * x) + size * way + 0.01 * rng.standard_normal(2 * steps)
@@ -414,7 +413,7 @@ def test_times_may_have_a_zone() -> None:
     ],
 )
 def test_another_form_of_simulation_or_suspects_is_refused_with_the_form_to_use(
-    predict: Predict, suspects: list[Suspect], says: str
-) -> None:
+    predict, suspects, says
+):
     with pytest.raises(TroubleshootError, match=says):
         diagnose_simulation(predict, FORCE, suspects)

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Outcome, Side
-from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.store import (
     Record,
     RecordKind,
@@ -87,20 +86,6 @@ def test_reading_makes_no_file(place: Path) -> None:
     assert not place.exists()
 
 
-def test_a_file_that_is_not_a_store_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text(
-        "no store at all, but a long enough text to be read as one" * 30
-    )
-    with pytest.raises(StoreError, match="not a database"):
-        Store(tmp_path / "notes.txt").gears()
-
-
-@pytest.mark.parametrize("url", ["mysql://host/db", "what://ever", "postgresql+nodriver://host/db"])
-def test_a_place_that_no_store_can_be_at_is_refused(url: str) -> None:
-    with pytest.raises(UsageError, match="store"):
-        Store(url)
-
-
 @pytest.mark.parametrize(
     "change", ["UPDATE mlg_records SET side = 'RH'", "DELETE FROM mlg_records"]
 )
@@ -111,10 +96,6 @@ def test_the_database_itself_refuses_to_change_a_record(store, place, change):
         pytest.raises(sqlite3.IntegrityError, match="only ever added"),
     ):
         raw.execute(change)
-
-
-def test_an_untouched_chain_fits(store: Store) -> None:
-    assert store.verify() == (10, None)
 
 
 COLUMNS = (
@@ -159,16 +140,6 @@ def test_a_changed_byte_in_any_field_is_found_and_its_record_named(store, place,
     assert store.verify() == (10, None)
 
 
-def test_a_record_that_was_taken_out_is_missed(store: Store, place: Path) -> None:
-    with closing(sqlite3.connect(place)) as raw, raw:
-        raw.execute("DROP TRIGGER mlg_no_delete")
-        raw.execute("DELETE FROM mlg_records WHERE seq = 4")
-    count, broken = store.verify()
-    assert count == 3
-    assert broken is not None
-    assert "record 4 is missing" in broken.why
-
-
 def test_an_exported_chain_comes_back_whole(store: Store, tmp_path: Path) -> None:
     other = Store(tmp_path / "other.sqlite")
     assert other.restore(store.export(), "chain").new == 10
@@ -186,12 +157,6 @@ def test_the_rest_of_a_chain_is_added_to_its_beginning(store: Store, tmp_path: P
     beginning = Store(tmp_path / "other.sqlite")
     beginning.restore(list(store.export())[:4], "chain")
     assert beginning.restore(store.export(), "chain").new == 6
-
-
-def test_an_export_in_which_a_word_was_changed_is_refused(store: Store, tmp_path: Path) -> None:
-    lines = [line.replace('"N3"', '"N4"') for line in store.export()]
-    with pytest.raises(StoreError, match="line 5"):
-        Store(tmp_path / "other.sqlite").restore(lines, "chain")
 
 
 def test_a_store_of_a_newer_schema_is_refused(store: Store, place: Path) -> None:
@@ -213,17 +178,12 @@ def test_a_store_of_each_schema_version_can_be_read_and_added_to(version, tmp_pa
     assert store.verify() == (8, None)
 
 
-def test_a_repair_kept_twice_is_one(store: Store) -> None:
-    repair = Record(RecordKind.REPAIR, "", "N1", "LH", "2026-03-01", places.packed({"joints": [3]}))
-    assert [store.add([repair]).new for _ in range(2)] == [1, 0]
-
-
 @pytest.mark.parametrize(
     ("written", "instead"), [('"day":"2026-01-04"', '"day":"2026-01-05"'), ("größer", "kleiner")]
 )
 def test_an_export_whose_columns_or_content_alone_were_changed_is_refused(
-    store: Store, tmp_path: Path, written: str, instead: str
-) -> None:
+    store, tmp_path, written, instead
+):
     told = [json.dumps(part)[1:-1] if part.isalpha() else part for part in (written, instead)]
     lines = [
         line.replace(*told, 1) if line.startswith('{"body"') else line for line in store.export()

@@ -253,18 +253,6 @@ def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(tmp_path, pla
     assert sorted(map(float, page.mediabox[2:])) == [612.0, 792.0]
 
 
-def test_verify_says_what_fits_and_names_what_does_not(tmp_path: Path, place: Path) -> None:
-    seeded((1, 0.001), (2, 0.002))
-    assert mlg("history", "verify").out.startswith("4 records fit the chain.\n")
-    data = bytearray(place.read_bytes())
-    at = data.rindex(b"N123-LH-2")
-    data[at] = ord("M")
-    place.write_bytes(data)
-    run = mlg("history", "verify")
-    assert run.code == 1
-    assert "M123-LH-2" in run.out
-
-
 def test_an_export_is_imported_with_its_chain(tmp_path: Path, place: Path) -> None:
     seeded((1, 0.001), (2, 0.002))
     repair("2024-08-01", 810)
@@ -310,22 +298,6 @@ def test_an_empty_store_says_how_to_keep(place: Path) -> None:
     assert "--keep" in run.out
 
 
-def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(tmp_path, place):
-    keep(
-        tmp_path,
-        visit(1, 0.013),
-        visit(2, 0.001),
-        visit(1, 0.001, side="RH"),
-        visit(2, 0.013, side="RH"),
-    )
-    told = mlg("fleet", "--json", "--no-forecast").json
-    assert [(g["tail_no"], g["side"], g["verdict"], g["record_id"]) for g in told["gears"]] == [
-        ("N123", "RH", "OUTSIDE_MARGIN", "N123-RH-2"),
-        ("N123", "LH", "WITHIN_MARGIN", "N123-LH-2"),
-    ]
-    assert told["gears"][0]["worst_joint"] == 3
-
-
 def test_a_fleet_without_landings_has_no_forecast_and_says_null(tmp_path, place):
     keep(tmp_path, {k: v for k, v in visit(1, 0.001).items() if k != "gear_landings"})
     assert mlg("fleet", "--no-forecast").out.startswith("The most urgent gear first.")
@@ -342,31 +314,6 @@ def test_a_gear_that_wears_faster_is_due_earlier(tmp_path: Path, place: Path) ->
     gears = {g["side"]: g for g in mlg("fleet", "--json").json["gears"]}
     assert gears["RH"]["next_inspection_landings"] < gears["LH"]["next_inspection_landings"]
     assert gears["RH"]["landings_to_limit"]["p50"] < gears["LH"]["landings_to_limit"]["p50"]
-
-
-@pytest.mark.slow
-def test_a_joint_read_over_its_limit_has_no_landings_left(tmp_path: Path, place: Path) -> None:
-    keep(
-        tmp_path,
-        visit(1, 0.001),
-        visit(2, 0.001),
-        visit(1, 0.001, side="RH"),
-        visit(2, 0.013, side="RH"),
-    )
-    worst = mlg("fleet", "--json").json["gears"][0]
-    assert (worst["landings_to_limit"]["p50"], worst["next_inspection_landings"]) == (0.0, 0.0)
-
-
-@pytest.mark.slow
-def test_a_missed_restoration_is_suggested(tmp_path: Path, place: Path) -> None:
-    others = [
-        visit(n, 0.0005 + 0.001 * n + i * 0.0001, tail=f"N{i}") for i in range(8) for n in range(5)
-    ]
-    worn = [visit(n, 0.0005 + 0.0014 * n) for n in range(5)]
-    keep(tmp_path, *others, *worn, visit(5, 0.0005))
-    notes = mlg("fleet").err
-    assert "N123 LH: #3 read much tighter than before" in notes
-    assert notes.count("read much tighter") == 1
 
 
 def test_the_fleet_page_has_a_line_a_gear_that_links_to_its_life(tmp_path, place):

@@ -110,8 +110,8 @@ EVERY_DAY = {*OTHERS, "a list", "a clearance below zero"}
     "name", [pytest.param(n, marks=() if n in EVERY_DAY else pytest.mark.slow) for n in EVIL]
 )
 def test_wrong_content_that_stands_in_a_store_ends_no_command_with_an_internal_error(
-    tmp_path: Path, place: Path, name: str
-) -> None:
+    tmp_path, place, name
+):
     Store(place).add([evil(name)])
     day = ("--date", "2026-02-01")
     for command in (
@@ -131,8 +131,8 @@ def test_wrong_content_that_stands_in_a_store_ends_no_command_with_an_internal_e
 
 @pytest.mark.parametrize("name", EVIL)
 def test_a_record_that_cannot_be_read_is_not_imported_named_by_verify_and_put_aside_by_voiding_it(
-    tmp_path: Path, place: Path, name: str
-) -> None:
+    tmp_path, place, name
+):
     Store(place).add([evil(name)])
     new = ("--store", tmp_path / "new.sqlite")
     (tmp_path / "evil.jsonl").write_text("".join(Store(place).export()), encoding="utf-8")
@@ -239,8 +239,8 @@ def test_a_record_that_cannot_be_read_is_named_with_what_to_do(place, change, co
 
 @pytest.mark.parametrize("change", BROKEN)
 def test_a_chain_that_does_not_fit_is_found_nothing_is_kept_on_it_and_it_is_not_exported(
-    tmp_path: Path, place: Path, change: str
-) -> None:
+    tmp_path, place, change
+):
     statement, values = BROKEN[change]
     tampered(place, statement, *values)
     assert mlg("history", "verify").code == 1
@@ -261,8 +261,8 @@ def test_of_a_long_chain_the_newest_records_are_walked_before_another_is_added(p
 
 
 def test_of_a_long_chain_an_old_record_that_was_taken_away_is_missed_by_the_count(
-    place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    place, monkeypatch
+):
     monkeypatch.setattr("mlg_troubleshoot.store.database._NEWEST", 2)
     tampered(place, "DELETE FROM mlg_records WHERE seq = ?", 2)
     with pytest.raises(StoreError, match="it holds 5 records, and the last one is number 6"):

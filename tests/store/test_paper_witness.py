@@ -122,8 +122,8 @@ TAMPERS: tuple[Tamper, ...] = (_cut_back, _take_one, _change_one)
 @pytest.mark.parametrize("times", [8, pytest.param(120, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("tamper", TAMPERS)
 def test_a_log_that_was_cut_back_or_changed_is_found_by_any_report(
-    kept: Path, tmp_path: Path, gear: Gear, tamper: Tamper, times: int
-) -> None:
+    kept, tmp_path, gear, tamper, times
+):
     draw = random.Random(f"{tamper.__name__} {times}")
     some = reports(kept)
     count = Store(kept / "store.sqlite").head()[0]

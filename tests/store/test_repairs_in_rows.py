@@ -32,23 +32,6 @@ def history(tmp_path: Path) -> Path:
     )
 
 
-def next_of(history: Path) -> dict[str, str]:
-    found = mlg("check", history, "--json").json["inspections"]
-    return {each["record_id"]: each["next_action"]["action"] for each in found}
-
-
-def test_a_row_below_the_repair_of_its_gear_is_not_judged_by_what_is_older(history: Path) -> None:
-    assert next_of(history)["below"] == "READ_PLUNGER"
-
-
-def test_a_row_above_the_repair_is_judged_as_it_was_then(history: Path) -> None:
-    assert next_of(history)["before"] in ("RESTORE", "MEASURE", "MEASURE_AGAIN", "CHECK_RIGGING")
-
-
-def test_a_failure_after_the_repair_is_a_new_one(history: Path) -> None:
-    assert next_of(history)["later"] != "READ_PLUNGER"
-
-
 def test_a_repair_that_a_row_states_is_kept_once_with_the_row(history, tmp_path):
     place = str(tmp_path / "store.sqlite")
     for _ in range(2):

@@ -134,8 +134,8 @@ def test_a_plunger_reading_from_before_a_repair_stands_no_more(at: At) -> None:
 
 @pytest.mark.parametrize(("reading_in", "stands"), [(FAR, True), (0.002, False)])
 def test_a_plunger_reading_of_the_day_of_a_repair_counts_only_beyond_the_margin(
-    at: At, reading_in: float, stands: bool
-) -> None:
+    at, reading_in, stands
+):
     found = at(of(FEB, readings_in=(reading_in,)), repaired(FEB, 3), of(MAR, {3: SOUND}))
     assert bool(found.inspection.readings_in) is stands
 

@@ -43,8 +43,8 @@ def test_eq_9_misses_a_moving_pivot_by_less_than_a_twentieth(growth: Amplificati
 
 
 def test_the_stage_of_a_current_clearance_is_the_cosecant_of_the_angle_between_the_links(
-    gear: Gear, growth: Amplification
-) -> None:
+    gear, growth
+):
     place = {p.name: np.array([p.x, p.y]) for p in gear.reference.mechanism.points}
     expected = csc(place["5"] - place["3"], place["4"] - place["5"])
     assert growth.local_stage[2] == pytest.approx(float(expected), rel=1e-9)

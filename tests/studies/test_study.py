@@ -21,7 +21,6 @@ from mlg_troubleshoot.indices.index_table import (
     write_index_table,
 )
 from mlg_troubleshoot.indices.variance import (
-    HeldDirections,
     Response,
     TensorIndices,
     group_indices,
@@ -161,8 +160,8 @@ def test_three_gauss_points_are_enough_for_the_linkage(gear, response):
 
 
 def test_directions_found_anew_for_every_sample_change_the_displacement_by_less_than_1e_5_in(
-    gear: Gear, response: HeldDirections
-) -> None:
+    gear, response
+):
     clearance = gear.limits_in * np.random.default_rng(0).random((500, 10))
     anew = worst_case(gear.model, clearance).magnitude_in
     assert np.abs(anew - response(clearance)).max() < 1e-5

@@ -127,8 +127,8 @@ def ends(level: float, drift: float, draws: Draws, n: int) -> _Ends:
 
 @pytest.mark.parametrize(("increment_sd", "wander_sd"), [(0.4, 0.0), (0.0, 0.7), (0.3, 0.5)])
 def test_a_path_is_followed_with_the_variance_of_its_increments_and_of_its_wandering_drift(
-    increment_sd: float, wander_sd: float
-) -> None:
+    increment_sd, wander_sd
+):
     draws = parameters(increment_sd=increment_sd, wander_sd=wander_sd, power=1.0)
     [found] = ends(0.3, 0.8, draws, 100_000).follow(
         np.array([[2.5]]), np.array([0.5]), np.array([0.0]), _Streams(1), reading=False
