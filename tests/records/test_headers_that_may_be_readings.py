@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from typing import Any
 
 import openpyxl
 import pytest
@@ -24,8 +25,12 @@ GOOD = ["R1", "N1", "LH", "RADIAL", *["0.001"] * 10]
 NEGATED = (
     *("not_retracted", "Not retracted", "Not-retracted", "Not\u2010retracted", "NOT RETRACTED?"),
     *("not retracted (y/n)", "Not_retracted_y_n", "Failed?", "failed_(y/n)", "Gear failed [Y/N]"),
+    "Failed to retract?",
 )
-AFFIRMED = ("retracted", "Retracted?", "gear_retracted", "retracted (y/n)", "Retracted yes/no")
+AFFIRMED = (
+    *("retracted", "Retracted?", "gear_retracted", "retracted (y/n)", "Retracted yes/no"),
+    "Did the gear retract?",
+)
 # Headers of a column that only travels to the report, whatever is in it.
 CARRIED = (
     *("Result 2026", "Retraction 1", "Result (2nd try)", "status 2", "remarks", "Ergebnis 3"),
@@ -47,12 +52,11 @@ MARGINS = (
 )
 
 
-def crossed(header: Sequence[str], **by_name: Sequence[str]) -> pytest.MarkDecorator:
+def pairs(header: Sequence[str], values: Sequence[str]) -> list[Any]:
     """Each header with a value and each value with a header every day, all pairs in the slow
     part.
     """
-    [(name, values)] = by_name.items()
-    pairs = [
+    return [
         pytest.param(
             each,
             value,
@@ -61,7 +65,11 @@ def crossed(header: Sequence[str], **by_name: Sequence[str]) -> pytest.MarkDecor
         for k, each in enumerate(header)
         for at, value in enumerate(values)
     ]
-    return pytest.mark.parametrize(("header", name), pairs)
+
+
+def crossed(header: Sequence[str], **by_name: Sequence[str]) -> pytest.MarkDecorator:
+    [(name, values)] = by_name.items()
+    return pytest.mark.parametrize(("header", name), pairs(header, values))
 
 
 def judged(headers: list[str], cells: list[str], **declared: object) -> Judgement:
@@ -77,11 +85,12 @@ def read(headers: list[str], rows: list[list[str]]) -> ReadResult:
     return read_many([Named("\n".join(lines).encode(), "t.csv")], ReadOptions.of(GEAR))
 
 
-@crossed(header=[*NEGATED, *AFFIRMED], answer=["yes", "TRUE", "1", "y"])
+@crossed(header=[*NEGATED, *AFFIRMED], answer=["yes", "TRUE", "1", "no", "N"])
 def test_a_question_is_answered_as_it_was_asked(header: str, answer: str) -> None:
     (row,) = read([*ALL, header], [[*GOOD, answer]]).rows
     assert isinstance(row, Inspection)
-    assert row.outcome is (Outcome.FAILED if header in NEGATED else Outcome.RETRACTED)
+    has_failed = (header in NEGATED) is (answer not in ("no", "N"))
+    assert row.outcome is (Outcome.FAILED if has_failed else Outcome.RETRACTED)
 
 
 @crossed(
@@ -159,26 +168,20 @@ def test_a_bare_number_that_could_decide_is_asked_about_under_any_header(header,
     assert [each.verdict for each in result.judgements] == [Verdict.INCOMPLETE]
 
 
-@crossed(header=PLUNGER, value=["0.06", "0.06 in", "1.5 mm"])
-def test_a_number_that_may_be_of_the_plunger_is_asked_about(header: str, value: str) -> None:
-    assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
+# Under any header a length with its unit.
+UNKNOWN = ("プランジャ", "stantuffo", "check", "x", "P")
 
 
-@crossed(header=JOINTS, value=["0.0121", "0.0121 in", "12.1 thou", "0.31"])
-def test_a_number_that_may_be_a_clearance_is_asked_about(header: str, value: str) -> None:
-    assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
-
-
-@crossed(header=MARGINS, value=["0.005", "5 thou", "0.12 mm"])
-def test_a_number_that_may_be_the_margin_of_the_gear_is_asked_about(header, value):
-    assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
-
-
-@crossed(
-    header=["プランジャ", "stantuffo", "check", "x", "P"],
-    value=["0.06 in", "60 thou", '.06"', "1.5 mm"],
+@pytest.mark.parametrize(
+    ("header", "value"),
+    [
+        *pairs(PLUNGER, ["0.06", "0.06 in", "1.5 mm"]),
+        *pairs(JOINTS, ["0.0121", "0.0121 in", "12.1 thou", "0.31"]),
+        *pairs(MARGINS, ["0.005", "5 thou", "0.12 mm"]),
+        *pairs(UNKNOWN, ["0.06 in", "60 thou", '.06"', "1.5 mm"]),
+    ],
 )
-def test_a_length_with_its_unit_is_asked_about_under_any_header(header: str, value: str) -> None:
+def test_a_number_that_may_be_of_plunger_joint_or_margin_is_asked_about(header, value):
     assert judged([header], [value]).verdict is not Verdict.WITHIN_MARGIN
 
 

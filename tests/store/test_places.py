@@ -249,20 +249,6 @@ def test_who_and_where_a_store_is_stays_readable_and_its_passwords_are_masked() 
     assert shown == f"postgresql+psycopg://anna:***@{AWAY}?password=***&sslmode=require"
 
 
-@pytest.mark.parametrize(
-    "url",
-    [
-        "postgresql+psycopg://anna:S3cret9@127.0.0.1:notaport/mlg",
-        f"postgresql+nosuch://anna@{AWAY}",
-        f"postgresql+psycopg://anna:x@y@{AWAY}",
-    ],
-)
-def test_a_url_that_cannot_be_meant_is_a_usage_error(url: str) -> None:
-    run = mlg("history", "--store", url)
-    assert run.code == 2
-    assert "What to do:" in run.err
-
-
 def test_a_server_that_cannot_be_reached_is_not_a_usage_error() -> None:
     with pytest.raises(StoreError):
         Store(f"postgresql+psycopg://anna@{AWAY}", patience_s=1).gears()
