@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import json
+import tempfile
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -103,17 +105,26 @@ FLEETS: dict[str, dict[str, Any]] = {
 }
 
 
+@cache
+def diagnosed(fleet: str) -> tuple[Any, Any]:
+    """The JSON of a diagnosis, and the extension that it writes if it names a cause."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, extension = Path(folder) / "measured.csv", Path(folder) / "e.toml"
+        write_csv(draw_fleet(3, rows=60, **FLEETS[fleet]), path)
+        found = mlg("diagnose", path, "--json", "--write-extension", extension).json
+        return found, as_read(extension) if extension.exists() else None
+
+
 @pytest.mark.parametrize("fleet", FLEETS)
-def test_every_diagnosis_fits_its_schema(fleet: str, tmp_path: Path) -> None:
-    path = tmp_path / "measured.csv"
-    write_csv(draw_fleet(3, rows=60, **FLEETS[fleet]), path)
-    assert complain("diagnose", mlg("diagnose", path, "--json").json) == []
+def test_every_diagnosis_and_its_extension_fit_their_schemas(fleet: str) -> None:
+    found, extension = diagnosed(fleet)
+    assert complain("diagnose", found) == []
+    assert (extension is not None) == (fleet == "one cause")
+    assert extension is None or complain("extension", extension) == []
 
 
-def test_causes_that_rows_cannot_tell_apart_share_the_probability_of_their_class(tmp_path):
-    path = tmp_path / "measured.csv"
-    write_csv(draw_fleet(3, rows=60, **FLEETS["aliased"]), path)
-    found = mlg("diagnose", path, "--json").json["also_possible"]
+def test_causes_that_rows_cannot_tell_apart_share_the_probability_of_their_class() -> None:
+    found = diagnosed("aliased")[0]["also_possible"]
     first, second = (each["probability"] for each in found[:2])
     assert found[0]["class_probability"] == pytest.approx(found[1]["class_probability"])
     assert found[0]["class_probability"] > max(first, second) + 0.2
@@ -222,14 +233,6 @@ def as_read(path: Path) -> Any:
 )
 def test_the_shipped_files_fit_the_schema_of_their_kind(name: str, end: str, gear: Gear) -> None:
     assert complain(name, as_read(gear.path.with_name(gear.path.stem + end))) == []
-
-
-def test_an_extension_that_was_written_fits_the_schema_of_its_kind(tmp_path: Path) -> None:
-    data = tmp_path / "measured.csv"
-    write_csv(draw_fleet(3, rows=60, **FLEETS["one cause"]), data)
-    extension = tmp_path / "e.toml"
-    mlg("diagnose", data, "--write-extension", extension)
-    assert complain("extension", as_read(extension)) == []
 
 
 def test_a_gear_file_that_is_refused_does_not_fit_its_schema(gear: Gear) -> None:
