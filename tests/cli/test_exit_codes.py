@@ -1,4 +1,4 @@
-"""Exit codes of the contract: 0 · 1 · 2 · 3 · 5 · 70 · 130."""
+"""Exit codes of the contract, 0 · 1 · 2 · 3 · 5 · 70 · 130, and what else a check writes."""
 
 from __future__ import annotations
 
@@ -106,3 +106,61 @@ def test_an_interrupt_exits_130(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(task, "check_files", interrupted)
     found = mlg("check", FAILURE)
     assert (found.code, found.err.strip()) == (130, "Interrupted.")
+
+
+TIGHT = {f"clearance_{joint}_in": "0.0005" for joint in range(1, 11)}
+
+
+@pytest.mark.parametrize(
+    ("header", "cell"),
+    [
+        ("Failed?", "yes"),
+        ("Result 2", "FAILED"),
+        ("Outcome (cold)", "failed"),
+        ("Retracted?", "no"),
+    ],
+)
+def test_a_failure_next_to_a_stated_retraction_is_not_overlooked(table, header, cell):
+    found = mlg("check", table(row(**TIGHT, outcome="RETRACTED", **{header: cell})), "--json")
+    assert found.code != 0
+    assert found.one["verdict"] == "INCOMPLETE"
+
+
+@pytest.mark.parametrize(
+    ("header", "cell"), [("Plunger reading 2", "0,041"), ("play 3 recheck", "0,013")]
+)
+def test_a_decimal_comma_in_a_column_that_may_be_a_reading_is_asked_about(table, header, cell):
+    found = mlg("check", table(row(**TIGHT, outcome="RETRACTED", **{header: cell})), "--json")
+    assert (found.code, found.one["verdict"]) == (1, "INCOMPLETE")
+
+
+def test_every_data_row_stands_exactly_once_even_if_it_is_bad(table: Table) -> None:
+    rows = [
+        row(record_id="A", side=""),
+        row(record_id="B", clearance_3_in="worn"),
+        row(record_id=""),
+        row(),
+    ]
+    found = mlg("check", table(*rows), "--json").json["inspections"]
+    assert [i["record_id"] for i in found] == ["A", "B", None, "R1"]
+
+
+def test_every_gear_of_a_batch_has_its_repair_sets(table: Table) -> None:
+    path = table(row(clearance_3_in="0.013"), row(record_id="R2"))
+    worn, sound = mlg("check", path, "--json").json["inspections"]
+    assert worn["repair_sets"][0]["joints"] == [3]
+    assert sound["repair_sets"] == []
+
+
+@pytest.mark.parametrize("chosen", [("html",), ("pdf",), ("html", "pdf")])
+def test_a_report_has_the_formats_that_are_chosen(chosen, tmp_path):
+    formats = [word for each in chosen for word in ("--format", each)] if len(chosen) < 2 else ()
+    mlg("check", FAILURE, *formats, "--report", tmp_path / "new" / "folder")
+    assert {path.suffix[1:] for path in (tmp_path / "new" / "folder").iterdir()} == {*chosen}
+
+
+def test_no_displacement_is_minus_zero(table: Table) -> None:
+    nothing = {f"clearance_{n}_in": "" for n in range(1, 11)}
+    found = mlg("check", table(row(**nothing, plunger_displacement_in="0")), "--json").out
+    assert '"predicted_displacement_in"' in found
+    assert "-0.0" not in found

@@ -14,12 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from threadpoolctl import threadpool_info
 
+from mlg_troubleshoot.decision import judge_rows
 from mlg_troubleshoot.decision.assessment import Judgement
 from mlg_troubleshoot.parallel import map_blocks
 from mlg_troubleshoot.workers import WorkerProcesses
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.check import BlockOutput, CheckOptions, check_files
+from tests.decision.conftest import inspected
 
 ROOT = Path(__file__).parents[2]
 BATCH = ROOT / "inspection_data" / "fleet_batch.csv"
@@ -186,3 +189,16 @@ def test_the_page_on_clusters_finds_the_same_on_two_dask_workers(cluster, tmp_pa
     alone = check_files([table.name])
     assert len(found.judgements) == 552
     assert task.json_lines(found.judgements) == task.json_lines(alone.judgements)
+
+
+def test_matrix_products_of_a_judgement_wait_for_no_other_threads(gear, table, monkeypatch):
+    seen: list[int] = []
+    judge = judge_rows._assess_valid
+
+    def watched(*given: Any) -> Any:
+        seen.extend(of["num_threads"] for of in threadpool_info() if of["user_api"] == "blas")
+        return judge(*given)
+
+    monkeypatch.setattr(judge_rows, "_assess_valid", watched)
+    judge_rows.assess([inspected({3: 0.013})], gear, table)
+    assert set(seen) == {1}

@@ -1,5 +1,5 @@
-"""Tables of all kinds of fleets, with columns, rows and cells missing or wrong: diagnosed, or
-refused in words.
+"""Tables of all kinds, with columns, rows and cells missing or wrong, or with what nobody listed:
+diagnosed, or refused in words.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import pytest
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 
-from . import departures
+from . import departures, unforeseen
 from .simulator import linkage, simulate_fleet
 from .simulator.records import write_csv
 
@@ -73,3 +73,17 @@ def test_any_table_is_diagnosed_or_refused_without_a_warning(first: int, tmp_pat
         except TroubleshootError as refused:
             assert refused.remedy, seed
     assert diagnosed > 5
+
+
+EVERY_DAY = ("humidity", "bent_link", "nothing")
+ALL = [
+    pytest.param(kind, marks=() if kind in EVERY_DAY else pytest.mark.slow)
+    for kind in unforeseen.KINDS
+]
+
+
+@pytest.mark.parametrize("kind", ALL)
+def test_what_is_hidden_is_found_by_its_column_or_name_and_rough_data_name_nothing(kind):
+    found = unforeseen.run((64_100_002, kind))
+    other = "in the set" if unforeseen.KINDS[kind][1] else "alarm"
+    assert found["grade"] in {"right", other}, found
