@@ -273,8 +273,9 @@ def test_what_to_inspect_stands_on_the_front(named: Made) -> None:
 def test_a_fault_stands_with_what_was_written_and_what_was_used(gear: Gear, make: Make) -> None:
     table = fleet(gear.model)
     table.readings_in[30, 0] *= 25.4
-    (fault,) = make(table).diagnosis.faults
-    assert f"{fault.value} {fault.suggested} millimetres entered as inches" in make(table).text
+    made = make(table)
+    (fault,) = made.diagnosis.faults
+    assert f"{fault.value} {fault.suggested} millimetres entered as inches" in made.text
 
 
 @pytest.mark.parametrize(
