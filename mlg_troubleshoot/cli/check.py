@@ -12,7 +12,7 @@ from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.options import ReportFormat
 
 EPILOG = (
-    "Examples: mlg check; mlg check N123AB LH; mlg check inspections.xlsx --report out; mlg"
+    "Examples: mlg check; mlg check N123AB LH; mlg check a.xlsx --report out; mlg"
     " check --tail N123 --side LH --convention RADIAL --set 3=0.013in --set outcome=FAILED"
 )
 # What --help shows; --help-all shows every option.

@@ -159,7 +159,7 @@ class Run:
         against = self._keep((), found.entries)
         if wanted.report is not None:
             self.write_reports(result, wanted.report, unit)
-        if not (wanted.keep or wanted.quiet or wanted.as_json):
+        if found.lines and not (wanted.keep or wanted.quiet or wanted.as_json):
             output.say("Not kept: --keep adds these inspections to the records.")
         if result.problems and not wanted.as_json and not found.lines:
             output.say("No row could be judged.")

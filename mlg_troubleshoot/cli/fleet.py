@@ -13,7 +13,7 @@ from mlg_troubleshoot.cli import history, options, output
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.units import LengthUnit
 
-EPILOG = "Example: mlg fleet; mlg fleet --since 2026-05-01; mlg fleet --joint 3 --within 300"
+EPILOG = "Example: mlg fleet; mlg fleet --since 2026-05-01; mlg fleet --within 300"
 
 
 def _day(text: str) -> str:

@@ -163,7 +163,7 @@ def _surely_above(
 def _places(over: Mask, contribution: Array, total_order: Array) -> Places:
     """Place of each joint on each linkage, from 1."""
     # Rounded: both ends of one link contribute alike, and rounding noise must not order them.
-    keys = (-np.round(total_order, 6), -np.round(contribution, 9), ~over)
+    keys = (-total_order, -np.round(contribution, 9), ~over)
     order = np.lexsort([np.broadcast_to(key, contribution.shape) for key in keys], axis=-1)
     return np.argsort(order, axis=-1) + 1
 
@@ -290,7 +290,8 @@ def assess(
     fleet: Fleet | None = None,
 ) -> tuple[Judgement, ...]:
     """Judge rows: verdict, plan and allowances; with `advice` re-rigging and the joints that are
-    likely worn, with `sets` the repair sets. `fleet` is what other gears teach.
+    likely worn, with `sets` the repair sets and what follows each outcome of NEXT. `fleet` is what
+    other gears teach.
     """
     valid = [row for row in rows if isinstance(row, Inspection)]
     # Gears of which the same is known are judged once; to an extension it matters whose they are.
@@ -312,7 +313,7 @@ def assess(
                 extended = _assess_valid(replace(cases, extension=extension), table, advice, sets)
                 approval = extension.approval
                 part = [_worse(*both, approval) for both in zip(part, extended, strict=True)]
-            if advice:
+            if sets:
                 judge = partial(_assess_valid, table=table, advice=False, sets=False)
                 part = with_consequences(part, cases, judge)
             found += part
@@ -474,8 +475,9 @@ def _assessment(
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.lower, cases, i) if known else None
-    size = abs(float(cases.plunger_in[i]))
-    most = _explained_at_most(cases, judged.upper, i)
+    measured = inspection.measured_displacement_in
+    size = math.nan if measured is None else measured
+    most = _explained_at_most(size, judged.upper, i)
     detail = _detail(cases, judged, i, budget, belief) if belief is not None and closes else {}
     found = Assessment(
         inspection=inspection,
@@ -506,7 +508,7 @@ def _assessment(
         basis=judged.bases[i],
         bound_in=number_or_none(lower.bound_in[i] + 0.0, True),
         explained_at_most_in=number_or_none(most),
-        unexplained_in=number_or_none(size - most),
+        unexplained_in=number_or_none(abs(size) - most),
         headline="",
         alarm=sentences.alarms(
             [f.joint for f in findings if f.over_limit], failed=bool(cases.failed[i])
@@ -518,11 +520,10 @@ def _assessment(
     return replace(found, headline=_headline(found, cases, i))
 
 
-def _explained_at_most(cases: Cases, upper: Prediction, i: int) -> float:
+def _explained_at_most(measured: float, upper: Prediction, i: int) -> float:
     """What of a measured displacement the joints explain at most, unmeasured ones at their limit.
     [in]
     """
-    measured = float(cases.plunger_in[i])
     worst = upper.worst
     bound = float(worst.over_in[i] if measured > 0.0 else -worst.under_in[i])
     return min(abs(measured), max(bound, 0.0)) if np.isfinite(bound) else abs(measured)

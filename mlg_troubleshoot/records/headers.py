@@ -19,8 +19,11 @@ from mlg_troubleshoot.decision.columns import (
     LANDINGS,
     MARGIN,
     PLUNGER_DISPLACEMENT,
+    PRESSURE,
     RESTORED_JOINTS,
+    RIGGING_CHECKED,
     SIDE,
+    TEMPERATURE,
     UNIT,
     Column,
 )
@@ -120,6 +123,10 @@ _SHORT = {
     "landings": LANDINGS.name,
     "date": DATE.name,
     "restored": RESTORED_JOINTS.name,
+    "rigging": RIGGING_CHECKED.name,
+    "temperature": TEMPERATURE.name,
+    "pressure": PRESSURE.name,
+    **{f"plunger_{n}": PLUNGER_DISPLACEMENT.header(n) for n in (2, 3)},
 }
 
 

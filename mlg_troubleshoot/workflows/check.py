@@ -118,8 +118,8 @@ class CheckOptions(TableOptions):
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
     advice : bool or None
-        Compute what is looked at for one gear: re-rigging, worn joints, what follows each outcome
-        of NEXT; None does so for a single one.
+        Compute what is looked at for one gear: re-rigging and worn joints; None does so for a
+        single one.
     extension : Extension or None
         An extension of the model.
     workers : int
@@ -179,7 +179,8 @@ def exit_code_of(lines: Iterable[Listed], unread_files: Sequence[str] = ()) -> E
 class BlockOutput:
     """Something that is made of judgements block by block, so that a long table never stands in
     memory: `make` turns a block into what is written of it, where it was judged; `take` receives
-    that here, in the order of the rows. `sets`: whether it shows the repair sets.
+    that here, in the order of the rows. `sets`: whether it shows the repair sets and
+    what follows NEXT.
     """
 
     make: Callable[[Sequence[Judgement]], Any]

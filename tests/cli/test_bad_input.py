@@ -112,6 +112,7 @@ def test_a_name_that_is_not_a_column_is_refused_with_the_nearest(name: str, near
         ("plunger=0.012in", "measured_displacement_in", 0.012),
         ("plunger_displacement_mm=0.3", "measured_displacement_in", 0.3 / 25.4),
         ("Plunger displacement=12thou", "measured_displacement_in", 0.012),
+        ("plunger_2=12thou", "measured_displacement_in", 0.012),
         ("margin=0.028in", "margin_in", 0.028),
         ("outcome=FAILED", "outcome", "FAILED"),
         ("record_id=mine", "record_id", "mine"),
@@ -124,8 +125,9 @@ def test_every_column_is_set_by_its_name_or_a_short_one(pair: str, key: str, val
 
 @pytest.mark.parametrize("restored", ["restored=3,5", "restored_joints=3 5"])
 def test_what_was_restored_is_set_as_well(restored: str) -> None:
-    day = ("--set", restored, "--set", "repair_date=2026-03-04", "--set", "landings=4000")
-    found = mlg(*ONE_VALUE, "3=0.001in", *day, "--set", "date=2026-03-05", "--json")
+    day = ("repair_date=2026-03-04", "landings=4000", "date=2026-03-05", "rigging=yes")
+    more = (restored, *day, "temperature=20", "pressure=3000")
+    found = mlg(*ONE_VALUE, "3=0.001in", *(f"--set={pair}" for pair in more), "--json")
     assert found.json["problems"] == []
 
 

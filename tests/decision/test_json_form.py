@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pandas as pd
 import pytest
 
 from mlg_troubleshoot.decision.inspection import InvalidRow, Outcome, Side
@@ -9,7 +10,7 @@ from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
-from mlg_troubleshoot.workflows.check import CheckResult
+from mlg_troubleshoot.workflows.check import CheckResult, check
 from tests.decision.conftest import Judge, every_joint
 
 INSPECTION = {
@@ -104,6 +105,15 @@ def test_numbers_are_not_rounded(form: dict, judge: Judge) -> None:
 def test_a_problem_has_its_nine_keys_in_order(form: dict) -> None:
     keys = ["code", "file", "sheet", "row", "column", "cell", "value", "expected", "remedy"]
     assert [list(problem) for problem in form["problems"]] == [keys]
+
+
+def test_a_row_of_a_table_says_what_follows_next_as_a_gear_alone_does() -> None:
+    row = {"tail_no": "N1", "side": "LH", "clearance_3_in": 0.013, "outcome": "FAILED"}
+    declared = row | {"clearance_convention": "RADIAL", "record_id": "R1"}
+    table = pd.DataFrame([declared, declared | {"tail_no": "N2", "record_id": "R2"}])
+    alone, *batch = (each.plan.then for t in (table[:1], table) for each in check(t).judgements)
+    assert len(alone) == 2
+    assert batch == [alone, alone]
 
 
 def test_what_was_not_asked_for_is_null(form: dict) -> None:

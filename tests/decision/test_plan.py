@@ -29,6 +29,12 @@ def test_an_unmeasured_joint_may_explain_a_displacement_up_to_its_limit(judge: J
     assert some.explained_at_most_in == pytest.approx(min(0.030, some.predicted_upper_in or 0.0))
 
 
+def test_what_is_explained_and_what_is_not_are_the_measured_displacement(judge: Judge) -> None:
+    found = judge(every_joint(0.001), readings_in=(-0.048, -0.044))
+    assert found.explained_at_most_in is not None and found.unexplained_in is not None
+    assert found.explained_at_most_in + found.unexplained_in == pytest.approx(0.046)
+
+
 def test_before_any_reading_one_joint_is_expected_to_be_restored(judge: Judge) -> None:
     steps = judge({}, outcome=Outcome.FAILED).plan.steps
     (restored,) = (step for step in steps if step.action is Action.RESTORE)
