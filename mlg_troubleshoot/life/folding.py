@@ -163,9 +163,7 @@ def lives(store: Store) -> dict[GearKey, GearLife]:
 
 def lives_of(store: Store, keys: Collection[GearKey]) -> dict[GearKey, GearLife]:
     """The lives of some gears."""
-    wanted = set(keys)
-    records = store.of_aircraft({tail for tail, _side in wanted})
-    return _lives(each for each in records if (each.tail_no, each.side) in wanted)
+    return _lives(store.of_gears(keys))
 
 
 def in_turn(store: Store, keys: Sequence[GearKey]) -> Iterator[GearLife | None]:

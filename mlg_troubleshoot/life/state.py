@@ -661,9 +661,11 @@ def overhauls(moments: Sequence[Moment]) -> dict[int, frozenset[int]]:
     begins nothing, and several joints are restored: a record says so, or they clearly read tighter,
     and no other joint wider.
     """
+    found: dict[int, frozenset[int]] = {}
+    if not _falls(moments):
+        return found
     placed = _placed(moments)
     landings = np.array([moments[i].landings for i in placed], float)
-    found = {}
     begun = 0
     for n, end in pairwise([*lasting_falls(landings).tolist(), len(placed)]):
         restored = _restored(moments, placed[begun:n], placed[n:end])
@@ -677,6 +679,12 @@ def _placed(moments: Sequence[Moment]) -> list[int]:
     """Places of what states both date and landings, by date."""
     found = [i for i, moment in enumerate(moments) if moment.day and moment.landings is not None]
     return sorted(found, key=lambda i: (moments[i].day, moments[i].landings))
+
+
+def _falls(moments: Sequence[Moment]) -> list[tuple[int, int]]:
+    """Neighbours by date of which the later one states fewer landings."""
+    landings = [moment.landings or 0.0 for moment in moments]
+    return [pair for pair in pairwise(_placed(moments)) if landings[pair[0]] > landings[pair[1]]]
 
 
 def _restored(
@@ -707,9 +715,8 @@ def contradictions(moments: Sequence[Moment], name: Callable[[int], str]) -> dic
     """
     anew = overhauls(moments)
     found: dict[int, str] = {}
-    for one, two in pairwise(_placed(moments)):
-        was, now = moments[one], moments[two]
-        if two in anew or (was.landings or 0.0) <= (now.landings or 0.0):
+    for one, two in _falls(moments):
+        if two in anew:
             continue
         listed = " and ".join(
             f"{moments[n].landings:g} landings on {moments[n].day} ({name(n)})" for n in (one, two)

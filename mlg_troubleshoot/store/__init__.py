@@ -3,7 +3,6 @@
 from mlg_troubleshoot.store.database import (
     Added,
     Broken,
-    Judge,
     Record,
     RecordKind,
     Store,
@@ -32,7 +31,6 @@ __all__ = [
     "Broken",
     "Draft",
     "Drafts",
-    "Judge",
     "Record",
     "RecordKind",
     "Store",

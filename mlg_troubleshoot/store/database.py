@@ -752,10 +752,13 @@ class Store:
             rows = self._rows(connection, *where, newest=newest)
             return [self._record(row) for row in rows]
 
-    def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:
-        """All records of a gear, or of both gears of an aircraft."""
-        found = self.records(_records.c.tail_no == tail_no)
-        return [record for record in found if side in (None, record.side)]
+    def of_gears(self, keys: Collection[tuple[str, str]]) -> list[Record]:
+        """All records of some gears, by tail and side."""
+        tails = {tail for tail, _side in keys}
+        # A database takes so many values at once.
+        few = [_records.c.tail_no.in_(sorted(tails))] if len(tails) <= _AT_ONCE else []
+        wanted = set(keys)
+        return [r for r in self.records(*few) if (r.tail_no, r.side) in wanted]
 
     def named(self, name: str) -> list[Record]:
         """Records with this id, or whose hash begins so."""
@@ -767,11 +770,6 @@ class Store:
             low, high = map(bytes.fromhex, ends)
             where |= _records.c.hash.between(low, high)
         return self.records(where)
-
-    def of_aircraft(self, tails: Collection[str]) -> list[Record]:
-        """All records of some aircraft; of every one where they are many."""
-        few = [_records.c.tail_no.in_(sorted(tails))] if len(tails) <= _AT_ONCE else []
-        return self.records(*few)
 
     def newest(self, kind: RecordKind, most: int) -> list[Record]:
         """The newest records of a kind, the last one first."""

@@ -94,9 +94,9 @@ class Told:
     file: str | None
 
     @classmethod
-    def by(cls, inspection: Inspection, kind: RecordKind = RecordKind.INSPECTION) -> Told:
+    def by(cls, inspection: Inspection) -> Told:
         said = said_of(inspection)
-        return cls.of(record_of(said, kind), said)
+        return cls.of(record_of(said), said)
 
     @classmethod
     def of(cls, record: Record, said: Mapping[str, Any] | None = None) -> Told:
@@ -319,8 +319,8 @@ def _free_id(made: str, used: Collection[str]) -> str:
 
 def _kept_of(store: Store, key: GearKey) -> list[Told]:
     """Every inspection of a gear as it was kept first, whatever became of it."""
-    records = store.of_gear(*key)
-    return [Told.of(record) for record in records if record.kind is RecordKind.INSPECTION]
+    kept = store.of_gears([key])
+    return [Told.of(record) for record in kept if record.kind is RecordKind.INSPECTION]
 
 
 def under_a_free_id(made: Inspection, store: Store) -> Inspection:
@@ -353,7 +353,7 @@ def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
     # Moved back it differs from the record that was moved away from there.
     moved = replace(moved, identity=())
     store.add([voids(wrong, why, moved_to=gear), moved])
-    return next(each for each in store.of_gear(*gear)[::-1] if each.packed == moved.packed)
+    return next(each for each in store.of_gears([gear])[::-1] if each.packed == moved.packed)
 
 
 def _entered(record: Record) -> Inspection:

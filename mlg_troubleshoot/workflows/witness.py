@@ -43,7 +43,7 @@ def witness_of(
     """
     count, head = store.head()
     newest: dict[GearKey, Record] = {}
-    for record in store.of_aircraft({tail for tail, _side in verdicts}):
+    for record in store.of_gears(verdicts):
         if record.seq <= count:
             newest[record.tail_no, record.side] = record
     gears = tuple(
@@ -86,7 +86,7 @@ def _changed(store: Store, gear: Gear, printed: Witness) -> Iterable[str]:
     made += ["another gear file"] * (printed.geometry != gear.geometry_sha256)
     changed = printed.program != program_version() or len(made) > 1
     for each, key in zip(printed.gears, keys, strict=True):
-        added = sum(record.seq > printed.count for record in store.of_gear(*key))
+        added = sum(record.seq > printed.count for record in store.of_gears([key]))
         if added:
             yield f"{' '.join(key)}: {added} {'record' if added == 1 else 'records'} added since"
         now = today.get(key)

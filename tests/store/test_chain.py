@@ -54,8 +54,8 @@ def test_the_same_inspection_twice_is_one_in_one_call_too(store: Store) -> None:
 
 def test_the_records_of_one_side_are_asked_for_without_those_of_the_other(store: Store) -> None:
     store.add([inspection_record(replace(places.inspection(1), side=Side.RH))])
-    assert {record.side for record in store.of_gear("N1")} == {"LH", "RH"}
-    assert {record.side for record in store.of_gear("N1", "LH")} == {"LH"}
+    assert {record.side for record in store.of_gears([("N1", "LH"), ("N1", "RH")])} == {"LH", "RH"}
+    assert {record.side for record in store.of_gears([("N1", "LH")])} == {"LH"}
 
 
 def test_while_one_writes_no_other_begins_to(store: Store) -> None:

@@ -55,7 +55,7 @@ def test_a_report_prints_its_record_the_head_of_the_log_and_the_count(kept: Path
     count, head = Store(kept / "store.sqlite").head()
     (page,) = (kept / "history").glob("*.html")
     text = page.read_text(encoding="utf-8")
-    newest = Store(kept / "store.sqlite").of_gear("A", "LH")[-1]
+    newest = Store(kept / "store.sqlite").of_gears([("A", "LH")])[-1]
     assert f"{count}\u00a0records, the last sha256 {head}" in text
     assert f"sha256 {newest.digest}" in text
 
