@@ -173,8 +173,9 @@ class Shown:
 
     def unit(self, *entered_in: LengthUnit | None) -> LengthUnit:
         """The unit that lengths are shown in; where none is asked for, that of most entries."""
-        entered = Counter(filter(None, entered_in)).most_common(1)
-        return self.show or (entered[0][0] if entered else LengthUnit.INCH)
+        usual = LengthUnit.parse(os.environ.get("MLG_UNIT") or "in")
+        entered = Counter(filter(None, entered_in)) or {usual: 1}
+        return self.show or max(entered, key=entered.__getitem__)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,18 @@ def test_the_environment_says_the_unit_to_show(monkeypatch: pytest.MonkeyPatch) 
     assert "0.0472 of" in mlg("check", FAILURE, "--show", "in").out
 
 
+def test_a_fleet_is_shown_in_the_unit_of_its_entries_else_in_that_of_the_environment(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    store = ("--store", tmp_path / "store.sqlite")
+    gear = ("check", "--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--keep", *store)
+    monkeypatch.setenv("MLG_UNIT", "thou")
+    assert "+12.0 of 30.0 thou" in mlg(*gear, "--set", "plunger=12").out
+    assert "+12.0 of 30.0 thou" in mlg("fleet", *store).out
+    mlg(*gear, "--set", "3=0.1mm", "--set", "5=0.1mm")
+    assert "of 0.762 mm" in mlg("fleet", *store).out
+
+
 def test_the_environment_says_the_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for size in ("Letter", "A4"):
         monkeypatch.setenv("MLG_PAGE", size)

@@ -526,7 +526,7 @@ class Asker:
                 self._say("   That key (an arrow?) does nothing here. Type the line again.")
             elif word in ("q", "quit"):
                 raise EOFError
-            elif word in ("u", "undo", "b", "back"):
+            elif word in ("u", "undo"):
                 raise BackError
             elif word in ("?", "help"):
                 self._say(f"{help_text}\n{WORD_HELP}")
