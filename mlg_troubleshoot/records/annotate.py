@@ -336,10 +336,14 @@ def annotate_workbook(
         raise OutputError(
             f"{source} is no longer the workbook that was judged", "Check the workbook again."
         )
-    if any(layout.kind == "visits" for layout in result.layouts if layout.file == label):
+    layouts = [layout for layout in result.layouts if layout.file == label]
+    is_several = len({layout.sheet for layout in layouts}) < len(layouts)
+    if is_several or any(layout.kind == "visits" for layout in layouts):
         raise OutputError(
-            f"{source} holds readings of several visits next to each other",
-            "Give each visit a row of its own, or use --csv for the results.",
+            f"{source} holds readings of several visits next to each other, or several tables on"
+            " one sheet",
+            "Give each visit a row, and each table a sheet of its own, or use --csv for the"
+            " results.",
         )
     buffer = io.BytesIO()
     try:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import itertools
 import re
 import struct
 import zipfile
@@ -87,17 +88,6 @@ class _CsvSheet(Sheet):
         self._budget = _QUOTE_BUDGET
 
     def rows(self) -> Iterator[NumberedRow]:
-        for number, fields in enumerate(self._records(), 1):
-            cells: list[Cell] = [
-                field if field and not field.isspace() else None for field in fields
-            ]
-            if not any(cells):
-                continue
-            if number > MAX_ROWS or (len(cells) > MAX_COLUMNS and any(cells[MAX_COLUMNS:])):
-                raise _too_large(f"row {number} has {len(cells)} fields", number)
-            yield number, cells
-
-    def _records(self) -> Iterator[list[str]]:
         """Split the lines into fields; a quoted field may go on over several lines."""
         text = self._text
         lines = deque(
@@ -124,7 +114,14 @@ class _CsvSheet(Sheet):
             usual = len(fields) or usual
             if "'" in line or '="' in line:
                 fields = [_PROTECTED.sub(r"\1\2", field) for field in fields]
-            yield fields
+            cells: list[Cell] = [
+                field if field and not field.isspace() else None for field in fields
+            ]
+            if not any(cells):
+                continue
+            if number > MAX_ROWS or (len(cells) > MAX_COLUMNS and any(cells[MAX_COLUMNS:])):
+                raise _too_large(f"row {number} has {len(cells)} fields", number)
+            yield number, cells
 
     def _quoted(self, line: str, lines: deque[str], usual: int, number: int) -> list[str]:
         fields = self._parse(line)
@@ -194,18 +191,12 @@ def _find_delimiter(head: str, header_score: Callable[[Cells], int]) -> str:
     none does, as in a form, the one that most rows have.
     """
     lines = head.splitlines()[:20]
-
-    def best_score(delimiter: str) -> int:
-        rows = (
-            next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
-            for line in lines
-            if delimiter in line
-        )
-        return max(
-            (header_score([f or None for f in fields[:MAX_COLUMNS]]) for fields in rows), default=0
-        )
-
-    scores = {delimiter: best_score(delimiter) for delimiter in _DELIMITERS}
+    scores = dict.fromkeys(_DELIMITERS, 0)
+    for each, line in itertools.product(_DELIMITERS, lines):
+        if each in line:
+            fields = next(csv.reader([line], delimiter=each, skipinitialspace=True), [])
+            score = header_score([field or None for field in fields[:MAX_COLUMNS]])
+            scores[each] = max(score, scores[each])
     if not any(scores.values()):
         scores = {each: sum(each in line for line in lines) for each in _DELIMITERS}
     return max(scores, key=lambda delimiter: scores[delimiter])

@@ -23,6 +23,7 @@ from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.life.state import GearVisit, Moment, contradictions
 from mlg_troubleshoot.parallel import Progress
 from mlg_troubleshoot.records.cells import (
+    HEADER_SEARCH_ROWS,
     FileRefusedError,
     NumberedRow,
     Sheet,
@@ -195,7 +196,13 @@ def _read(source: Source, options: ReadOptions) -> _Found:
             if suffix != f".{kind}" and suffix in _SUFFIXES - {".tsv", ".txt"}:
                 found.notes.append(f"the file is of kind {kind}, whatever its name")
             found.notes += book.notes
-            _read_book(book, options, label, found)
+            chosen = _choose(book, options, found)
+            for each in chosen:
+                if each.header is None:
+                    raise _no_header([each])
+                how = each.header, each.rows, options
+                part = read_table(each.sheet, *how, file=label, delimiter=book.delimiter)
+                found.join(part, f"sheet {each.sheet.name!r}: " if len(chosen) > 1 else "")
         if not found.rows and not found.problems:
             raise FileRefusedError("no_rows", "it contains no inspection")
     except FileRefusedError as refusal:
@@ -288,7 +295,8 @@ def _packed(data: bytes, suffix: str) -> Workbook:
 def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     rows = sheet.rows()
     peeked = list(islice(rows, _PEEKED_ROWS))
-    header = find_header(peeked, options, sheet.merged) or find_form(peeked, options)
+    near = [(number, cells) for number, cells in peeked if number <= HEADER_SEARCH_ROWS]
+    header = find_header(near, options, sheet.merged) or find_form(peeked, options)
     # A form that nobody touched holds no inspection; a header may stand too far below to be seen.
     if isinstance(header, Form):
         is_filled = not header.is_untouched
@@ -297,16 +305,6 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     else:
         is_filled = any(header_score(cells, options) for _, cells in peeked)
     return _Candidate(sheet, peeked, chain(peeked, rows), header, is_filled)
-
-
-def _read_book(book: Workbook, options: ReadOptions, label: str, found: Collected) -> None:
-    chosen = _choose(book, options, found)
-    for candidate in chosen:
-        sheet, header, rows = candidate.sheet, candidate.header, candidate.rows
-        if header is None:
-            raise _no_header([candidate])
-        part = read_table(sheet, header, rows, options, file=label, delimiter=book.delimiter)
-        found.join(part, f"sheet {sheet.name!r}: " if len(chosen) > 1 else "")
 
 
 def _names(candidates: Iterable[_Candidate]) -> str:
@@ -500,8 +498,11 @@ def cell_of(
     """Header of a column as it was written, and its cell in a row or a form; no cell if the table
     does not have it.
     """
-    for layout in layouts:
+    row = source.row or 0
+    # The table in whose rows it stands is the last one that begins above it.
+    for layout in reversed(layouts):
         is_there = (layout.file, layout.sheet) == (source.file, source.sheet)
+        is_there = is_there and layout.header_row <= row
         for column in layout.columns if is_there else ():
             if column.read_as == wanted.name:
                 return column.header, f"{column_letters(column.index)}{column.row or source.row}"

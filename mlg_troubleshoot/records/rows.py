@@ -142,6 +142,13 @@ class Heading:
         return {*re.findall(r"[^\W_]+", self.rest)} <= _NO_MATTER
 
     @property
+    def unit(self) -> LengthUnit | None:
+        """The only unit that it names."""
+        words = re.findall(r"[^\W_]+", self.rest)
+        units = {UNIT_SPELLINGS[word] for word in words if word in UNIT_SPELLINGS}
+        return units.pop() if len(units) == 1 else None
+
+    @property
     def is_said(self) -> bool:
         return self.is_reading is not None or self.visit != ONE_VISIT
 
@@ -712,6 +719,8 @@ def is_made_for_row(record_id: str) -> bool:
 
 # A clearance of which only an end was found; a no-go gauge did not enter, a go gauge did.
 _END = re.compile(r"(?:(?P<below><=?|≤|no[ -]?go)|(?:>=?|≥|go))\s*(?=[\d.,])", re.IGNORECASE)
+# That sign, or its word, in a cell of its own.
+_ABOVE = re.compile(r"[>≥]=?|(?:more|greater|larger) than|above|over")
 _NO_END = "Measure with a gauge that reaches further, or leave it blank if it was not measured."
 
 
@@ -728,11 +737,11 @@ def _tells_failure(header: str, cell: Filled) -> bool:
 
 
 @lru_cache(4096)
-def _spoken(cell: Filled) -> tuple[ClearanceConvention | None, LengthUnit | None]:
-    """The convention or the unit that a cell is."""
+def _spoken(cell: Filled) -> tuple[ClearanceConvention | None, LengthUnit | None, bool]:
+    """The convention or the unit that a cell is, and whether it says above of a number."""
     is_word = isinstance(cell, str) and not _CODE.fullmatch(cell)
     text = plain_text(show(cell)).lower() if is_word else ""
-    return convention_word(text), UNIT_SPELLINGS.get(text)
+    return convention_word(text), UNIT_SPELLINGS.get(text), _ABOVE.fullmatch(text) is not None
 
 
 @dataclass(slots=True)
@@ -1103,7 +1112,7 @@ class RowReader:
             is_named = nearest or is_sure or of_joint
             smallest = 0.0 if is_named else min(self._options.limit_in.values(), default=0.0)
             any_number = is_sure or units == {LengthUnit.THOU}
-            said, unit = _spoken(cell)
+            said, unit, is_above = _spoken(cell)
             if is_unread and self._may_be_length(cell, smallest, is_sure=any_number):
                 target = nearest or CLEARANCE.name
                 meant = f'a reading, pass --map "{header}={target}" (a length with its unit)'
@@ -1113,6 +1122,8 @@ class RowReader:
                 meant = f'the convention, pass --map "{header}={CONVENTION.name}"'
             elif unit is not None and units and unit not in units:
                 meant = f'the unit, pass --map "{header}={UNIT.name}"'
+            elif is_above:
+                meant = "of a reading, write > in front of its number"
             else:
                 continue
             other = "rename the column" if placed.is_misread else f'"{header}=carry"'

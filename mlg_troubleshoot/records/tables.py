@@ -35,7 +35,6 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import ROUNDING_IN
 from mlg_troubleshoot.records.cells import (
-    HEADER_SEARCH_ROWS,
     Cell,
     Cells,
     FileRefusedError,
@@ -44,8 +43,8 @@ from mlg_troubleshoot.records.cells import (
     NumberedRow,
     OddCell,
     Sheet,
+    SheetFacts,
     column_letters,
-    plain_text,
     quote,
     show,
     writable,
@@ -160,28 +159,39 @@ def header_score(cells: Cells, options: ReadOptions) -> int:
     return 2 * len(known | meant) + mapped + doubtful - len(meant)
 
 
+# A header has so many rows below its first one at most. [1]
+_HEADING_ROWS = 3
+
+
 def find_header(
     rows: Sequence[NumberedRow], options: ReadOptions, merged: Callable[[], Sequence[MergedRange]]
 ) -> Header | None:
-    near = [(number, cells) for number, cells in rows if number <= HEADER_SEARCH_ROWS]
     across: dict[int, list[slice]] = {}
-    for top, first, bottom, last in merged() if near else ():
+    for top, first, bottom, last in merged() if rows else ():
         if top == bottom and last > first:
             across.setdefault(top, []).append(slice(first, last + 1))
-    headers = [Header(number, tuple(map(_text, cells)), (number,)) for number, cells in near]
-    scores = [header_score(cells, options) for _, cells in near]
-    for (upper, above), (lower, below) in pairwise(near):
+    headers = [Header(number, tuple(map(_text, cells)), (number,)) for number, cells in rows]
+    scores = [header_score(cells, options) for _, cells in rows]
+    for ((upper, above), (lower, below)), known in zip(pairwise(rows), [*scores], strict=False):
         is_text = all(c is None or isinstance(c, str) for c in above)
-        if lower == upper + 1 and upper in across and is_text:
-            texts = _joined(above, below, across[upper])
+        if lower == upper + 1 and is_text and (known or upper in across):
+            above_it = [_text(cell) for cell, _ in zip_longest(above, below)]
+            for covered in across.get(upper, ()):
+                above_it[covered] = [above_it[covered.start]] * len(above_it[covered])
+            joined = zip_longest(above_it, map(_text, below), fillvalue="")
+            texts = tuple(" ".join(words).strip() for words in joined)
             headers.append(Header(lower, texts, (upper, lower)))
             scores.append(header_score(texts, options))
     score = max(scores, default=0)
     if not score:
         return None
-    header = headers[scores.index(score)]
-    for number, cells in near:
-        if number != header.row + 1 or len(header.rows_used) == 4:
+    return _with_rows_below(headers[scores.index(score)], rows, options)
+
+
+def _with_rows_below(header: Header, rows: Sequence[NumberedRow], options: ReadOptions) -> Header:
+    """A header with the rows of headings and units that belong to it."""
+    for number, cells in rows:
+        if number != header.row + 1 or len(header.rows_used) > _HEADING_ROWS:
             continue
         used = (*header.rows_used, number)
         units = _unit_row(header, cells, options)
@@ -207,15 +217,6 @@ def find_header(
 
 def _text(cell: Cell) -> str:
     return writable(" ".join(show(cell).split()))
-
-
-def _joined(above: Cells, below: Cells, across: Sequence[slice]) -> tuple[str, ...]:
-    """The headers of two rows, where merged cells say which columns the upper one covers."""
-    texts = [_text(cell) for cell, _ in zip_longest(above, below)]
-    for covered in across:
-        texts[covered] = [texts[covered.start]] * len(texts[covered])
-    joined = zip_longest(texts, map(_text, below), fillvalue="")
-    return tuple(" ".join(words).strip() for words in joined)
 
 
 # What stands in a row of units where a column has none that is read.
@@ -267,6 +268,9 @@ class Columns:
             if found is UNKNOWN and text:
                 found = near_miss(text, self._options.joints)
             known = found.field
+            if known is not None and unit and known.unit not in (None, unit):
+                found = Recognition(None, f"below it stands {unit.value}", known.name)
+                known = None
             if known is not None:
                 known = replace(known, unit=known.unit or unit)
             refused = bool(found.reason)
@@ -291,9 +295,10 @@ class Columns:
         """Where some columns stand, refused or not."""
         return [p.index for p in self.placed if p.field is not None and p.field.column in columns]
 
-    def notes(self) -> tuple[str, str]:
-        """Say how the headers were read, all in one note, and what is only carried, in another;
-        empty if nothing.
+    def notes(self) -> tuple[str, str, list[str]]:
+        """Say how the headers were read, all in one note, and what is only carried, in another,
+        empty if nothing; and which columns that bear a verdict the caller leaves unread, or reads
+        as others.
         """
         mapped = []
         carried = []
@@ -318,16 +323,13 @@ class Columns:
                 " content"
             )
         unread = "unknown column, carried to the report: " + ", ".join(carried)
-        return "; ".join(read), unread if carried else ""
-
-    def left_unread(self) -> list[str]:
-        """Say which columns that bear a verdict the caller leaves unread, or reads as others."""
-        return [
+        left = [
             f'"{p.header}" is {f"read as {p.field.name}" if p.field else "left unread"},'
             " as --map says"
             for p in self.placed
             if p.is_misread
         ]
+        return "; ".join(read), unread if carried else "", left
 
     def _doubt_readings(self) -> None:
         """Refuse the headers that may name readings where no clearance surely is named."""
@@ -494,15 +496,20 @@ _READ = (CLEARANCE, PLUNGER_DISPLACEMENT)
 # What is of one visit, below the headings of several.
 _MEASURED = (*_READ, OUTCOME)
 _NUMBER = re.compile(r"[^\w]*\d")
+_SAID = re.compile(r"\s*([^:]{1,40}):\s*(\S.*)")
 
 
 class _Line(NamedTuple):
-    """A row with a label, and the column of a table that this names; None if it names none."""
+    """A row with a label, and the column of a table that this names; None if it names none.
+
+    said: what the cell of the label says behind it, as in ``Tail: N123``, and the cell's column.
+    """
 
     row: int
     label: str
     column: Column | None
     cells: Cells
+    said: tuple[int, str] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -528,7 +535,7 @@ class Form(Header):
     @property
     def is_untouched(self) -> bool:
         at = self.value_column
-        filled = [line.column for line in self.lines if any(line.cells[at : at + 1])]
+        filled = [line.column for line in self.lines if line.said or any(line.cells[at : at + 1])]
         return not self.columns and all(column in _DECLARATIONS for column in filled)
 
     def visits(self, sheet: str | None) -> dict[int, Occasion]:
@@ -569,14 +576,17 @@ class Form(Header):
             found = Row(row, [], visit=visit)
             for line, p in zip(self.lines, columns.placed, strict=True):
                 cells = dict(enumerate(line.cells))
-                own, shared = cells.get(column), cells.get(self.value_column)
+                at, shared = line.said or (column, cells.get(self.value_column))
+                own = cells.get(column)
                 is_measured = p.field is None or p.field.column in _MEASURED
                 # Above the readings a line may say it once for all columns.
-                is_own = is_measured and line.row >= self.measured_from
+                is_below = len(visits) > 1 if line.said else line.row >= self.measured_from
+                is_own = is_measured and is_below
                 is_read = any(cells.get(i) is not None for i in visits)
-                if is_own and not is_read and shared is not None and line.column is not CLEARANCE:
+                is_apart = line.said or line.column is not CLEARANCE
+                if is_own and not is_read and shared is not None and is_apart:
                     # So may one that no column of readings fills; next to a reading stands a limit.
-                    is_own = line.column is PLUNGER_DISPLACEMENT
+                    is_own = line.column in _READ
                     if is_own:
                         found.questions.append(
                             f"{line.label!r} says {quote(shared, 40)} in a column that is not read:"
@@ -584,7 +594,7 @@ class Form(Header):
                             " delete it."
                         )
                 found.cells.append(own if own is not None or is_own else shared)
-                found.places.append(CellPlace.at(line.row, column, line.label))
+                found.places.append(CellPlace.at(line.row, at, line.label))
             yield found
 
     def note(self, visits: Mapping[int, Occasion]) -> str:
@@ -623,12 +633,17 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     above = [(row, cells) for row, cells in reversed(rows) if row < joints[0].row]
     headings = dict(takewhile(lambda each: not kinds.get(each[0]), above[:3]))
     # So does a row that says joint, wherever the plunger's line stands.
-    headings |= {
+    of_joints = {
         line.row: line.cells
         for line in lines
         if line.column is JOINT and not any(map(_is_number, line.cells[at + 1 :]))
     }
-    lines = [line for line in lines if line.row not in headings and _is_line(line, at, options)]
+    headings |= of_joints
+    lines = [
+        line
+        for line in lines
+        if line.said or (line.row not in headings and _is_line(line, at, options))
+    ]
     # Lines of a side or a day that several columns fill also head them.
     told_apart = [
         line.cells
@@ -637,6 +652,10 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         and sum(cell is not None for cell in line.cells[at + 1 :]) > 1
     ]
     heads = [*reversed(headings.values()), *told_apart]
+    headed = {i: _heading(i, heads) for i in sorted(numbers)}
+    stated = {heading.unit for heading, _ in headed.values() if heading.is_reading is not False}
+    unit = stated.pop() if len(stated) == 1 else None
+    measured_from = min(of_joints or [joints[0].row, *headings])
     return Form(
         row=lines[0].row,
         texts=tuple(line.label for line in lines),
@@ -645,8 +664,11 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         width=max(len(cells) for _, cells in rows),
         label_column=at,
         value_column=value_column,
-        columns={i: _heading(i, heads) for i in sorted(numbers)},
-        measured_from=min([joints[0].row, *headings]),
+        columns=headed,
+        measured_from=measured_from,
+        units=tuple(
+            unit if line.column in _READ and line.row > measured_from else None for line in lines
+        ),
         is_ours=is_ours,
     )
 
@@ -655,13 +677,35 @@ def _lines(rows: Sequence[NumberedRow], at: int, options: ReadOptions) -> list[_
     """The rows with a label; numbers below a label that says joint are the names of joints."""
     lines: list[_Line] = []
     for row, cells in rows:
-        label = cells[at] if at < len(cells) else None
+        said = [line for i in range(len(cells)) if (line := _said(row, cells, i, at, options))]
+        lines += said
+        is_said = any(line.said and line.said[0] == at for line in said)
+        label = cells[at] if at < len(cells) and not is_said else None
         number = show(label).strip()
         if number.isdecimal() and any(line.column is JOINT for line in lines):
             label = f"joint {number}"
         if isinstance(label, str):
-            lines.append(_Line(row, label, _column(label, options), cells))
+            # A cell alone in its row is a title or a hint, but not one that tells of a failure.
+            is_told = says_failed(label) and not any(cells[at + 1 :])
+            told = (at, label) if is_told else None
+            lines.append(_Line(row, label, _column(label, options), cells, told))
     return lines
+
+
+def _said(row: int, cells: Cells, index: int, at: int, options: ReadOptions) -> _Line | None:
+    """The line that one cell is, label and value; a number next to it makes it a label alone. With
+    a label that is not known it is one in the column of labels if its value may matter.
+    """
+    cell = cells[index]
+    parts = _SAID.fullmatch(cell) if isinstance(cell, str) and not _column(cell, options) else None
+    column = _column(parts[1], options) if parts else None
+    if parts is None or column is JOINT or any(map(_is_number, cells[index + 1 :][:1])):
+        return None
+    if column is None and not (index == at and _matters(parts[2])):
+        return None
+    if column in _READ and math.isnan(written_number(parts[2], decimal_comma=True)[0]):
+        return None
+    return _Line(row, parts[1], column, (), (index, parts[2]))
 
 
 def _heading(index: int, rows: Sequence[Cells]) -> tuple[Heading, str]:
@@ -692,18 +736,14 @@ def _is_line(line: _Line, at: int, options: ReadOptions) -> bool:
     """Leave out titles, hints and signature lines, but not a label that may be a reading."""
     is_known = recognise(line.label, options.joints) is not UNKNOWN
     is_named = mapped_to(options, line.label, -1) is not None or line.label.rstrip().endswith(":")
-    return (
-        is_known
-        or is_named
-        or any(
-            _is_fraction(cell) or may_be_outcome(cell, asked=False) or says_failed(show(cell))
-            for cell in line.cells[at + 1 :]
-            if cell is not None
-        )
+    return is_known or is_named or any(map(_matters, line.cells[at + 1 :]))
+
+
+def _matters(cell: Cell) -> bool:
+    """Whether a cell may be a reading, or what the gear did, whatever stands next to it."""
+    return cell is not None and (
+        _is_fraction(cell) or may_be_outcome(cell, asked=False) or says_failed(show(cell))
     )
-
-
-_JOINT_TEXT = re.compile(r"(?!-)(?:joint|jt|j)?\W*(?:no|nr|number|#)?\W*0?(\d{1,3})", re.ASCII)
 
 
 class Folder:
@@ -713,7 +753,6 @@ class Folder:
         self._table = table
         joints = table.options.joints
         self._joints = dict(zip(map(tidy, joints.names), joints.numbers, strict=False))
-        self._joints |= {str(number): number for number in joints.numbers}
         known = {p.read_as: p for p in columns.placed}
         self._record = known.get(RECORD_ID.name)
         self._joint = known.get(JOINT.name)
@@ -761,9 +800,12 @@ class Folder:
         joint = None
         if self._joint is not None:
             cell = cells[self._joint.index]
-            text = tidy(plain_text(show(cell)))
-            match = _JOINT_TEXT.fullmatch(text)
-            joint = self._joints.get(text if match is None else match[1].lstrip("0"))
+            text = tidy(show(cell))
+            named = recognise(f"joint {text}", self._table.options.joints).field
+            joint = self._joints.get(text)
+            is_joint = named is not None and named == Field(CLEARANCE, named.number)
+            if named is not None and is_joint and not text.startswith("-"):
+                joint = named.number
             if joint is None and (cell is not None or readings):
                 code = "joint_missing" if cell is None else "joint_unknown"
                 expected = f"a joint number from {self._table.options.joints.span}"
@@ -810,6 +852,8 @@ class Folder:
 
 # So many in one table are one mistake: they would take memory and help nobody.
 MAX_PROBLEMS = 20_000
+# Each table costs what reading its header costs; so many are a file made to take time.
+MAX_TABLES = 100
 # Rows by which a column is known that holds sides, whatever its header says.
 _LOOKED_AT = 50
 _GEARS = frozenset(("gear", "mlg", "main gear", "landing gear", "leg", "hand", "l/r"))
@@ -859,8 +903,39 @@ def read_table(
     file: str | None,
     delimiter: str | None,
 ) -> Collected:
-    """Read a table, or a form as the table of its visits."""
+    """Read a table, or a form as the table of its visits, and the tables of other columns below."""
     out = Collected()
+    below: Header | None = header
+    while below is not None:
+        top = below.row
+        part, below, rows = _read_one(sheet, below, rows, options, file=file, delimiter=delimiter)
+        out.join(part, f"table in row {top}: " if below or out.layouts else "")
+        if len(out.layouts) > MAX_TABLES:
+            raise FileRefusedError(
+                "table_second",
+                f"more than {MAX_TABLES} tables",
+                "one table with one header on each sheet",
+                "Put each table on a sheet or into a file of its own.",
+                sheet=sheet.name,
+            )
+        # What the caller says of headers is said of all tables together.
+        said = {**options.shared_map, **options.column_map}
+        options = replace(options, column_map={}, shared_map=said)
+    return out
+
+
+def _read_one(
+    sheet: Sheet,
+    header: Header,
+    rows: Iterator[NumberedRow],
+    options: ReadOptions,
+    *,
+    file: str | None,
+    delimiter: str | None,
+) -> tuple[Collected, Header | None, Iterator[NumberedRow]]:
+    """Read a table; return the header of other columns below it, with the rows from there on."""
+    out = Collected()
+    below: Header | None = None
     form = header if isinstance(header, Form) else None
     visits = {} if form is None else form.visits(sheet.name)
     side = next((visit.side for visit in visits.values()), None)
@@ -879,7 +954,16 @@ def read_table(
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
     titles: list[str] = []
     width = len(header.texts) if form is None else form.width
-    for number, cells in chain(first, rows) if form is None else ():
+    rows = chain(first, rows)
+    for number, cells in rows if form is None else ():
+        if number > header.row and table.is_header(cells):
+            if table.repeats(cells):
+                continue
+            ahead = [(number, cells), *islice(rows, _HEADING_ROWS)]
+            top = Header(number, tuple(map(_text, cells)), (number,))
+            below = _with_rows_below(top, ahead, options)
+            rows = chain(ahead, rows)
+            break
         width = max(width, len(cells))
         if number < header.rows_used[0]:
             titles += [cell for cell in cells if isinstance(cell, str)]
@@ -888,14 +972,22 @@ def read_table(
     if form is not None:
         out.rows += map(table.reader.read, form.upright(columns, visits))
     about = "; ".join(table.finish())
-    read, carried = columns.notes()
+    read, carried, left = columns.notes()
     read = "; ".join(filter(None, (placed * (header.row > 1), read, said)))
     which = "" if form is None else form.note(visits)
     against = _against_title(titles, options.convention)
     out.notes += filter(None, (against, read, carried, about, which))
-    left = columns.left_unread()
     out.notes += left
     out.unread += left
+    kind, readings = _layout(columns, form, visits)
+    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, width, readings))
+    return out, below, rows
+
+
+def _layout(
+    columns: Columns, form: Form | None, visits: Collection[int]
+) -> tuple[str, tuple[ColumnReading, ...]]:
+    """The kind of a table, and how its columns, or the lines of a form, were read."""
     kind = "long" if columns.is_long else "wide"
     if len(columns.visits) > 1:
         kind = "visits"
@@ -906,8 +998,7 @@ def read_table(
         at = next(iter(visits))
         lines = zip(readings, form.lines, strict=True)
         readings = [replace(each, index=at, row=line.row) for each, line in lines]
-    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, width, tuple(readings)))
-    return out
+    return kind, tuple(readings)
 
 
 def _against_title(titles: Sequence[str], declared: ClearanceConvention | None) -> str:
@@ -1035,7 +1126,6 @@ class _Table:
         self._aside: list[tuple[int, str, Cells]] = []
         # Whether ids begin with the sign of a comment, as the first of them does.
         self._is_marked: bool | None = None
-        self._second: FileRefusedError | None = None
         self._telling = [columns.at(column) for column in (TAIL_NO, SIDE, CLEARANCE, JOINT)]
         self._named = {
             i: column for column in (RECORD_ID, TAIL_NO, JOINT) for i in columns.at(column)
@@ -1044,8 +1134,6 @@ class _Table:
         self._stated = {*columns.at(CONVENTION, UNIT)}
 
     def take(self, number: int, cells: Cells) -> None:
-        if self._begins_again(number, cells):
-            return
         filled = [i for i, cell in enumerate(cells) if cell is not None]
         if filled and self._stated.issuperset(filled):
             # A line of a template that nobody filled in.
@@ -1057,7 +1145,7 @@ class _Table:
         if self._of_several:
             cells = self._with_merged(number, cells)
         width = self._width
-        why = self._second or self._sheet.facts.faulty.get(number)
+        why = self._sheet.facts.faulty.get(number)
         if why is not None:
             self._out.rows.append(self.reader.faulty(number, cells, why))
         elif (
@@ -1107,10 +1195,8 @@ class _Table:
                     self._filled_in += 1
         return cells
 
-    def _begins_again(self, number: int, cells: Cells) -> bool:
-        """Whether the row is a header. Below that of other columns every row is refused, until the
-        first one is printed again, in whatever words.
-        """
+    def is_header(self, cells: Cells) -> bool:
+        """Whether the row is a header, of this table or of another one."""
         joints = self._table.options.joints
         words = [
             cell
@@ -1119,26 +1205,20 @@ class _Table:
         ]
         if all(recognise(word, joints) is UNKNOWN for word in words):
             return False
-        texts = [_text(cell) for cell in cells]
-        fields = [recognise(text, joints).field for text in texts]
+        fields = [recognise(_text(cell), joints).field for cell in cells]
         names = any(field is not None and field.column in IDENTITY for field in fields)
-        if not names or not header_score(cells, self._table.options):
-            return False
-        own = zip_longest(texts, fields, self._columns.placed)
-        if all(
+        return names and header_score(cells, self._table.options) > 0
+
+    def repeats(self, cells: Cells) -> bool:
+        """Whether a header is that of this table printed again, in whatever words."""
+        texts = [_text(cell) for cell in cells]
+        fields = [recognise(text, self._table.options.joints).field for text in texts]
+        is_own = all(
             p and ((text or "") == p.header or (field and field == p.field))
-            for text, field, p in own
-        ):
-            self._repeated += 1
-            self._second = None
-            return True
-        self._second = self._second or FileRefusedError(
-            "table_second",
-            f"below the header of another table in row {number}",
-            "one table with one header on each sheet",
-            "Put each table on a sheet or into a file of its own.",
+            for text, field, p in zip_longest(texts, fields, self._columns.placed)
         )
-        return False
+        self._repeated += is_own
+        return is_own
 
     def _stands_aside(self, cells: Cells) -> str:
         """The name of a row of totals, signatures and the like: its name says so, and it lacks what
@@ -1164,9 +1244,10 @@ class _Table:
         for index in filled.intersection(named, texts):
             # A gear whose side stands elsewhere may have any tail.
             is_whole = named[index] is TAIL_NO and self._table.side is not None
-            says = _STATISTIC.fullmatch if is_whole else _NO_INSPECTION.match
+            text = texts[index].strip()
+            says = _STATISTIC.fullmatch(text) or (not is_whole and _NO_INSPECTION.match(text))
             others = sum(not (filled - {index}).isdisjoint(kind) for kind in self._telling)
-            if says(texts[index].strip()) is not None and others < 2:
+            if says and others < 2:
                 return texts[index]
         return ""
 
@@ -1231,17 +1312,26 @@ class _Table:
         if self._aside:
             self._judge_aside()
         facts = self._sheet.facts
+        # The rows ahead of the next table were read before this one ends.
+        self._sheet.facts = SheetFacts(faulty=facts.faulty)
         words = self.reader.not_measured
         named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
         more = [f"{len(named) - 5} more"] if len(named) > 5 else []
         hidden = sum(row > self._header_row for row in facts.hidden_rows)
         said = ", ".join(map(repr, [*words][:4]))
+        tops = {row.source.row for row in found}
+        spread = [
+            f"{column_letters(left)}{top}"
+            for top, left, _, right in self._sheet.merged()
+            if top in tops and any(left <= i <= right for i in self._evidence)
+        ]
         counted = (
             (len(named), "row", f"set aside by name: {', '.join([*named[:5], *more])}"),
             (self._repeated, "repeated header row", "skipped"),
             (self._filled_in, "blank cell", "merged with one above read as it is"),
             (words.total(), "cell", f"with {said} read as not measured"),
             (hidden, "hidden or filtered row", "also read"),
+            (len(spread), "reading", f"merged over cells read as blank: {', '.join(spread[:5])}"),
         )
         notes = [f"{n} {what}{'s' * (n > 1)} {how}" for n, what, how in counted if n]
         self._out.unread += notes[: bool(named)]

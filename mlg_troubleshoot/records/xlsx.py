@@ -15,6 +15,7 @@ import re
 import warnings
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from string import ascii_letters
 from typing import Any, cast
 from xml.etree.ElementTree import Element, TreeBuilder, XMLParser, fromstring, iterparse
 
@@ -63,7 +64,8 @@ _MERGE, _SPANNING = (
 _TEXT_TAG, _PHONETIC_TAG, _STRING_TAG = (
     f"{{{SHEET_MAIN_NS}}}{name}" for name in ("t", "rPh", "si")
 )
-_RAISED = "{*}rPr/{*}vertAlign[@val='superscript']"
+_FONT_OF_RUN = "{*}rPr"
+_RAISED = f"{_FONT_OF_RUN}/{{*}}vertAlign[@val='superscript']"
 _EXCEL_ROWS = 1 << 20
 _EXCEL_COLUMNS = 1 << 14
 _TRUE = ("1", "true", "on")
@@ -120,7 +122,7 @@ class XlsxFile(Workbook):
         fonts = {
             str(index)
             for index, font in enumerate(self._styles.iterfind("{*}fonts/{*}font"))
-            if (mark := font.find("{*}strike")) is not None and mark.get("val", "1") in _TRUE
+            if _is_struck(font)
         }
         styles = enumerate(self._styles.iterfind("{*}cellXfs/{*}xf"))
         return frozenset(str(index) for index, style in styles if style.get("fontId") in fonts)
@@ -144,16 +146,21 @@ class XlsxFile(Workbook):
 
 
 def _text(element: Element) -> str | None:
-    """Return the text of a cell, without its pronunciation and the marks of footnotes; None if it
-    is blank.
+    """Return the text of a cell, without its pronunciation and the marks of footnotes; what is
+    struck through stands between ~~, which no number has. None if it is blank.
     """
-    runs = (
-        run
-        for run in element
-        if run.tag != _PHONETIC_TAG and not (len(run) and run.find(_RAISED) is not None)
-    )
-    pieces = (t.text or "" for run in runs for t in run.iter(_TEXT_TAG))
+    pieces = []
+    for run in element:
+        if run.tag == _PHONETIC_TAG or (len(run) and run.find(_RAISED) is not None):
+            continue
+        text = "".join(t.text or "" for t in run.iter(_TEXT_TAG))
+        pieces.append(f"~~{text}~~" if len(run) and _is_struck(run.find(_FONT_OF_RUN)) else text)
     return _shown("".join(pieces))
+
+
+def _is_struck(font: Element | None) -> bool:
+    mark = None if font is None else font.find("{*}strike")
+    return mark is not None and mark.get("val", "1") in _TRUE
 
 
 def _shown(text: str) -> str | None:
@@ -168,6 +175,10 @@ class XlsxSheet(Sheet):
         self.book = book
 
     def merged(self) -> Sequence[MergedRange]:
+        return self._merged
+
+    @cached_property
+    def _merged(self) -> Sequence[MergedRange]:
         """Search the part: they stand behind the last row and are asked for before the first is
         judged.
         """
@@ -203,7 +214,8 @@ class XlsxSheet(Sheet):
         with damage(f"sheet {self.name!r} cannot be read"):
             number = 0
             for element in self.elements():
-                place = element.get("r") or str(number + 1)
+                located = next(filter(None, (each.get("r") for each in element)), "")
+                place = element.get("r") or located.lstrip(ascii_letters) or str(number + 1)
                 number = int(place if place.isdecimal() else place.removesuffix(".0"))
                 cells: list[Cell] = []
                 index = -1

@@ -236,15 +236,6 @@ def test_12_an_unknown_header_of_two_rows_is_an_error_and_its_second_row_no_insp
     assert not result.rows
 
 
-def test_12_nothing_below_the_header_of_a_second_table_is_read_by_the_first(read, table):
-    other = [*HEADER[:4], "clearance_5_in", "clearance_3_in"]
-    rows = [GOOD, other, ["R2", *GOOD[1:]], ["R3", *GOOD[1:]]]
-    result = read(table(rows=rows))
-    assert [row.record_id for row in result.inspections] == ["R1"]
-    assert len(result.rows) == 4
-    assert {problem.code for problem in result.problems} == {"table_second"}
-
-
 @pytest.mark.parametrize(("declared", "notes"), [("TOTAL_PLAY", 1), ("RADIAL", 0)])
 def test_14_a_title_that_names_another_convention_is_said(read, xlsx, declared, notes):
     header = [*HEADER[:3], *HEADER[4:]]
