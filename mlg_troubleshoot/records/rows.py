@@ -850,6 +850,7 @@ class RowReader:
         # What is only carried, and may still say that the gear failed or how it was read; with the
         # column of readings that each may be and whether any number may be one.
         self._unread_words: list[tuple[PlacedField, str | None, bool]] = []
+        self._matters = lru_cache(_REMEMBERED)(self._may_matter)
         self._add(placed)
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
@@ -1101,9 +1102,9 @@ class RowReader:
         found = found or _Found(None)
         outcome = found.values.get(OUTCOME)
         units = {entered.unit for entered in found.entered.values()}
-        for placed, nearest, is_sure in self._unread_words:
+        for place, (placed, nearest, is_sure) in enumerate(self._unread_words):
             cell = cells[placed.index]
-            if cell is None:
+            if cell is None or not self._matters(place, cell):
                 continue
             header = placed.header or column_letters(placed.index)
             is_unread = placed.field is None and (nearest is not None or of_joint)
@@ -1132,6 +1133,12 @@ class RowReader:
                 f" {other}."
             )
         return asked
+
+    def _may_matter(self, place: int, cell: Filled) -> bool:
+        """Whether a cell of a column that is not read may be asked about in any row."""
+        placed = self._unread_words[place][0]
+        is_length = self._may_be_length(cell, 0.0, is_sure=True)
+        return is_length or any(_spoken(cell)) or self._may_say_outcome(placed, cell, None)
 
     def _may_say_outcome(self, placed: PlacedField, cell: Filled, outcome: Outcome | None) -> bool:
         """Whether an unread cell says that the gear failed or, where no outcome is known, may say

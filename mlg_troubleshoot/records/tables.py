@@ -1319,10 +1319,11 @@ class _Table:
         more = [f"{len(named) - 5} more"] if len(named) > 5 else []
         hidden = sum(row > self._header_row for row in facts.hidden_rows)
         said = ", ".join(map(repr, [*words][:4]))
-        tops = {row.source.row for row in found}
+        merged = self._sheet.merged()
+        tops = {row.source.row for row in found} if merged else set()
         spread = [
             f"{column_letters(left)}{top}"
-            for top, left, _, right in self._sheet.merged()
+            for top, left, _, right in merged
             if top in tops and any(left <= i <= right for i in self._evidence)
         ]
         counted = (

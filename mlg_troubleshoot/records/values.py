@@ -174,6 +174,7 @@ _USUAL = {
 
 
 _SIGNED = re.compile(rf"^\s*([{MINUS}+])\s*(?=[\d.,])")
+_BEGINS = re.compile(rf"[{MINUS}+]?\s*[.,]?\d")
 _COMMA_NUMBER = re.compile(r"\s*[+\-]?\d*,\d+(?![\d,.])[^,.]*")
 _UNCLEAR_GROUP = re.compile(r"[+\-]?[1-9]\d{0,2}[,.]\d{3}")
 _PLAIN = re.compile(r"[+\-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+\-]?\d+)?", re.ASCII)
@@ -508,6 +509,8 @@ def written_number(cell: Filled, *, decimal_comma: bool) -> tuple[float, LengthU
         return (math.nan if cell.number is None else cell.number), None
     if isinstance(cell, str):
         cell = plain_text(cell).lstrip("<>=≤≥ ")
+        if not _BEGINS.match(cell):
+            return math.nan, None
     try:
         return _parse(cell, decimal_comma, "", partial(_length, "", None))
     except CellFaultError:
