@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import re
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -396,10 +395,17 @@ def _annotate(
             _behind_table(sheet, layout, free, own)
 
 
-# Folders of parts that the library may drop in silence.
-_DROPPABLE = re.compile(
-    "media|charts|pivottables|ctrlprops|slicers|threadedcomments|diagrams|drawings"
-)
+# Parts that the library may drop in silence, by their folder, as a user calls them.
+_DROPPABLE = {
+    "media": "pictures",
+    "charts": "charts",
+    "pivottables": "pivot tables",
+    "ctrlprops": "form controls",
+    "slicers": "slicers",
+    "threadedcomments": "threaded comments",
+    "diagrams": "diagrams",
+    "drawings": "drawings",
+}
 
 
 def _not_taken_over(before: bytes, after: bytes) -> tuple[str, ...]:
@@ -410,9 +416,9 @@ def _not_taken_over(before: bytes, after: bytes) -> tuple[str, ...]:
     )
     lost = held - kept
     return tuple(
-        f"the annotated copy lacks {lost[what]} of the {what} of the workbook"
-        for what in sorted(lost)
-        if _DROPPABLE.fullmatch(what)
+        f"the annotated copy lacks {lost[folder]} of the {what} of the workbook"
+        for folder, what in _DROPPABLE.items()
+        if lost[folder]
     )
 
 

@@ -78,6 +78,7 @@ from mlg_troubleshoot.records.rows import (
 )
 from mlg_troubleshoot.records.values import (
     CellFaultError,
+    convention_word,
     may_be_outcome,
     says_failed,
     written_number,
@@ -172,11 +173,11 @@ def find_header(
             across.setdefault(top, []).append(slice(first, last + 1))
     headers = [Header(number, tuple(map(_text, cells)), (number,)) for number, cells in rows]
     scores = [header_score(cells, options) for _, cells in rows]
-    for ((upper, above), (lower, below)), known in zip(pairwise(rows), [*scores], strict=False):
+    for (upper, above), (lower, below) in pairwise(rows):
         is_text = all(c is None or isinstance(c, str) for c in above)
-        if lower == upper + 1 and is_text and (known or upper in across):
+        if lower == upper + 1 and upper in across and is_text:
             above_it = [_text(cell) for cell, _ in zip_longest(above, below)]
-            for covered in across.get(upper, ()):
+            for covered in across[upper]:
                 above_it[covered] = [above_it[covered.start]] * len(above_it[covered])
             joined = zip_longest(above_it, map(_text, below), fillvalue="")
             texts = tuple(" ".join(words).strip() for words in joined)
@@ -1136,8 +1137,10 @@ class _Table:
     def take(self, number: int, cells: Cells) -> None:
         filled = [i for i, cell in enumerate(cells) if cell is not None]
         if filled and self._stated.issuperset(filled):
+            words = [show(cells[i]) for i in filled]
             # A line of a template that nobody filled in.
-            return
+            if all(convention_word(word) or tidy(word) in UNIT_SPELLINGS for word in words):
+                return
         name = self._stands_aside(cells)
         if name:
             self._aside.append((number, name, () if _RULE.fullmatch(name) else cells))

@@ -275,8 +275,8 @@ def test_what_the_copy_cannot_take_over_is_said(book, tmp_path):
         archive.writestr("xl/drawings/drawing1.xml", b"<xdr:wsDr><xdr:sp macro=''/></xdr:wsDr>")
     notes = annotate_workbook(book, tmp_path / "b.xlsx", read_inspections(book, ReadOptions()), {})
     assert [note.split("lacks ")[1] for note in notes] == [
+        "1 of the pictures of the workbook",
         "1 of the drawings of the workbook",
-        "1 of the media of the workbook",
     ]
 
 

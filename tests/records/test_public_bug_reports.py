@@ -27,15 +27,13 @@ RUNS = "<si><r><t>{}</t></r><r><rPr><strike/></rPr><t>{}</t></r><r><t>{}</t></r>
         ("pandas 64821", f"{HEAD}\n{WIDE.format('0.003,0.002')} ,\n", []),
         ("pandas 17869", f"{HEAD}\n{WIDE.format('0.0_03,0.002')}\n", ["not_a_length"]),
         ("pandas 40583", f"{HEAD}\n{WIDE.format('#0.003,0.002')}\n", ["not_a_length"]),
-        ("readr 1413", f'{HEAD}\n{WIDE.format(chr(34) + "0,3" + chr(34))},\n', ["decimal_comma"]),
+        ("readr 1413", f"{HEAD}\n{WIDE.format(chr(34) + '0,3' + chr(34))},\n", ["decimal_comma"]),
         ("dmm_util 26", f"{HEAD}\n{WIDE.format('9.9e+37,OL')}\n", ["clearance_out_of_range"]),
         ("CleverCSV 35", f"at,{HEAD}\n10:43:05,{WIDE.format('0.003,0.002')}\n", []),
         ("OpenRefine 423", f"{HEAD}\n5E1,5E2,LH,RADIAL,0.003,0.002\n", []),
         ("vincentlaucsb 151", f'{HEAD}\n{WIDE.format("0.003,")}""', []),
-        ("NumeRe 45", "ID,tail,side,convention,Clearance,\n,,,,Joint 3 (in),#5 (in)\n"
-         + WIDE.format("0.003,0.002"), []),
     ],
-)  # fmt: skip
+)
 def test_a_row_of_text_is_whole_or_named(read, report, text, bad):
     result = read(text)
     (row,) = result.rows
