@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.boundary import Boundary
 from mlg_troubleshoot.cli.gone import refuse_gone
-from mlg_troubleshoot.errors import ExitCode, UsageError
+from mlg_troubleshoot.errors import ExitCode
 
 # In the order of the help; each stands in the module of its name, as `app`.
 _COMMANDS = {
@@ -46,9 +46,8 @@ def _understood(given: list[str]) -> list[str]:
     if given[:1] == ["help"]:
         return [*given[1:], "--help"]
     if given[:1] == ["report"]:
-        if len(given) < 3:
-            raise UsageError("mlg report needs a gear", "Write for example mlg report N123AB LH.")
-        return ["history", *given[1:], *["--report", "report"] * ("--report" not in given)]
+        # The last folder that is named counts.
+        return ["history", "--report", "report", *given[1:]]
     return given
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from datetime import date
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +10,6 @@ import typer
 
 from mlg_troubleshoot.cli import history, options, output
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.units import LengthUnit
 
 EPILOG = "Example: mlg fleet; mlg fleet --since 2026-05-01; mlg fleet --within 300"
 
@@ -58,9 +56,7 @@ def fleet(
     from mlg_troubleshoot.workflows.history import show_fleet
 
     known = load_gear(records.gear)
-    unit = os.environ.get("MLG_SHOW")
-    show = LengthUnit.parse(unit) if unit else None
-    shown = options.Shown(report, force, show, as_json, quiet)
+    shown = options.Shown(report, force, as_json=as_json, quiet=quiet)
     if joint is not None:
         known.require_joints([joint], "--joint")
     outputs = [("--csv", csv)]

@@ -173,9 +173,10 @@ class Shown:
 
     def unit(self, *entered_in: LengthUnit | None) -> LengthUnit:
         """The unit that lengths are shown in; where none is asked for, that of most entries."""
-        usual = LengthUnit.parse(os.environ.get("MLG_UNIT") or "in")
-        entered = Counter(filter(None, entered_in)) or {usual: 1}
-        return self.show or max(entered, key=entered.__getitem__)
+        show, usual = (os.environ.get(name) for name in ("MLG_SHOW", "MLG_UNIT"))
+        entered = Counter(filter(None, entered_in)) or {LengthUnit.parse(usual or "in"): 1}
+        shown = max(entered, key=entered.__getitem__)
+        return self.show or (LengthUnit.parse(show) if show else shown)
 
 
 @dataclass(frozen=True, slots=True)

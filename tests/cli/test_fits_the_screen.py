@@ -104,7 +104,7 @@ def test_a_report_is_asked_for_by_its_gear(tmp_path: Path, monkeypatch: pytest.M
     mlg("check", table(tmp_path, row()), "--keep")
     assert mlg("report", "N123", "LH").code == 0
     assert [*(tmp_path / "report").glob("*.html")]
-    assert "Write for example mlg report N123AB LH" in mlg("report").err
+    assert "--report needs a gear" in mlg("report").err
 
 
 @pytest.mark.parametrize(

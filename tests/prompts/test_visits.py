@@ -198,6 +198,15 @@ def test_a_new_inspection_of_a_known_gear_is_a_second_one(sit, begun, life):
     assert any("last 8 thou on" in prompt for prompt in terminal.prompts)
 
 
+def test_a_reading_that_was_none_is_taken_out_of_the_visit_that_has_it(
+    sit, begun, now, capsys
+) -> None:
+    begun(*failed("8", "11", "done"))
+    sit("N1 LH", "p 40", "#3 none", "")
+    assert now().clearance_in == {5: 0.0055}
+    assert "Not changed" not in capsys.readouterr().err
+
+
 def test_a_reading_tighter_than_the_last_is_asked_about(sit: Sit, begun: Begun) -> None:
     begun(*LIMIT)
     screen = sit("N1 LH", "#2 6", "y", "").screen

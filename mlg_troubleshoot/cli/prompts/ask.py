@@ -12,8 +12,10 @@ from dataclasses import dataclass, field
 from mlg_troubleshoot.cli.prompts.entry import (
     FIRST,
     HEADING,
+    IDENTITY,
     LAST,
     PLUNGER,
+    READ_IN,
     REPAIR_DATE,
     WORD_HELP,
     Entry,
@@ -53,7 +55,7 @@ _HOW = {
 }
 _CONVENTIONS = {kind.lower(): kind.value for kind in ClearanceConvention} | {**CONVENTION.hints}
 # What is typed once for all that follows of a gear.
-_STATED = (UNIT.name, CONVENTION.name, DATE.name)
+_STATED = (*READ_IN, DATE.name)
 # Questions that Enter leaves open.
 _OPTIONAL = (PLUNGER, *LAST)
 _QUESTIONS = {
@@ -124,7 +126,7 @@ class Asker:
             self.entry.cells[TAIL_NO.name] = self.entry.accepted(self.gear, TAIL_NO.name, tail)
         with self._interrupted():
             self._say(f"{self.gear.name}. Every answer is saved. ? help, u undo, q stop.")
-            while not {*HEADING[:2]} <= self.entry.cells.keys():
+            while not {*IDENTITY} <= self.entry.cells.keys():
                 self._turn(self._open())
             return self._opened()
 
@@ -173,7 +175,7 @@ class Asker:
 
     def _opened(self) -> Entry | Visit:
         """Continue the unfinished entry of the gear, show its records, or ask on."""
-        gear = {name: self.entry.cells[name] for name in HEADING[:2]}
+        gear = {name: self.entry.cells[name] for name in IDENTITY}
         begun = [each for each in self._unfinished if each.cells | gear == gear | each.cells]
         self.known = self.visit(*self.entry.gear_key)
         if begun or self.known:
@@ -240,7 +242,7 @@ class Asker:
                 columns += [REPAIR_DATE, *map(CLEARANCE.header, restored)]
         # A unit is asked for where something is read in it.
         is_reading = self.entry.todo is None or any(map(_is_length, columns[len(HEADING) :]))
-        skipped = () if is_reading else HEADING[2:]
+        skipped = () if is_reading else READ_IN
         open_ones = [name for name in columns if name not in cells and name not in skipped]
         return next(iter(open_ones), _UNUSUAL if self._unusual() else "")
 
@@ -262,7 +264,7 @@ class Asker:
             if typed.lower() == "new" and self.entry.typed:
                 self.saved.discard(self.entry.id)
                 cells = self.entry.cells
-                kept = {name: cells[name] for name in HEADING[:2] if name in cells}
+                kept = {name: cells[name] for name in IDENTITY if name in cells}
                 self.entry = Entry.new(self.gear, kept)
                 self._named.clear()
             else:
@@ -310,7 +312,7 @@ class Asker:
             raise UsageError("Enter alone is not an answer", "Type the answer, or u to go back.")
         elif name == TAIL_NO.name:
             self._answer_tail(text)
-        elif name in HEADING[2:]:
+        elif name in READ_IN:
             self._answer_unit(text)
         elif name == _UNUSUAL:
             if text.lower() not in _YES:
@@ -329,7 +331,7 @@ class Asker:
         """Take a unit, a convention or both; what is not typed is that of the last entry."""
         cells = self.entry.cells
         last = {**self.saved.offered(), **cells}
-        found = {name: last[name] for name in HEADING[2:] if name in last}
+        found = {name: last[name] for name in READ_IN if name in last}
         was = _heading(found)
         for word in typed.lower().replace(",", " ").split():
             if word in _CONVENTIONS:
@@ -384,7 +386,7 @@ class Asker:
     def _take(self, line: str) -> bool:
         """Take a line of words; false if it is not one."""
         words = split_words(line)
-        if units := [text for name, text in words if name in HEADING[2:]]:
+        if units := [text for name, text in words if name in READ_IN]:
             self._answer_unit(" ".join(units))
         for name, text in words:
             number = joint_of(name)
@@ -396,7 +398,7 @@ class Asker:
             self._named.append(name)
             if text:
                 self._answer_joint(name, text)
-        others = [each for each in words if not joint_of(each[0]) and each[0] not in HEADING[2:]]
+        others = [each for each in words if not joint_of(each[0]) and each[0] not in READ_IN]
         if others:
             self._give(others)
         return bool(words)
@@ -565,7 +567,7 @@ class Asker:
 
 def _heading(cells: Mapping[str, str]) -> str:
     """Unit and convention, in words."""
-    return ", ".join(_plain(cells[name]) for name in HEADING[2:] if name in cells)
+    return ", ".join(_plain(cells[name]) for name in READ_IN if name in cells)
 
 
 def _plain(text: str) -> str:

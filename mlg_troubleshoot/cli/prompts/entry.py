@@ -50,7 +50,10 @@ from mlg_troubleshoot.units import (
 
 PLUNGER = PLUNGER_DISPLACEMENT.name
 REPAIR_DATE = "repair_date"
-HEADING = (TAIL_NO.name, SIDE.name, UNIT.name, CONVENTION.name)
+# What gear is entered, and what its readings are.
+IDENTITY = (TAIL_NO.name, SIDE.name)
+READ_IN = (UNIT.name, CONVENTION.name)
+HEADING = (*IDENTITY, *READ_IN)
 # What is asked of every new entry before and after its joints.
 FIRST = (*HEADING, OUTCOME.name, PLUNGER)
 LAST = (TECHNICIAN_ID.name, GAUGE_ID.name)
@@ -129,7 +132,7 @@ class Entry(msgspec.Struct, kw_only=True):
 
     @property
     def identity(self) -> str:
-        return " ".join(self.cells[name] for name in HEADING[:2] if name in self.cells)
+        return " ".join(self.cells[name] for name in IDENTITY if name in self.cells)
 
     @property
     def gear_key(self) -> tuple[str, Side]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.prompts.ask import Asker
-from mlg_troubleshoot.cli.prompts.entry import HEADING, Entry
+from mlg_troubleshoot.cli.prompts.entry import HEADING, Entry, joint_of
 from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit, continued, find_visit
 from mlg_troubleshoot.decision.columns import UNIT
 from mlg_troubleshoot.decision.inspection import Side
@@ -19,6 +19,7 @@ from mlg_troubleshoot.decision.judge_rows import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.state import GearKey, key_of
+from mlg_troubleshoot.store import inspection_from
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.keep import add_typed, amend, move, voids
@@ -88,7 +89,7 @@ class Sitting:
             own = [each for each in known.records if each.record_id in self._own]
             moved = self._move(known, own or known.records[-1:] * (not entry.has_findings), key)
         if known is not None and not entry.has_findings:
-            self._amend(entry, (moved or known.records)[-1])
+            self._amend(entry, moved or known.records)
         else:
             moved = []
             self._add(entry)
@@ -128,13 +129,17 @@ class Sitting:
             output.say(f"Moved {of} from {' '.join(key_of(visit.row))} to {' '.join(key)}.")
         return moved
 
-    def _amend(self, entry: Entry, record: Record) -> None:
-        """Correct what does not belong to one finding in the visit that was recorded last."""
+    def _amend(self, entry: Entry, records: Sequence[Record]) -> None:
+        """Correct what does not belong to one finding in the visit that was recorded last; a joint
+        that was not read, in the last one that reads it.
+        """
         changed = [name for name in entry.typed if name not in HEADING]
         changes = {name: entry.cells[name] for name in changed}
+        joints = {*map(joint_of, changed)}
+        read = [each for each in records if joints & inspection_from(each).clearance_in.keys()]
         try:
             if changes:
-                amend(self._place, self._gear, record, changes)
+                amend(self._place, self._gear, (read or records)[-1], changes)
         except UsageError as error:
             output.say(f"Not changed: {error.message}. {error.remedy}")
 
