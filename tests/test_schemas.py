@@ -123,6 +123,14 @@ def test_every_diagnosis_and_its_extension_fit_their_schemas(fleet: str) -> None
     assert extension is None or complain("extension", extension) == []
 
 
+@pytest.mark.parametrize("fleet", ["one cause", "aliased"])
+@pytest.mark.parametrize("name", ["causes", "also_possible"])
+def test_a_list_of_causes_belongs_to_its_verdict(fleet: str, name: str) -> None:
+    spoilt = copy.deepcopy(diagnosed(fleet)[0])
+    spoilt[name] = [] if spoilt[name] else spoilt["causes"] + spoilt["also_possible"]
+    assert complain("diagnose", spoilt) != []
+
+
 def test_causes_that_rows_cannot_tell_apart_share_the_probability_of_their_class() -> None:
     found = diagnosed("aliased")[0]["also_possible"]
     first, second = (each["probability"] for each in found[:2])

@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from enum import StrEnum
 from functools import lru_cache
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Probability, Size
-from mlg_troubleshoot.decision.inspection import Fact, FactKind, Inspection, InvalidRow
+from mlg_troubleshoot.decision.inspection import Fact, FactKind, Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.results import Result
 
@@ -617,7 +618,7 @@ class Assessment(_Planned, Result):
 class Rejected(_Planned, Result):
     """A row that cannot be judged: verdict INVALID, its numbers absent."""
 
-    json_names = _COURSE
+    json_names = f"{_COURSE} standing outcome inspection_date"
     json_nulls = Assessment
     row: InvalidRow
     joints: tuple[UnjudgedJoint, ...]
@@ -641,6 +642,19 @@ class Rejected(_Planned, Result):
     def headline(self) -> str:
         """What to correct."""
         return self.next_action.text
+
+    @property
+    def standing(self) -> tuple[Fact, ...]:
+        return ()
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """What the gear did, as far as it could be read."""
+        return None if self.row.understood is None else self.row.understood.outcome
+
+    @property
+    def inspection_date(self) -> date | None:
+        return None if self.row.understood is None else self.row.understood.inspection_date
 
     @property
     def in_brief(self) -> str:

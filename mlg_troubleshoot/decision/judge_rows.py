@@ -477,6 +477,9 @@ def _assessment(
     budget = _budget(judged.lower, cases, i) if known else None
     measured = inspection.measured_displacement_in
     size = math.nan if measured is None else measured
+    # A failure that may be as new as a repair stands.
+    is_new = inspection.is_since_repair(inspection.outcome_date) is not False
+    is_failed = inspection.outcome is Outcome.FAILED and is_new
     most = _explained_at_most(size, judged.upper, i)
     detail = _detail(cases, judged, i, budget, belief) if belief is not None and closes else {}
     found = Assessment(
@@ -510,9 +513,7 @@ def _assessment(
         explained_at_most_in=number_or_none(most),
         unexplained_in=number_or_none(abs(size) - most),
         headline="",
-        alarm=sentences.alarms(
-            [f.joint for f in findings if f.over_limit], failed=bool(cases.failed[i])
-        ),
+        alarm=sentences.alarms([f.joint for f in findings if f.over_limit], failed=is_failed),
         repair_sets=sets if closes else None,
         warnings=_warnings(cases, i, findings, worst, float(judged.u_in[i])),
         **detail,

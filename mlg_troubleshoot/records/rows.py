@@ -908,11 +908,14 @@ class RowReader:
                 self._tell(index, fault)
         identity = {column.name: found.values.pop(column, None) for column in IDENTITY}
         given = {**identity, "convention": found.convention, "source": source}
-        if self._bad or row.bad or None in given.values():
+        # Numbers of a table none of whose headers is a clearance are not facts of a gear.
+        is_unknown = bool(asked) and CLEARANCE not in self._at
+        if self._bad or row.bad or is_unknown or None in given.values():
             bad = sorted(index for index in self._bad if index >= 0)
             named = [*row.bad, *(self._placed[index].header for index in bad)]
             named += [c.name for c in IDENTITY if c not in self._at and identity[c.name] is None]
             named += [CONVENTION.name] if -1 in self._bad else []
+            named += [CLEARANCE.header(1, LengthUnit.INCH)] if is_unknown else []
             return InvalidRow(
                 **identity,
                 correct=tuple(dict.fromkeys(named)),
@@ -1109,8 +1112,9 @@ class RowReader:
             header = placed.header or column_letters(placed.index)
             is_unread = placed.field is None and (nearest is not None or of_joint)
             is_unread = is_unread or placed.is_misread
-            # Under a header that names nothing only a number that may decide is asked about.
-            is_named = nearest or is_sure or of_joint
+            # Under a header that names nothing only a number that may decide is asked about, or any
+            # number where no header is a clearance.
+            is_named = nearest or is_sure or of_joint or CLEARANCE not in self._at
             smallest = 0.0 if is_named else min(self._options.limit_in.values(), default=0.0)
             any_number = is_sure or units == {LengthUnit.THOU}
             said, unit, is_above = _spoken(cell)

@@ -64,11 +64,23 @@ def schema(name: str) -> dict[str, Any]:
         rows = parts["CheckResult"]["properties"]["inspections"]
         invalid = {"properties": {"verdict": {"const": "INVALID"}}}
         rows["items"] = {"if": invalid, "then": row, "else": rows["items"]}
+    if name == "diagnose":
+        parts["DiagnoseResult"]["allOf"] = [_only("causes", "NAMED")]
+        parts["DiagnoseResult"]["allOf"] += [_only("also_possible", "AMBIGUOUS")]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"urn:mlg-troubleshoot:{name}:{SCHEMA_VERSION}",
         **(roots[0] if len(roots) == 1 else {"anyOf": list(roots)}),
         "$defs": parts,
+    }
+
+
+def _only(listed: str, verdict: str) -> dict[str, Any]:
+    """That a list holds something with one verdict, and is empty with the others."""
+    return {
+        "if": {"properties": {"verdict": {"const": verdict}}},
+        "then": {"properties": {listed: {"minItems": 1}}},
+        "else": {"properties": {listed: {"maxItems": 0}}},
     }
 
 

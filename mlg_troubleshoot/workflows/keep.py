@@ -82,6 +82,13 @@ class Kept:
     warnings: tuple[str, ...]
 
 
+def _as_shown(value: Any) -> Any:
+    """A value with numbers of 12 digits: a spreadsheet program keeps 15 of the 17 of a double."""
+    if isinstance(value, float):
+        return float(f"{value:.12g}")
+    return {k: _as_shown(v) for k, v in value.items()} if isinstance(value, Mapping) else value
+
+
 @dataclass(frozen=True, slots=True)
 class Told:
     """An inspection as a record, with the hashes of what was found, with its day and without it;
@@ -101,7 +108,8 @@ class Told:
     @classmethod
     def of(cls, record: Record, said: Mapping[str, Any] | None = None) -> Told:
         said = said or record.body["inspection"]
-        found = {n: v for n, v in said.items() if n not in (*NOT_CONTENT, DATE.filled)}
+        left_out = (*NOT_CONTENT, DATE.filled)
+        found = {n: _as_shown(v) for n, v in said.items() if n not in left_out}
         text = canonical(found).encode()
         contents = sha256(text + record.day.encode()).digest(), sha256(text).digest()
         return cls(record, *contents, said.get("source", (None,))[0])

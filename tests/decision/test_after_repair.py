@@ -83,8 +83,9 @@ def test_a_gear_that_fails_again_after_the_repair_with_its_plunger_within_has_an
 
 
 def test_a_failure_that_may_be_older_than_the_repair_is_asked_about(judge: Judge) -> None:
-    warnings = judge(RESTORED, **REPAIRED).warnings
-    assert any("FAILED may be older or newer than the repair" in w for w in warnings)
+    found = judge(RESTORED, **REPAIRED)
+    assert any("FAILED may be older or newer than the repair" in w for w in found.warnings)
+    assert found.headline.endswith("The gear FAILED.")
 
 
 @pytest.mark.parametrize(

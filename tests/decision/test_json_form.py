@@ -89,7 +89,15 @@ def test_the_numbers_of_an_invalid_row_are_null(form: dict) -> None:
 def test_the_identity_of_an_invalid_row_is_given_as_far_as_it_could_be_read(form: dict) -> None:
     row = form["inspections"][1]
     assert (row["record_id"], row["tail_no"], row["side"]) == ("R2", None, "RH")
-    assert row["warnings"] == ["noticed"]
+    assert (row["warnings"], row["standing"]) == (["noticed"], [])
+
+
+def test_what_an_invalid_row_says_that_the_gear_did_is_given() -> None:
+    row = {"tail_no": "N1", "side": "LH", "clearance_3_in": -1.0, "outcome": "FAILED"}
+    said = check(row | {"inspection_date": "2026-03-04", "clearance_convention": "RADIAL"})
+    (found,) = said.to_dict()["inspections"]
+    assert (found["verdict"], found["outcome"]) == ("INVALID", "FAILED")
+    assert found["inspection_date"] == "2026-03-04"
 
 
 def test_a_clearance_that_was_not_measured_is_null_and_one_measured_as_zero_is_zero(judge):

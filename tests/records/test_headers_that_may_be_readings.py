@@ -130,6 +130,14 @@ def test_a_row_that_says_something_only_where_nobody_reads_is_not_set_aside(head
     assert [each.verdict for each in result.judgements][1:] == [Verdict.INCOMPLETE]
 
 
+def test_a_table_none_of_whose_clearance_headers_is_understood_is_invalid_in_every_row() -> None:
+    text = "tail_no,side,clearance_convention,Wert A,Wert B\n"
+    text += "N1,LH,RADIAL,0.013,0.002\nN2,LH,RADIAL,0.003,0.002\n"
+    result = check(Named(text.encode(), "t.csv"), advice=False)
+    assert [each.verdict for each in result.judgements] == [Verdict.INVALID] * 2
+    assert result.exit_code is ExitCode.NO_CONCLUSION
+
+
 # Remarks of every day, which nobody has to answer for.
 ORDINARY = (
     *("stuck bolt replaced", "pin jammed in bush, pressed out", "placard hung at the door"),

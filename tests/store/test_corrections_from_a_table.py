@@ -162,6 +162,11 @@ def test_a_table_without_ids_that_was_sorted_or_renamed_is_known(without_ids, na
     assert "3 known already" in said
 
 
+def test_the_last_digits_of_a_double_are_no_change(without_ids: Path) -> None:
+    again = unnamed(without_ids, "0.0011", "0.0012000000000000001", "0.0013", name="saved.csv")
+    assert "3 known already" in mlg("check", again, "--keep").err
+
+
 def test_a_changed_cell_of_a_table_without_ids_is_named_and_amended(without_ids: Path) -> None:
     changed = unnamed(without_ids, "0.0011", "0.0099", "0.0013")
     assert "#3 was 0.0012, the table says 0.0099" in mlg("check", changed, "--keep").err
