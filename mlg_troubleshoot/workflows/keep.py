@@ -353,10 +353,7 @@ def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
         )
     own = lives_of(store, [(wrong.tail_no, wrong.side)])[wrong.tail_no, wrong.side]
     entered = next(each.place for each in own.inspections if each.kept.digest == wrong.digest)
-    row = replace(row, tail_no=gear[0], side=Side(gear[1]))
-    there = lives_of(store, [gear]).get(gear)
-    if there and any(v.inspection.record_id == row.record_id for v in there.inspections):
-        row = under_a_free_id(row, store)
+    row = under_a_free_id(replace(row, tail_no=gear[0], side=Side(gear[1])), store)
     moved = inspection_record(row, moved_from=wrong.key, entered=entered)
     # Moved back it differs from the record that was moved away from there.
     moved = replace(moved, identity=())

@@ -22,6 +22,7 @@ from mlg_troubleshoot.parallel import map_blocks
 from mlg_troubleshoot.workers import WorkerProcesses
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.check import BlockOutput, CheckOptions, check_files
+from tests.cli.conftest import mlg
 from tests.decision.conftest import inspected
 
 ROOT = Path(__file__).parents[2]
@@ -75,6 +76,11 @@ def told() -> Told:
 def test_what_is_found_does_not_depend_on_the_number_of_workers(told: Told) -> None:
     alone = check_files([BATCH], CheckOptions())
     assert task.json_lines(told.judgements) == task.json_lines(alone.judgements)
+
+
+def test_the_json_of_the_command_is_that_of_python() -> None:
+    alone = check_files([BATCH], CheckOptions()).to_dict()
+    assert mlg("check", BATCH, "--json").json["inspections"] == alone["inspections"]
 
 
 def test_any_executor_finds_the_same(told: Told, monkeypatch: pytest.MonkeyPatch) -> None:
