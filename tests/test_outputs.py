@@ -153,7 +153,7 @@ def test_an_output_that_is_an_input_is_refused(tmp_path: Path, name: str) -> Non
 
 def test_an_output_in_an_input_folder_is_refused_where_it_is_one_of_its_files(tmp_path):
     (tmp_path / "a.csv").write_text("x")
-    with pytest.raises(UsageError):
+    with pytest.raises(UsageError, match=r"a\.csv\): nothing was read and nothing written$"):
         claim_outputs([tmp_path], [("--csv", tmp_path / "a.csv")], force=True)
 
 
