@@ -13,7 +13,7 @@ from datetime import date, datetime
 from functools import cached_property
 from operator import itemgetter
 
-from mlg_troubleshoot.decision.assessment import Action, Assessment, Verdict
+from mlg_troubleshoot.decision.assessment import Action, Assessment, Basis, Verdict
 from mlg_troubleshoot.decision.inspection import (
     Fleet,
     Inspection,
@@ -65,6 +65,7 @@ class TodaysVerdict:
     """
 
     verdict: Verdict | None = None
+    basis: Basis | None = None
     title: str = ""
     predicted_displacement_in: float | None = None
     margin_in: float | None = None
@@ -450,6 +451,7 @@ def _judged(
     return [
         TodaysVerdict(
             found.verdict,
+            found.basis,
             found.title,
             found.predicted_displacement_in,
             found.margin_in,

@@ -454,7 +454,7 @@ class FleetLine:
 
     json_names = """
         tail_no side record_id inspection_date gear_landings verdict=now.verdict
-        worst_joint=now.worst_joint landings_to_limit=ahead.landings_to_limit
+        basis=now.basis worst_joint=now.worst_joint landings_to_limit=ahead.landings_to_limit
         limit_joint=ahead.limit_joint landings_to_margin=ahead.landings_to_margin
         next_inspection_landings=ahead.next_inspection_landings due_date=ahead.due_date repairs
         predicted_displacement_in=now.predicted_displacement_in margin_in=now.margin_in

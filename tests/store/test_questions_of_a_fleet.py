@@ -170,6 +170,7 @@ def test_the_most_urgent_gears_stand_first_with_the_reason(fleet) -> None:
         within = "measured" if truth[key(gear)].plunger else "worst case"
         words = ("FAILED in", "measured", "FAILED on", "of its limit", within)[place]
         assert words in gear["why"]
+        assert place != 1 or gear["basis"] == "MEASURED"
     again = [gear for gear, place in zip(found, ranks, strict=True) if place == 0]
     for gear in again:
         own = truth[key(gear)]
