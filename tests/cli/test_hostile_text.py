@@ -44,7 +44,8 @@ def test_a_header_and_a_command_act_on_neither_stream(table: Table) -> None:
 
 @pytest.mark.parametrize("column", ["record_id", "tail_no"])
 @pytest.mark.parametrize("rows", [1, 2])
-def test_markup_in_an_identity_is_shown_as_it_is(column: str, rows: int, table: Table) -> None:
+def test_markup_in_an_identity_is_shown_as_it_is(column, rows, table, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
     found = mlg(
         "check", table(*[row(**{column: "[/b][conceal]X"}), row(record_id="B", side="RH")][:rows])
     )

@@ -182,6 +182,14 @@ def test_a_joint_prompt_says_what_enter_does_and_what_ends_the_joints(sit: Sit) 
         assert said in terminal.screen
 
 
+def test_a_unit_is_understood_where_a_name_is_asked_for_and_done_is_no_name(sit, life) -> None:
+    typed = ("f", "done", "8", "done", "unit mm", "done", "convention play", "G-03", "", "")
+    sit("unit thou", "N1 LH", "", "play", *typed)
+    found = life().inspections[-1].inspection
+    assert (found.readings_in, found.clearance_in) == ((), {3: 0.004})
+    assert (found.technician_id, found.gauge_id) == (None, "G-03")
+
+
 @pytest.mark.parametrize("line", ["unit mm", "unit mm #5 0.2", "#5 0.2 unit mm", "0.2"])
 def test_a_unit_is_changed_at_any_question_for_what_is_typed_from_there_on(sit, life, line):
     typed = ["unit mm", "0.2"] if line == "unit mm" else [line]

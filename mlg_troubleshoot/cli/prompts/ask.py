@@ -298,9 +298,12 @@ class Asker:
         if name == _UNUSUAL and PLUNGER in dict(split_words(typed)):
             # It is typed again, not once more.
             self.entry.cells.pop(PLUNGER, None)
-        # One letter at the heading is a slip, not an outcome.
-        no_words = name in (TAIL_NO.name, *LAST) or (name in HEADING and len(typed) == 1)
-        if no_words or not self._take(typed):
+        if name in _OPTIONAL and typed.lower() == "done":
+            typed = ""
+        # A name may be any word but a unit; one letter at the heading is a slip, not an outcome.
+        is_unit = typed.lower().startswith(("unit ", "convention "))
+        is_name = name in (TAIL_NO.name, *LAST) and not is_unit
+        if is_name or (name in HEADING and len(typed) == 1) or not self._take(typed):
             self._answer_question(name, typed or self._enters(name))
 
     def _answer_question(self, name: str, text: str) -> None:
@@ -448,21 +451,20 @@ class Asker:
 
     def _joint_question(self, number: int) -> tuple[str, str]:
         joint = self.gear.joint(number)
-        unit, kind = self.entry.unit, self.entry.convention
+        kind = self.entry.convention
         limit = self._length(joint.limit.value * kind.per_radial)
         last = self.known.last.get(number) if self.known else None
         prompt = f"#{number} {joint.name}, limit {limit}" + f", last {last}" * (last is not None)
         typed = self.entry.cells.get(CLEARANCE.header(number))
         prompt += f" (Enter: {f'{typed}; or none' if typed else 'not read'}; done)"
-        lines = [
-            f"{joint.label}. {joint.location}. Area: {joint.area}.",
-            f"Limit {limit} {_plain(kind)} = {unit.shown(joint.limit.value)} {unit} radial,"
-            f" {joint.limit.kind.value}.",
-            f"How: {_HOW[kind]} Only play across the pin counts.",
-            "Make the gear safe as the maintenance manual says before you reach in.",
-            "done: no more joints are read. #7: joint 7. #7 13: its reading.",
-        ]
-        return prompt, "\n".join(lines)
+        return prompt, (
+            f"{joint.label}. {joint.location}. Area: {joint.area}.\n"
+            f"Limit {limit} {_plain(kind)} = {self._length(joint.limit.value)} radial,"
+            f" {joint.limit.kind.value}.\n"
+            f"How: {_HOW[kind]} Only play across the pin counts.\n"
+            "Make the gear safe as the maintenance manual says before you reach in.\n"
+            "done: no more joints are read. #7: joint 7. #7 13: its reading."
+        )
 
     def _enters(self, name: str) -> str:
         """What Enter answers: for a tail number, the gear of the last unfinished entry."""
@@ -474,7 +476,7 @@ class Asker:
             return self.entry.day.isoformat()
         if name == RESTORED_JOINTS.name and self.known:
             return " ".join(map(str, self.known.step.joints))
-        return self.saved.offered().get(name, "") if name in LAST else ""
+        return self.saved.offered().get(name, "")
 
     def _unusual(self) -> str:
         """What is unusual and not confirmed, in one line."""
