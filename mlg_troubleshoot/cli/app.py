@@ -4,6 +4,7 @@ runs.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -59,6 +60,11 @@ class CommandGroup(TyperGroup):
     def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
         given = list(sys.argv[1:] if args is None else args)
         with Boundary():
+            if "SOURCE_DATE_EPOCH" in os.environ:
+                from mlg_troubleshoot.reporting.html import moment_of_report
+
+                # NumPy reads it as well, and does not say what is wrong with it.
+                moment_of_report()
             refuse_gone(given)
             given = _understood(given)
             self.shows_all = _ALL in given

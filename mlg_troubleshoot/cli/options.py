@@ -47,7 +47,7 @@ class PaperSize(StrEnum):
 
 def paper_size() -> str:
     """The paper that the environment asks for."""
-    return one_of(PaperSize, os.environ.get("MLG_PAGE", PaperSize.A4), "MLG_PAGE").value
+    return one_of(PaperSize, os.environ.get("MLG_PAGE") or PaperSize.A4, "MLG_PAGE").value
 
 
 def _show_version(wanted: bool) -> None:

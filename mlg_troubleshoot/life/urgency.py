@@ -95,14 +95,16 @@ def recurrence(lines: Sequence[LogLine]) -> str:
 
 
 def changes_since(life: GearLife, lines: Sequence[LogLine], day: str) -> tuple[str, ...]:
-    """What was found and done on a gear since a day, and how its verdict changed."""
+    """What was found and done on a gear since a day, and how its verdict changed; what has no day
+    may be of any.
+    """
     said: list[str] = []
     for line in lines:
-        if not line.counts or line.date is None or line.date < day:
+        if not line.counts or (line.date or day) < day:
             continue
         if line.kind in (*Outcome, "restored") or line.text == "rigging corrected":
-            said.append(f"{line.text} on {line.date}")
-    before = [line for line in lines if line.verdict and (line.date or "") < day]
+            said.append(f"{line.text} on {line.date}" if line.date else f"{line.text}, no date")
+    before = [line for line in lines if line.verdict and (line.date or day) < day]
     now = life.now.title
     was = before[-1].text.removeprefix("verdict: ") if before else "not inspected"
     if now and now != was:

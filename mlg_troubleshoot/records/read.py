@@ -12,6 +12,7 @@ import os
 import stat
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
@@ -124,22 +125,24 @@ def read_many(
     finally:
         if is_collected:
             gc.enable()
-    passed_over = tuple(note for source in given if (note := _subfolders_note(source)))
+    passed_over = tuple(note for source in given for note in _passed_over(source))
     return replace(read, notes=passed_over + read.notes, unread=passed_over + read.unread)
 
 
-def _subfolders_note(source: Source) -> str:
-    """Say which folders in a folder hold tables that were not read."""
-    try:
-        if not isinstance(source, str | Path) or not Path(source).is_dir():
-            return ""
-        folders = [folder for folder in sorted(Path(source).iterdir()) if folder.is_dir()]
-        names = [f.name for f in folders if any(p.suffix.lower() in _SUFFIXES for p in f.iterdir())]
-    except OSError:
-        return ""
-    return (
-        f"{source}: folders in it were not read: {', '.join(map(writable, names))}" if names else ""
-    )
+def _passed_over(source: Source) -> Iterator[str]:
+    """Say which files of a folder, and which folders in it that hold tables, were not read."""
+    if not isinstance(source, str | Path) or not Path(source).is_dir():
+        return
+    with suppress(OSError):
+        found = [p for p in sorted(Path(source).iterdir()) if not p.name.startswith((".", "~$"))]
+        folders = [p for p in found if p.is_dir()]
+        others = [p for p in found if p.suffix.lower() not in _SUFFIXES and p not in folders]
+        tables = [f for f in folders if any(p.suffix.lower() in _SUFFIXES for p in f.iterdir())]
+        for what, paths in (("folders", tables), ("files", others)):
+            names = [writable(path.name) for path in paths]
+            more = [f"{len(names) - 5} more"] if len(names) > 5 else []
+            if names:
+                yield f"{source}: {what} in it were not read: {', '.join([*names[:5], *more])}"
 
 
 def expand(source: Source) -> list[Source]:

@@ -79,6 +79,7 @@ from mlg_troubleshoot.records.rows import (
 from mlg_troubleshoot.records.values import (
     CellFaultError,
     convention_word,
+    in_words,
     may_be_outcome,
     says_failed,
     written_number,
@@ -968,6 +969,7 @@ def _read_one(
         width = max(width, len(cells))
         if number < header.rows_used[0]:
             titles += [cell for cell in cells if isinstance(cell, str)]
+            table.take_above(number, cells)
         elif number > header.row:
             table.take(number, cells)
     if form is not None:
@@ -1067,6 +1069,13 @@ _NO_INSPECTION = re.compile(
 _JOINT_SAID = re.compile(r"\b(?:joints?|jt|plunger|clearance|gelenk)\b|#\s*\d", re.IGNORECASE)
 _FRACTION = re.compile(r"(?<![\d.,/\-])\d{0,3}[.,]\d+(?![\d.,/\-])|\d\s*(?:thou|mm)\b")
 _RULE = re.compile(r"[-=_*.\s]{3,}")
+# Both outcomes next to each other: a legend.
+_LEGEND = re.compile(r"\bretracted(?: \w{1,3})? failed\b|\bfailed(?: (?!not )\w{1,3})? retracted\b")
+
+
+def _tells_failure(text: str) -> bool:
+    """Whether a line outside the table says that a gear failed."""
+    return says_failed(text) and _LEGEND.search(in_words(text)) is None
 
 
 def _ragged(cells: Cells, width: int) -> FileRefusedError:
@@ -1127,12 +1136,38 @@ class _Table:
         self._aside: list[tuple[int, str, Cells]] = []
         # Whether ids begin with the sign of a comment, as the first of them does.
         self._is_marked: bool | None = None
+        self._is_below_other = False
         self._telling = [columns.at(column) for column in (TAIL_NO, SIDE, CLEARANCE, JOINT)]
         self._named = {
             i: column for column in (RECORD_ID, TAIL_NO, JOINT) for i in columns.at(column)
         }
         self._evidence = columns.at(CLEARANCE, PLUNGER_DISPLACEMENT, OUTCOME)
         self._stated = {*columns.at(CONVENTION, UNIT)}
+
+    def take_above(self, number: int, cells: Cells) -> None:
+        """Refuse a row above the header that may be a finding: words of a failure, a number of
+        another table, a number behind the label of a reading or a fraction beside a side.
+        """
+        if header_score(cells, self._table.options):
+            self._is_below_other = True
+            return
+        texts = [cell for cell in cells if isinstance(cell, str)]
+        fields = {text: recognise(_text(text), self._table.options.joints).field for text in texts}
+        is_told = self._is_below_other or any(
+            field and field.column in (CLEARANCE, PLUNGER_DISPLACEMENT) for field in fields.values()
+        )
+        others = [cell for cell in cells if not isinstance(cell, str) or not fields[cell]]
+        is_of_gear = any(map(Side.spelt, texts)) and any(map(_is_fraction, cells))
+        is_number = is_told and any(map(_is_number, others))
+        if is_number or is_of_gear or any(map(_tells_failure, texts)):
+            why = FileRefusedError(
+                "row_above",
+                "above the header of the inspections",
+                "a title without readings or outcomes",
+                "Enter it below the header as an inspection, or delete the line; put another"
+                " table on a sheet of its own.",
+            )
+            self._out.rows.append(self.reader.faulty(number, cells, why))
 
     def take(self, number: int, cells: Cells) -> None:
         filled = [i for i, cell in enumerate(cells) if cell is not None]
@@ -1270,6 +1305,8 @@ class _Table:
             texts = [*filter(None, map(show, cells))]
             if _JOINT_SAID.search(" ".join(texts)) and any(map(_FRACTION.search, texts)):
                 alarms.append("a joint and a number in words")
+            if not worst.get(Outcome.FAILED) and any(map(_tells_failure, texts)):
+                alarms.append("a failure in words")
             if alarms:
                 what = f"{quote(name, 40)!r}, set aside although it holds {', '.join(alarms)}"
                 why = FileRefusedError(
@@ -1301,7 +1338,7 @@ class _Table:
         if far > options.margin_in + ROUNDING_IN:
             yield "a plunger reading beyond the margin", far
         if known.outcome is Outcome.FAILED:
-            yield "FAILED", 1.0
+            yield Outcome.FAILED, 1.0
 
     def finish(self) -> list[str]:
         """Read what could be read only with all rows at hand, and say what stood between the

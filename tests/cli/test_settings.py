@@ -34,11 +34,11 @@ def test_a_fleet_is_shown_in_the_unit_of_its_entries_else_in_that_of_the_environ
 
 
 def test_the_environment_says_the_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    for size in ("Letter", "A4"):
+    for size in ("Letter", "A4", ""):
         monkeypatch.setenv("MLG_PAGE", size)
-        mlg("check", FAILURE, "--report", tmp_path / size, "--format", "html")
-        (page,) = (tmp_path / size).glob("*.html")
-        assert re.findall(r"size: (A4|Letter)", page.read_text(encoding="utf-8")) == [size]
+        mlg("check", FAILURE, "--report", tmp_path / f"of{size}", "--format", "html")
+        (page,) = (tmp_path / f"of{size}").glob("*.html")
+        assert re.findall(r"size: (A4|Letter)", page.read_text(encoding="utf-8")) == [size or "A4"]
 
 
 def test_the_environment_says_unit_and_convention_of_tables(monkeypatch, table):
@@ -67,6 +67,14 @@ def test_every_variable_is_named_in_the_help_and_refused_with_its_value(
     found = mlg("check", FAILURE, "--keep")
     assert found.code == 2
     assert "furlong" in found.err or str(tmp_path) in found.err
+
+
+@pytest.mark.parametrize("value", ["", "yesterday"])
+@pytest.mark.parametrize("command", [["fleet"], ["check", FAILURE, "--keep"]])
+def test_a_date_of_the_sources_that_is_not_valid_is_refused(command, value, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", value)
+    found = mlg(*command)
+    assert (found.code, repr(value) in found.err) == (2, True)
 
 
 def test_a_file_says_how_headers_are_read(table: Table, tmp_path: Path) -> None:

@@ -12,15 +12,19 @@ from mlg_troubleshoot.cli.check_run import Run
 from mlg_troubleshoot.cli.options import Tables
 from mlg_troubleshoot.cli.prompts.ask import EntryInterruptedError
 
+Line = str | Callable[[], str]
+
 
 class StoppedError(Exception):
     """More was asked than was typed; with the screen."""
 
 
 class ScriptedTerminal:
-    """Types the given lines one after the other, then ends the input."""
+    """Types the given lines one after the other, then ends the input; what is to be called first
+    happens meanwhile, as in another window.
+    """
 
-    def __init__(self, typed: Iterable[str], end: type[BaseException] = EOFError) -> None:
+    def __init__(self, typed: Iterable[Line], end: type[BaseException] = EOFError) -> None:
         self._typed = list(typed)
         self._end = end
         self.screen = ""
@@ -35,7 +39,8 @@ class ScriptedTerminal:
         if not self._typed:
             raise self._end
         self.prompts.append(prompt)
-        text = self._typed.pop(0)
+        line = self._typed.pop(0)
+        text = line if isinstance(line, str) else line()
         self.keys += len(text) + 1
         self.screen += text + "\n"
         return text
@@ -48,7 +53,7 @@ def sitting(store: Path, patch: pytest.MonkeyPatch) -> Sit:
     """One run of ``mlg check`` on a terminal, ended with Enter."""
 
     def sit(
-        *typed: str, end: type[BaseException] = EOFError, flags: Flags | None = None
+        *typed: Line, end: type[BaseException] = EOFError, flags: Flags | None = None
     ) -> ScriptedTerminal:
         terminal = ScriptedTerminal(typed, end)
         patch.setattr("mlg_troubleshoot.cli.prompts.sitting.Terminal", lambda: terminal)

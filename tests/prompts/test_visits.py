@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.cli.check import Flags
-from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.inspection import Inspection, Outcome
 from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.store import Store
 from tests.cli.conftest import mlg
@@ -189,6 +189,57 @@ def test_undo_goes_back_visit_by_visit_to_the_first_one(sit, begun, life, now, c
     assert "Nothing is left to undo" in capsys.readouterr().err
     assert life().repairs == ()
     assert now().clearance_in[2] == 0.013
+
+
+def meanwhile(other: Callable[[], object], line: str) -> Callable[[], str]:
+    """Type a line after something else happened in another window."""
+
+    def first() -> str:
+        other()
+        return line
+
+    return first
+
+
+def facts(life: GearLife) -> list[tuple[object, ...]]:
+    """What each visit of a gear says, in the order of the log."""
+    return [
+        (row.outcome, row.readings_in, dict(row.clearance_in))
+        for row in (visit.inspection for visit in life.visits)
+    ]
+
+
+def test_two_first_visits_begun_in_two_windows_are_two_visits(sit, life, now):
+    anna = ("radial", "f", "46", "#3 13", "done", "Anna", "", "")
+    bert = ("N1 LH", "thou", "radial", "r", "8", "#5 4", "done", "Bert", "", "")
+    sit("N1 LH", meanwhile(lambda: sit(*bert), "thou"), *anna)
+    assert sorted(facts(life()), key=str) == [
+        (Outcome.FAILED, (0.046,), {3: 0.013}),
+        (Outcome.RETRACTED, (0.008,), {5: 0.004}),
+    ]
+    assert (now().outcome, now().readings_in) == (Outcome.FAILED, (0.008, 0.046))
+    assert now().clearance_in == {3: 0.013, 5: 0.004}
+
+
+@pytest.mark.parametrize("place", range(1, 4))
+@pytest.mark.parametrize("typed", [("p 50", "#3 9"), ("#3 9", "p 50")])
+def test_two_windows_open_on_one_gear_lose_nothing_and_count_nothing_twice(
+    sit, begun, life, now, place, typed
+):
+    begun(*failed("8", "done"))
+    before = facts(life())
+    lines = ["N1 LH", typed[0], "#1 2", "#4 3"]
+    lines[place] = meanwhile(lambda: sit("N1 LH", typed[1], "#2 5", ""), lines[place])
+    sit(*lines, "")
+    after = facts(life())
+    assert [each for each in after if each in before] == before
+    told = [(j, v) for _, _, read in after if read for j, v in read.items()]
+    own = {1: 0.001, 2: 0.0025, 3: 0.0045, 4: 0.0015}
+    assert sorted(pair for pair in told if pair in own.items()) == sorted(own.items())
+    assert sum(read == (0.05,) for _, read, _ in after) == 1
+    assert {j: now().clearance_in[j] for j in own} == own
+    assert now().readings_in == (0.046, 0.05)
+    assert now().outcome is Outcome.FAILED
 
 
 def test_a_new_inspection_of_a_known_gear_is_a_second_one(sit, begun, life):

@@ -228,9 +228,14 @@ def test_an_open_file_is_called_by_its_name(folder):
         assert read_many([file], ReadOptions()).files[0].name == str(folder / "a.csv")
 
 
-def test_folders_in_a_folder_that_hold_tables_are_named(folder):
+def test_what_is_not_read_of_a_folder_is_named(folder):
     (folder / "old").mkdir()
     (folder / "old" / "e.csv").write_text(OF_EACH_FILE + "E1,N1,LH,RADIAL,0.013\n")
     (folder / "pictures").mkdir()
-    (note,) = [note for note in read_many([folder], ReadOptions()).unread if "not read" in note]
-    assert note.endswith("folders in it were not read: old")
+    for name in ("b.bak", "c.csv.gz", "d.dat", ".e.csv"):
+        (folder / name).write_text("")
+    notes = [note for note in read_many([folder], ReadOptions()).unread if "not read" in note]
+    assert notes == [
+        f"{folder}: folders in it were not read: old",
+        f"{folder}: files in it were not read: b.bak, c.csv.gz, d.dat, notes.md",
+    ]

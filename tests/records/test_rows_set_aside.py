@@ -130,3 +130,36 @@ def test_what_was_set_aside_is_said_by_a_quiet_check_and_decides_its_exit_code(
     done = mlg("check", str(file), "--convention", "RADIAL", "-q")
     assert done.code == code
     assert "'Max'" in done.err
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        "A/C Reg,Posn,Jt 3 clr (in),Result\nN2,LH,0.012,\n",
+        "tail_no,side,plunger_displacement_thou\nN2,LH,60\n",
+        "N2,LH,0.002,0.06\n",
+        "Plunger displacement (in),0.060\n",
+        "Outcome,FAILED\n",
+        "The gear of N2 did not retract on 3 May\n",
+    ],
+)
+def test_a_finding_above_the_header_is_a_row_to_correct(above: str) -> None:
+    found = read(f"{above}{WIDE}N1,0.001,0.002,,\n", "LH.csv")
+    assert [type(row) for row in found.rows] == [InvalidRow, Inspection]
+    assert {problem.code for problem in found.problems} == {"row_above"}
+
+
+@pytest.mark.parametrize(
+    "above",
+    ["Inspection of 2026-03-04,,0.5", "outcome: RETRACTED or FAILED", "#3 (in)", "Limit,0.0075"],
+)
+def test_a_title_above_the_header_is_no_finding(above: str) -> None:
+    found = read(f"{above}\n{WIDE}N1,0.001,0.002,,\n", "LH.csv")
+    assert [type(row) for row in found.rows] == [Inspection]
+
+
+def test_a_failure_in_words_below_the_table_is_a_row_to_correct_unless_a_row_says_it() -> None:
+    line = "Note: failed to retract on 3 May,,,,\n"
+    for outcome, kinds in (("", [Inspection, InvalidRow]), ("FAILED", [Inspection])):
+        found = read(f"{WIDE}N1,0.001,0.002,,{outcome}\n{line}", "LH.csv")
+        assert [type(row) for row in found.rows] == kinds

@@ -212,6 +212,15 @@ def test_what_changed_since_a_day_names_failures_and_repairs(fleet) -> None:
             assert (f"restored #{joint} on {day}" in said) == (day >= SINCE)
 
 
+def test_what_has_no_day_may_have_changed_since_any(tmp_path: Path) -> None:
+    table = tmp_path / "undated.csv"
+    found = "tail_no,side,plunger_displacement_in,outcome\nN1,LH,0.002,FAILED\nN2,LH,0.06,\n"
+    table.write_text(found, encoding="utf-8")
+    mlg("check", table, "--convention", "RADIAL", "--keep", "--store", tmp_path / "a.sqlite")
+    gears = mlg("fleet", "--since", SINCE, "--store", tmp_path / "a.sqlite", "--json").json["gears"]
+    assert [gear["tail_no"] for gear in gears] == ["N2", "N1"]
+
+
 @pytest.mark.parametrize("joint", [3, 7])
 def test_the_trend_of_a_joint_has_every_reading_with_its_date(fleet, joint: int) -> None:
     folder, truth = fleet
