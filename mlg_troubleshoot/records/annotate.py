@@ -33,7 +33,6 @@ from mlg_troubleshoot.decision.columns import (
     DATE,
     OUTCOME,
     PLUNGER_DISPLACEMENT,
-    RECORD_ID,
     REMARKS,
     SIDE,
     TAIL_NO,
@@ -448,8 +447,7 @@ def _load(source: str | Path, out: str | Path) -> tuple[bytes, XlsxFile]:
 def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:
     place = problem.cell
     if place is None:
-        row = problem.row or layout.header_row
-        place = f"{column_letters(layout.index_of(RECORD_ID.name) or 0)}{row}"
+        place = f"A{problem.row or layout.header_row}"
     cell = sheet[place]
     if isinstance(cell, MergedCell):
         anchor = next(r for r in sheet.merged_cells.ranges if place in r)
@@ -507,20 +505,15 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
             if s.row is not None and v.get(header) is not None
         }
         longest = max((len(v) for v in found.values() if isinstance(v, str)), default=0)
-        width = (
-            _NUMBER_WIDTH
-            if not longest
-            else _TEXT_WIDTH
-            if longest < 2 * _TEXT_WIDTH
-            else _LONG_WIDTH
-        )
+        is_long = longest >= 2 * _TEXT_WIDTH
+        width = _LONG_WIDTH if is_long else _TEXT_WIDTH if longest else _NUMBER_WIDTH
         sheet.column_dimensions[column_letters(column - 1)].width = width
         for row, value in found.items():
             written = sheet.cell(row, column)
             _put(written, value)
             written.number_format = "General" if isinstance(value, str) else "0.0000"
-            written.alignment = Alignment(wrap_text=width == _LONG_WIDTH)
-            if width == _LONG_WIDTH and sheet.row_dimensions[row].height is None:
+            written.alignment = Alignment(wrap_text=is_long)
+            if is_long and sheet.row_dimensions[row].height is None:
                 sheet.row_dimensions[row].height = 15.0 * -(-len(str(value)) // _ON_A_LINE)
             if header == "verdict":
                 _fill(written, _VERDICT_FILLS.get(str(value), _UNDECIDED_FILL))

@@ -51,17 +51,9 @@ _QUOTE_BUDGET = 20_000_000
 
 def decode(data: bytes) -> tuple[str, list[str]]:
     """Decode a text file: UTF-8, UTF-16 or Windows-1252."""
-    head = data[:4096]
     ways = [("utf-8-sig", []), ("cp1252", ["read as Windows-1252 text, because it is not UTF-8"])]
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         ways = [("utf-16", ["read as UTF-16 text"])]
-    elif len(data) >= 4:
-        even = head[0::2].count(0)
-        odd = head[1::2].count(0)
-        for order, own, other in (("little", odd, even), ("big", even, odd)):
-            if own > len(head) * 0.3 and other < len(head) * 0.05:
-                note = f"read as UTF-16 text ({order}-endian, without a byte order mark)"
-                ways = [(f"utf-16-{order[0]}e", [note])]
     for encoding, notes in ways:
         with suppress(UnicodeDecodeError):
             return data.decode(encoding), notes

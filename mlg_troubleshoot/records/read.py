@@ -1,7 +1,7 @@
 """From files to inspections: every data row exactly once, every bad cell named.
 
-Rows compared with each other: record ids and clearances that stand twice, tails that look alike,
-and the order of time.
+Rows compared with each other: record ids that stand twice, tails that look alike, and the order of
+time.
 """
 
 from __future__ import annotations
@@ -195,9 +195,6 @@ def _read(source: Source, options: ReadOptions) -> _Found:
             book = open_book(data, label, options)
             del data
             kind = book.kind
-            suffix = Path(label).suffix.lower()
-            if suffix != f".{kind}" and suffix in _SUFFIXES - {".tsv", ".txt"}:
-                found.notes.append(f"the file is of kind {kind}, whatever its name")
             found.notes += book.notes
             chosen = _choose(book, options, found)
             for each in chosen:
@@ -405,9 +402,8 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     problems = out.problems
     alike = one_aircraft(rows)
     problems += settle_duplicates(rows, out.layouts)
-    repeated = copies(rows)
     backwards = order_warnings(rows, out.layouts)
-    for place, said in (*repeated.items(), *backwards.items()):
+    for place, said in backwards.items():
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, said))
     files = {file.name: i for i, (file, _) in reversed([*enumerate(results)])}
     sheets = dict.fromkeys((layout.file, layout.sheet) for layout in out.layouts)
@@ -420,11 +416,9 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         )
     )
     frames = {file.name: file.labels for file, _ in results if file.labels}
-    named = [f"{rows[place].record_id}: {said}" for place, said in repeated.items()]
     many = {
         "Tails look alike": alike,
         "Landings fall": [*dict.fromkeys(backwards.values())],
-        "Clearances are repeated": named,
     }
     for what, notes in many.items():
         out.notes += notes[:_NAMED]
@@ -513,31 +507,6 @@ def cell_of(
 
 
 Rows = Sequence[Inspection | InvalidRow]
-
-
-# So many different clearances are not read again exactly: a reading agrees with the one before to
-# within its gauge's error only. Assumed. [1]
-_DIFFERENT = 5
-
-
-def copies(rows: Rows) -> dict[int, str]:
-    """Name the rows, by their place, that repeat every clearance of an earlier row of the gear."""
-    first: dict[object, Inspection] = {}
-    found: dict[int, str] = {}
-    for place, row in enumerate(rows):
-        # Rows after a repair are of one reading of the clearances.
-        if not isinstance(row, Inspection) or row.is_repaired:
-            continue
-        if len({value for value in row.clearance_in.values() if value > 0.0}) < _DIFFERENT:
-            continue
-        before = first.setdefault((row.tail_no, row.side, *row.clearance_in.items()), row)
-        if before is row or before.record_id == row.record_id:
-            continue
-        said = "copied from that sheet?"
-        if before.inspection_date == row.inspection_date:
-            said = "the same inspection, entered twice?"
-        found[place] = f"all clearances are those of {where(before.source)}: {said}"
-    return found
 
 
 def one_aircraft(rows: list[Inspection | InvalidRow]) -> list[str]:

@@ -413,12 +413,6 @@ class SheetLayout:
     width: int
     columns: tuple[ColumnReading, ...]
 
-    def index_of(self, column: str) -> int | None:
-        """Return the index of a canonical column, counted from 0; None if the table does not have
-        it.
-        """
-        return next((c.index for c in self.columns if c.read_as == column), None)
-
 
 @dataclass(frozen=True, slots=True)
 class FileRead:

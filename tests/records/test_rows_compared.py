@@ -24,43 +24,6 @@ def warnings(result):
     return {row.record_id: row.warnings for row in result.rows if row.warnings}
 
 
-COPIED = "all clearances are those of row 2 of "
-
-
-def again(read, table, second, first=LEFT, dates=("2026-03-02", "2026-05-02"), **more):
-    """Return what is said of the second of two inspections of a gear."""
-    header = (*HEADER, "inspection_date", *more)
-    rows = [
-        ("A", "N1", "LH", "RADIAL", *first, dates[0], *more.values()),
-        ("B", "N1", "LH", "RADIAL", *second, dates[1], *more.values()),
-    ]
-    return " ".join(warnings(read(table(header, rows))).get("B", ()))
-
-
-def test_a_sheet_copied_from_an_earlier_one_is_asked_about(read, table):
-    said = again(read, table, LEFT)
-    assert COPIED in said
-    assert said.endswith("copied from that sheet?")
-
-
-def test_an_inspection_under_a_second_record_id_is_asked_about(read, table):
-    said = again(read, table, LEFT, dates=("2026-03-02", "2026-03-02"))
-    assert said.endswith("the same inspection, entered twice?")
-
-
-@pytest.mark.parametrize(
-    ("second", "more"),
-    [
-        ((*LEFT[:4], LEFT[4] + 0.0001), {}),
-        ((*LEFT[:4], ""), {"first": (*LEFT[:4], "")}),
-        (LEFT, {"restored_joints": "6", "repair_date": "2026-03-01"}),
-    ],
-    ids=["one differs", "four", "after a repair"],
-)
-def test_rows_that_may_well_be_alike_are_not_asked_about(read, table, second, more):
-    assert "all clearances" not in again(read, table, second, **more)
-
-
 @pytest.mark.parametrize(("gears", "more"), [(9, "1 more place;"), (10, "2 more places;")])
 def test_landings_that_fall_in_many_gears_are_counted_beyond_the_eighth_and_noted_in_each(
     read, table, gears, more

@@ -536,9 +536,8 @@ def test_32_windows_1252_is_detected_and_said(read, table):
     assert any("Windows-1252" in note for note in result.notes)
 
 
-@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
-def test_32_utf_16_is_detected_and_said(read, table, encoding):
-    result = read(table((*HEADER, "remarks"), [(*GOOD, "ü")]).encode(encoding))
+def test_32_utf_16_is_detected_and_said(read, table):
+    result = read(table((*HEADER, "remarks"), [(*GOOD, "ü")]).encode("utf-16"))
     assert result.rows[0].carried["remarks"] == "ü"
     assert any("UTF-16" in note for note in result.notes)
 
