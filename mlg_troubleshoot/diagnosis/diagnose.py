@@ -1004,7 +1004,7 @@ def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections |
         apart += sign * (column @ value)
     latest = np.array([rows[-1] for rows in visits(table).values()])
     place = int(latest[np.argmax(np.abs(apart[latest]))])
-    squared = float(noise.square(apart[:, None], noise.tail_ratios[-1])[0]) / noise.scale_in**2
+    squared = noise.products(apart[:, None]).item() / noise.scale_in**2
     second = max(chances[1], np.finfo(float).tiny)
     lead = abs(float(np.log(chances[0]) - np.log(second)))
     times = problem.beliefs.further(float(np.sqrt(squared)), lead)

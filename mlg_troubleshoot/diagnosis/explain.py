@@ -12,9 +12,10 @@ and which?
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain, islice
 from math import erfc, sqrt
 from typing import NamedTuple
 
@@ -24,7 +25,7 @@ from mlg_troubleshoot.arrays import Array, Mask, Wholes, log_sum, numbered, rms
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, levels
 from mlg_troubleshoot.diagnosis.causes.linkage import Block
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, less_expected, standardised
-from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.beliefs import SHORT, Beliefs
 from mlg_troubleshoot.misfit.columns import FAR, EffectColumns, NoiseModel, fit
 from mlg_troubleshoot.misfit.posterior import (
     UNLISTED,
@@ -33,7 +34,7 @@ from mlg_troubleshoot.misfit.posterior import (
     Explanation,
     Key,
     MisfitPosterior,
-    more_than_slips,
+    Search,
     posterior,
 )
 from mlg_troubleshoot.misfit.simulation_result import Conclusion
@@ -52,7 +53,7 @@ WITHIN = ("hydraulic_pressure_psi", "temperature_c", "gear_landings", "predicted
 _LEAST_OF_TAIL = 6
 # Periods of seasons: one to three a year, evenly spaced in frequency.
 # Computing only: shapes that are compared together.
-_AT_ONCE = 256
+_AT_ONCE = 64
 _PERIODS_DAYS = DAYS_PER_YEAR / np.linspace(1, 3, 6)
 
 
@@ -73,14 +74,15 @@ class Bank:
 
 
 def build_bank(scene: Scene, catalogue: EffectColumns) -> Bank:
-    """Build the shapes that the table allows and that no candidate of the catalogue already has."""
+    """Build the shapes that the table allows and that no candidate of the catalogue already has,
+    the same in all rows last.
+    """
     smooth = _quantities(scene)
-    shapes = [*_shapes(scene, smooth)]
-    populations = [*_populations(scene)]
-    bank = _distinct([*shapes, *((own, ("tail_no",)) for own in populations)], catalogue, smooth)
+    populations = [(own, ("tail_no",)) for own in _populations(scene)]
+    columns, variables = _distinct(lambda: chain(_shapes(scene, smooth), populations), catalogue)
     tails = len(np.unique(scene.table.tails))
-    two = np.array([variables == ("tail_no",) for variables in bank.variables])
-    return replace(bank, rarity=np.where(two, (1.0 - tails) * np.log(2.0), 0.0))
+    rare = np.array([own == ("tail_no",) for own in variables])
+    return Bank(columns, variables, smooth, rare * (1.0 - tails) * np.log(2.0))
 
 
 def _shapes(scene: Scene, smooth: Mapping[str, Array]) -> Iterator[tuple[Array, tuple[str, ...]]]:
@@ -149,8 +151,8 @@ def _populations(scene: Scene) -> Iterator[Array]:
     splits = range(3, len(names) - 2)
     if splits:
         rows = [np.isin(tails, order[k:]) for k in splits]
-        apart = [np.var(misfit) - _within(misfit, own) for own in rows]
-        yield rows[int(np.argmax(apart))].astype(float)
+        within = [_within(misfit, own) for own in rows]
+        yield rows[int(np.argmin(within))].astype(float)
 
 
 def _within(misfit: Array, rows: Mask) -> float:
@@ -173,41 +175,33 @@ def _quantities(scene: Scene) -> dict[str, Array]:
 
 
 def _distinct(
-    shapes: Iterable[tuple[Array, tuple[str, ...]]],
+    shapes: Callable[[], Iterator[tuple[Array, tuple[str, ...]]]],
     catalogue: EffectColumns,
-    smooth: Mapping[str, Array],
-) -> Bank:
-    """Drop shapes that are constant, or that a candidate of the catalogue has already."""
+) -> tuple[EffectColumns, tuple[tuple[str, ...], ...]]:
+    """Drop shapes that are constant, or that a candidate of the catalogue has already; but one that
+    is the same in all rows.
+
+    They are made twice: all of them at once would fill the memory.
+    """
     n = len(catalogue.full)
-    variables = list[tuple[str, ...]]()
-    spreads = list[float]()
 
-    def varied() -> Iterator[Array]:
-        for shape, names in shapes:
-            spread = float(np.std(shape))
-            if spread > 1e-9 * float(np.max(np.abs(shape))):
-                size = rms(shape[shape != 0.0])
-                variables.append(names)
-                spreads.append(spread / size)
-                yield shape / size
+    def varied() -> Iterator[tuple[Array, tuple[str, ...]]]:
+        return (s for s in shapes() if np.std(s[0]) > 1e-9 * np.max(np.abs(s[0])))
 
-    columns = EffectColumns.made(n, varied())
-    one = np.full((1, n), 1.0 / n)
-    mean = catalogue.onto(one)[0]
-    about = columns.onto(one)[0]
-    spread = np.array(spreads)
+    mean = catalogue.onto(np.full((1, n), 1.0 / n))[0]
     size = np.sqrt(np.maximum(catalogue.squares / n - mean**2, 0.0))
     varying = np.flatnonzero(size)
-    alike = np.zeros(columns.p)
-    for places in np.array_split(np.arange(columns.p), 1 + columns.p // _AT_ONCE):
-        product = catalogue.onto(columns.take(places).T)[:, varying] / n
-        product -= np.outer(about[places], mean[varying])
-        product /= np.outer(spread[places], size[varying])
-        alike[places] = np.max(np.abs(product), axis=1, initial=0.0)
+    each = varied()
+    alike = list[float]()
+    while block := [(shape - shape.mean()) / shape.std() for shape, _n in islice(each, _AT_ONCE)]:
+        product = catalogue.onto(np.array(block))[:, varying] / (n * size[varying])
+        alike += np.max(np.abs(product), axis=1, initial=0.0).tolist()
     # With few rows all may look like a candidate: then the least alike one is asked.
-    use = np.flatnonzero(alike < max(0.97, 1.000001 * float(np.min(alike, initial=1.0))))
-    kept = EffectColumns.made(n, (columns.take([k])[:, 0] for k in use.tolist()))
-    return Bank(kept, tuple(variables[k] for k in use.tolist()), smooth, np.zeros(len(use)))
+    most = max(0.97, 1.000001 * min(alike, default=1.0))
+    names = [own for (_shape, own), near in zip(varied(), alike, strict=True) if near < most]
+    kept = (shape for (shape, _n), near in zip(varied(), alike, strict=True) if near < most)
+    every = chain((shape / rms(shape[shape != 0.0]) for shape in kept), [np.ones(n)])
+    return EffectColumns.made(n, every), (*names, ("all rows",))
 
 
 # The noise is estimated again from the residual as long as that changes the likeliest explanation,
@@ -260,10 +254,13 @@ class MisfitProblem:
         return less_expected(self.misfit, self.rows.predicted_in)
 
     @cached_property
-    def shapes(self) -> EffectColumns:
-        """What no list has, the same in all rows last."""
-        constant = EffectColumns.of(np.ones((len(self.misfit), 1)))
-        return EffectColumns.joined([self.bank.columns, constant])
+    def every(self) -> EffectColumns:
+        """All that may act alone: candidates, shapes, entry errors."""
+        n = len(self.misfit)
+        off = np.abs(self.expected - np.median(self.expected))
+        far = np.sort(np.argsort(-off)[:_MOST_SLIPS]).tolist()
+        slips = EffectColumns.made(n, (np.eye(1, n, place)[0] for place in far))
+        return EffectColumns.joined([self.columns, self.bank.columns, slips])
 
     def likeliest(self, key: Key, found: MisfitPosterior) -> int:
         """Place of the likeliest candidate of a name."""
@@ -295,7 +292,7 @@ class MisfitProblem:
         stated = np.array([beliefs.plausible.get(c.name, c.plausible) for c in causes], float)
         plausible = np.where(np.isnan(stated), usual, stated)
         listed = Effects(
-            self.columns,
+            self.every,
             [c.key for c in self.candidates],
             np.ones(len(often), bool),
             np.log(often) + rarity,
@@ -306,23 +303,18 @@ class MisfitProblem:
             exact,
             rarity,
         )
-        named = [(UNLISTED, _BY.join(names)) for names in (*self.bank.variables, ("all rows",))]
+        named = [(UNLISTED, _BY.join(names)) for names in self.bank.variables]
         alike = Counter(named)
         share = np.log([shares[UNLISTED] / (len(alike) * alike[name]) for name in named])
-        searched = np.append(self.bank.rarity, 0.0)
+        searched = self.bank.rarity
         free = replace(
-            Effects.free(self.shapes, named, share + searched, beliefs.shape_size * scale),
+            Effects.free(self.every, named, share + searched, beliefs.shape_size * scale),
             rarity=searched,
         )
-        far = np.sort(np.argsort(-np.abs(self.expected - np.median(self.expected)))[:_MOST_SLIPS])
         slip = float(np.log(beliefs.slips / n))
-        slips = Effects.free(
-            EffectColumns.made(n, (np.eye(1, n, place)[0] for place in far.tolist())),
-            [None] * len(far),
-            slip,
-            beliefs.slip_size * scale,
-        )
-        return Effects.joined([listed, free, slips])
+        rows = [None] * (self.every.p - len(often) - len(named))
+        slips = Effects.free(self.every, rows, slip, beliefs.slip_size * scale)
+        return Effects.joined(self.every, [listed, free, slips])
 
     def contexts(self, scale_in: float) -> list[Context]:
         """Nothing, all-joint effects, or aircraft that wander."""
@@ -345,7 +337,7 @@ class MisfitProblem:
         since = (day - day.min()) / np.ptp(day)
         turns = (np.arange(_WAVES) + 0.5) * np.pi
         waves = np.sin(since[:, None] * turns) * 2.0 / turns
-        often = self._shares()[UNLISTED] / (len({*self.bank.variables}) + 2)
+        often = self._shares()[UNLISTED] / (len({*self.bank.variables}) + 1)
         yield Context(
             (UNLISTED, _BY.join(("tail_no", "day"))),
             float(np.log(often)),
@@ -453,8 +445,9 @@ class Finding:
         effects = self.posterior.effects
         scale = self.noise.scale_in
         square = self.noise.squares(effects.kept)[-1] / scale**2
-        often = np.exp(effects.log_prior)
-        size = self.problem.beliefs.seen_from(often, effects.size**2 * square) / np.sqrt(square)
+        # Over its error an effect is likelier than nothing from here on, with 80 % power.
+        bar = np.log1p(effects.size**2 * square) - 2.0 * effects.log_prior
+        size = (np.sqrt(np.maximum(bar, 0.0)) + SHORT) / np.sqrt(square)
         needed = size * np.sqrt(effects.kept.squares / len(self.problem.misfit))
         of_cause: dict[str, list[float]] = {}
         for name, least in zip(effects.names, needed.tolist(), strict=True):
@@ -532,6 +525,31 @@ def _with_far_rows(
     return (other, near) if lead > beliefs.odds else (found, settled)
 
 
+def more_than_slips(
+    noise: NoiseModel,
+    data: Array,
+    effects: Effects,
+    contexts: Sequence[Context],
+    beliefs: Beliefs,
+    start: Explanation,
+    slips: int,
+) -> bool:
+    """Tell whether an effect that has a name likely acts beside an explanation and its slips, which
+    are added to it as long as one is the likeliest further effect, at most so many.
+    """
+    search = Search(noise, data, effects, contexts, beliefs, len(start.members) + slips + 1)
+    members = frozenset(start.members)
+    while True:
+        search.extend(start.context, members)
+        at = search.extended[start.context, members]
+        (nearest, *_) = at.leading
+        if at.further[nearest] <= at.own.log_posterior:
+            return False
+        if effects.names[nearest] is not None:
+            return True
+        members |= {nearest}
+
+
 def _as_slips(noise: NoiseModel, beliefs: Beliefs) -> float:
     """Logarithm of how much less likely far rows are as entry errors than as what was made of their
     scatter.
@@ -592,9 +610,9 @@ def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
     """p-value of the shape of the bank that stands out most in a residual, as one of all of them
     (Bonferroni).
     """
-    shapes = problem.shapes
     fitted = fit(noise, np.ones((len(left), 1)), left)
-    product, _log = noise.precision_times(left[:, None], fitted.tail_ratio)
+    product = noise.with_tails(fitted.tail_ratio).precision_times(left[:, None])
+    shapes = problem.bank.columns
     spread = fitted.scale * np.sqrt(noise.squares(shapes)[0])
     largest = float(np.max(np.abs(shapes.onto(product.T)[0]) / spread))
     return float(min(1.0, shapes.p * erfc(largest / sqrt(2.0))))

@@ -450,7 +450,7 @@ class DataCondition:
     record_next : str
         What to record next time.
     doubtful : bool
-        True if nothing that depends on the clearances can be named because of it.
+        True if nothing that depends on the clearances can be named where it concerns many values.
     """
 
     json_names = "kind where share effect record_next"
@@ -484,12 +484,25 @@ def data_condition(table: DiagnosisTable, gear: Gear) -> tuple[tuple[DataConditi
     doubtful = equal & ~limits & (2 * equal.sum() < len(table))
     each = (twice, *(rows & ~twice for rows in (_copies(table) & ~equal, limits, doubtful)))
     aside = np.any(each, axis=0)
+    people = np.unique(table.people[table.people != ""]).tolist()
+    # The habit of all rows, else those of single technicians.
+    habits = [*_habit(table)] or (
+        c
+        for one in people
+        for c in _habit(table.take(table.people == one), f" of technician {one}")
+    )
     found = (
         *_rounded(table.take(~aside)),
         *_ends(table.take(~equal)),
-        *_blanks(table),
+        *habits,
         *(
-            DataCondition(kind, _listed(table, rows), float(np.mean(rows)), *said)
+            DataCondition(
+                kind,
+                f"row{'s' * bool(rows.sum() > 1)} {first_few([*map(str, table.row[rows])])}"
+                f"{_whose(table, rows)}",
+                float(np.mean(rows)),
+                *said,
+            )
             for rows, (kind, said) in zip(each, _ASIDE.items(), strict=True)
             if rows.any()
         ),
@@ -512,16 +525,10 @@ def doubt_of(found: tuple[DataCondition, ...]) -> str:
     str
         The reason, empty without one.
     """
-    cut = [c.where for c in found if c.doubtful]
-    if not cut:
-        return ""
-    return f"Causes of joints, of scale, of wear and of rigging are not named: {'; '.join(cut)}."
-
-
-def _listed(table: DiagnosisTable, rows: Mask) -> str:
-    """Name rows by their numbers, and by whose they are where it is one's."""
-    numbers = first_few([*map(str, table.row[rows])])
-    return f"row{'s' * bool(rows.sum() > 1)} {numbers}{_whose(table, rows)}"
+    cut = "; ".join(c.where for c in found if c.doubtful and c.share > _MANY_CUT)
+    return (
+        f"Causes of joints, of scale, of wear and of rigging are not named: {cut}." if cut else ""
+    )
 
 
 def first_few(names: list[str]) -> str:
@@ -535,10 +542,10 @@ def _duplicates(table: DiagnosisTable) -> Mask:
     texts = [numbered(t) for t in table.factors.values()]
     parts = [table.clearance_in, table.readings_in, *table.quantities.values(), *texts]
     whole = np.nan_to_num(np.column_stack(parts), nan=-1.0)
-    again = ~np.isin(np.arange(len(whole)), np.unique(whole, axis=0, return_index=True)[1])
     # A row that says hardly anything is not known to stand twice.
-    said = np.isfinite(table.clearance_in).sum(axis=1) >= LEAST_ALIKE - 1
-    return np.asarray(again & said)
+    again = np.sum(np.isfinite(table.clearance_in), axis=1) >= LEAST_ALIKE - 1
+    again[np.unique(whole, axis=0, return_index=True)[1]] = False
+    return np.asarray(again)
 
 
 def _copies(table: DiagnosisTable) -> Mask:
@@ -585,15 +592,14 @@ def _rounded(used: DiagnosisTable) -> Iterator[DataCondition]:
         steps = steps_of(used, values)
         for step in np.unique(steps[steps >= 2.0 * gauge_u]).tolist():
             on = steps == step
-            share = float(np.mean(on))
             # What rounding takes away depends on the values where the step is larger than twice
             # their standard deviation, that of the rounding taken out (Sheppard's corrections).
             spread = np.nanvar(values[on]) - step**2 / 12.0
-            cut = what == "clearances" and share > _MANY_CUT and step**2 > 4.0 * spread
+            cut = what == "clearances" and step**2 > 4.0 * spread
             yield DataCondition(
                 "rounded",
                 f"{what}, to {step:.4g} in{_whose(used, on)}",
-                share,
+                float(np.mean(on)),
                 f"each is known to ± {0.5 * step:.4g} in only: smaller effects are not seen",
                 record,
                 bool(cut),
@@ -614,28 +620,26 @@ def _ends(table: DiagnosisTable) -> Iterator[DataCondition]:
     """The least or the largest value stands for what lies beyond it."""
     values = read_in(table)
     if table.below is not None:
-        share = float(np.mean(table.below[np.isfinite(table.clearance_in)]))
         yield DataCondition(
             "censored",
             "clearances below an end of the gauge",
-            share,
+            float(np.mean(table.below[np.isfinite(table.clearance_in)])),
             "half of the end stands for each, and anything up to it is as likely",
             "the value, with a gauge that reaches further",
-            share > _MANY_CUT,
+            doubtful=True,
         )
     values = np.round(values[np.isfinite(values)], 7)
     small = np.any(values < 2.0 * np.median(table.gauge_u_in))
     for way, sign, beyond in ((-1.0, "<", "less"), (1.0, ">", "more"))[bool(small) :]:
         found, counts = np.unique(way * values, return_counts=True)
         if _piled_up(counts):
-            share = float(counts[-1] / len(values))
             yield DataCondition(
                 "censored",
                 f"clearances of {abs(found[-1]):.4g} in",
-                share,
+                float(counts[-1] / len(values)),
                 f"some of them are {beyond} than this: it is where the gauge or the sheet ends",
                 f"{sign}{abs(found[-1]):.4g} where no value was read",
-                share > _MANY_CUT,
+                doubtful=True,
             )
 
 
@@ -652,20 +656,9 @@ def _piled_up(counts: Places) -> bool:
     return bool(ahead @ np.log(counts[-4:]) < -2.0 * error)
 
 
-def _blanks(table: DiagnosisTable) -> Iterator[DataCondition]:
-    """Blanks that depend on what would have been read: the habit of all rows, else those of single
-    technicians.
-    """
-    people = table.people
-    own = np.unique(people[people != ""]).tolist()
-    yield from [*_habit(table)] or (
-        c for one in own for c in _habit(table.take(people == one), f" of technician {one}")
-    )
-
-
 def _habit(table: DiagnosisTable, whose: str = "") -> Iterator[DataCondition]:
+    """Blanks that depend on what would have been read."""
     read = np.isfinite(table.clearance_in)
-    blanks = np.sum(~read, axis=1)
     values = table.clearance_in[read.any(axis=1)][:, read.any(axis=0)]
     blank = np.isnan(values)
     partly = blank.any(axis=1)
@@ -681,18 +674,22 @@ def _habit(table: DiagnosisTable, whose: str = "") -> Iterator[DataCondition]:
         record = "every joint, also after a worn one"
     elif (
         least > 2.0 * np.median(table.gauge_u_in)
-        and _rank_correlation(table.numbers(LANDINGS.variable), blanks) < 0.0
+        and _rank_correlation(table.numbers(LANDINGS.variable), np.sum(~read, axis=1)) < 0.0
     ):
         what = "worn joints were written, sound ones were not"
         effect = f"each blank stands for less than {least:.4g} in"
         record = "every joint that was read, also the sound ones"
     else:
         return
-    share = float(np.mean(blank))
-    # What others read of the same joints says what the blanks hide.
-    doubtful = not whose and share > _MANY_CUT
-    where = f"blank clearances{whose}: {what}"
-    yield DataCondition("blank_not_at_random", where, share, effect, record, doubtful)
+    yield DataCondition(
+        "blank_not_at_random",
+        f"blank clearances{whose}: {what}",
+        float(np.mean(blank)),
+        effect,
+        record,
+        # What others read of the same joints says what the blanks hide.
+        doubtful=not whose,
+    )
 
 
 def _rank_correlation(x: Array, y: Array) -> float:
@@ -709,16 +706,14 @@ def _rank_correlation(x: Array, y: Array) -> float:
 
 def _selected(table: DiagnosisTable) -> Iterator[DataCondition]:
     """Whether the plunger was read depends on how worn the gear is."""
-    read = np.isfinite(table.readings_in).any(axis=1).astype(float)
-    known = np.isfinite(table.clearance_in)
-    count = known.sum(axis=1)
-    worn = np.nansum(table.clearance_in, axis=1) / np.where(count > 0, count, np.nan)
-    correlation = _rank_correlation(worn, read)
+    some = np.isfinite(table.clearance_in).any(axis=1)
+    read = np.asarray(np.isfinite(table.readings_in[some]).any(axis=1), float)
+    correlation = _rank_correlation(np.nanmean(table.clearance_in[some], axis=1), read)
     if correlation:
         yield DataCondition(
             "selected",
             f"plunger readings: of gears that are {'more' if correlation > 0.0 else 'less'} worn",
-            float(np.mean(read[count > 0])),
+            float(np.mean(read)),
             "the mean misfit is that of the gears chosen, not of the fleet",
             "the plunger at every inspection, also of gears that retract",
         )

@@ -256,11 +256,8 @@ def _ratio(noise: NoiseModel, levels: Array, rest: Array) -> float:
     count = levels.shape[1]
     if count < _LEAST_LEVELS:
         return USUAL_RATIO
-    held = np.column_stack([np.ones(len(rest)), levels])
-    product, _log = noise.precision_times(np.column_stack([held, rest]), noise.tail_ratios[-1])
-    inner = held.T @ product[:, :-1]
-    along = held.T @ product[:, -1]
-    square, score = _apart(inner, along, 0)
+    inner = noise.products(np.column_stack([np.ones(len(rest)), levels, rest]))
+    square, score = _apart(inner[:-1, :-1], inner[:-1, -1], 0)
     most = int(np.argmax(score**2 / np.maximum(np.diag(square), 1e-9)))
     square, score = _apart(square, score, most)
     values, vectors = np.linalg.eigh(square)

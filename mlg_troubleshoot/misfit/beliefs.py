@@ -83,28 +83,20 @@ class Beliefs:
         square = np.asarray(distance) ** 2
         return np.asarray(np.log(share) - 0.5 * (np.log(wide) - square * (1.0 - 1.0 / wide)))
 
-    def seen_from(self, often: Array, wide: Array) -> Array:
-        """Size of effects over the error of it, from which they are likelier than nothing with 80 %
-        power: how often each is expected in a table, and its expected variance over that of the
-        error. [1]
-        """
-        bar = np.log1p(wide) - 2.0 * np.log(often)
-        return np.asarray(np.sqrt(np.maximum(bar, 0.0)) + _SHORT)
-
     def apart_from(self, lead: float = 0.0) -> float:
         """Distance of two explanations over the error of a row, from which data make either as sure
         as anything that is said with 80 % power, though the other leads by so much. [1]
         """
-        return float(_SHORT + np.sqrt(_SHORT**2 + 2.0 * (self.odds + lead)))
+        return float(SHORT + np.sqrt(SHORT**2 + 2.0 * (self.odds + lead)))
 
     def further(self, distance: float, lead: float) -> float:
         """How many times the data are needed again for that, if two explanations that were fitted
         to them are so far apart: what is looked for is found too large, with 80 % power by less
         than a standard error's share. [1]
         """
-        return float((self.apart_from(lead) / max(distance - _SHORT, 1e-9)) ** 2)
+        return float((self.apart_from(lead) / max(distance - SHORT, 1e-9)) ** 2)
 
 
 # Standard errors by which an estimate falls short once in five: what is aimed at is seen with a
 # power of four in five. [1]
-_SHORT = NormalDist().inv_cdf(4 / 5)
+SHORT = NormalDist().inv_cdf(4 / 5)

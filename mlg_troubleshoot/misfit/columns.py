@@ -11,8 +11,8 @@ Covariance of the rows when nothing is wrong, in a form that is cheap to invert.
 in units of the common scatter: B what each row scatters by itself, a diagonal or, along a series, a
 process that forgets; F what rows have in common, over B: groups and loadings. S(r) is 1 but for the
 tails T, whose ratio r is one of a few; G is F without them. With C Cᵀ = I + Gᵀ G, P = G C⁻ᵀ,
-Q = T − P Pᵀ T, D Dᵀ = I + r² Tᵀ Q and R = r D⁻¹ (Woodbury, twice):
-V⁻¹ = B⁻ᵀ (I − P Pᵀ − Q Rᵀ R Qᵀ) B⁻¹.
+M = Pᵀ T, Q = T − P M, D Dᵀ = I + r² Tᵀ Q and R = r D⁻¹ (Woodbury, twice):
+V⁻¹ = B⁻ᵀ (I − P Pᵀ − Q Rᵀ R Qᵀ) B⁻¹. P and Q are not written out: G and T are short.
 
 Columns fitted to data under a noise model, freely and with what is known of them beforehand; and
 what a fit explains of held-out rows.
@@ -27,14 +27,15 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.sparse import csc_array, hstack
+from scipy.sparse import csc_array, csr_array, hstack
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, Wholes
 
 # Computing only: rows from which a table is large; a column that acts in fewer than one row of so
-# many is kept by these rows.
+# many is kept by these rows; columns that are worked out together.
 _LARGE = 1_000
 _FEW = 5
+_AT_ONCE = 1_000
 
 
 @dataclass(frozen=True)
@@ -68,36 +69,29 @@ class EffectColumns:
         """Columns as they come, each kept as is shorter."""
         full: list[Array] = []
         few: list[tuple[Places, Array]] = []
-        places: list[int] = []
+        is_short: list[bool] = []
         for column in columns:
             rows = np.flatnonzero(column)
             short = n > _LARGE and _FEW * len(rows) < n
-            places.append(-len(few) - 1 if short else len(full))
+            is_short.append(short)
             if short:
                 few.append((rows, column[rows]))
             else:
                 full.append(column)
-        at = np.array(places, np.intp)
-        at = np.where(at < 0, len(full) - 1 - at, at)
         ends = np.cumsum([0, *(len(rows) for rows, _values in few)])
         rows = np.concatenate([np.empty(0, np.intp), *(rows for rows, _values in few)])
         values = np.concatenate([np.empty(0), *(values for _rows, values in few)])
         written = np.column_stack([np.empty((n, 0)), *full])
-        return EffectColumns(written, csc_array((values, rows, ends), (n, len(few))), at)
+        short_ones = csc_array((values, rows, ends), (n, len(few)))
+        return EffectColumns(written, short_ones, _places_of(is_short))
 
     @staticmethod
     def joined(parts: Sequence[EffectColumns]) -> EffectColumns:
         """All columns of several, one after the other."""
-        f = sum(part.full.shape[1] for part in parts)
-        begin = [0, f]
-        at = []
-        for part in parts:
-            own = part.full.shape[1]
-            at.append(np.where(part.at < own, part.at + begin[0], part.at - own + begin[1]))
-            begin[0] += own
-            begin[1] += part.few.shape[1]
+        is_short = [own >= part.full.shape[1] for part in parts for own in part.at.tolist()]
+        full = np.hstack([part.full for part in parts])
         few = csc_array(hstack([part.few for part in parts]))
-        return EffectColumns(np.hstack([part.full for part in parts]), few, np.concatenate(at))
+        return EffectColumns(full, few, _places_of(is_short))
 
     @property
     def p(self) -> int:
@@ -115,23 +109,30 @@ class EffectColumns:
         found[:, at >= f] = self.few[:, at[at >= f] - f].toarray()
         return found
 
-    def onto(self, rows: Array) -> Array:
+    def onto(self, rows: Array | csr_array) -> Array:
         """Products of all columns with some vectors, shape (k, n): (k, p)."""
         if not self.few.shape[1]:
-            return rows @ self.full
-        return np.hstack([rows @ self.full, rows @ self.few])[:, self.at]
+            return np.asarray(rows @ self.full)
+        few: Any = rows @ self.few
+        short = few.toarray() if hasattr(few, "toarray") else few
+        return np.hstack([rows @ self.full, short])[:, self.at]
+
+    def scaled(self, weight: Array) -> EffectColumns:
+        """All columns, each row so many times."""
+        few = csc_array(self.few.multiply(weight[:, None]))
+        return EffectColumns(self.full * weight[:, None], few, self.at)
 
     def times(self, values: Array) -> Array:
-        """Sum of all columns, each so many times, shape (n,)."""
-        placed = np.empty(self.p)
+        """Sums of all columns, each so many times, (p,) or (p, k): (n,) or (n, k)."""
+        placed = np.empty(values.shape)
         placed[self.at] = values
         f = self.full.shape[1]
         return np.asarray(self.full @ placed[:f] + self.few @ placed[f:])
 
     def squared_onto(self, weight: Array) -> Array:
         """Sum of the squares of each column, each row so many times, shape (p,)."""
-        squares = [weight @ self.full**2, weight @ self.few.power(2)]
-        return np.asarray(np.concatenate(squares)[self.at])
+        full = np.einsum("n,nk,nk->k", weight, self.full, self.full)
+        return np.asarray(np.concatenate([full, weight @ self.few.power(2)])[self.at])
 
     @property
     def squares(self) -> Array:
@@ -144,6 +145,11 @@ class EffectColumns:
         written = np.count_nonzero(self.full, axis=0)
         rows = np.concatenate([written, np.diff(self.few.indptr)])[self.at]
         return np.asarray(np.sqrt(self.squares / np.maximum(rows, 1)))
+
+
+def _places_of(is_short: Sequence[bool]) -> Places:
+    """Places of columns, those that are written out first."""
+    return np.argsort(np.argsort(is_short, kind="stable"))
 
 
 # Rows further out than this many standard deviations count less, and may be entry errors.
@@ -289,12 +295,12 @@ class NoiseModel:
         """What effects of unknown size that are part of this covariance most likely explain of data
         (BLUP). [in]
         """
-        product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
+        product = self.precision_times(data[:, None])
         return effects_in @ (effects_in.T @ product[:, 0]) / self.scale_in**2
 
     def share_of_groups(self, scatter_in: Array, group: Wholes, data: Array) -> Array:
         """BLUP of what the rows of each group scatter alike, each in its own measure. [in]"""
-        product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
+        product = self.precision_times(data[:, None])
         pull = np.bincount(group, scatter_in * product[:, 0])
         return scatter_in * pull[group] / self.scale_in**2
 
@@ -302,73 +308,96 @@ class NoiseModel:
         """What each row scatters by itself, all that rows have in common taken out, and the share
         of the rows that is left to tell it. [in, 1]
         """
-        common, tails, roots, _log = self._common
-        low = np.vstack([common.T, roots[-1] @ tails.T])
+        joint, _root, _between, roots, _log = self._common
+        common, apart = self._low(joint.take(np.arange(joint.p)).T)
+        low = np.vstack([common, roots[-1] @ apart])
         own = self.own(data[:, None])[:, 0]
         left = own - low.T @ (low @ own)
         return self.relative * left, float(1.0 - np.mean(np.sum(low**2, axis=0)))
 
     @cached_property
-    def _common(self) -> tuple[Array, Array, Array, Array]:
-        """P, Q, R of each ratio of the scatter between tails, (levels, t, t), and log |V|."""
-        one = np.ones(len(self.relative))
-        kinds = [(self.gears, self.gear_ratio * one)]
+    def _common(self) -> tuple[EffectColumns, Array, Array, Array, Array]:
+        """F and T over the scatter of each row, C⁻¹, M, R of each ratio of the scatter between
+        tails, (levels, t, t), and log |V|.
+        """
+        n = len(self.relative)
+        kinds = [(self.gears, np.full(n, self.gear_ratio))]
         kinds += [] if self.of_gear is None else [(self.gears, self.of_gear)]
         kinds += [] if self.of_tail is None else [(self.tails, own) for own in self.of_tail.T]
-        parts = [_by_group(group, scatter) for group, scatter in kinds if scatter.any()]
-        shared = self.own(np.hstack([self.loadings, *parts]))
-        tails = self.own(_by_group(self.tails, one)[:, : None if any(self.tail_ratios) else 0])
+        kinds = [(group, scatter) for group, scatter in kinds if scatter.any()]
+        t = (int(self.tails.max()) + 1) * any(self.tail_ratios)
+        kinds += [(self.tails, np.ones(n))] * bool(t)
+        groups = [csc_array((own, (np.arange(n), group))) for group, own in kinds]
+        few = csc_array(hstack([csc_array((n, 0)), *groups]))
+        joint = EffectColumns(self.loadings, few, np.arange(self.loadings.shape[1] + few.shape[1]))
+        if self.correlation or n <= _LARGE:
+            joint = EffectColumns.of(self.own(joint.take(joint.at)))
+        else:
+            joint = joint.scaled(1.0 / self.relative)
+        inner = np.vstack([joint.onto(joint.full.T), joint.onto(joint.few.T)])
+        c = joint.p - t
+        lower = np.linalg.cholesky(np.eye(c) + inner[:c, :c])
+        root = solve_triangular(lower, np.eye(c), lower=True)
+        between = root @ inner[:c, c:]
         ratios = np.array(self.tail_ratios)[:, None, None]
-        lower = np.linalg.cholesky(np.eye(shared.shape[1]) + shared.T @ shared)
-        common = solve_triangular(lower, shared.T, lower=True).T
-        apart = tails - common @ (common.T @ tails)
-        inner = np.linalg.cholesky(np.eye(tails.shape[1]) + ratios**2 * (tails.T @ apart))
-        log = 2.0 * np.log(np.diagonal(inner, axis1=1, axis2=2)).sum(axis=1)
+        apart = inner[c:, c:] - between.T @ between
+        tails = np.linalg.cholesky(np.eye(t) + ratios**2 * apart)
+        log = 2.0 * np.log(np.diagonal(tails, axis1=1, axis2=2)).sum(axis=1)
         log += 2.0 * np.sum(np.log(np.diagonal(lower))) + 2.0 * np.sum(np.log(self.relative))
         log += np.sum(np.log1p(-(self._steps[2] ** 2)))
-        return common, apart, np.linalg.inv(inner) * ratios, log
+        return joint, root, between, np.linalg.inv(tails) * ratios, log
+
+    def _low(self, inner: Array) -> tuple[Array, Array]:
+        """Pᵀ x and Qᵀ x of columns by their products with F and T, (c + t, k)."""
+        _joint, root, between, _roots, _log = self._common
+        low = root @ inner[: len(root)]
+        return low, inner[len(root) :] - between.T @ low
 
     def each_precision_times(
         self, columns: Array, levels: slice = slice(None)
     ) -> tuple[Array, Array]:
         """Columns times V⁻¹, (levels, n, k), and log |V|, (levels,), of each ratio or of some."""
-        common, tails, roots, log = self._common
+        joint, root, between, roots, log = self._common
         roots = roots[levels]
         own = self.own(columns)
-        left = own - common @ (common.T @ own)
-        bent = roots.swapaxes(1, 2) @ (roots @ (tails.T @ own))
-        return self._back(left - tails @ bent), log[levels]
+        low, apart = self._low(joint.onto(own.T).T)
+        bent = roots.swapaxes(1, 2) @ (roots @ apart)
+        common = root.T @ (low - between @ bent)
+        each = [joint.times(part) for part in np.concatenate([common, bent], axis=1)]
+        return self._back(own - np.array(each)), log[levels]
 
-    def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
-        """Columns times V⁻¹, and log |V|, of one ratio of the scatter between tails."""
-        level = self.tail_ratios.index(tail_ratio)
-        (product,), (log,) = self.each_precision_times(columns, slice(level, level + 1))
-        return product, float(log)
+    def precision_times(self, columns: Array) -> Array:
+        """Columns times V⁻¹ of the last ratio."""
+        (product,), _log = self.each_precision_times(columns, slice(-1, None))
+        return np.asarray(product)
 
-    def square(self, data: Array, tail_ratio: float) -> Array:
-        """Squared length of data sets under V⁻¹."""
-        each: Array = self.squares(EffectColumns.of(data))[self.tail_ratios.index(tail_ratio)]
-        return each
+    def products(self, columns: Array) -> Array:
+        """Products of some columns with each other under V⁻¹, of the last ratio, shape (k, k)."""
+        own = self.own(columns)
+        low, apart = self._low(self._common[0].onto(own.T).T)
+        both = np.vstack([low, self._common[3][-1] @ apart])
+        return np.asarray(own.T @ own - both.T @ both)
 
     def squares(self, columns: EffectColumns) -> Array:
         """Squared length of many columns, for each ratio of the scatter between tails, (levels,
         p).
         """
-        common, tails, roots, _log = self._common
+        joint, _root, _between, roots, _log = self._common
         if self.correlation:
             columns = EffectColumns.of(self.own(columns.take(np.arange(columns.p))))
             scale = np.ones(len(self.relative))
         else:
             scale = 1.0 / self.relative
-        own = columns.squared_onto(scale**2)
-        own -= np.sum(columns.onto((common * scale[:, None]).T) ** 2, axis=0)
-        low = columns.onto((tails * scale[:, None]).T)
-        return np.array([own - np.sum((root @ low) ** 2, axis=0) for root in roots])
-
-
-def _by_group(group: Wholes, scatter: Array) -> Array:
-    """What the rows of each group have in common, one column each."""
-    return np.asarray(scatter[:, None] * (group[:, None] == np.arange(group.max() + 1)))
+        joint = joint.scaled(scale)
+        common = []
+        # All at once would fill the memory.
+        every: Any = (columns.full.T, columns.few.T)
+        for rows in every:
+            for start in range(0, rows.shape[0], _AT_ONCE):
+                low, apart = self._low(joint.onto(rows[start : start + _AT_ONCE]).T)
+                common.append(np.sum(low**2, axis=0) + np.sum((roots @ apart) ** 2, axis=1))
+        whole = np.hstack([np.empty((len(roots), 0)), *common])
+        return np.asarray(columns.squared_onto(scale**2) - whole[:, columns.at])
 
 
 @dataclass(frozen=True)
@@ -402,12 +431,13 @@ def shrunk(
     """
     both = np.hstack([free, columns])
     scale = noise.scale_in
-    product, _log = noise.precision_times(np.column_stack([both, data]), noise.tail_ratios[-1])
-    inner = both.T @ product[:, :-1] / scale**2
+    inner = noise.products(np.column_stack([both, data])) / scale**2
+    along = inner[:-1, -1]
+    inner = inner[:-1, :-1]
     k = free.shape[1]
     inner[k:, k:] += np.linalg.inv(covariance)
     inverse = np.linalg.pinv(inner)
-    return inverse @ (both.T @ product[:, -1]) / scale**2, np.asarray(inverse, float)
+    return inverse @ along, np.asarray(inverse, float)
 
 
 def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
@@ -473,10 +503,8 @@ def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bo
     Far readings decide no more than others: where noise is estimated they scatter more.
     """
     left = np.column_stack([before, after])
-    ratio = noise.tail_ratios[-1]
-    square = np.sum(
-        [noise.take(fold == k).square(left[fold == k], ratio) for k in np.unique(fold)], axis=0
-    )
+    parts = [noise.take(fold == k).products(left[fold == k]) for k in np.unique(fold)]
+    square = np.diag(np.sum(parts, axis=0))
     return bool(square[1] < square[0])
 
 

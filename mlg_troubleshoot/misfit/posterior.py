@@ -75,10 +75,10 @@ class Effects:
     rarity: Array | float = 0.0
 
     @staticmethod
-    def joined(parts: Sequence[Effects]) -> Effects:
-        """All effects of several lists in one."""
+    def joined(columns: EffectColumns, parts: Sequence[Effects]) -> Effects:
+        """All effects of several lists in one, whose columns stand one after the other."""
         return Effects(
-            EffectColumns.joined([e.kept for e in parts]),
+            columns,
             [name for e in parts for name in e.names],
             *(
                 np.concatenate([np.broadcast_to(getattr(e, what), len(e.names)) for e in parts])
@@ -408,7 +408,7 @@ class Marginal:
         noise = self.products.noise
         shared = self.context.shared_in
         columns = np.hstack([shared, self.products.columns.take(members)])
-        product, _log = noise.precision_times(columns / noise.scale_in, noise.tail_ratios[-1])
+        product = noise.precision_times(columns / noise.scale_in)
         left = self.products.data - self.context.mean * shared.sum(axis=1)
         # All sizes normal: mean and variance of each of the context's.
         variance = np.full(shared.shape[1], np.var(changes))
@@ -567,34 +567,9 @@ def posterior(
     them.
     """
     # What a search works out of the noise goes with it.
-    search = _Search(replace(noise), data, effects, contexts, beliefs, most)
+    search = Search(replace(noise), data, effects, contexts, beliefs, most)
     search.run(start)
     return search.summed()
-
-
-def more_than_slips(
-    noise: NoiseModel,
-    data: Array,
-    effects: Effects,
-    contexts: Sequence[Context],
-    beliefs: Beliefs,
-    start: Explanation,
-    slips: int,
-) -> bool:
-    """Tell whether an effect that has a name likely acts beside an explanation and its slips, which
-    are added to it as long as one is the likeliest further effect, at most so many.
-    """
-    search = _Search(noise, data, effects, contexts, beliefs, len(start.members) + slips + 1)
-    members = frozenset(start.members)
-    while True:
-        search.extend(start.context, members)
-        at = search.extended[start.context, members]
-        (nearest, *_) = at.leading
-        if at.further[nearest] <= at.own.log_posterior:
-            return False
-        if effects.names[nearest] is not None:
-            return True
-        members |= {nearest}
 
 
 @dataclass
@@ -607,7 +582,7 @@ class _Extended:
     leading: tuple[int, ...]
 
 
-class _Search:
+class Search:
     """Sets that were looked at, by context and members."""
 
     def __init__(

@@ -55,18 +55,28 @@ from mlg_troubleshoot.misfit.simulation_result import (
 from mlg_troubleshoot.misfit.simulation_result import MisfitVerdict as Verdict
 
 
-def read_numbers(values: Any, name: str) -> Array:
-    """A copy of an array of numbers, NaN where it is masked."""
+def read_numbers(values: Any, name: str, *shapes: tuple[int, ...], above: float = -np.inf) -> Array:
+    """A copy of an array of numbers, NaN where it is masked; with shapes, it has one of them and
+    every number is finite and above a least one.
+    """
     try:
         # Text is not a number, even where one could be read from it.
-        numbers = np.ma.array(values)
-        if numbers.dtype.kind in "UO" and any(isinstance(each, str) for each in numbers.flat):
+        given = np.ma.array(values)
+        if given.dtype.kind in "UO" and any(isinstance(each, str) for each in given.flat):
             raise TypeError(f"{values!r} holds text")
-        return np.array(np.ma.filled(numbers.astype(float), np.nan))
+        numbers = np.array(np.ma.filled(given.astype(float), np.nan))
     except (TypeError, ValueError) as error:
         raise UsageError(
             f"{name} is not an array of numbers: {error}", "give numbers, NaN where not read"
         ) from error
+    is_finite = np.all((numbers > above) & (numbers < np.inf))
+    if shapes and not (numbers.shape in shapes and is_finite):
+        raise UsageError(
+            f"{name} has shape {numbers.shape}, or a number that is not finite, or not above"
+            f" {above:g}",
+            f"give numbers of shape {' or '.join(map(str, shapes))}: one per row",
+        )
+    return numbers
 
 
 def read_measured(measured: Any) -> tuple[Array, list[str]]:
@@ -82,17 +92,6 @@ def read_measured(measured: Any) -> tuple[Array, list[str]]:
     return data, names
 
 
-def read_rows(values: Any, n: int, name: str) -> Array:
-    """One number for each row."""
-    column = read_numbers(values, name)
-    if column.shape != (n,) or not np.isfinite(column).all():
-        raise UsageError(
-            f"{name} has shape {column.shape} for {n} rows, or values that are not finite",
-            "give one number or one date for each row",
-        )
-    return column
-
-
 def read_labels(labels: ArrayLike | None, n: int, name: str) -> Wholes:
     """One number for each different label; one for all where there are no labels."""
     given = np.zeros(n) if labels is None else np.asarray(labels)
@@ -106,11 +105,10 @@ def read_labels(labels: ArrayLike | None, n: int, name: str) -> Wholes:
 def read_times(time: ArrayLike | None, chain: Wholes) -> Array:
     """When each row was read, in usual steps of a series; without time in the order given."""
     given = np.arange(len(chain)) if time is None else np.asarray(time)
-    if given.dtype == object:
+    if given.dtype.kind in "OM":
         given = np.asarray(time, "datetime64[us]")
-    if given.dtype.kind == "M":
         given = np.divide(given - given.min(), np.timedelta64(1, "s"))
-    when = read_rows(given, len(chain), "time")
+    when = read_numbers(given, "time", chain.shape)
     order = np.lexsort((when, chain))
     step = np.diff(when[order])[np.diff(chain[order]) == 0]
     if np.any(step <= 0.0):
@@ -133,18 +131,6 @@ def check_predict(predict: Callable[..., Any]) -> None:
     except ValueError:
         # What is written in C may have no signature.
         return
-
-
-def read_declared(reading_u: ArrayLike, run: Runner) -> Array:
-    """Standard uncertainty of each reading."""
-    declared = read_numbers(reading_u, "reading_u")
-    if declared.shape not in {(), run.shape[1:], run.shape} or not np.all(declared > 0.0):
-        raise UsageError(
-            f"reading_u has shape {declared.shape}, the readings have shape {run.shape};"
-            f" least value: {np.min(declared)}, not above 0",
-            "give a positive number for each output, or for each reading",
-        )
-    return np.broadcast_to(declared, run.shape)[run.row, run.output]
 
 
 def read_suspects(every: Sequence[Suspect], readings: int, count: int) -> Array:
@@ -183,10 +169,7 @@ def read_suspects(every: Sequence[Suspect], readings: int, count: int) -> Array:
 Predict = Callable[[Mapping[str, float]], Any]
 
 # Shares of a trial by which a derivative is taken: the next one where one does nothing or fails.
-_STEPS = (0.1, 1, 0.01)
-# Central difference over forward one below which the effect is even about the value, as of a play:
-# then the forward difference stands for it.
-_EVEN = 1e-3
+_STEPS = (0.1, 1)
 
 
 class Runner:
@@ -272,8 +255,8 @@ class Runner:
             usable = [slope for slope in usable if np.isfinite(slope).all()]
             if np.any(usable):
                 both = np.mean(usable, axis=0)
-                even = np.linalg.norm(both) < _EVEN * np.linalg.norm(usable[0])
-                return usable[0] if even else both
+                # What is even about the value, as of a play, has an effect all the same.
+                return both if np.any(both) else usable[0]
         return np.zeros(len(self.row))
 
 
@@ -376,8 +359,11 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
             "time was given without series", "say with series= which rows follow each other"
         )
     moving = dict(covariates) if covariates is not None else {}
-    known = {str(name): read_rows(own, n, repr(name)) for name, own in moving.items()}
-    declared = None if reading_u is None else read_declared(reading_u, run)
+    known = {str(name): read_numbers(own, repr(name), (n,)) for name, own in moving.items()}
+    declared = None
+    if reading_u is not None:
+        stated = read_numbers(reading_u, "reading_u", (), run.shape[1:], run.shape, above=0.0)
+        declared = np.broadcast_to(stated, run.shape)[run.row, run.output]
     bad = np.flatnonzero(~np.isfinite(run.at(run.nominal)))
     if len(bad):
         raise UsageError(
@@ -596,7 +582,7 @@ class _Study:
 
         _found, noise = at.linear(chosen, context)
         bare = replace(noise, loadings=noise.loadings[:, noise.absorbed :], absorbed=0)
-        root = cholesky(bare.precision_times(np.eye(len(at.unit)), bare.tail_ratios[0])[0])
+        root = cholesky(bare.precision_times(np.eye(len(at.unit))))
         white = root / at.unit
 
         def there(some: Array) -> Array:
@@ -616,12 +602,12 @@ class _Study:
             start[free],
             slopes,
             (low, high),
+            "dogbox",
             x_scale=np.abs(trial),
             ftol=1e-6,
             max_nfev=30,
         )
-        at_bound = np.where(found.active_mask < 0, low, high)
-        return there(np.where(found.active_mask, at_bound, found.x))
+        return there(found.x)
 
     def search(self, values: Array) -> _Point:
         """Judge, fit what is likeliest and linearise there, until the same is likeliest again; at

@@ -3,8 +3,10 @@
 The design variables are x = m + L z: m and L Lᵀ are mean and covariance of the ensemble, z of each
 linkage of the type is about of unit size. A reading is y = f(x) + u e. An entry error does not bend
 the linkage: the fit minimises the sum of c² ln(1 + (e/c)²) over all e and all z (1). The readings
-that the others do not contradict are fitted by least squares; with slopes J of f/u, the posterior
-is normal about that fit with covariance (I + JᵀJ)⁻¹ of z (2).
+that the others do not contradict are fitted by least squares; with slopes J of f/u, each is known
+from the others by the covariance (I + JᵀJ)⁻¹ of z (2). The linkages that fit the readings lie on a
+bent surface: a draw of the posterior is the fit to readings and prior that were moved by standard
+normal numbers (3; randomized maximum likelihood, Kitanidis 1995).
 """
 
 from __future__ import annotations
@@ -137,6 +139,7 @@ class SurveyedLinkage:
         rate = direction * vectors[:, -1:] / -np.min(direction * moved, axis=1, keepdims=True)
         return mechanism, reference, numbers, rate
 
+    @np.errstate(all="ignore")
     def predicted(self, readings: Sequence[SurveyReading], vectors: Array) -> Array:
         """What each vector predicts for each reading, shape (n_vectors, n_readings); NaN where the
         linkage does not close. [in or rad]
@@ -168,6 +171,7 @@ class SurveyedLinkage:
                 columns.append(value - 2.0 * np.pi * turns)
         return np.column_stack(columns)
 
+    @np.errstate(all="ignore")
     def amplification(self, vectors: Array) -> Array:
         """Plunger amplification index A_iP of each joint (Eq. 8), shape (n_vectors, n_joints);
         NaN where the linkage does not close over its whole stroke. [1]
@@ -279,8 +283,9 @@ _MISFIT = 3.9
 # differ by less than the second. [1]
 _APART = 0.1
 _AS_LIKELY = 3.0
-# Draws of the posterior, and those of them that are an ensemble.
+# Draws of the posterior, steps of each from the fit, and draws that are an ensemble.
 _DRAWS = 200
+_SETTLED = 8
 _MEMBERS = 11
 
 
@@ -420,12 +425,18 @@ def survey(readings: Any, gear: Gear | str | Path = DEFAULT_GEAR, *, seed: int =
     best = modes[0]
     weights = np.exp([best.cost - mode.cost for mode in modes])
     drawn = [
-        rng.multivariate_normal(modes[k].x, modes[k].covariance)
+        fit.descend(
+            modes[k].x,
+            kept,
+            _SETTLED,
+            moved=rng.standard_normal(len(read)),
+            middle=rng.standard_normal(len(best.x)),
+            loss="linear",
+        ).x
         for k in rng.choice(len(modes), _DRAWS, p=weights / weights.sum())
     ]
     points = fit.points(np.vstack([best.x, *drawn]))
-    with np.errstate(all="ignore"):
-        indices = linkage.amplification(points)
+    indices = linkage.amplification(points)
     closed = np.isfinite(indices.sum(axis=1))
     if not closed[0] or closed.sum() < 3:
         raise InconclusiveDataError(
@@ -455,11 +466,10 @@ def survey(readings: Any, gear: Gear | str | Path = DEFAULT_GEAR, *, seed: int =
         geometry_sha256=digest,
         ensemble_sha256=digest,
     )
-    joints = [f"#{number}" for number in before.joint_numbers]
     return SurveyResult(
         surveyed,
         _adjusted(linkage.names, values),
-        _adjusted(joints, indices[closed]),
+        _adjusted([f"#{number}" for number in before.joint_numbers], indices[closed]),
         read,
         frozen(residuals),
         tuple(misfits),
@@ -491,15 +501,13 @@ class _Fit:
         self.readings = readings
         self.value = np.array([r.value for r in readings])
         self.u = np.array([r.u for r in readings])
-        self.every = self.u > 0.0
         members = np.array([linkage.vector(each) for each in linkage.gear.ensemble])
         angles = np.array([name.endswith(_ANGLES) for name in linkage.names])
         # The same direction, one turn further, is not a distance.
         turns = np.round((members - members[0]) / (2.0 * np.pi))
         members -= 2.0 * np.pi * turns * angles
-        points = linkage.gear.reference.mechanism.points
-        size = np.std([c for p in points for c in (p.x, p.y)])
-        alone = np.where(angles, _ALONE_ANGLE, _ALONE_SIZE * size)
+        places = ((p.x, p.y) for p in linkage.gear.reference.mechanism.points)
+        alone = np.where(angles, _ALONE_ANGLE, _ALONE_SIZE * np.std([*places]))
         covariance = np.diag(alone**2)
         if len(members) > 2:
             around = np.cov(members.T)
@@ -517,39 +525,37 @@ class _Fit:
 
     def residuals(self, z: Array) -> Array:
         """Shape (n_points, n_readings). [1]"""
-        with np.errstate(all="ignore"):
-            residuals = (
-                self.linkage.predicted(self.readings, self.points(z)) - self.value
-            ) / self.u
+        residuals = (self.linkage.predicted(self.readings, self.points(z)) - self.value) / self.u
         return np.where(np.isfinite(residuals), residuals, _OPEN)
 
     def slopes(self, z: Array) -> Array:
         """Shape (n_readings, n_variables); 0 where the linkage does not close. [1]"""
-        with np.errstate(all="ignore"):
-            tried = self.points(z) + central_steps(len(z))
-            found = central_slopes(self.linkage.predicted(self.readings, tried)).T
+        tried = self.points(z) + central_steps(len(z))
+        found = central_slopes(self.linkage.predicted(self.readings, tried)).T
         return np.asarray(np.where(np.isfinite(found), found, 0.0) @ self.root / self.u[:, None])
 
     def descend(
         self,
         z: Array,
-        kept: Mask,
+        kept: Any,
         steps: int,
         widened: float = 1.0,
         *,
+        moved: Any = 0.0,
         middle: Any = 0.0,
-        robust: bool = True,
+        loss: Any = "cauchy",
     ) -> Any:
-        """Minimise equation 1 from one point; middle: of the prior, else 0."""
+        """Minimise equation 1 from one point; moved: how far the readings are, in their
+        uncertainties; middle: of the prior, else 0.
+        """
         weight = kept / widened
 
         def residuals(at: Array) -> Array:
-            return np.append(self.residuals(at[None])[0] * weight, at - middle)
+            return np.append((self.residuals(at[None])[0] - moved) * weight, at - middle)
 
         def slopes(at: Array) -> Array:
-            return np.vstack([self.slopes(at) * weight[:, None], np.eye(len(at))])
+            return np.vstack([(self.slopes(at).T * weight).T, np.eye(len(at))])
 
-        loss: Any = "cauchy" if robust else "linear"
         return least_squares(residuals, z, slopes, loss=loss, f_scale=_CORE, max_nfev=steps)
 
     def search(self, rng: np.random.Generator) -> list[Any]:
@@ -568,9 +574,7 @@ class _Fit:
             nearest = np.argsort(np.median(np.abs(self.residuals(starts)), axis=1))
             points = list(starts[nearest[: _STARTS // 3]])
             for widened, steps, count in _MOVING:
-                fits = _distinct(
-                    [self.descend(z, self.every, steps, widened) for z in points], count
-                )
+                fits = _distinct([self.descend(z, True, steps, widened) for z in points], count)
                 points = [fit.x for fit in fits]
             best = _distinct([*best, *fits], count)
             square = np.sort(best[0].fun ** 2)[:-_ENTRY_ERRORS]
@@ -581,7 +585,7 @@ class _Fit:
 
     def settled(self, fits: list[Any]) -> tuple[Mask, list[Any]]:
         """The readings that fit, and the fits of them that are as likely."""
-        robust = self.descend(fits[0].x, self.every, 300).x
+        robust = self.descend(fits[0].x, True, 300).x
         kept = np.abs(self.residuals(robust[None])[0]) < 2.0 * _MISFIT
         for _ in self.readings:
             fitted = self._fitted(robust, kept)
@@ -599,10 +603,10 @@ class _Fit:
         """Fit with its covariance (2), and the variance of each reading about what the others
         predict for it, over its own. [1]
         """
-        fit = self.descend(z, kept, 100, robust=False)
+        fit = self.descend(z, kept, 100, loss="linear")
         slopes = self.slopes(fit.x)
         used = slopes * kept[:, None]
-        fit.covariance = np.linalg.inv(np.eye(len(z)) + used.T @ used)
-        known = np.einsum("ij,jk,ik->i", slopes, fit.covariance, slopes)
+        covariance = np.linalg.inv(np.eye(len(z)) + used.T @ used)
+        known = np.einsum("ij,jk,ik->i", slopes, covariance, slopes)
         fit.variance = np.where(kept, np.maximum(1.0 - known, 1e-9), 1.0 + known)
         return fit

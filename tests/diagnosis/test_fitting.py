@@ -51,7 +51,7 @@ def dense(ratio: float, noise: NoiseModel = NOISE) -> Array:
 @pytest.mark.parametrize("ratio", NOISE.tail_ratios)
 def test_the_inverse_covariance_is_that_of_the_whole_matrix(ratio, noise):
     columns = RNG.standard_normal((N, 3))
-    product, log_determinant = replace(noise).precision_times(columns, ratio)
+    (product,), (log_determinant,) = noise.with_tails(ratio).each_precision_times(columns)
     assert product == pytest.approx(np.linalg.solve(dense(ratio, noise), columns))
     assert log_determinant == pytest.approx(np.linalg.slogdet(dense(ratio, noise))[1])
 

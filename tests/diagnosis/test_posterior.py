@@ -18,7 +18,7 @@ from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
 from mlg_troubleshoot.diagnosis.causes.linkage import CalibrationRate, JointContact, JointFactors
 from mlg_troubleshoot.diagnosis.causes.reading import GaugeBias
-from mlg_troubleshoot.diagnosis.explain import Bank, MisfitProblem
+from mlg_troubleshoot.diagnosis.explain import Bank, MisfitProblem, more_than_slips
 from mlg_troubleshoot.diagnosis.noise import Rows
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import EffectColumns, NoiseModel
@@ -31,7 +31,6 @@ from mlg_troubleshoot.misfit.posterior import (
     Marginal,
     MisfitPosterior,
     Products,
-    more_than_slips,
     posterior,
 )
 from mlg_troubleshoot.misfit.simulation_result import Conclusion

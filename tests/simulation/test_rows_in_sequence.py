@@ -10,7 +10,7 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import SimulationDiagnosis, Suspect, Verdict, diagnose_simulation
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.misfit.columns import NoiseModel
+from mlg_troubleshoot.misfit.columns import EffectColumns, NoiseModel
 
 N = 120
 T = np.linspace(0.0, 1.0, N)
@@ -75,7 +75,7 @@ def noise() -> NoiseModel:
 
 
 def test_the_inverse_of_a_correlated_covariance_is_its_inverse(noise: NoiseModel) -> None:
-    inverse, log_determinant = noise.precision_times(np.eye(9), 0.0)
+    (inverse,), (log_determinant,) = noise.each_precision_times(np.eye(9))
     assert inverse @ covariance(noise) == pytest.approx(np.eye(9), abs=1e-9)
     assert log_determinant == pytest.approx(np.linalg.slogdet(covariance(noise))[1])
 
@@ -83,7 +83,8 @@ def test_the_inverse_of_a_correlated_covariance_is_its_inverse(noise: NoiseModel
 def test_the_length_of_data_is_that_under_the_inverse(noise: NoiseModel) -> None:
     data = np.random.default_rng(4).standard_normal((9, 3))
     expected = np.einsum("ij,ij->j", data, np.linalg.solve(covariance(noise), data))
-    assert noise.square(data, 0.0) == pytest.approx(expected)
+    assert np.diag(noise.products(data)) == pytest.approx(expected)
+    assert noise.squares(EffectColumns.of(data))[0] == pytest.approx(expected)
 
 
 def test_what_is_new_in_each_row_is_independent_and_of_unit_size(noise: NoiseModel) -> None:

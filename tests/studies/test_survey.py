@@ -12,8 +12,9 @@ import pandas as pd
 import pytest
 
 from mlg_troubleshoot import SurveyResult, predict, survey
-from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.errors import MechanismError, UsageError
+from mlg_troubleshoot.gear.assembly import DesignSpace
+from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.surveying.survey import ReadingKind, SurveyedLinkage, SurveyReading
 
 FOUR_BAR = Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml"
@@ -230,3 +231,73 @@ def test_predictions_in_a_batch_are_those_of_the_calibrated_linkage(gear: Gear) 
     reading = (SurveyReading(0, ReadingKind.PLUNGER, "", "", 0.0, 1.0, 0.3, is_angle=False),)
     moved = [float(m.plunger(0.3) - m.plunger(m.stroke[1])) for m in models]
     assert linkage.predicted(reading, vectors)[:, 0] == pytest.approx(moved, abs=1e-4)
+
+
+READINGS = Path(__file__).parents[2] / "docs" / "how-to" / "data" / "survey-readings.csv"
+
+
+def read_of(gear: Gear, linkage: Linkage) -> pd.DataFrame:
+    """The readings of the example's table on another linkage, without error."""
+    model, mechanism, table = gear.model_of(linkage), linkage.mechanism, pd.read_csv(READINGS)
+    vector = dict(
+        zip(DesignSpace(linkage).names, DesignSpace(linkage).vector(linkage), strict=True)
+    )
+    places = {}
+    for point in mechanism.points:
+        origin, axes = mechanism.frame(point.plane)
+        places[point.name] = origin + np.array([point.x, point.y]) @ axes[:2]
+    mid = model.plunger(linkage.stroke[1])
+    for k, row in table.iterrows():
+        if row["kind"] == "PLUNGER":
+            table.loc[k, "value_in"] = float(model.plunger(row["extension_in"]) - mid)
+        elif row["kind"] == "DISTANCE":
+            table.loc[k, "value_in"] = np.linalg.norm(places[row["from"]] - places[row["to"]])
+        elif row["kind"] == "EXTENSION":
+            table.loc[k, "value_in"] = vector["extension"]
+        else:
+            what = "direction" if row["to"] == "hinge" else row["to"]
+            table.loc[k, "value_deg"] = np.degrees(vector[f"{row['from']}.{what}"])
+    return table
+
+
+def hidden(gear: Gear, rng: np.random.Generator) -> Linkage:
+    """A linkage drawn between three of the ensemble, and a little around, that moves freely."""
+    space = DesignSpace(gear.reference)
+    members = np.array([space.vector(each) for each in gear.ensemble])
+    members -= 2.0 * np.pi * np.round((members - members[0]) / (2.0 * np.pi))
+    for _ in range(99):
+        three = rng.choice(len(members), 3, replace=False)
+        around = 0.15 * members.std(axis=0) * rng.standard_normal(len(space.names))
+        linkage = space.linkage(rng.dirichlet(np.ones(3)) @ members[three] + around, "H")
+        try:
+            if gear.model_of(linkage).plunger_amplification().max() < 5.0:
+                return linkage
+        except MechanismError:
+            # It does not close over its whole stroke.
+            continue
+    raise AssertionError("no linkage closes")
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_indices_of_hidden_linkages_and_the_ensemble_fits_the_readings(
+    gear: Gear,
+) -> None:
+    inside, wide, misfit = [], [], []
+    for seed in (2, 3):
+        rng = np.random.default_rng([4, seed])
+        linkage = hidden(gear, rng)
+        table = read_of(gear, linkage)
+        columns = ["value_in", "value_deg"]
+        u = table[["u_in", "u_deg"]].to_numpy()
+        table[columns] += u * rng.standard_normal(u.shape)
+        found = survey(table, gear)
+        true = gear.model_of(linkage).plunger_amplification()
+        inside += [j.low <= t <= j.high for j, t in zip(found.joints, true, strict=True)]
+        wide += [j.low <= j.value <= j.high for j in found.joints]
+        for drawn in found.gear.ensemble[1:]:
+            off = (read_of(found.gear, drawn)[columns] - table[columns]).to_numpy() / u
+            misfit.append(np.nanmean(off**2))
+    assert np.mean(inside) >= 0.9
+    assert all(wide)
+    # Each adds to the readings' own error as much as the readings leave open.
+    assert np.median(misfit) < 3.0
