@@ -41,10 +41,7 @@ from .simulator.records import write_csv as write_columns
 FIRST_SEED, STRENGTH = 40_000, 20.0
 CAUSES = tuple(CATALOGUE)
 # Of the linkage, of joints, of one tail and of reading; the others run in the slow part.
-EVERY_DAY = (
-    *("elastic_compliance", "thermal_growth", "direction_not_worst_case", "oval_wear"),
-    *("rigging_offset", "gauge_bias", "date_step"),
-)
+EVERY_DAY = ("elastic_compliance", "oval_wear", "rigging_offset", "gauge_bias")
 each_cause = pytest.mark.parametrize(
     "cause", [pytest.param(c, marks=() if c in EVERY_DAY else pytest.mark.slow) for c in CAUSES]
 )

@@ -148,6 +148,7 @@ def test_a_tilt_acts_like_a_projected_length_shrunk_by_its_cosine(tilted: int) -
 # Fleets
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_seed_reproduces_the_fleet(kind: str) -> None:
     one, two = (draw_fleet(17, kind) for _ in range(2))
@@ -156,6 +157,7 @@ def test_a_seed_reproduces_the_fleet(kind: str) -> None:
     assert one.table != draw_fleet(18, kind).table
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cause", [*CATALOGUE, *OFF_CATALOGUE])
 def test_the_requested_strength_is_reached(cause: str) -> None:
     kind = "single" if cause in CATALOGUE else "off_catalogue"
@@ -164,6 +166,7 @@ def test_the_requested_strength_is_reached(cause: str) -> None:
     assert label.effects[0].strength == pytest.approx(label.strength)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cause", [*CATALOGUE, *OFF_CATALOGUE])
 def test_the_misfit_of_the_table_is_the_effect_plus_the_noise_of_the_label(cause: str) -> None:
     fleet = simulate_fleet(_hide(EffectSpec(cause, strength=25.0)), 3)
@@ -256,6 +259,7 @@ def drawn(case: str, form: str = "strong") -> tuple[Rows, Truth]:
     return blemished_fleet(case, form, SEED, rows=120)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BLEMISHES)
 def test_a_blemish_changes_the_table_tells_nothing_of_itself_and_leaves_unseen_rows(case):
     rows, truth = drawn(case)
@@ -270,6 +274,7 @@ def test_the_same_seed_gives_the_same_fleet(case: str) -> None:
     assert drawn.__wrapped__(case) == drawn(case)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cause", CATALOGUE)
 def test_any_listed_cause_stands_beside_a_blemish(cause: str) -> None:
     _, truth = blemished_fleet("round", "mild", SEED, beside=cause, rows=120)
