@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import doctest
 import inspect
 import subprocess
@@ -162,9 +163,10 @@ def test_check_says_what_the_command_says() -> None:
 
 
 def test_check_without_advice_looks_for_no_worn_joints() -> None:
-    read = inspection(FAILURE)
-    assert mlg.check(read).rigging is not None
-    assert mlg.check(read, advice=False).rigging is None
+    failed = {"outcome": mlg.Outcome.FAILED, "readings_in": (0.04,)}
+    read = dataclasses.replace(inspection(FAILURE), **failed)
+    assert mlg.check(read).posterior is not None
+    assert mlg.check(read, advice=False).posterior is None
 
 
 def test_check_with_repairs_finds_the_set() -> None:

@@ -74,7 +74,7 @@ class Wanted(options.Shown):
         typer.Option(metavar="OUT.csv", help="Verdicts as a CSV, one line per row."),
     ] = None
     detail: Annotated[
-        bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")
+        bool, typer.Option("--detail", help="All joints, repairs and the uncertainty.")
     ] = False
     extension: Annotated[
         list[Path] | None,

@@ -5,7 +5,6 @@ The advice as a plan: what to do, step by step, to an end. Only the first step b
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
@@ -283,18 +282,6 @@ class RepairSet:
 
 
 @dataclass(frozen=True, slots=True)
-class Rigging:
-    """What re-rigging alone would do: half of the range between both worst cases is left,
-    clearances as they are.
-    """
-
-    shift_in: float
-    predicted_displacement_in: float
-    probability_within_margin: Probability
-    probability_exceed_random_directions: Probability
-
-
-@dataclass(frozen=True, slots=True)
 class UncertaintyBudget:
     """Standard uncertainties behind the probability, at the prediction with unmeasured joints at 0.
     [in]
@@ -305,12 +292,6 @@ class UncertaintyBudget:
     model_in: float
     margin_in: Size
     model_source: str
-
-    @property
-    def combined_in(self) -> float:
-        """Of the prediction against the margin. [in]"""
-        others = (self.geometry_in, self.model_in, self.margin_in)
-        return math.hypot(*self.readings_in.values(), *others)
 
     @property
     def lines(self) -> tuple[tuple[str, float, float], ...]:
@@ -324,7 +305,7 @@ class UncertaintyBudget:
             "model": self.model_in,
             "margin": self.margin_in,
         }
-        variance = self.combined_in**2 or 1.0
+        variance = sum(u**2 for u in parts.values()) or 1.0
         return tuple((name, u, u**2 / variance) for name, u in parts.items())
 
 
@@ -339,32 +320,16 @@ class GroupChance:
 
 
 @dataclass(frozen=True, slots=True)
-class ClearanceInterval:
-    """Median and central 90 % interval of one radial clearance, and the chance that it is beyond
-    its limit. [in, 1]
-    """
-
-    joint: int
-    low_in: float
-    median_in: float
-    high_in: float
-    worn: float
-
-
-@dataclass(frozen=True, slots=True)
 class Posterior:
     """Which joints explain a measured plunger displacement, most likely worn first.
 
     no_joint_worn: chance that no joint is worn beyond its limit. [1]
     not_clearance: chance that something other than clearance displaced the plunger. [1]
-    called_worn: groups that are more likely worn than not.
     """
 
     groups: tuple[GroupChance, ...]
     no_joint_worn: float
     not_clearance: float
-    intervals: tuple[ClearanceInterval, ...]
-    called_worn: tuple[tuple[int, ...], ...]
     text: str
 
 
@@ -469,8 +434,6 @@ class Assessment(_Planned, Result):
         Repair sets; None if they were not asked for.
     warnings : tuple of str
         Everything else a user must see.
-    rigging : Rigging or None
-        What re-rigging alone would do; None if it was not asked for or is not needed.
     posterior : Posterior or None
         Which joints explain the measured displacement; None if none was measured or it was not
         asked for.
@@ -484,7 +447,7 @@ class Assessment(_Planned, Result):
         {_COURSE} rigid margin_in remaining_in standard_uncertainty_in probability_within_margin
         predicted_displacement_in over_travel_in under_travel_in predicted_upper_in bound_in
         probability_exceed_random_directions geometry_spread_in explained_at_most_in unexplained_in
-        measured_displacement_in=row.measured_displacement_in basis standing repair_sets rigging
+        measured_displacement_in=row.measured_displacement_in basis standing repair_sets
         posterior outcome=row.outcome inspection_date=row.inspection_date
         gear_landings=row.gear_landings
     """
@@ -513,7 +476,6 @@ class Assessment(_Planned, Result):
     alarm: str
     repair_sets: tuple[RepairSet, ...] | None
     warnings: tuple[str, ...]
-    rigging: Rigging | None = None
     posterior: Posterior | None = None
     rigid: RigidBound | None = None
     older: tuple[Fact, ...] = ()

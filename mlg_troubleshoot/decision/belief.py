@@ -10,7 +10,7 @@ Which joints explain a measured plunger displacement, in numbers and words.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from statistics import NormalDist
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, frozen
-from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
+from mlg_troubleshoot.decision.assessment import GroupChance, Posterior
 from mlg_troubleshoot.decision.inspection import Fleet, RiggingCheck
 from mlg_troubleshoot.decision.prediction import Cases, responses
 from mlg_troubleshoot.decision.priors import PRIORS
@@ -28,16 +28,18 @@ from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, tabled_normal_cd
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import random_directions
 
-# Cells of the plunger's displacement, mid-position first, then over-travel, then under-travel; all
-# joints worn out together stay inside. [1, in]
-_CELLS = 256
+# Cells of the plunger's displacement, mid-position first, then over-travel, then under-travel: what
+# joints that are worn out together move it by stays inside. [1, in]
+_CELLS = 192
 _CELL_IN = 0.00125
 _PLACES = np.arange(_CELLS)
 _AT = np.asarray(np.fft.fftfreq(_CELLS) * _CELLS * _CELL_IN, np.float64)
 _ENDS_IN = np.array([_AT - 0.5 * _CELL_IN, _AT + 0.5 * _CELL_IN], np.float64)
 _FREQUENCIES = 2.0 * np.pi * np.fft.rfftfreq(_CELLS, _CELL_IN)
-# Share of the likeliest cell below which a chance is none. [1]
+# Share of the likeliest cell below which a chance is none, and of the likeliest pins and level of a
+# cause below which these are left out. [1]
 _NEGLIGIBLE = 1e-7
+_RARE = 1e-3
 # Transform of what the linkage adds (5).
 _LINKAGE = np.exp(-0.5 * (PRIORS.linkage_u_in * _FREQUENCIES) ** 2)
 
@@ -46,6 +48,8 @@ _ENDS = np.linspace(0.0, 2.0, 51)
 SHARES = np.asarray(0.5 * (_ENDS[1:] + _ENDS[:-1]), np.float64)
 _WORN = SHARES > 1.0
 
+# Gears of which is believed at once: what they need stays in the cache of a processor. [1]
+_AT_ONCE = 8
 # States drawn of failures of the joints, and of each other kind. [1]
 STATES = 192
 _OTHERS = 64
@@ -69,6 +73,10 @@ def _wear() -> Array:
 
 # f_k of (2): chance of each cell, by level; in the last row each joint has its own level. [1]
 WEAR = _wear()
+# The cells that stand for a joint that nobody read, (levels, points).
+_USUAL_POINTS = np.array(
+    [np.searchsorted(np.cumsum(each), _QUANTILES).clip(max=len(each) - 1) for each in WEAR]
+)
 # p of (1) before a fleet is known. [1]
 LEVELS = np.append(np.full(6, PRIORS.alike / 6), 1.0 - PRIORS.alike)
 
@@ -78,23 +86,26 @@ def given_readings(cases: Cases) -> tuple[Array, Array]:
     """Chances of the levels of each gear given its readings (1) to (3), (n, levels), and of each
     cell of wear at each level, (n, joints, levels, wear). [1]
     """
-    limits = cases.gear.limits_in
-    share = np.clip(cases.filled(0.0) / limits, 0.0, 2.0)[..., None]
-    doubtful = (cases.over_limit & ~cases.own_gauge)[..., None]
-    u = np.maximum(cases.gauge_u_in / limits, 1e-3)[..., None]
-    slip = doubtful * -np.expm1(-PRIORS.wrong_readings / len(limits))
-    likely = np.zeros((*cases.measured.shape, len(SHARES)))
+    gear, measured = cases.gear, cases.measured
+    limits = np.broadcast_to(gear.limits_in, measured.shape)[measured]
+    share = np.clip(cases.clearance_in[measured] / limits, 0.0, 2.0)
+    u = np.maximum(cases.gauge_u_in[measured] / limits, 1e-3)
+    likely = np.diff(tabled_normal_cdf((_ENDS - share[:, None]) / u[:, None]))
+    doubtful = (cases.over_limit & ~cases.own_gauge)[measured]
+    likely[doubtful] = 0.0
+    share, u = share[doubtful, None], u[doubtful, None]
+    slip = -np.expm1(-PRIORS.wrong_readings / len(gear.joints))
     for factor, often in ((1.0, 1.0 - slip), (2.0, slip)):
-        if not often.any():
-            continue
-        spread = np.hypot(u, doubtful * PRIORS.gauge_scale * factor * SHARES)
+        spread = np.hypot(u, PRIORS.gauge_scale * factor * SHARES)
         above, below = ((factor * ends - share) / spread for ends in (_ENDS[1:], _ENDS[:-1]))
-        likely += often / factor * (tabled_normal_cdf(above) - tabled_normal_cdf(below))
-    likely[~cases.measured] = 1.0
-    wear = likely[:, :, None] * WEAR
+        likely[doubtful] += often / factor * (tabled_normal_cdf(above) - tabled_normal_cdf(below))
+    wear = np.empty((*measured.shape, *WEAR.shape))
+    wear[...] = WEAR
+    wear[measured] *= likely[:, None]
     fits = wear.sum(axis=3, keepdims=True)
     levels = fits[..., 0].prod(axis=1) * (cases.fleet.levels or LEVELS)
-    return levels / levels.sum(axis=1, keepdims=True), wear / fits
+    wear /= fits
+    return levels / levels.sum(axis=1, keepdims=True), wear
 
 
 def _characteristic(reach_in: Array, shift_in: Array) -> Array:
@@ -127,7 +138,7 @@ def _by_wear(gear: Gear) -> Array:
     return _characteristic(reach[:, None] * SHARES, bend[:, None] * SHARES**2).view(float)
 
 
-def _density(transform: Array | NDArray[np.complex128]) -> Array:
+def _density(transform: NDArray[np.complexfloating]) -> Array:
     """Chance of each cell from a transform. [1]"""
     found = np.fft.irfft(transform, _CELLS)
     # Less is what the frequencies that are left out would take away.
@@ -140,7 +151,9 @@ def _share_within(margin_in: Array | float) -> Array:
     return np.asarray(np.clip((margin_in - np.abs(_AT)) / _CELL_IN + 0.5, 0.0, 1.0))
 
 
-def _products_before(factors: Array, first: Array | float = 1.0) -> Array:
+def _products_before(
+    factors: NDArray[np.complex128], first: Array | float = 1.0
+) -> NDArray[np.complex128]:
     """Product of the factors before each one along the second axis, and of one before them all."""
     before = np.empty_like(factors)
     before[:, 0] = first
@@ -149,193 +162,258 @@ def _products_before(factors: Array, first: Array | float = 1.0) -> Array:
     return before
 
 
+def _of_wear(wear: Array, by_wear: Array) -> NDArray[np.complex128]:
+    """Transforms of joints that are worn beyond their limit, and of them all, by their wear."""
+    worn = wear[..., _WORN] @ by_wear[..., _WORN, :]
+    return np.array([worn, wear[..., ~_WORN] @ by_wear[..., ~_WORN, :] + worn]).view(complex)
+
+
+@lru_cache(maxsize=4)
+def _usual_transforms(gear: Gear) -> NDArray[np.complex128]:
+    """The same of joints that nobody read, shape (2, 2, joints, levels, frequencies)."""
+    return _of_wear(WEAR, _by_wear(gear))
+
+
 @lru_cache(maxsize=8)
 def usual_of(gear: Gear, fleet: Fleet) -> tuple[Array, float]:
     """Of a gear of the fleet of which nothing was read: the chance of leaving the margin with free
     and with held pins, and how rarely work on it leaves its worn joints as they are. [1]
     """
     levels = np.array(fleet.levels or LEVELS)
-    whole = (WEAR @ _by_wear(gear)).view(complex).prod(axis=1) * _LINKAGE
+    whole = _usual_transforms(gear)[1].prod(axis=1) * _LINKAGE
     out = _density(whole) @ (1.0 - _share_within(gear.margin.value)) @ levels
     left = (1.0 - (1.0 - PRIORS.overlooked) * (WEAR @ _WORN)) ** len(gear.joints)
     return np.clip(out, 1e-9, 1.0 - 1e-9), float(levels @ left)
 
 
-class Belief:
-    """What is believed of one gear that failed, by everything that is known of it.
+class Inference:
+    """What is believed of some gears that failed, by everything that is known of them.
 
     Attributes
     ----------
-    looked : bool
+    looked : list of bool
         Whether the rigging was checked.
-    chances : tuple of float
+    chances : ndarray, shape (n, 3)
         Chances that the joints, the rigging and something else are the cause (9). [1]
-    held : float
+    held : ndarray, shape (n,)
         How much likelier the plunger's reading is with held pins than with free ones. [1]
     """
 
-    def __init__(self, cases: Cases, row: int = 0) -> None:
-        levels, wear = (each[row] for each in given_readings(cases))
-        gear, fleet = cases.gear, cases.fleet
-        self.gear = gear
-        self.margin_in = margin = float(cases.margin_in[row])
-        self.looked = cases.inspections[row].rigging_checked not in (None, RiggingCheck.NO)
-        self._wear = wear
-        # By pins, joints and levels.
-        self._transforms = (wear @ _by_wear(gear)).view(complex)
-        self._before = _products_before(self._transforms, _LINKAGE)
-        self._stands = _density(self._before[:, -1] * self._transforms[:, -1])
-        y, u = float(cases.plunger_in[row]), float(np.hypot(cases.plunger_u_in[row], 1e-4))
-        seen, of_rigging = np.ones(_CELLS), 1.0
-        if np.isfinite(y):
-            # (6), and (7) of a wrong rigging.
-            below, above = tabled_normal_cdf((_ENDS_IN - y) / u)
-            seen = (above - below) / _CELL_IN
-            even = 1.0 / (1.0 + (y / (PRIORS.offset * margin)) ** 8)
-            out = float(tabled_normal_cdf(np.array((abs(y) - margin) / u)))
-            of_rigging = even * out / (2.0 * (PRIORS.offset - 1.0) * margin)
-        within = _share_within(margin)
-        usual, overlooked = usual_of(gear, fleet)
-        before = np.outer([1.0 - fleet.loaded, fleet.loaded], levels)
-        often = usual[:, None]
+    def __init__(self, cases: Cases, rows: Sequence[int]) -> None:
+        some = list(rows)
+        levels, wear = (each[some] for each in given_readings(cases))
+        self.gear, fleet = cases.gear, cases.fleet
+        self.measured = cases.measured[some]
+        self.margin_in = margin = cases.margin_in[some]
+        checks = [cases.inspections[row].rigging_checked for row in some]
+        self.looked = [check not in (None, RiggingCheck.NO) for check in checks]
+        self._levels, self._wear = levels, wear
+        self._of_worn, self._transforms = self._of_joints(wear)
+        whole = _LINKAGE
+        for j in range(self._transforms.shape[2]):
+            whole = whole * self._transforms[:, :, j]
+        self._stands = _density(whole)
+        y, u = cases.plunger_in[some], np.hypot(cases.plunger_u_in[some], 1e-4)
+        is_read = np.isfinite(y)
+        y = np.where(is_read, y, 0.0)
+        # (6), and (7) of a wrong rigging.
+        below, above = tabled_normal_cdf((_ENDS_IN[:, None] - y[:, None]) / u[:, None])
+        seen = np.where(is_read[:, None], (above - below) / _CELL_IN, 1.0)
+        even = 1.0 / (1.0 + (y / (PRIORS.offset * margin)) ** 8)
+        out = tabled_normal_cdf((np.abs(y) - margin) / u)
+        of_rigging = even * out / (2.0 * (PRIORS.offset - 1.0) * margin)
+        of_rigging = np.where(is_read, of_rigging, 1.0)
+        within = _share_within(margin[:, None])
+        usual, overlooked = usual_of(self.gear, fleet)
+        before = np.array([1.0 - fleet.loaded, fleet.loaded])[:, None, None] * levels
+        often = usual[:, None, None]
         elsewhere = before / (1.0 - often) / PRIORS.joints_for_one_elsewhere
-        # By cause, pins and levels; by cause, pins and cells.
+        # By cause, pins, gears and levels; by cause, pins, gears and cells.
         self._factors = np.array([before / often, elsewhere])
         likely = seen * np.array([1.0 - within, within])
         # Held pins may rest with either sign.
-        self._seen_at = np.stack([likely, 0.5 * (likely + likely[:, -_PLACES])], axis=1)
-        fits = np.einsum("pkx,cpx->cpk", self._stands, self._seen_at)
-        free, held = (fits.sum(axis=0) @ levels).tolist()
-        self.held = held / max(free, 1e-300)
-        self._weights = self._factors * fits
+        self._seen_at = np.stack([likely, 0.5 * (likely + likely[..., -_PLACES])], axis=1)
+        fits = (self._stands @ self._seen_at[..., None])[..., 0]
+        free, held = np.sum(fits.sum(axis=0) * levels, axis=2)
+        self.held = held / np.maximum(free, 1e-300)
+        # By gears, causes, pins and levels.
+        self._weights = np.ascontiguousarray(np.moveaxis(self._factors * fits, 2, 0))
         # (8), (9): work that left the rigging wrong leaves few worn joints.
         left = wear * np.where(_WORN, PRIORS.overlooked, 1.0)
-        sound = left.sum(axis=2)
-        of_levels = levels * np.prod(sound, axis=0) / overlooked
-        looked = PRIORS.overlooked if self.looked else 1.0
-        rigging = looked * of_rigging * float(of_levels.sum()) / PRIORS.joints_for_one_misrigged
-        joints, other = self._weights.sum(axis=(1, 2)).tolist()
-        total = max(joints + rigging + other, 1e-300)
-        self.chances = joints / total, rigging / total, other / total
-        self._rigging_levels = of_levels / of_levels.sum()
-        self._left_worn = left[..., _WORN].sum(axis=2) / sound
+        sound = left.sum(axis=3)
+        of_levels = levels * np.prod(sound, axis=1) / overlooked
+        rigging = np.where(self.looked, PRIORS.overlooked, 1.0) * of_rigging
+        rigging *= of_levels.sum(axis=1) / PRIORS.joints_for_one_misrigged
+        joints, other = self._weights.reshape(len(some), 2, -1).sum(axis=2).T
+        total = np.maximum(joints + rigging + other, 1e-300)
+        self.chances = np.transpose([joints / total, rigging / total, other / total])
+        self._rigging_levels = of_levels / of_levels.sum(axis=1, keepdims=True)
+        self._left_worn = left[..., _WORN].sum(axis=3) / sound
+
+    def _of_joints(self, wear: Array) -> NDArray[np.complex128]:
+        """Transforms of the joints that are worn beyond their limit, and of them all, by pins,
+        gears, joints and levels.
+        """
+        usual = _usual_transforms(self.gear)[:, :, None]
+        found = np.repeat(usual, len(wear), axis=2)
+        by_wear = _by_wear(self.gear)[:, None]
+        for j, is_read in enumerate(self.measured.T):
+            if is_read.any():
+                found[:, :, is_read, j] = _of_wear(wear[is_read, j], by_wear[:, :, j])
+        return found
 
     @cached_property
-    def wear(self) -> Array:
-        """Chance of each cell of wear of each joint where the rigging is right, (joints, wear): all
-        others as they are, this one worn so far. [1]
-        """
-        after = _products_before(self._transforms[:, ::-1])[:, ::-1]
-        seen = np.fft.rfft(self._seen_at)
+    def _contexts(self) -> tuple[Places, Places, Places]:
+        """Gears, pins and levels that may be together, by gears."""
+        least = _RARE * self._weights.max(axis=(2, 3), keepdims=True)
+        gear, pins, levels = np.nonzero((self._weights >= least).any(axis=1))
+        return gear, pins, levels
+
+    @cached_property
+    def _before(self) -> NDArray[np.complex128]:
+        """Products of the transforms of the joints before each one, (contexts, joints, ...)."""
+        gear, pins, levels = self._contexts
+        found = self._transforms[pins, gear, :, levels]
+        return np.asarray(_products_before(found, _LINKAGE))
+
+    @cached_property
+    def _others(self) -> Array:
+        """Transforms of where each joint, by all others and the readings, moves the plunger."""
+        gear, pins, levels = self._contexts
+        after = _products_before(self._transforms[pins, gear, ::-1, levels])[:, ::-1]
+        seen = np.conj(np.fft.rfft(self._seen_at))
         seen[..., 1:-1] *= 2.0
-        weighed = np.einsum("cpk,cpf->pkf", self._factors, np.conj(seen))
-        others = self._before * after * weighed[:, None]
-        # Parseval.
-        by_wear = np.conj(others).view(float) @ _by_wear(self.gear).swapaxes(2, 3)
-        found = np.maximum(np.einsum("pjks,jks->js", by_wear, self._wear), 1e-300)
-        return np.asarray(found / found.sum(axis=1, keepdims=True))
+        factors = self._factors[:, pins, gear, levels, None]
+        after *= np.sum(factors * seen[:, pins, gear], axis=0)[:, None]
+        after *= self._before
+        after.imag *= -1.0
+        return np.asarray(after.view(float))
 
     @cached_property
     def worn(self) -> Array:
-        """Chance of each joint to be beyond its limit (10). [1]"""
-        rigging = self.chances[1]
-        found = (1.0 - rigging) * (self.wear @ _WORN)
-        return np.asarray(found + rigging * (self._left_worn @ self._rigging_levels))
+        """Chance of each joint to be beyond its limit (10), (n, joints). [1]"""
+        gear, pins, levels = self._contexts
+        of_worn = self._of_worn[pins, gear, :, levels].view(float)
+        worn = (self._others[..., None, :] @ of_worn[..., None])[..., 0, 0]
+        starts = np.searchsorted(gear, np.arange(len(self.chances)))
+        total = np.add.reduceat(self._weights[gear, :, pins, levels].sum(axis=1), starts)
+        worn = np.add.reduceat(worn, starts) / np.maximum(_CELLS * total, 1e-300)[:, None]
+        rigging = self.chances[:, 1:2]
+        left = (self._left_worn @ self._rigging_levels[..., None])[..., 0]
+        return np.asarray((1.0 - rigging) * np.clip(worn, 0.0, 1.0) + rigging * left)
 
-    @property
-    def worn_by_leverage(self) -> Array:
-        """Chance of each joint to be worn, times how far it moves the plunger against the one that
-        moves it most: a worn joint that hardly moves it is hardly the cause. [1]
+    @cached_property
+    def chance_random(self) -> Array:
+        """Chance of leaving the margin with random directions, whatever the outcome (12). [1]"""
+        free, seen = self._stands[0], self._seen_at[:, 0].sum(axis=0)
+        levels = self._levels * (free @ seen[..., None])[..., 0] + 1e-300
+        out = free @ (1.0 - _share_within(self.margin_in[:, None]))[..., None]
+        return np.asarray(np.sum(levels * out[..., 0], axis=1) / levels.sum(axis=1))
+
+    def chance_of_any(self, place: int, joints: Sequence[int]) -> float:
+        """Chance that any of some joints of one gear, by their places, is worn, whatever the cause.
+        [1]
         """
-        amplification = responses(self.gear)[0].amplification
-        return np.asarray(self.worn * amplification / amplification.max())
+        each, states = self.worn[place, list(joints)], self.states[place]
+        worn = states.worn[:, list(joints)]
+        # Drawn is only how often several are.
+        several = states.causes.sum(axis=0) @ (worn.sum(axis=1) - worn.any(axis=1))
+        return max(float(each.sum() - several), float(each.max()))
 
-    def clearances_in(self, at: Sequence[float]) -> Array:
-        """Quantiles of the clearance of each joint, (joints, quantiles). [in]"""
-        steps = np.cumsum(self.wear, axis=1)
-        found = [np.interp(at, [0.0, *each], _ENDS) for each in steps]
-        return np.array(found) * self.gear.limits_in[:, None]
-
-    def second_repair(self, restored: Mask) -> float:
-        """Chance that the plunger is beyond its margin once some joints are new (11). [1]"""
-        gone, stay = (self._transforms[:, some].prod(axis=1) for some in (restored, ~restored))
+    def second_repair(self, place: int, restored: Mask) -> float:
+        """Chance that the plunger is beyond its margin once some joints of one gear are new (11).
+        [1]
+        """
+        of_joints, seen_at = self._transforms[:, place], self._seen_at[0, :, place]
+        gone, stay = (of_joints[:, some].prod(axis=1) for some in (restored, ~restored))
         fresh = _as_new(self.gear)[:, restored].prod(axis=1)
-        out = np.fft.rfft(self._seen_at[0])[:, None]
+        out = np.fft.rfft(seen_at)[:, None]
         weight = _density(np.conj(gone) * out) * _density(stay * _LINKAGE)
-        weight *= self._factors[0][..., None]
-        inside = _density(np.conj(fresh) * np.fft.rfft(_share_within(self.margin_in)))
+        weight *= self._factors[0, :, place, :, None]
+        inside = _density(np.conj(fresh) * np.fft.rfft(_share_within(self.margin_in[place])))
         # Where the joints can hardly be the cause no repair is one.
         within = np.sum(weight * inside[:, None]) / max(float(weight.sum()), 1e-9)
         return float(np.clip(1.0 - within, _NEGLIGIBLE, 1.0 - _NEGLIGIBLE))
 
-    def chance_of_any(self, joints: Sequence[int]) -> float:
-        """Chance that any of some joints, by their places, is worn, whatever the cause. [1]"""
-        each, worn = self.worn[list(joints)], self.states.worn[:, list(joints)]
-        # Drawn is only how often several are.
-        several = self.states.causes.sum(axis=0) @ (worn.sum(axis=1) - worn.any(axis=1))
-        return max(float(each.sum() - several), float(each.max()))
-
     @cached_property
-    def states(self) -> States:
-        """Drawn failures, the same ones whoever else is judged: where the plunger stands, then what
-        each joint moved, one after another, as in a hidden Markov chain.
+    def states(self) -> list[States]:
+        """Drawn failures of each gear, the same ones whoever else is judged: where the plunger
+        stands, then what each joint moved, one after another, as in a hidden Markov chain.
         """
         causes = np.repeat([0, 1], [STATES, _OTHERS])
-        n, joints, half = len(causes), len(self.gear.joints), _CELLS // 2
-        even, (turns, of_level, of_joint) = _even(joints + 3, n), _random(joints)
-        # A context is a cause with pins and a level.
-        shape = self._weights.shape
-        drawn = _drawn(self._weights.reshape(2, -1), causes, even[0])
-        drawn += causes * shape[1] * shape[2]
-        is_used = np.bincount(drawn, minlength=self._weights.size) > 0
-        context = np.cumsum(is_used)[drawn] - 1
-        cause, pins, levels = np.unravel_index(np.flatnonzero(is_used), shape)
-        likely = self._stands[pins, levels] * self._seen_at[cause, pins] + 1e-300
-        place = _drawn(likely, context, even[1])
+        gears, joints, half = len(self._wear), len(self.gear.joints), _CELLS // 2
+        even, (turns, of_level, of_joint) = _even(joints + 3, len(causes)), _random(joints)
+        each = np.arange(gears)[:, None]
+        gear, pins, levels = self._contexts
+        weights = np.zeros_like(self._weights)
+        weights[gear, :, pins, levels] = self._weights[gear, :, pins, levels]
+        drawn = _drawn(weights.reshape(2 * gears, -1), 2 * each + causes, even[0])
+        places = np.zeros(weights[:, 0].shape, int)
+        places[gear, pins, levels] = np.arange(len(gear))
+        context = places.reshape(gears, -1)[each, drawn]
+        likely = self._stands[pins, gear, levels] * self._seen_at[:, pins, gear] + 1e-300
+        place = _drawn(likely.reshape(-1, _CELLS), causes * len(gear) + context, even[1])
         stands = _AT[place] + _CELL_IN * (even[2] - 0.5)
-        before = _density(self._before[pins, :, levels])
-        before = before.swapaxes(0, 1)
         # In single precision: a draw needs no more, and half of the time.
+        before = _density(self._before.astype(np.complex64))
         before = np.concatenate(
             [before[..., half:], before, before[..., :half]], axis=2, dtype=np.float32
         )
         share = even[3:, :, None].astype(np.float32)
-        is_worn, at_in = self._points(pins, levels)
+        is_worn, at_in = self._points(gear, pins, levels)
         # The cells go round: from half of them below to half above.
         cell = (np.rint(at_in / _CELL_IN).astype(int) + half) % _CELLS - half
-        first = 2 * _CELLS * context + half
-        chosen = np.empty((joints, n), int)
+        moved, worn = np.empty((*place.shape, joints)), np.empty((*place.shape, joints), bool)
         for j in range(joints - 1, -1, -1):
-            left = (first + place)[:, None] - cell[j].take(context, axis=0)
-            steps = before[j].take(left) @ _SUMS
-            chosen[j] = np.argmax(steps >= share[j] * steps[:, -1:], axis=1)
-            place = (place - cell[j, context, chosen[j]]) % _CELLS
-        at = np.arange(joints)[:, None], context, chosen
-        moved, worn = at_in[at].T, is_worn[at].T
-        level = _drawn(self._rigging_levels[None], np.zeros(_OTHERS, int), of_level)
-        rigging = of_joint < self._left_worn[:, level].T
-        fresh = turns[pins[context[:STATES]], np.arange(STATES)]
-        reach = responses(self.gear)[0].amplification * self.gear.new_parts_in
+            first = 2 * _CELLS * (joints * context + j) + half + place
+            steps = before.take(first[..., None] - cell[j].take(context, axis=0)) @ _SUMS
+            chosen = np.argmax(steps >= share[j] * steps[..., -1:], axis=2)
+            chosen += len(_QUANTILES) * context
+            place = (place - cell[j].take(chosen)) % _CELLS
+            moved[..., j] = at_in[j].take(chosen)
+            worn[..., j] = is_worn[j].take(chosen)
+        level = _drawn(self._rigging_levels, each, of_level)
+        rigging = of_joint < self._left_worn[each, :, level]
+        fresh = turns[pins[context[:, :STATES]], np.arange(STATES)]
+        amplification = responses(self.gear)[0].amplification
+        freed = moved[:, :STATES] - amplification * self.gear.new_parts_in * fresh
         counts = [STATES, _OTHERS, _OTHERS]
-        return States(
-            np.repeat(np.diag(np.divide(self.chances, counts)), counts, axis=1),
-            np.vstack([worn[:STATES], rigging, worn[STATES:]]),
-            moved[:STATES] - reach * fresh,
-            stands[:STATES],
-            self.margin_in,
-        )
+        blamed = self.worn * amplification / amplification.max()
+        worn = np.concatenate([worn[:, :STATES], rigging, worn[:, STATES:]], axis=1)
+        return [
+            States(
+                np.repeat(np.diag(self.chances[k] / counts), counts, axis=1),
+                worn[k],
+                freed[k],
+                stands[k, :STATES],
+                blamed[k],
+                float(self.margin_in[k]),
+            )
+            for k in range(gears)
+        ]
 
-    def _points(self, pins: Places, levels: Places) -> tuple[Mask, Array]:
+    def _points(self, gear: Places, pins: Places, levels: Places) -> tuple[Mask, Array]:
         """Points that stand for each joint in some contexts, (joints, contexts, points): whether it
         is worn, and what it moves the plunger by. [in]
         """
-        wear = self._wear.reshape(-1, len(SHARES))
-        cells = _drawn(wear, np.arange(len(wear))[:, None], _QUANTILES)
-        share = SHARES[cells].reshape(*self._wear.shape[:2], -1)[:, levels]
+        cells = np.empty((*self._wear.shape[:3], len(_QUANTILES)), int)
+        cells[...] = _USUAL_POINTS
+        read = self._wear[self.measured].reshape(-1, len(SHARES))
+        of_read = _drawn(read, np.arange(len(read))[:, None], _QUANTILES)
+        cells[self.measured] = of_read.reshape(-1, *_USUAL_POINTS.shape)
+        share = SHARES[cells[gear, :, levels].swapaxes(0, 1)]
         reach, bend = (each[:, None, None] for each in _reach(self.gear))
         mean, spread = PRIORS.cosine
         turned = np.array([np.cos(2.0 * np.pi * _TURNS), mean + spread * _SCORES])[pins]
         return share > 1.0, reach * share * turned + (pins == 0)[:, None] * bend * share**2
+
+
+def believed(cases: Cases, rows: Sequence[int]) -> Iterator[tuple[Inference, int]]:
+    """What is believed of each of some gears, by its place among those worked out together."""
+    for start in range(0, len(rows), _AT_ONCE):
+        some = rows[start : start + _AT_ONCE]
+        belief = Inference(cases, some)
+        yield from ((belief, place) for place in range(len(some)))
 
 
 @lru_cache(maxsize=4)
@@ -390,96 +468,45 @@ class States:
         joints: its pin rests anew. [in]
     stands_in : ndarray, shape (STATES,)
         Where the plunger stands then. [in]
+    blamed : ndarray, shape (joints,)
+        Chance of each joint to be worn, times how far it moves the plunger against the one that
+        moves it most: a worn joint that hardly moves it is hardly the cause. [1]
     """
 
     causes: Array
     worn: Mask
     freed_in: Array
     stands_in: Array
+    blamed: Array
     margin_in: float
 
-    def stays_out(self, sets: Mask) -> Mask:
+    def stays_out(self, sets: Mask) -> NDArray[np.float32]:
         """Whether the plunger is beyond its margin in each failure of the joints once sets of
-        joints are new, shape (STATES, sets).
+        joints are new, 1 or 0, shape (STATES, sets).
         """
-        left = self.stands_in[:, None] - self.freed_in @ sets.T
-        return np.asarray(np.abs(left) > self.margin_in)
+        left = self.freed_in.astype(np.float32) @ sets.T.astype(np.float32)
+        left -= self.stands_in[:, None].astype(np.float32)
+        return (np.abs(left, out=left) > self.margin_in).astype(np.float32)
 
 
-# Sets of random directions and wear by which the chance of unread joints is counted. [1]
-_IMAGINED = 1024
-
-
-@lru_cache(maxsize=4)
-def _imagined(gear: Gear) -> tuple[Array, Array, Array]:
-    """Shared draws of (2) and (4): what each joint moves the plunger by per clearance and per
-    clearance squared, (joints, draws), (joints,), and at each level of wear if nobody read it,
-    (levels, joints, draws). [1, 1/in, in]
-    """
-    joints = len(gear.joints)
-    reach, bend = _reach(gear)
-    even = _even(2 * joints, _IMAGINED)
-    turned = np.cos(2.0 * np.pi * even[:joints])
-    steps = np.cumsum(WEAR, axis=1)
-    share = np.array([np.interp(even[joints:], np.r_[0.0, each], _ENDS) for each in steps])
-    moved = share * reach[:, None] * turned + share**2 * bend[:, None]
-    per_clearance = reach / gear.limits_in
-    return per_clearance[:, None] * turned, bend / gear.limits_in**2, moved
-
-
-def chance_random(cases: Cases, rows: Places) -> Array:
-    """Chance of leaving the margin with random directions (12) of some gears: joints that were read
-    as they are, the others by their usual wear, weighed by where the plunger was read. [1]
-    """
-    levels = given_readings(cases)[0][rows]
-    cases = cases.take(rows)
-    linear, bend, moved = _imagined(cases.gear)
-    read = cases.filled(0.0)
-    base = read @ linear + (read**2 @ bend)[:, None]
-    y, u = cases.plunger_in[:, None], np.hypot(cases.plunger_u_in, PRIORS.linkage_u_in)[:, None]
-    is_read = np.isfinite(y[:, 0])
-    beyond = np.empty_like(levels)
-    for k, each in enumerate(moved):
-        at = base + (~cases.measured).astype(float) @ each
-        beyond[:, k] = np.mean(np.abs(at) > cases.margin_in[:, None], axis=1)
-        off = (at[is_read] - y[is_read]) / u[is_read]
-        levels[is_read, k] *= np.mean(np.exp(-0.5 * off**2), axis=1) + 1e-12
-    return np.asarray(np.sum(levels * beyond, axis=1) / levels.sum(axis=1))
-
-
-_INTERVAL = 1.0 - CONFORMANCE, 0.5, CONFORMANCE
-
-
-def explain(belief: Belief) -> Posterior:
+def explain(belief: Inference, place: int) -> Posterior:
     """Find which joints explain the plunger's reading of one gear that failed."""
     gear = belief.gear
     every = [*gear.link_groups, gear.joint_numbers]
     places = [[gear.joint_numbers.index(n) for n in group] for group in every]
     # Nothing is surer than what drawn states allow.
     *chances, worn = np.clip(
-        [belief.chance_of_any(each) for each in places], 1e-4, 1.0 - 1e-4
+        [belief.chance_of_any(place, each) for each in places], 1e-4, 1.0 - 1e-4
     ).tolist()
     groups = [GroupChance(*each) for each in zip(gear.link_groups, chances, strict=True)]
     groups.sort(key=lambda group: -group.probability)
-    intervals = tuple(
-        ClearanceInterval(number, low, median, high, worn)
-        for number, (low, median, high), worn in zip(
-            gear.joint_numbers,
-            belief.clearances_in(_INTERVAL).tolist(),
-            belief.worn.tolist(),
-            strict=True,
-        )
-    )
-    called = tuple(group.joints for group in groups if group.probability > 0.5)
     none = 1.0 - worn
-    rigging = belief.chances[1]
+    rigging = float(belief.chances[place, 1])
     return Posterior(
         tuple(groups),
         none,
         rigging,
-        intervals,
-        called,
-        _text(groups, none, rigging, looked=belief.looked),
+        _text(groups, none, rigging, looked=belief.looked[place]),
     )
 
 

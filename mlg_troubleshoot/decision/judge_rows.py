@@ -6,12 +6,11 @@ What is looked at first: of the joints of a gear, of the gears of a batch.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import date
-from functools import lru_cache, partial
+from functools import partial
 from operator import attrgetter
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -25,7 +24,6 @@ from mlg_troubleshoot.decision.assessment import (
     Basis,
     JointFinding,
     Judgement,
-    Plan,
     Rejected,
     RepairSet,
     RigidBound,
@@ -34,7 +32,6 @@ from mlg_troubleshoot.decision.assessment import (
     Verdict,
     VerdictTone,
 )
-from mlg_troubleshoot.decision.belief import Belief, chance_random, explain
 from mlg_troubleshoot.decision.inspection import (
     FactKind,
     Fleet,
@@ -44,11 +41,12 @@ from mlg_troubleshoot.decision.inspection import (
     Side,
 )
 from mlg_troubleshoot.decision.planner import (
+    Course,
     Judged,
     correct,
     plans,
     repair_sets,
-    rigging_alternative,
+    sure_sets,
     with_consequences,
 )
 from mlg_troubleshoot.decision.prediction import (
@@ -65,9 +63,6 @@ from mlg_troubleshoot.gear.gear import DEFAULT_PLUNGER_U_IN, ROUNDING_IN, Gear, 
 from mlg_troubleshoot.indices.index_table import IndexTable, JointIndices
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
-# Two readings differ for sure where they do by this many standard uncertainties of the difference:
-# 90 % intervals. [1]
-_SURELY = 1.645
 # Where one of these comes next a gear is not done with, whatever its joints predict.
 _OPEN = (Action.READ_PLUNGER, Action.RETRACT)
 WORST_FIRST = (
@@ -80,15 +75,14 @@ def rank_joints(
     gear: Gear,
     table: IndexTable,
     clearance_in: Array,
-    allowance_in: Array | None = None,
-    gauge_u_in: Array | None = None,
+    allowance_in: Array,
 ) -> list[tuple[JointFinding, ...]]:
     """Rank the joints of each gear in the order in which to inspect them; NaN where nothing was
     measured or found.
 
     Joints over their limit come first, then by contribution; an unmeasured joint counts with half
     its limit, ties go to the larger total-order index. The range of a rank is over the ensemble of
-    geometries and over the errors of the readings.
+    geometries.
     """
     measured = np.isfinite(clearance_in)
     over = gear.over_limit(clearance_in)
@@ -99,14 +93,6 @@ def rank_joints(
     places = _places(over[:, None, :], contribution, table.total_order)
     first = places.min(axis=1)
     last = places.max(axis=1)
-    if gauge_u_in is not None:
-        u = np.where(measured, gauge_u_in, 0.0)
-        above = _surely_above(
-            contribution[:, 0], u * responses(gear)[0].amplification, assumed, u, gear
-        )
-        first = np.minimum(first, 1 + above.sum(axis=1))
-        last = np.maximum(last, above.shape[1] - above.sum(axis=2))
-    room = np.full(over.shape, np.nan) if allowance_in is None else allowance_in
 
     def finding(
         joint: JointSpec,
@@ -134,7 +120,7 @@ def rank_joints(
             allowance_in=_number_or_none(left),
         )
 
-    of_each = (clearance_in, over, places[:, 0], first, last, room)
+    of_each = (clearance_in, over, places[:, 0], first, last, allowance_in)
     return [
         tuple(map(finding, gear.joints, table.joints, *row))
         for row in zip(*(each.tolist() for each in of_each), strict=True)
@@ -143,21 +129,6 @@ def rank_joints(
 
 def _number_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-def _surely_above(
-    contribution: Array, u_in: Array, clearance_in: Array, gauge_u_in: Array, gear: Gear
-) -> Mask:
-    """Whether a joint ranks before another whatever the errors of both readings, (n, joint, other).
-
-    A joint over its limit comes first; one whose reading is at its limit may or may not be.
-    """
-    apart = contribution[:, :, None] - contribution[:, None, :]
-    differ = apart > _SURELY * np.hypot(u_in[:, :, None], u_in[:, None, :]) + 1e-12
-    sure = gear.over_limit(clearance_in - _SURELY * gauge_u_in)
-    may_be = gear.over_limit(clearance_in + _SURELY * gauge_u_in)
-    rejected = sure[:, :, None] & ~may_be[:, None, :]
-    return rejected | (differ & (sure[:, :, None] | ~may_be[:, None, :]))
 
 
 def _places(over: Mask, contribution: Array, total_order: Array) -> Places:
@@ -289,9 +260,8 @@ def assess(
     extension: Extension | None = None,
     fleet: Fleet | None = None,
 ) -> tuple[Judgement, ...]:
-    """Judge rows: verdict, plan and allowances; with `advice` re-rigging and the joints that are
-    likely worn, with `sets` the repair sets and what follows each outcome of NEXT. `fleet` is what
-    other gears teach.
+    """Judge rows: verdict, plan and allowances; with `advice` the joints that are likely worn, with
+    `sets` the repair sets and what follows each outcome of NEXT. `fleet` is what other gears teach.
     """
     valid = [row for row in rows if isinstance(row, Inspection)]
     # Gears of which the same is known are judged once; to an extension it matters whose they are.
@@ -320,7 +290,8 @@ def assess(
     judged = dict(zip(alike, found, strict=True))
     unjudged = tuple(UnjudgedJoint(joint.number, joint.name) for joint in gear.joints)
     assessed = (
-        replace(judged[each], inspection=row) for each, row in zip(known, valid, strict=True)
+        a if (a := judged[each]).inspection is row else replace(a, inspection=row)
+        for each, row in zip(known, valid, strict=True)
     )
     return tuple(
         (
@@ -392,12 +363,8 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool, sets: bool) -> 
     )
     closes = np.isfinite(lower.displacement_in)
     # A reading clears a gear by what is known of its joints: those that were not read count as 0.
-    known = chance_at(cases, cases.filled(0.0))
-    chance = known.copy()
-    unread = np.flatnonzero(~cases.measured.all(axis=1))
-    if len(unread) and cases.extension is None:
-        chance[unread] = chance_random(cases, unread)
-    verdicts = _verdicts(cases, p_lower, p_upper, known)
+    chance = chance_at(cases, cases.filled(0.0))
+    verdicts = _verdicts(cases, p_lower, p_upper, chance)
     found = [verdict for verdict, _basis in verdicts]
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes & sets
     findings = rank_joints(
@@ -405,7 +372,6 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool, sets: bool) -> 
         table,
         cases.clearance_in,
         allowances(cases, lower),
-        cases.gauge_u_in,
     )
     order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
     judged = Judged(
@@ -418,12 +384,11 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool, sets: bool) -> 
         p_lower,
         lower.standard_uncertainty(cases.margin_u_in),
     )
-    belief = lru_cache(4)(partial(Belief, cases))
-    planned, tried = plans(cases, judged, belief)
-    repairs = repair_sets(cases, upper, np.flatnonzero(wanted), tried if sets else {}, belief)
-    asked = belief if advice else None
+    sure = sure_sets(cases, upper, np.flatnonzero(wanted))
+    courses = [*plans(cases, judged, sure, advice=advice, sets=sets)]
+    repairs = repair_sets(cases, courses)
     return [
-        _assessment(cases, judged, i, findings[i], planned[i], repairs[i], asked)
+        _assessment(cases, judged, i, findings[i], courses[i], repairs[i])
         for i in range(len(cases))
     ]
 
@@ -458,9 +423,8 @@ def _assessment(
     judged: Judged,
     i: int,
     findings: tuple[JointFinding, ...],
-    plan: Plan,
+    course: Course,
     sets: tuple[RepairSet, ...],
-    belief: Callable[[int], Belief] | None,
 ) -> Assessment:
     inspection = cases.inspections[i]
     lower = judged.lower
@@ -481,7 +445,6 @@ def _assessment(
     is_new = inspection.is_since_repair(inspection.outcome_date) is not False
     is_failed = inspection.outcome is Outcome.FAILED and is_new
     most = _explained_at_most(size, judged.upper, i)
-    detail = _detail(cases, judged, i, budget, belief) if belief is not None and closes else {}
     found = Assessment(
         inspection=inspection,
         verdict=judged.verdicts[i],
@@ -494,7 +457,9 @@ def _assessment(
         remaining_in=number_or_none(margin - lower.displacement_in[i]),
         standard_uncertainty_in=number_or_none(judged.u_in[i]),
         probability_within_margin=float(judged.p_within[i]),
-        probability_exceed_random_directions=number_or_none(judged.chance[i]),
+        probability_exceed_random_directions=number_or_none(
+            judged.chance[i] if course.chance is None else course.chance
+        ),
         geometry_spread_in=(
             (
                 float(lower.spread_low_in[i]) + 0.0,
@@ -507,7 +472,7 @@ def _assessment(
         over_directions_rad=tuple(lower.worst.over_directions[i].tolist()) if closes else (),
         under_directions_rad=tuple(lower.worst.under_directions[i].tolist()) if closes else (),
         joints=findings,
-        plan=plan,
+        plan=course.plan,
         basis=judged.bases[i],
         bound_in=number_or_none(lower.bound_in[i] + 0.0, True),
         explained_at_most_in=number_or_none(most),
@@ -516,7 +481,7 @@ def _assessment(
         alarm=sentences.alarms([f.joint for f in findings if f.over_limit], failed=is_failed),
         repair_sets=sets if closes else None,
         warnings=_warnings(cases, i, findings, worst, float(judged.u_in[i])),
-        **detail,
+        posterior=course.posterior if closes else None,
     )
     return replace(found, headline=_headline(found, cases, i))
 
@@ -553,24 +518,6 @@ def _budget(lower: Prediction, cases: Cases, i: int) -> UncertaintyBudget:
         float(cases.margin_u_in[i]),
         source,
     )
-
-
-def _detail(
-    cases: Cases,
-    judged: Judged,
-    i: int,
-    budget: UncertaintyBudget | None,
-    belief: Callable[[int], Belief],
-) -> dict[str, Any]:
-    """What is worked out for a gear that is looked at alone."""
-    detail: dict[str, Any] = {}
-    if budget is not None and judged.verdicts[i] in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
-        worst = judged.lower.worst
-        worst_in = float(worst.over_in[i]), float(worst.under_in[i])
-        detail["rigging"] = rigging_alternative(cases.take([i]), worst_in, budget)
-    if np.isfinite(cases.plunger_in[i]) and cases.failed[i]:
-        detail["posterior"] = explain(belief(i))
-    return detail
 
 
 def _headline(a: Assessment, cases: Cases, i: int) -> str:

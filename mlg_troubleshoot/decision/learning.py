@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import betaincinv
 
-from mlg_troubleshoot.decision.belief import LEVELS, SHARES, WEAR, Belief, given_readings
+from mlg_troubleshoot.decision.belief import LEVELS, SHARES, WEAR, believed, given_readings
 from mlg_troubleshoot.decision.inspection import Fleet, Inspection
 from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.decision.priors import PRIORS
@@ -53,7 +53,7 @@ def learned(gear: Gear, inspections: Sequence[Inspection]) -> Fleet:
     share = betaincinv(PRIORS.loaded, 1.0 - PRIORS.loaded, _QUANTILES)
     likely = np.zeros(len(share))
     if len(whole):
-        ratio = np.array([Belief(known, i).held for i in whole.tolist()])
+        ratio = np.array([each.held[place] for each, place in believed(known, whole.tolist())])
         likely = np.log1p(share[:, None] * (ratio - 1.0)).sum(axis=1)
     weight = np.exp(likely - likely.max())
     loaded = float(np.sum(share * weight) / np.sum(weight))

@@ -6,7 +6,7 @@ limit is restored, nothing else. What comes after the first step is the expected
 
 `choose`: the next action on a gear that failed has the fewest expected minutes to an end, one step
 ahead over the states of its belief, by (13) to (16) of docs/reference/models.md. Repair sets: all
-subsets by the expansion, the best checked exactly; and what re-rigging would do. Consequences, IF …
+subsets by the expansion, the best checked exactly. Consequences, IF …
 THEN …: each outcome is a typical reading, entered in the inspection and judged by the same rule.
 """
 
@@ -30,27 +30,26 @@ from mlg_troubleshoot.decision.assessment import (
     Consequence,
     End,
     Plan,
+    Posterior,
     RepairKind,
     RepairSet,
-    Rigging,
     Step,
-    UncertaintyBudget,
     Verdict,
     how_to,
     minutes_of,
 )
-from mlg_troubleshoot.decision.belief import STATES, Belief
+from mlg_troubleshoot.decision.belief import STATES, Inference, States, believed, explain
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.prediction import (
     Cases,
     Prediction,
-    exact_chance,
+    ensemble,
     model_uncertainty,
     responses,
 )
 from mlg_troubleshoot.decision.priors import PRIORS, THRESHOLDS
 from mlg_troubleshoot.decision.sentences import joints_are
-from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, normal_cdf
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE
 from mlg_troubleshoot.gear.gear import BETTER_GAUGES_IN, Gear
 
 
@@ -69,7 +68,7 @@ class Choice:
 
 def choose(
     gear: Gear,
-    belief: Belief,
+    states: States,
     *,
     over: Mask,
     worn: Mask,
@@ -85,92 +84,97 @@ def choose(
     readings over the limit that may be taken again. looked : whether the rigging was checked, or
     cannot be asked for yet.
     """
-    states = belief.states
-    groups = [(), *_groups(gear, belief, unread, doubted)]
-    starts = np.cumsum([0, *(1 << len(group) for group in groups[:-1])])
+    groups = [(), *_groups(gear, states, unread, doubted)]
     # A row is one pattern of what is worn of one group.
-    asked, found = _patterns(groups, len(over))
-    rows = np.arange(len(asked))
-    code = 1 << np.arange(len(over))
-    matches = states.worn @ code & (asked @ code)[:, None] == (found @ code)[:, None]
+    starts, of_row, asked, found = _patterns(groups)
+    rows, joints = np.arange(len(asked)), np.arange(len(over))
+    matches = states.worn @ (1 << joints) & asked[:, None] == found[:, None]
     matches = matches.astype(np.float32)
     causes = matches @ states.causes.T
 
     fixed = over & ~doubted
-    bits = _bits(belief, (worn | unread & spare | doubted) & ~fixed, doubted)
+    bits = _bits(states, (worn | unread & spare | doubted) & ~fixed, doubted)
     codes = np.arange(bits.sum() + 1)
     sets = ((codes[:, None] & bits) > 0) | fixed
     # Failures of the joints weigh the same.
-    out = states.causes[0, 0] * (matches[:, :STATES] @ states.stays_out(sets).astype(np.float32))
-    must = np.where(asked, found, over) @ bits
-    more = codes != must[:, None]
-    allowed = codes & ~(np.where(asked, spare, worn | over) @ bits)[:, None] == 0
+    out = states.causes[0, 0] * (matches[:, :STATES] @ states.stays_out(sets))
+    is_asked, is_found = (each[:, None] >> joints & 1 > 0 for each in (asked, found))
+    must = np.where(is_asked, is_found, over) @ bits
+    allowed = codes & ~(np.where(is_asked, spare, worn | over) @ bits)[:, None] == 0
     allowed &= (codes & must[:, None] == must[:, None]) & sets.any(axis=1)
-    allowed &= ~more | (out < 0.5 * causes[:, :1])
+    allowed &= (out < 0.5 * causes[:, :1]) | (codes == must[:, None])
 
-    read = minutes_of(gear, asked[starts], np.zeros_like(over))[0]
-    minutes = minutes_of(gear, sets, asked[:, None])[1]
-    check = gear.rigging_check.value
-    after = gear.plunger_reading.value + gear.retraction.value
-    # (13)
-    second = median(joint.restore.value for joint in gear.joints)
-    second /= THRESHOLDS.one_repair * gear.second_repair_chance.value
+    opened = is_asked[starts]
+    read = minutes_of(gear, opened, np.zeros_like(over))[0]
+    minutes = minutes_of(gear, sets, opened[:, None])[1][of_row]
+    check, reading = gear.rigging_check.value, gear.plunger_reading.value
+    after = reading + gear.retraction.value
+    second = _second_minutes(gear)
+    out *= second
+    repeated = np.where(allowed, out, np.inf)
 
     def ends(causes: Array, late: float = 0.0) -> tuple[Array, int]:
         """Minutes of the best end after each pattern (14), and the place of its set without a
         reading, -1 where the cause is looked for elsewhere; `late`: of a check of the rigging after
         the repair. [min]
         """
-        total = causes.sum(axis=1, keepdims=True)
+        total = causes.sum(axis=1)
         # In vain: sound joints where the joints are not the cause.
-        vain = more * causes[:, 1:].sum(axis=1, keepdims=True)
-        restored = total * (minutes + after) + second * (out + vain) + late * causes[:, 1:2]
-        restored = np.where(allowed, restored, np.inf)
-        places = np.argmin(np.round(restored, 6), axis=1)
-        elsewhere = total[:, 0] * (minutes[rows, must] + after * sets[must].any(axis=1))
-        elsewhere += THRESHOLDS.sent_away * second * (out[rows, must] + causes[:, 1])
-        best = restored[rows, places]
-        place = -1 if elsewhere[0] < best[0] else int(places[0])
-        return np.minimum(best, elsewhere), place
+        vain = second * causes[:, 1:].sum(axis=1)
+        restored = total[:, None] * (minutes + after) + repeated
+        restored[rows, must] -= vain
+        best = restored.min(axis=1)
+        # The first of those that differ by rounding.
+        place = int(np.argmax(restored[0] <= best[0] + 1e-6))
+        best += vain + late * causes[:, 1]
+        elsewhere = total * (minutes[rows, must] + after * sets[must].any(axis=1))
+        elsewhere += THRESHOLDS.sent_away * (out[rows, must] + second * causes[:, 1])
+        return np.minimum(best, elsewhere), -1 if elsewhere[0] < best[0] else place
 
     def first_step(values: Array, place: int) -> Choice:
         if k := int(values.argmin()):
             return Choice(read=groups[k])
         return Choice(restore=sets[place] if place >= 0 else None)
 
-    # (15)
-    right = causes * [1.0, PRIORS.overlooked, 1.0]
-    wrong = (causes - right).sum(axis=1) * minutes[rows, must]
-    checked, place = ends(right)
-    checked += wrong
-    now, place_now = ends(causes, 0.0 if looked else check + gear.plunger_reading.value)
+    now, place = ends(causes, 0.0 if looked else check + reading)
+    # Rounded: both ends of one link are worth the same, and noise must not choose between them.
     if not looked:
+        # (15)
+        right = causes * [1.0, PRIORS.overlooked, 1.0]
+        checked, place_checked = ends(right)
+        checked += (causes - right).sum(axis=1) * minutes[rows, must]
         now[1:] = np.minimum(now, checked + check * causes.sum(axis=1))[1:]
-    # (16), rounded: both ends of one link are worth the same, and noise must not choose between
-    # them.
+        checked = check + right[0].sum() * read + np.add.reduceat(checked, starts)
+        checked = np.round(checked, 6)
+    # (16)
     now = np.round(read + np.add.reduceat(now, starts), 6)
-    checked = np.round(check + right[0].sum() * read + np.add.reduceat(checked, starts), 6)
-    if looked or now.min() <= checked.min():
-        return first_step(now, place_now)
-    return Choice(then=first_step(checked, place))
+    if not looked and checked.min() < now.min():
+        return Choice(then=first_step(checked, place_checked))
+    return first_step(now, place)
 
 
-def _bits(belief: Belief, may: Mask, first: Mask) -> Wholes:
+def _second_minutes(gear: Gear) -> float:
+    """What a second repair costs (13). [min]"""
+    restore = median(joint.restore.value for joint in gear.joints)
+    return restore / (THRESHOLDS.one_repair * gear.second_repair_chance.value)
+
+
+def _bits(states: States, may: Mask, first: Mask) -> Wholes:
     """The bit of each joint whose restoration is weighed, 0 of the others: some first, then those
     that move the plunger farthest.
     """
-    reach = np.abs(belief.states.freed_in).mean(axis=0)
+    reach = np.abs(states.freed_in).mean(axis=0)
     weighed = np.lexsort((-reach, ~first, ~may))[: min(int(may.sum()), THRESHOLDS.movable)]
     bits = np.zeros(len(may), np.int64)
     bits[weighed] = 1 << np.arange(len(weighed))
     return bits
 
 
-def _groups(gear: Gear, belief: Belief, unread: Mask, doubted: Mask) -> list[tuple[int, ...]]:
+def _groups(gear: Gear, states: States, unread: Mask, doubted: Mask) -> list[tuple[int, ...]]:
     """Joints that may be read together: in each area those likeliest worn per minute, by how far
     they move the plunger; readings in doubt.
     """
-    rate = np.round(belief.worn_by_leverage, 4) / gear.access_minutes
+    rate = np.round(states.blamed, 4) / gear.access_minutes
     found = []
     for area in gear.areas:
         inside = [j for j, joint in enumerate(gear.joints) if joint.area == area.name]
@@ -181,16 +185,22 @@ def _groups(gear: Gear, belief: Belief, unread: Mask, doubted: Mask) -> list[tup
     return [*found, again] if again else found
 
 
-def _patterns(groups: Sequence[tuple[int, ...]], joints: int) -> tuple[Mask, Mask]:
-    """The joints of each group, once for each pattern of its worn ones, and these."""
-    found = []
-    for group in groups:
-        both = np.zeros((2, 1 << len(group), joints), bool)
-        both[0, :, group] = True
-        both[1, :, group] = np.arange(1 << len(group)) >> np.arange(len(group))[:, None] & 1
-        found.append(both)
-    asked, worn = np.concatenate(found, axis=1)
-    return asked, worn
+def _patterns(groups: Sequence[tuple[int, ...]]) -> tuple[Wholes, Wholes, Wholes, Wholes]:
+    """The patterns of worn joints of all groups: the first one of each group, the group of each
+    pattern, the joints of that group and those that are worn, as bits.
+    """
+    found = [_worn_of(group) for group in groups]
+    sizes = [len(each) for each in found]
+    of_row = np.repeat(np.arange(len(groups)), sizes)
+    whole = np.array([each[-1] for each in found])
+    return np.cumsum([0, *sizes[:-1]]), of_row, whole[of_row], np.concatenate(found)
+
+
+@lru_cache(maxsize=1024)
+def _worn_of(group: tuple[int, ...]) -> Wholes:
+    """Which joints of a group are worn, in every pattern, as bits; all of them in the last."""
+    subsets = np.arange(1 << len(group))[:, None] >> np.arange(len(group)) & 1
+    return np.asarray(subsets @ (1 << np.array(group, np.int64)))
 
 
 def _correction(text: str) -> Plan:
@@ -232,20 +242,50 @@ class Judged:
     u_in: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """The plan of one gear, its chance of leaving the margin with random directions where joints
+    were not read, the repairs that are offered, each with the chance of a second one, and which
+    joints explain its plunger.
+    """
+
+    plan: Plan
+    chance: float | None
+    repairs: Sequence[tuple[RepairKind, Mask, float | None]]
+    posterior: Posterior | None
+
+
 def plans(
-    cases: Cases, judged: Judged, belief: Callable[[int], Belief]
-) -> tuple[list[Plan], dict[int, Mask]]:
-    """The plan of each gear, and the joints of those whose repair is to be tried."""
-    courses = [_PlanBuilder(cases, judged, belief, i) for i in range(len(cases))]
-    planned = [course.plan() for course in courses]
-    return planned, {c.row: c.tried for c in courses if c.tried is not None}
+    cases: Cases, judged: Judged, sure: Mapping[int, Sequence[Mask]], *, advice: bool, sets: bool
+) -> Iterator[Course]:
+    """The course of each gear. `sure`: sets that bring the worst case within the margin."""
+    complained = cases.beyond_margin & (cases.failed | cases.repaired)
+    unread = np.asarray((~cases.measured).any(axis=1)) & (cases.extension is None)
+    needed = cases.failed | cases.repaired & (cases.beyond_margin | cases.over_limit.any(axis=1))
+    needed |= unread
+    beliefs = believed(cases, np.flatnonzero(needed).tolist())
+    for row, is_needed in enumerate(needed.tolist()):
+        belief, place = next(beliefs) if is_needed else (None, 0)
+        builder = _PlanBuilder(cases, judged, belief, place, row)
+        plan = builder.plan()
+        repairs: list[tuple[RepairKind, Mask, float | None]] = []
+        for members in sure.get(row, ()):
+            second = belief.second_repair(place, members) if belief and complained[row] else None
+            repairs.append((RepairKind.SURE, members, second))
+        if belief and sets and builder.tried is not None:
+            second = belief.second_repair(place, builder.tried)
+            repairs.append((RepairKind.TRY, builder.tried, second))
+        explained = advice and cases.failed[row] and builder.read_plunger
+        posterior = explain(belief, place) if belief and explained else None
+        chance = float(belief.chance_random[place]) if belief and unread[row] else None
+        yield Course(plan, chance, repairs, posterior)
 
 
 class _PlanBuilder:
     """The course of one gear: each branch appends its steps and ends."""
 
     def __init__(
-        self, cases: Cases, judged: Judged, belief: Callable[[int], Belief], row: int
+        self, cases: Cases, judged: Judged, belief: Inference | None, place: int, row: int
     ) -> None:
         self.cases = cases
         self.judged = judged
@@ -255,6 +295,7 @@ class _PlanBuilder:
         self.inspection = cases.inspections[row]
         self.beyond = bool(cases.beyond_margin[row])
         self._belief = belief
+        self.place = place
         self.steps: list[Step] = []
         self.tried: Mask | None = None
         self.taken_again = False
@@ -268,9 +309,10 @@ class _PlanBuilder:
         self.looked = self.inspection.rigging_checked not in (None, RiggingCheck.NO)
 
     @property
-    def belief(self) -> Belief:
+    def belief(self) -> Inference:
         """What is believed of a gear that failed, or failed before its repair."""
-        return self._belief(self.row)
+        assert self._belief is not None
+        return self._belief
 
     @cached_property
     def doubted(self) -> Mask:
@@ -287,7 +329,7 @@ class _PlanBuilder:
         near = may_be & (read - limits <= THRESHOLDS.doubtful * cases.gauge_u_in[i])
         failed = cases.failed[i] or self.inspection.is_repaired
         if failed and self.read_plunger and (may_be & ~near).any():
-            sound = 1.0 - self.belief.worn
+            sound = 1.0 - self.belief.worn[self.place]
             near |= may_be & (sound > self.gear.second_repair_chance.value)
         return np.asarray(near)
 
@@ -358,14 +400,14 @@ class _PlanBuilder:
         """A gear that failed: the plunger first, then what has the fewest expected minutes."""
         if not self.read_plunger or self._again():
             self._read_the_plunger(again=self.read_plunger)
-        joints, _rigging, elsewhere = self.belief.chances
+        joints, _rigging, elsewhere = self.belief.chances[self.place].tolist()
         if not self.read_plunger and joints < elsewhere:
             return self._restore_over_limit()._end(End.NOT_EXPLAINED)
         cases = self.cases
         i = self.row
         choice = choose(
             self.gear,
-            self.belief,
+            self.belief.states[self.place],
             over=cases.over_limit[i],
             worn=cases.removable[i],
             spare=cases.restorable[i],
@@ -377,7 +419,7 @@ class _PlanBuilder:
 
     def _follow(self, choice: Choice) -> Plan:
         """Do what was chosen; what comes after it is the expected course."""
-        joints, rigging, elsewhere = self.belief.chances
+        joints, rigging, elsewhere = self.belief.chances[self.place].tolist()
         if choice.then is not None:
             self._check_rigging()
             if rigging > 0.5:
@@ -400,7 +442,7 @@ class _PlanBuilder:
             self._reread()
             return self._try(over)
         self._measure(tuple(self.numbers[j] for j in places))
-        worn = self.belief.worn_by_leverage
+        worn = self.belief.states[self.place].blamed
         # What is over its limit already does not suffice, or there would be nothing to read: one
         # joint more is restored on average.
         joints = self.cases.must_restore[self.row].copy()
@@ -476,13 +518,7 @@ class _PlanBuilder:
         """Go on: the plan ends."""
         if where is End.CANNOT_CLEAR and self._barred():
             return self._stop_for_today()
-        text = sentences.go_on(
-            where,
-            self.inspection,
-            failed=bool(self.cases.failed[self.row]),
-            beyond=self.beyond,
-            looked=self.looked,
-        )
+        text = sentences.go_on(where, beyond=self.beyond, looked=self.looked)
         required = where is not End.TOO_CLOSE
         self._step(Action.CONTINUE, 0.0, text, required=required)
         return Plan(tuple(self.steps), where)
@@ -559,15 +595,16 @@ _ABOUT_IN = 5e-4
 
 
 @lru_cache(maxsize=4)
-def subsets_of(gear: Gear) -> tuple[Mask, Array]:
-    """All subsets of a gear's joints, the quickest to restore first, then the smallest, and the
-    minutes of each. [min]
+def subsets_of(gear: Gear) -> tuple[Wholes, Mask, Array]:
+    """All subsets of a gear's joints, as bits and as masks, the quickest to restore first, then
+    the smallest; and the minutes of each. [min]
     """
     n = len(gear.joints)
-    members = ((np.arange(2**n)[:, None] >> np.arange(n)) & 1).astype(bool)
+    codes = np.arange(2**n)
+    members = (codes[:, None] >> np.arange(n) & 1).astype(bool)
     minutes = minutes_of(gear, members, np.zeros(n, bool))[1]
     order = np.lexsort((members.sum(axis=1), np.round(minutes, 6)))
-    return members[order], minutes[order]
+    return codes[order], members[order], minutes[order]
 
 
 def restored(cases: Cases, rows: Sequence[int], sets: Sequence[Mask]) -> tuple[Cases, Prediction]:
@@ -591,17 +628,23 @@ class Sets:
 
     def __init__(self, cases: Cases, upper: Prediction, row: int) -> None:
         gear = cases.gear
-        members, minutes = subsets_of(gear)
-        allowed = ~(members & ~cases.removable[row]).any(axis=1)
-        allowed &= (members | ~cases.must_restore[row]).all(axis=1)
+        codes, members, minutes = subsets_of(gear)
+        each_joint = 1 << np.arange(len(gear.joints))
+        may, must = cases.removable[row] @ each_joint, cases.must_restore[row] @ each_joint
+        allowed = (codes & ~may == 0) & (codes & must == must)
         self.row = row
         self.members = members[allowed]
         self.minutes = minutes[allowed]
         now = np.where(cases.measured[[row]], cases.clearance_in[[row]], gear.limits_in)
         after = np.where(self.members, np.minimum(now, gear.new_parts_in), now)
-        each = np.array([linkage.magnitude(after) for linkage in responses(gear)])
+        # The larger of the two senses on each linkage, before and after.
+        both = np.vstack([now, after])
+        amplification, curvature = ensemble(gear)
+        bent = 0.5 * np.sum((both @ curvature) * both, axis=2)
+        size = amplification @ both.T + np.abs(bent)
+        each = size[:, 1:]
         reference = responses(gear)[0]
-        worst = each[0] + upper.displacement_in[row] - reference.magnitude(now)
+        worst = each[0] + upper.displacement_in[row] - size[0, 0]
         read = (reference.slopes(after) * cases.gauge_u_in[row] * cases.measured[row]) ** 2
         variance = read.sum(axis=1) + model_uncertainty(worst, cases.extension) ** 2
         variance += cases.margin_u_in[row] ** 2
@@ -626,77 +669,50 @@ class Sets:
         return [k for k in found if self.members[k].any()]
 
 
-def repair_sets(
-    cases: Cases,
-    upper: Prediction,
-    wanted: Places,
-    tried: Mapping[int, Mask],
-    belief: Callable[[int], Belief],
-) -> list[tuple[RepairSet, ...]]:
+def sure_sets(cases: Cases, upper: Prediction, wanted: Places) -> dict[int, list[Mask]]:
     """Find the sets of joints which, restored, bring the worst case of the wanted gears within the
-    margin; `upper`: with unmeasured joints at their limit. `tried`: sets that plans restore.
+    margin by the expansion; `upper`: with unmeasured joints at their limit.
 
     Unmeasured joints count with their limit: what holds with them at 0 sends every fifth gear back.
-    Of sure sets only those that contain no smaller sufficient set are returned, the quickest first,
-    each checked by the exact worst case.
+    Of sure sets only those that contain no smaller sufficient set are returned, the quickest first.
     """
+    near = []
+    for row in wanted.tolist():
+        sets = Sets(cases, upper, row)
+        about = sets.slack_in >= -_ABOUT_IN
+        if about.any():
+            near.append((sets, sets.quickest(about)))
+    if not near:
+        return {}
+    # Shifted so that it is exact for the quickest set that is about sufficient.
+    some, after = restored(cases, [s.row for s, _ in near], [s.members[k] for s, k in near])
+    guard = SCORE * after.standard_uncertainty(some.margin_u_in)
+    exact = some.margin_in - after.displacement_in - guard
+    for (sets, k), slack in zip(near, exact.tolist(), strict=True):
+        sets.slack_in = sets.slack_in + np.nan_to_num(slack - sets.slack_in[k])
+    return {sets.row: [sets.members[k] for k in sets.sufficient()] for sets, _ in near}
+
+
+def repair_sets(cases: Cases, courses: Sequence[Course]) -> list[tuple[RepairSet, ...]]:
+    """The repairs that are offered for each gear, each checked by the exact worst case."""
     result: list[tuple[RepairSet, ...]] = [()] * len(cases)
-    each = [Sets(cases, upper, row) for row in wanted.tolist()]
-    near = [
-        (sets, sets.quickest(about))
-        for sets in each
-        if (about := sets.slack_in >= -_ABOUT_IN).any()
-    ]
-    if near:
-        # Shifted so that it is exact for the quickest set that is about sufficient.
-        some, after = restored(cases, [s.row for s, _ in near], [s.members[k] for s, k in near])
-        guard = SCORE * after.standard_uncertainty(some.margin_u_in)
-        exact = some.margin_in - after.displacement_in - guard
-        for (sets, k), slack in zip(near, exact.tolist(), strict=True):
-            sets.slack_in = sets.slack_in + np.nan_to_num(slack - sets.slack_in[k])
-    asked = [(s.row, s.members[k], RepairKind.SURE) for s, _ in near for k in s.sufficient()]
-    asked += [(row, members, RepairKind.TRY) for row, members in tried.items()]
+    asked = [(row, *each) for row, course in enumerate(courses) for each in course.repairs]
     if not asked:
         return result
-    some, after = restored(cases, [row for row, *_ in asked], [each for _, each, _ in asked])
+    sets = [members for _row, _kind, members, _second in asked]
+    some, after = restored(cases, [row for row, *_ in asked], sets)
     within = after.probability_within(some.margin_in, some.margin_u_in)
-    complained = cases.beyond_margin & (cases.failed | cases.repaired)
-    for (row, members, kind), moved, p in zip(
-        asked, after.displacement_in.tolist(), within.tolist(), strict=True
+    access, minutes = minutes_of(cases.gear, np.array(sets), np.zeros_like(sets[0]))
+    of_each = (after.displacement_in, within, access, minutes)
+    for (row, kind, members, second), moved, p, opening, takes in zip(
+        asked, *(each.tolist() for each in of_each), strict=True
     ):
         joints = tuple(np.array(cases.gear.joint_numbers)[members].tolist())
         sure = kind is RepairKind.SURE
         if p < CONFORMANCE if sure else joints in [each.joints for each in result[row]]:
             continue
-        access, minutes = map(float, minutes_of(cases.gear, members, np.zeros_like(members)))
-        stated = complained[row] or not sure
-        second = belief(row).second_repair(members) if stated else None
-        result[row] = (*result[row], RepairSet(joints, moved, p, access, minutes, kind, second))
+        result[row] = (*result[row], RepairSet(joints, moved, p, opening, takes, kind, second))
     return result
-
-
-def rigging_alternative(
-    one: Cases, worst_in: tuple[float, float], budget: UncertaintyBudget
-) -> Rigging:
-    """Shift the plunger back by what was measured, else so that the worst cases of both senses are
-    equally far.
-
-    Re-rigging moves the range of the plunger and cannot narrow it: what remains is half the
-    distance between both worst cases, or, where a measured offset is taken out, the worst case of
-    the joints. The uncertainties of the decision rule stay as they are.
-    """
-    over, under = worst_in
-    measured = float(one.plunger_in[0])
-    if np.isfinite(measured):
-        shift = 0.0 - measured
-        left = max(over, -under)
-        chance = exact_chance(one, one.filled(0.0))
-    else:
-        shift = -0.5 * (over + under)
-        left = 0.5 * (over - under)
-        chance = exact_chance(one, one.filled(0.0), shift)
-    within = float(normal_cdf((one.margin_in - left) / budget.combined_in)[0])
-    return Rigging(shift, left, within, float(chance[0]))
 
 
 # Typical readings: shares of a limit or a margin, well within it, and beyond it. [1]

@@ -71,11 +71,6 @@ class Response:
         second = 0.5 * np.sum((clearance_in @ self.worst_curvature) * clearance_in, axis=-1)
         return first + second, second - first
 
-    def magnitude(self, clearance_in: Array) -> Array:
-        """Worst displacement, the larger of the two senses. [in]"""
-        over, under = self.worst(clearance_in)
-        return np.maximum(over, -under)
-
     def slopes(self, clearance_in: Array) -> Array:
         """Slope of the worst displacement by each clearance, in the governing sense. [1]"""
         return self.amplification + self.sense(clearance_in)[..., None] * (
@@ -105,23 +100,6 @@ class Response:
             links[1::2] = length * y
         return links
 
-    def chance_beyond(self, clearance_in: Array, margin_in: Array, n: int) -> Array:
-        """Chance of leaving the margin with uniformly random directions. [1]"""
-        turns = random_directions(clearance_in.shape[1], n)
-        unit = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
-        linear = np.einsum("mjx,jx->jm", unit, self.gradient.reshape(-1, 2))
-        first, second = np.triu_indices(clearance_in.shape[1])
-        blocks = self.curvature.reshape(len(turns.T), 2, len(turns.T), 2)[first, :, second, :]
-        bent = np.einsum("mpx,pxy,mpy->pm", unit[:, first], blocks, unit[:, second], optimize=True)
-        bent *= np.where(first == second, 0.5, 1.0)[:, None]
-        chance = np.empty(len(clearance_in))
-        for start in range(0, len(clearance_in), 128):
-            part = slice(start, start + 128)
-            c = clearance_in[part]
-            moved = c @ linear + (c[:, first] * c[:, second]) @ bent
-            chance[part] = np.mean(np.abs(moved) > margin_in[part, None], axis=1)
-        return chance
-
 
 def expand(model: LinkageModel) -> Response:
     """Expand the displacement of one linkage by central differences."""
@@ -148,6 +126,16 @@ def expand(model: LinkageModel) -> Response:
 @lru_cache(maxsize=4)
 def responses(gear: Gear) -> tuple[Response, ...]:
     return tuple(expand(model) for model in gear.ensemble_models)
+
+
+@lru_cache(maxsize=4)
+def ensemble(gear: Gear) -> tuple[Array, Array]:
+    """Amplifications and curvatures of all linkages, (linkages, joints), and (…, joints)."""
+    linkages = responses(gear)
+    return (
+        np.array([linkage.amplification for linkage in linkages]),
+        np.array([linkage.worst_curvature for linkage in linkages]),
+    )
 
 
 # Sets of random directions behind the chance of exceeding the margin. [1]
@@ -220,15 +208,11 @@ class Prediction:
         """The larger of the two senses in magnitude; NaN where the linkage does not close. [in]"""
         return self.worst.magnitude_in
 
-    @property
-    def u_clearances_in(self) -> Array:
-        """What the uncertainty of all readings adds. [in]"""
-        return np.asarray(np.sqrt(np.sum(self.u_readings_in**2, axis=1)))
-
     def standard_uncertainty(self, margin_u_in: Array) -> Array:
         """Combined standard uncertainty of the prediction against the margin. [in]"""
-        parts = (self.u_clearances_in, self.u_geometry_in, self.u_model_in, margin_u_in)
-        return np.sqrt(sum(part**2 for part in parts))
+        others = (self.u_geometry_in, self.u_model_in, margin_u_in)
+        read = np.sum(self.u_readings_in**2, axis=1)
+        return np.sqrt(sum((part**2 for part in others), start=read))
 
     def probability_within(self, margin_in: Array, margin_u_in: Array) -> Array:
         """Probability that the worst-case bound is within the margin. [1]"""
@@ -505,6 +489,22 @@ def plunger_u(inspection: Inspection) -> float:
     return one / math.sqrt(max(len(inspection.standing_readings_in), 1))
 
 
+@lru_cache(maxsize=4)
+def _turned(gear: Gear) -> tuple[Array, Array, Places, Places]:
+    """How far sets of random directions move the plunger per clearance, (joints, sets), and per
+    product of the clearances of two joints, (pairs, sets), and these pairs. [1, 1/in]
+    """
+    response, joints = responses(gear)[0], len(gear.joints)
+    turns = random_directions(joints, DIRECTION_SETS)
+    unit = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    linear = np.einsum("mjx,jx->jm", unit, response.gradient.reshape(-1, 2))
+    first, second = np.triu_indices(joints)
+    blocks = response.curvature.reshape(joints, 2, joints, 2)[first, :, second, :]
+    bent = np.einsum("mpx,pxy,mpy->pm", unit[:, first], blocks, unit[:, second], optimize=True)
+    bent *= np.where(first == second, 0.5, 1.0)[:, None]
+    return linear, bent, first, second
+
+
 def chance_at(cases: Cases, clearance_in: Array) -> Array:
     """Chance of exceeding the margin with random directions: by the expansion where clearances are
     small.
@@ -512,34 +512,21 @@ def chance_at(cases: Cases, clearance_in: Array) -> Array:
     gear = cases.gear
     chance = np.empty(len(cases))
     small = np.all(clearance_in <= gear.confirm_above.value, axis=1) & (cases.extension is None)
-    chance[small] = responses(gear)[0].chance_beyond(
-        clearance_in[small], cases.margin_in[small], DIRECTION_SETS
-    )
+    linear, bent, first, second = _turned(gear)
+    for some in np.array_split(np.flatnonzero(small), 1 + len(chance) // 128):
+        c = clearance_in[some]
+        moved = c @ linear + (c[:, first] * c[:, second]) @ bent
+        chance[some] = np.mean(np.abs(moved) > cases.margin_in[some, None], axis=1)
     rows = np.flatnonzero(~small)
     if len(rows):
-        chance[rows] = exact_chance(cases.take(rows), clearance_in[rows])
+        others = cases.take(rows)
+        found = Adjustment(clearance_in[rows])
+        if cases.extension is not None:
+            found = cases.extension.adjust(others.inspections, clearance_in[rows])
+        acts = (found.numbers(gear.model), found.offset_in, found.rate_factor)
+        sets = (found.clearance_in, others.margin_in, DIRECTION_SETS)
+        chance[rows] = chance_beyond(gear.model, *sets, *acts)
     return chance
-
-
-def exact_chance(cases: Cases, clearance_in: Array, shift_in: float = 0.0) -> Array:
-    """Chance of exceeding the margin with random directions, the plunger shifted. [1]"""
-    model = cases.gear.model
-    extension = cases.extension
-    found = (
-        Adjustment(clearance_in)
-        if extension is None
-        else extension.adjust(cases.inspections, clearance_in)
-    )
-    offset = shift_in + (np.zeros(len(cases)) if found.offset_in is None else found.offset_in)
-    acts = (
-        found.clearance_in,
-        cases.margin_in,
-        DIRECTION_SETS,
-        found.numbers(model),
-        offset,
-        found.rate_factor,
-    )
-    return chance_beyond(model, *acts)
 
 
 def disagreement(

@@ -7,7 +7,6 @@ Instructions have at most 20 words, descriptions 25 (ASD-STE100).
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from datetime import date
 
 from mlg_troubleshoot.decision.assessment import (
     STOP,
@@ -15,7 +14,6 @@ from mlg_troubleshoot.decision.assessment import (
     Basis,
     End,
     JointFinding,
-    Rigging,
     Verdict,
 )
 from mlg_troubleshoot.decision.inspection import Inspection
@@ -52,20 +50,9 @@ _GO_ON = {
         "Refer the gear to engineering. The plunger is outside its margin; no failure is recorded."
     ),
     End.CANNOT_CLEAR: f"Refer the gear to engineering. No {_SET_THAT_HOLDS}",
-}
-_NOT_EXPLAINED = {
-    "beyond, looked": (
-        "Refer the gear to engineering. The joints do not explain the plunger position, and the"
-        " rigging was checked."
+    End.NOT_EXPLAINED: (
+        "Check hydraulics, reversing valve and doors. Joint clearances do not explain the failure."
     ),
-    "beyond": (
-        "Refer the gear to engineering if the rigging is right. The joints do not explain the"
-        " plunger position."
-    ),
-    "failed": (
-        "Check hydraulics, reversing valve and doors. Joint clearances do not explain this failure."
-    ),
-    "": "Check hydraulics, reversing valve and doors. Joint clearances do not explain it.",
 }
 
 
@@ -201,36 +188,19 @@ def beside(displacement_in: float | None, verdict: Verdict) -> Sentence:
     )
 
 
-def go_on(end: End, inspection: Inspection, *, failed: bool, beyond: bool, looked: bool) -> str:
+def go_on(end: End, *, beyond: bool, looked: bool) -> str:
     """Step CONTINUE: where to look depends on where the plunger stands."""
-    if end is End.NOT_EXPLAINED and beyond:
-        return _NOT_EXPLAINED["beyond, looked" if looked else "beyond"]
-    if end is End.NOT_EXPLAINED:
-        return _NOT_EXPLAINED["failed" if failed else ""]
-    again = f" {_look_again(inspection)}" if end is End.TOO_CLOSE else ""
-    return f"{_GO_ON[end]}{again}"
-
-
-# Landings and months after which a gear that is too close is looked at again: half of what most
-# operators leave between inspections of this kind; assumed. [landings, months]
-_AGAIN_LANDINGS = 300
-_AGAIN_MONTHS = 6
-
-
-def _look_again(inspection: Inspection) -> str:
-    """By when a gear that is too close to its margin is looked at again."""
-    day = inspection.inspection_date
-    landings = inspection.gear_landings
-    if landings is not None:
-        by = f"at {landings + _AGAIN_LANDINGS:.0f} landings"
-    else:
-        by = f"within {_AGAIN_LANDINGS} landings"
-    if day is None:
-        return f"Look again {by} or {_AGAIN_MONTHS} months, whichever comes first."
-    month = day.month + _AGAIN_MONTHS
-    year = min(day.year + (month - 1) // 12, date.max.year)
-    until = date(year, (month - 1) % 12 + 1, min(day.day, 28))
-    return f"Look again {by} or by {until.isoformat()}, whichever comes first."
+    if end is not End.NOT_EXPLAINED or not beyond:
+        return _GO_ON[end]
+    if looked:
+        return (
+            "Refer the gear to engineering. The joints do not explain the plunger position, and the"
+            " rigging was checked."
+        )
+    return (
+        "Refer the gear to engineering if the rigging is right. The joints do not explain the"
+        " plunger position."
+    )
 
 
 _COUNTS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
@@ -382,14 +352,3 @@ def _order(what: str, column: str, is_newer: bool | None) -> list[str]:
         f"The {what} may be older or newer than the repair: the worse of both counts. Enter"
         f" {column}, on the day of the repair with both times."
     ]
-
-
-def rigging_sentence(rigging: Rigging) -> Sentence:
-    return Sentence.of(
-        "Re-rigging alone, the plunger shifted by {}, would leave a worst case of {}. Probability"
-        " within the margin {}, chance of leaving it with random directions {}.",
-        Length(rigging.shift_in, sign=True),
-        Length(rigging.predicted_displacement_in),
-        percent(rigging.probability_within_margin),
-        percent(rigging.probability_exceed_random_directions),
-    )

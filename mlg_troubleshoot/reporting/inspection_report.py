@@ -17,7 +17,6 @@ from mlg_troubleshoot.decision.judge_rows import WORST_FIRST, latest_of_each_gea
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
     no_repair_set,
-    rigging_sentence,
 )
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
@@ -129,7 +128,6 @@ def _inspection(
         "legend": [(joint_mark("", state), words) for state, words in JOINT_STATES.items()],
         "wrong": chance_wrong_sentence(a),
         "no_repair": no_repair_set(a),
-        "rigging": None if a.rigging is None else lengths.said(rigging_sentence(a.rigging)),
         "areas": partial(_areas, gear),
         "rows": _joints(gear, a),
         "cases": _sequence(gear, a, lengths),

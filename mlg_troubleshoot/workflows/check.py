@@ -118,8 +118,7 @@ class CheckOptions(TableOptions):
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
     advice : bool or None
-        Compute what is looked at for one gear: re-rigging and worn joints; None does so for a
-        single one.
+        Compute what is looked at for one gear: worn joints; None does so for a single one.
     extension : Extension or None
         An extension of the model.
     workers : int
@@ -302,7 +301,7 @@ def check(
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
     advice : bool, optional
-        Find worn joints and what re-rigging is worth; for a single gear unless it is False.
+        Find worn joints; for a single gear unless it is False.
     extension : Extension, optional
         An extension of the model.
     **declared

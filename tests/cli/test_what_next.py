@@ -1,4 +1,4 @@
-"""What the terminal says of the next joint, repair and re-rigging; reports in the unit asked."""
+"""What the terminal says of the next joint and repair; reports in the unit asked."""
 
 from __future__ import annotations
 
@@ -52,10 +52,6 @@ def test_the_quickest_repair_is_shown_with_what_it_leaves() -> None:
         shown,
     )
     assert "A restored joint counts with the radial clearance of a new part, 0.0005 in." in shown
-
-
-def test_re_rigging_alone_is_shown_with_the_risk_that_stays(failure: str) -> None:
-    assert re.search(r"Re-rigging alone, .*, would leave a worst case of 0\.0450 in", failure)
 
 
 def test_the_joints_that_explain_a_reading_are_given_as_pairs_that_act_alike(explained):

@@ -4,20 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment
+from mlg_troubleshoot.decision.belief import Inference, explain
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.prediction import Extension
+from mlg_troubleshoot.decision.prediction import Cases, Extension
 from mlg_troubleshoot.gear.gear import Adjustment, Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import ClearanceConvention
 
 Judge = Callable[..., Assessment]
+
+
+def belief_of(cases: Cases) -> SimpleNamespace:
+    """What is believed of the first gear."""
+    found = Inference(cases, [0])
+    return SimpleNamespace(
+        chances=tuple(found.chances[0].tolist()),
+        held=float(found.held[0]),
+        worn=found.worn[0],
+        second_repair=partial(found.second_repair, 0),
+        explained=explain(found, 0),
+    )
 
 
 def inspected(clearance_in: Mapping[int, float], **more: Any) -> Inspection:

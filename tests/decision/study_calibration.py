@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlg_troubleshoot.decision.belief import Belief, explain
+from mlg_troubleshoot.decision.belief import believed
 from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.life.forecast import expected_of
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
@@ -40,8 +40,8 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
     fleet = None if hangar.store is None else expected_of(hangar.store, result.gear)
     rows = [judgement.inspection for judgement in result.judgements]
     cases = Cases.of(result.gear, rows, fleet=fleet)
-    beliefs = [Belief(cases.take([i])) for i in range(len(cases))]
-    causes = [belief.chances for belief in beliefs]
+    beliefs = [*believed(cases, range(len(cases)))]
+    causes = [belief.chances[place] for belief, place in beliefs]
     for i, (gear, said) in enumerate(zip(gears, unread, strict=True)):
         read = cases.measured[i]
         if read.all():
@@ -61,14 +61,10 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
             pairs["rigging"].append((causes[i][1], gear.kind == MISRIGGED))
             pairs["something else"].append((causes[i][2], gear.kind == OTHER))
         if gear.kind in (CLEARANCE, MISRIGGED):
-            found = explain(beliefs[i])
-            for each in found.intervals:
-                j = each.joint - 1
-                inside = each.low_in <= true[i, j] <= each.high_in
-                kind = "read" if read[j] else "unread"
-                pairs[f"90 % interval, {kind}"].append((0.9, inside))
-                if not read[j]:
-                    pairs["worn, unread joint"].append((each.worn, true[i, j] > LIMIT_IN))
+            belief, place = beliefs[i]
+            for j in np.flatnonzero(~read):
+                worn = float(belief.worn[place, j])
+                pairs["worn, unread joint"].append((worn, true[i, j] > LIMIT_IN))
     hangar.work(folder)
     for gear in gears:
         pairs["a second repair"] += gear.chances

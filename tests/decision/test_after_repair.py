@@ -131,12 +131,6 @@ def test_sound_joints_are_not_restored_while_the_rigging_is_likelier(judge: Judg
     assert found.next_action.action is Action.CHECK_RIGGING
 
 
-def test_re_rigging_takes_out_what_was_measured(judge: Judge) -> None:
-    found = judge(every_joint(0.002), advice=True, readings_in=(0.085,))
-    assert found.rigging is not None
-    assert found.rigging.shift_in == pytest.approx(-0.085)
-
-
 def test_a_plunger_at_the_edge_of_its_margin_is_read_again_once(judge: Judge) -> None:
     once = judge({}, outcome=Outcome.FAILED, readings_in=(0.0305,))
     twice = judge({}, outcome=Outcome.FAILED, readings_in=(0.0305, 0.0305))

@@ -11,13 +11,12 @@ from scipy.stats import norm
 from mlg_troubleshoot.decision.assessment import Action, Assessment, Basis, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.judge_rows import Listed, assess
-from mlg_troubleshoot.decision.prediction import Cases, exact_chance
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
 from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.benchmarks.worn_gears import LIMIT_IN, displacement
-from tests.decision.conftest import Judge, Shifted, every_joint, inspected
+from tests.decision.conftest import Judge, every_joint, inspected
 
 
 @pytest.mark.parametrize("clearance_in", [0.0014, 0.0018, 0.0025])
@@ -38,35 +37,6 @@ def test_advice_does_not_change_the_verdict_or_its_probability(judge: Judge) -> 
         advised.verdict,
         advised.probability_within_margin,
     )
-
-
-@pytest.mark.parametrize(("shift_in", "chance"), [(-0.02, 0.0), (0.02, 1.0)])
-def test_re_rigging_takes_back_what_shifts_the_plunger_already(gear, shift_in, chance):
-    one = Cases.of(gear, [inspected(every_joint(0.0))], Shifted(0.02))
-    assert exact_chance(one, one.filled(0.0), shift_in) == [chance]
-
-
-def test_re_rigging_leaves_half_of_the_range_between_both_worst_cases(gear, judge):
-    found = judge(every_joint(0.004), advice=True).rigging
-    exact = worst_case(gear.model, np.full((1, 10), 0.004))
-    assert found is not None
-    assert found.predicted_displacement_in == pytest.approx(
-        0.5 * (exact.over_in[0] - exact.under_in[0]), abs=1e-12
-    )
-    assert exact.over_in[0] + found.shift_in == pytest.approx(
-        -(exact.under_in[0] + found.shift_in), abs=1e-12
-    )
-
-
-def test_re_rigging_cannot_clear_the_published_failure(judge: Judge) -> None:
-    found = judge({3: 0.013, 5: 0.007}, advice=True).rigging
-    assert found is not None
-    assert found.probability_within_margin < 0.05
-    assert 0.2 < found.probability_exceed_random_directions < 0.3
-
-
-def test_a_gear_within_its_margin_has_no_rigging_alternative(judge: Judge) -> None:
-    assert judge(every_joint(0.001), advice=True).rigging is None
 
 
 GAUGE_U_IN, PLUNGER_U_IN, MARGIN_IN = 0.0005, 0.002, 0.03

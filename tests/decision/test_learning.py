@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.belief import SHARES, WEAR, Belief, given_readings
+from mlg_troubleshoot.decision.belief import SHARES, WEAR, given_readings
 from mlg_troubleshoot.decision.inspection import Fleet, Inspection
 from mlg_troubleshoot.decision.learning import learned
 from mlg_troubleshoot.decision.prediction import Cases
@@ -17,7 +17,7 @@ from mlg_troubleshoot.life.forecast import expected_of
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from mlg_troubleshoot.workflows.keep import keep, told_by
-from tests.decision.conftest import every_joint, inspected
+from tests.decision.conftest import belief_of, every_joint, inspected
 from tests.decision.technician import Hangar, World
 
 
@@ -73,7 +73,9 @@ def test_a_failure_near_the_bound_is_repaired_again_more_often_where_loads_hold_
     """Plain draws of the model: .025 with free pins, .203 with held ones."""
     reading = float(0.8 * gear.model.plunger_amplification() @ np.full(10, 0.0035))
     row = inspected(every_joint(0.0035), readings_in=(reading,))
-    least, most = (Belief(Cases.of(gear, [row], fleet=Fleet(loaded))) for loaded in (0.001, 0.999))
+    least, most = (
+        belief_of(Cases.of(gear, [row], fleet=Fleet(loaded))) for loaded in (0.001, 0.999)
+    )
     shut = np.arange(10) < 2
     assert most.second_repair(shut) == pytest.approx(0.203, abs=0.02)
     assert least.second_repair(shut) == pytest.approx(0.025, abs=0.02)

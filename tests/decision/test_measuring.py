@@ -11,14 +11,21 @@ from scipy.stats import norm
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Verdict, minutes_of
-from mlg_troubleshoot.decision.belief import SHARES, WEAR, Belief, given_readings
+from mlg_troubleshoot.decision.belief import SHARES, WEAR, given_readings
 from mlg_troubleshoot.decision.inspection import Outcome
-from mlg_troubleshoot.decision.prediction import Cases, Response, expand, responses
+from mlg_troubleshoot.decision.prediction import (
+    DIRECTION_SETS,
+    Cases,
+    Response,
+    chance_at,
+    expand,
+    responses,
+)
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.decision.verdict_rule import normal_cdf, tabled_normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import links_from, random_directions, worst_case
-from tests.decision.conftest import Judge, every_joint, inspected
+from tests.decision.conftest import Judge, belief_of, every_joint, inspected
 
 MARGIN_IN = 0.03
 
@@ -52,15 +59,12 @@ def test_the_second_order_displacement_follows_the_linkage_in_any_direction(gear
 def test_the_quick_chance_with_random_directions_is_the_share_of_displacements_beyond_the_margin(
     gear: Gear,
 ) -> None:
-    response, clearance = (
-        responses(gear)[0],
-        np.array([[0.0] * 2 + [0.015] + [0.0] * 7, [0.0075] * 10]),
-    )
-    links = np.array(links_from(clearance[:, None, :], random_directions(10, 512)))
+    clearance = np.array([[0.0] * 2 + [0.015] + [0.0] * 7, [0.0075] * 10])
+    links = np.array(links_from(clearance[:, None, :], random_directions(10, DIRECTION_SETS)))
+    response = responses(gear)[0]
     share = [np.mean(np.abs(to_second_order(response, links[:, k].T)) > 0.03) for k in range(2)]
-    assert response.chance_beyond(clearance, np.full(2, 0.03), 512) == pytest.approx(
-        np.array(share), abs=1e-12
-    )
+    cases = Cases.of(gear, [inspected({}), inspected({})])
+    assert chance_at(cases, clearance) == pytest.approx(np.array(share), abs=1e-12)
 
 
 def test_a_gear_whose_measured_joints_are_worn_is_expected_to_be_worn_elsewhere(gear: Gear) -> None:
@@ -78,7 +82,7 @@ def test_readings_unlike_each_other_speak_for_joints_that_each_have_their_own_le
 
 def doubt(gear: Gear, clearance_in: dict[int, float], joint: int, **more: Any) -> float:
     """Chance that a joint that reads over its limit is within it."""
-    belief = Belief(Cases.of(gear, [inspected(clearance_in, **more)]))
+    belief = belief_of(Cases.of(gear, [inspected(clearance_in, **more)]))
     return float(1.0 - belief.worn[joint - 1])
 
 
@@ -136,7 +140,9 @@ def test_slopes_are_those_of_the_sense_that_governs(gear: Gear, sense: float) ->
     bent = sense * reference.sense(start) * reference.worst_curvature
     response = replace(reference, worst_curvature=bent)
     assert response.sense(start) == sense
-    numeric = (response.magnitude(start + step) - response.magnitude(start - step)) / 2e-5
+    after, before = (np.array(response.worst(at)) for at in (start + step, start - step))
+    sizes = [np.maximum(over, -under) for over, under in (after, before)]
+    numeric = (sizes[0] - sizes[1]) / 2e-5
     assert response.slopes(start) == pytest.approx(numeric, rel=1e-6)
 
 

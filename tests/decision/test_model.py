@@ -14,12 +14,11 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.prediction import Cases, responses
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.gear.gear import Gear
-from tests.decision.conftest import inspected
+from tests.decision.conftest import belief_of, inspected
 
 PLUNGER_U_IN, GAUGE_U_IN, MARGIN_IN = 0.002, 0.0005, 0.030
 # Centres of fifty cells of wear, from nothing to twice the limit. [1]
@@ -146,7 +145,7 @@ def believed(gear: Gear, read: Mapping[int, float], y: float, sets: Array) -> Tr
         plunger_gauge_u_in=PLUNGER_U_IN,
         gauge_u_in=GAUGE_U_IN,
     )
-    found = Belief(Cases.of(gear, [row]))
+    found = belief_of(Cases.of(gear, [row]))
     return Truth(
         np.array(found.chances),
         found.worn,

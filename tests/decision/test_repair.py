@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision import planner as repair
-from mlg_troubleshoot.decision.assessment import RepairSet, minutes_of
-from mlg_troubleshoot.decision.belief import Belief
+from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, minutes_of
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import allowances
 from mlg_troubleshoot.decision.prediction import Cases, Prediction, predict
@@ -25,7 +24,9 @@ MARGIN_IN = 0.03
 
 def sure_sets(cases: Cases, upper: Prediction) -> tuple[RepairSet, ...]:
     """Sets that hold in the worst case."""
-    return repair.repair_sets(cases, upper, np.array([0]), {}, lambda _row: Belief(cases))[0]
+    sure = repair.sure_sets(cases, upper, np.array([0])).get(0, ())
+    offered = [(RepairKind.SURE, members, None) for members in sure]
+    return repair.repair_sets(cases, [repair.Course(repair.CONFIRM, None, offered, None)])[0]
 
 
 def repair_sets(

@@ -92,9 +92,10 @@ def test_only_measured_joints_carry_reading_uncertainty(gear: Gear, judge: Judge
 
 def test_a_joint_with_an_uncertainty_of_its_own_carries_that_instead(gear: Gear) -> None:
     plain, own = inspected(WORN), inspected(WORN, gauge_u_by_joint_in={3: 0.002, 5: 0.0001})
-    u = Cases.of(gear, [plain, own]).predict_bounds()[0].u_clearances_in
+    each = Cases.of(gear, [plain, own]).predict_bounds()[0].u_readings_in
+    u = np.linalg.norm(each, axis=1)
     ones = [inspected(WORN, gauge_u_in=0.0, gauge_u_by_joint_in={j: 0.0005}) for j in (3, 5)]
-    alone = Cases.of(gear, ones).predict_bounds()[0].u_clearances_in
+    alone = Cases.of(gear, ones).predict_bounds()[0].u_readings_in.max(axis=1)
     assert u[1] ** 2 == pytest.approx(u[0] ** 2 + 15 * alone[0] ** 2 - 0.96 * alone[1] ** 2)
     assert min(alone) > 0.0005
     assert u[1] > u[0]
@@ -159,7 +160,7 @@ def test_the_upper_prediction_gives_unmeasured_joints_no_reading_uncertainty(gea
     row = np.full((1, 10), 0.0075)
     measured = np.zeros((1, 10), bool)
     found = predict(gear, [inspected({})], row, measured, np.array([0.0005]))
-    assert found.u_clearances_in[0] == 0.0
+    assert found.u_readings_in.max() == 0.0
 
 
 def test_an_extension_replaces_the_model_uncertainty_by_its_residual_scatter_and_says_so(judge):

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.belief import Belief
 from mlg_troubleshoot.decision.inspection import RiggingCheck
 from mlg_troubleshoot.decision.prediction import Cases
 from mlg_troubleshoot.decision.priors import PRIORS
 from mlg_troubleshoot.gear.gear import Gear
-from tests.decision.conftest import every_joint, inspected
+from tests.decision.conftest import belief_of, every_joint, inspected
 
 WORN = every_joint(0.004)
 
 
-def causes_of(gear: Gear, clearance_in: dict[int, float], **more: Any) -> Belief:
-    return Belief(Cases.of(gear, [inspected(clearance_in, **more)]))
+def causes_of(gear: Gear, clearance_in: dict[int, float], **more: Any) -> SimpleNamespace:
+    return belief_of(Cases.of(gear, [inspected(clearance_in, **more)]))
 
 
 def test_a_rigging_that_was_looked_at_is_rarely_the_cause(gear: Gear) -> None:
@@ -43,14 +43,14 @@ def test_a_joint_that_was_read_twice_is_known_to_be_worn_or_not(gear: Gear) -> N
 
 
 def test_of_a_gear_of_which_nothing_was_read_the_joints_are_the_cause_as_often_as_usual(gear):
-    found = Belief(Cases.of(gear, [inspected({})]))
+    found = belief_of(Cases.of(gear, [inspected({})]))
     assert found.chances[0] / found.chances[2] == pytest.approx(
         PRIORS.joints_for_one_elsewhere, rel=0.01
     )
 
 
 def test_the_joints_of_a_gear_read_as_new_are_rarely_the_cause(gear: Gear) -> None:
-    found = Belief(Cases.of(gear, [inspected(every_joint(0.001))]))
+    found = belief_of(Cases.of(gear, [inspected(every_joint(0.001))]))
     assert found.chances[0] / found.chances[2] < 0.1
 
 

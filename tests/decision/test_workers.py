@@ -201,9 +201,9 @@ def test_matrix_products_of_a_judgement_wait_for_no_other_threads(gear, table, m
     seen: list[int] = []
     judge = judge_rows._assess_valid
 
-    def watched(*given: Any) -> Any:
+    def watched(*given: Any, **more: Any) -> Any:
         seen.extend(of["num_threads"] for of in threadpool_info() if of["user_api"] == "blas")
-        return judge(*given)
+        return judge(*given, **more)
 
     monkeypatch.setattr(judge_rows, "_assess_valid", watched)
     judge_rows.assess([inspected({3: 0.013})], gear, table)

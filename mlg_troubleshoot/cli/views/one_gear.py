@@ -9,7 +9,7 @@ from rich.text import Text
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, show_page, text, word
 from mlg_troubleshoot.cli.views.batch import MARKS, TONES
 from mlg_troubleshoot.decision.assessment import Action, Assessment, Judgement, Step
-from mlg_troubleshoot.decision.sentences import chance_wrong_sentence, rigging_sentence
+from mlg_troubleshoot.decision.sentences import chance_wrong_sentence
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, Sentence
 
@@ -107,7 +107,7 @@ def _show_joints(a: Assessment, screen: DataConsole, most: int | None = None) ->
 
 
 def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
-    """All joints, repairs, re-rigging, the uncertainty budget; the report has the indices."""
+    """All joints, repairs, the uncertainty budget; the report has the indices."""
     _show_joints(a, screen)
     restored = {number for each in a.repair_sets or () for number in each.joints}
     pairs = (" = ".join(map("#{}".format, group)) for group in gear.link_groups if len(group) > 1)
@@ -118,6 +118,5 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
         gear=gear,
         alike=", ".join(pairs),
         parts=sorted({gear.joint(number).new_part.value for number in restored}),
-        rigging=a.rigging and rigging_sentence(a.rigging),
         wrong=chance_wrong_sentence(a),
     )
