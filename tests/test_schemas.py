@@ -194,6 +194,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any
         ("fleet", ("fleet", "-q")),
         ("fleet", ("fleet", "-q", "--no-forecast")),
         ("history", ("history",)),
+        ("history", ("history", "N1", "LH")),
         ("life", ("history", "N1", "LH")),
         ("life", ("history", "N2", "LH", "--no-forecast")),
     ],

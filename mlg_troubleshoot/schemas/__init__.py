@@ -118,7 +118,7 @@ def _kinds(name: str) -> list[Any]:
         [DiagnoseResult, InconclusiveDataError],
         [StudyFindings],
         [Lives],
-        [Lives],
+        [Lives, LifeAhead],
         [LifeAhead],
         [Gear],
         [Verification],
