@@ -376,6 +376,11 @@ class SimulationDiagnosis(Result):
         """The causes that the verdict stands for."""
         return self.causes if self.verdict is MisfitVerdict.NAMED else ()
 
+    @property
+    def remainder_p(self) -> float:
+        """Probability that what the suspects leave is noise. [1]"""
+        return 1.0 - self.p_unlisted
+
     def summary(self) -> str:
         """Say the verdict, each cause or what may be one, the gain and the notes, line by line."""
         lines = [

@@ -249,6 +249,7 @@ def test_what_is_small_beside_an_unlisted_curve_is_found_where_it_alternates_oft
         [Suspect("level", 0.0, 0.1)],
     )
     assert (found.verdict, found.named) == (Verdict.UNLISTED, ())
+    assert found.remainder_p < 0.1
     sizes = [pytest.approx(size, abs=0.005)] if found_too else []
     assert [cause.value for cause in found.causes] == sizes
 
@@ -362,6 +363,7 @@ def test_what_a_simulation_returns_is_copied() -> None:
     noise = 0.01 * np.random.default_rng(23).standard_normal(len(RAMP))
     found = diagnose_simulation(predict, RAMP / 8.0 + noise, [Suspect("stiffness", 10.0, 0.5)])
     assert [cause.name for cause in found.named] == ["stiffness"]
+    assert found.remainder_p > 0.9
     assert found.notes == ()
 
 
