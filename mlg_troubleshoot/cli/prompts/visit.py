@@ -218,15 +218,12 @@ def _entry_of(draft: Draft) -> Entry | None:
     return entry
 
 
-_WIDEST = 80
-
-
 class Terminal:
     """Standard input and standard error; standard output is left to the results."""
 
     def __init__(self) -> None:
         self._console = console(to_stderr=True)
-        self._console.width = min(self._console.width, _WIDEST)
+        self._console.width = min(self._console.width, 80)
         self._edits = sys.stdout.isatty() and _edits_lines()
 
     def say(self, text: str, style: str = "") -> None:
@@ -234,10 +231,11 @@ class Terminal:
 
     def ask(self, prompt: str) -> str:
         """Ask for one line, with the arrow keys where the terminal and the library can."""
-        *above, last = word(prompt.rstrip(), "bold").wrap(self._console, self._console.width)
+        width = self._console.width - 3
+        *above, last = word(prompt.rstrip(" >"), "bold").wrap(self._console, width)
         for line in above:
             self._console.print(line)
-        last.append(" ")
+        last.append(" > ")
         try:
             if self._edits:
                 # The library must know the prompt: it draws the line again.
