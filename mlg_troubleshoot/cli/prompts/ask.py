@@ -301,8 +301,8 @@ class Asker:
         if name in _OPTIONAL and typed.lower() == "done":
             typed = ""
         # A name may be any word but a unit; one letter at the heading is a slip, not an outcome.
-        is_unit = typed.lower().startswith(("unit ", "convention "))
-        is_name = name in (TAIL_NO.name, *LAST) and not is_unit
+        is_name = name in (TAIL_NO.name, *LAST)
+        is_name &= not typed.lower().startswith(("unit ", "convention "))
         if is_name or (name in HEADING and len(typed) == 1) or not self._take(typed):
             self._answer_question(name, typed or self._enters(name))
 

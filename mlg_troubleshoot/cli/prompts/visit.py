@@ -231,8 +231,9 @@ class Terminal:
 
     def ask(self, prompt: str) -> str:
         """Ask for one line, with the arrow keys where the terminal and the library can."""
-        width = self._console.width - 3
-        *above, last = word(prompt.rstrip(" >"), "bold").wrap(self._console, width)
+        *above, last = word(prompt.rstrip(" >"), "bold").wrap(
+            self._console, self._console.width - 3
+        )
         for line in above:
             self._console.print(line)
         last.append(" > ")
