@@ -56,7 +56,8 @@ _IN_ASCII = str.maketrans(_SIGNS[::2], _SIGNS[1::2])
 _OF_FILES = re.compile(
     r",? or (?:pass --decimal-comma|leave it blank[^.]*)|leave it blank, and "
     r"| Enter \w+_date[^.]*\.|: enter repair_date[^.]*| in restored_joints"
-    r"| Enter (?:rigging_checked: yes or corrected|the outcome with its date and time)\."
+    r"| ?Enter (?:rigging_checked: yes or corrected|the outcome with its date and time"
+    r"|RETRACTED or FAILED, or leave it blank if it is not known)\."
 )
 
 

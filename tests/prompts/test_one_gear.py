@@ -72,9 +72,17 @@ def test_readings_keep_the_unit_that_they_were_typed_in(sit: Sit, life: Life) ->
 
 
 def test_a_change_of_unit_or_convention_is_said(sit: Sit) -> None:
-    sit(*failed("done"), "")
+    assert "before:" not in sit(*failed("done"), "").screen
     screen = sit("N2 LH", "mm radial", "r", "", "done", "", "", "").screen
     assert "Readings are in mm, radial (before: thou, total play)." in screen
+
+
+def test_a_word_that_is_no_outcome_is_refused_with_what_is_expected_and_asked_again(
+    sit: Sit,
+) -> None:
+    screen = sit(*gear("total", "f", "", "done"), "").screen
+    refused = "'total' is not accepted: expected RETRACTED or FAILED. Did it retract?"
+    assert refused in " ".join(screen.split())
 
 
 @pytest.mark.parametrize("typed", ["p 41 p 22", "plunger 41; 22", "p 0.041 in p 22", "p 41"])

@@ -354,9 +354,9 @@ class Asker:
         for name, text in changed.items():
             self.entry.give(name, text)
         said = "; what was typed before keeps its unit" * bool(read)
-        now = _heading(found)
-        before = f" (before: {was})" * (was not in ("", now))
-        self._say(f"   Readings are in {now}{before}{said}.")
+        replaced = any(last.get(name, text) != text for name, text in found.items())
+        before = f" (before: {was})" * replaced
+        self._say(f"   Readings are in {_heading(found)}{before}{said}.")
 
     def _answer_joint(self, name: str, typed: str) -> None:
         """Take a clearance; one that can hardly be is confirmed."""
