@@ -81,12 +81,13 @@ class LogEntry:
     """A record in the log of a gear, and whether it counts; what was recorded in two chains before
     they were merged is one entry.
 
-    row: the inspection, of the last version of it. correction: the version that it corrects, and
-    what it says.
+    newest: the last version of its visit. row: the inspection, of the last version of it.
+    correction: the version that it corrects, and what it says.
     """
 
     record: Record
     counts: bool
+    newest: Record
     row: Inspection | None = None
     correction: tuple[Inspection, Inspection] | None = None
 
@@ -226,13 +227,19 @@ def find(store: Store, record_id: str) -> Record:
     live = [visit.kept for life in gears for visit in life.visits]
     found = [r for r in live if r.record_id == record_id and r.kind not in _WORK]
     if not found and len(record_id) >= LEAST_OF_A_HASH:
-        found = [r for r in live if r.digest.startswith(record_id.lower())]
+        newest = {
+            entry.newest
+            for life in gears
+            for entry in life.entries
+            if entry.record.digest.startswith(record_id.lower())
+        }
+        found = [record for record in live if record in newest]
     if len(found) == 1:
         return found[0]
     if not found:
         raise UsageError(
-            f"no record {record_id!r} in {store.place}",
-            "See the records: mlg history TAIL SIDE",
+            f"no record that counts is called {record_id!r} in {store.place}",
+            "See the records, and which are void: mlg history TAIL SIDE",
         )
     named = ", ".join(
         f"{r.digest[:10]} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in found[:6]
@@ -284,6 +291,7 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
             roots[own] not in void
             if own in roots
             else own in others or record.kind is RecordKind.VOID,
+            last[roots[own]] if own in roots else record,
             rows[own] if own in newest else None,
             (rows[before[own].key], rows[own]) if own in before else None,
         )

@@ -97,7 +97,7 @@ WORDS = (
 )
 
 
-@pytest.mark.parametrize("question", [3, 5])
+@pytest.mark.parametrize("question", [3, 5, 8])
 def test_words_are_understood_at_every_question(sit: Sit, life: Life, question: int) -> None:
     answers = [*HEAD, "f", "46", "8", "done", *END]
     sit(*answers[:question], *WORDS, *answers[question:], "")
@@ -109,6 +109,25 @@ def test_words_are_understood_at_every_question(sit: Sit, life: Life, question: 
     assert (found.cannot_reach, found.no_spare) == ((3, 5), (3,))
     assert (found.rigging_checked, found.carried["work_order"]) == ("yes", "WO-17")
     assert found.carried["remarks"] == "oil seen"
+
+
+def test_a_reading_counts_where_a_name_is_asked_for_and_an_initial_is_of_a_name(sit, life) -> None:
+    sit("order WO-17", *gear("f", "", "done")[:-2], "p 40", "F. Kern", "#3 8", "gauge P. 7", "")
+    found = life().inspections[-1].inspection
+    assert (found.readings_in, found.clearance_in) == ((0.04,), {3: 0.004})
+    assert (found.technician_id, found.gauge_id) == ("F. Kern", "P. 7")
+    assert found.carried["work_order"] == "WO-17"
+
+
+def test_of_a_line_only_what_is_wrong_is_refused_and_asked_for(sit: Sit, life: Life) -> None:
+    line = "#1 2 #2 0,15 #4 3 p 40 p 41 x p 42 landings x"
+    terminal = sit(*gear("f", "", line, "4", "done"), "")
+    for said in ("#2 '0,15 thou' is", "Landings since overhaul 'x' is", "Plunger displacement '41"):
+        assert f"✗ {said}" in terminal.screen
+    assert terminal.prompts[6].startswith("#2 ")
+    found = life().inspections[-1].inspection
+    assert found.clearance_in == {1: 0.001, 4: 0.0015, 2: 0.002}
+    assert found.readings_in == (0.04, 0.042)
 
 
 def test_a_day_without_a_year_is_the_last_such_day(sit: Sit, life: Life) -> None:

@@ -144,11 +144,14 @@ def test_landings_left_grow_by_a_repair(tmp_path: Path, place: Path) -> None:
 
 def test_a_correction_counts_and_what_it_corrects_does_not(tmp_path: Path, place: Path) -> None:
     seeded((1, 0.001), (2, 0.02))
-    assert mlg("history", "amend", "N123-LH-2", "3=0.002in").code == 0
+    shown = life()["events"][-1]["hash"][:10]
+    for value in ("3=0.003in", "3=0.002in"):
+        assert mlg("history", "amend", shown, value).code == 0
     assert joint_3(life())["readings"] == [[400.0, 0.001], [800.0, 0.002]]
     assert Store(place).verify()[1] is None
     correction = Store(place).all()[-1].digest[:10]
     assert mlg("history", "void", correction, "--why", "another aircraft").code == 0
+    assert "See the records, and which are void" in mlg("history", "void", shown, "--why", "x").err
     assert joint_3(life())["readings"] == [[400.0, 0.001]]
 
 

@@ -19,7 +19,6 @@ from mlg_troubleshoot.cli.prompts.entry import (
     REPAIR_DATE,
     WORD_HELP,
     Entry,
-    column_of,
     joint_of,
     label_of,
     split_words,
@@ -288,7 +287,7 @@ class Asker:
         self._say(f"– undone: {label_of(name)} {text or 'no answer'}", "magenta")
 
     def _answer(self, name: str, typed: str) -> None:
-        """Take an answer; a line of words counts at every question but those of a name."""
+        """Take an answer, or a line of words, which counts at every question."""
         if joint_of(name) and typed.lower() == "done":
             self._named.clear()
             for each in self._joints():
@@ -300,10 +299,9 @@ class Asker:
             self.entry.cells.pop(PLUNGER, None)
         if name in _OPTIONAL and typed.lower() == "done":
             typed = ""
-        # A name may be any word but a unit; one letter at the heading is a slip, not an outcome.
-        is_name = name in (TAIL_NO.name, *LAST)
-        is_name &= not typed.lower().startswith(("unit ", "convention "))
-        if is_name or (name in HEADING and len(typed) == 1) or not self._take(typed):
+        # One letter at the heading is a slip, or begins a tail number; it is no reading.
+        is_word = name not in HEADING or typed[1:2].isalpha()
+        if not (is_word and self._take(typed)):
             self._answer_question(name, typed or self._enters(name))
 
     def _answer_question(self, name: str, text: str) -> None:
@@ -322,13 +320,14 @@ class Asker:
                 raise UsageError(f"{text!r} is not understood", "Type y, #3 13 or p 41.")
             self.entry.give(SMALL_READINGS_TRUE.name, "yes")
         else:
-            self._give([(name, text)])
+            self._give(name, text)
 
     def _answer_tail(self, typed: str) -> None:
         first, _, last = typed.rpartition(" ")
         side = Side.spelt(last) if first else None
-        words = [(TAIL_NO.name, first if side else typed)]
-        self._give(words + [(SIDE.name, last)] * bool(side))
+        self._give(TAIL_NO.name, first if side else typed)
+        if side:
+            self._give(SIDE.name, last)
 
     def _answer_unit(self, typed: str) -> None:
         """Take a unit, a convention or both; what is not typed is that of the last entry."""
@@ -387,35 +386,38 @@ class Asker:
     # Lines of words.
 
     def _take(self, line: str) -> bool:
-        """Take a line of words; false if it is not one."""
+        """Take a line of words, each by itself; false if it is not one."""
         words = split_words(line)
         if units := [text for name, text in words if name in READ_IN]:
             self._answer_unit(" ".join(units))
         for name, text in words:
-            number = joint_of(name)
-            if number is None:
-                continue
-            if number not in self.gear.joint_numbers:
-                raise UsageError(f"there is no joint #{number}", "Type for example #3 13.")
-            self.entry.require_untyped(name)
-            self._named.append(name)
-            if text:
-                self._answer_joint(name, text)
-        others = [each for each in words if not joint_of(each[0]) and each[0] not in READ_IN]
-        if others:
-            self._give(others)
+            try:
+                if joint_of(name):
+                    self._name_joint(name, text)
+                elif name not in READ_IN:
+                    self._give(name, text)
+            except UsageError as error:
+                self._refuse(error)
         return bool(words)
 
-    def _give(self, words: list[tuple[str, str]]) -> None:
-        """Give columns, and say what was taken."""
+    def _name_joint(self, name: str, text: str) -> None:
+        if joint_of(name) not in self.gear.joint_numbers:
+            raise UsageError(f"there is no joint {label_of(name)}", "Type for example #3 13.")
+        self.entry.require_untyped(name)
+        self._named.append(name)
+        if text:
+            self._answer_joint(name, text)
+
+    def _give(self, name: str, text: str) -> None:
+        """Give a column, and say what was taken."""
         before = {**self.entry.cells}
-        taken = self.entry.take(self.gear, words)
+        taken = self.entry.take(self.gear, name, text)
         said = self._doubted() if PLUNGER in taken else ""
         if said and (again := self._instead(said, "")):
             self.entry.cells = before
-            self._give([(PLUNGER, again)])
+            self._give(PLUNGER, again)
             return
-        given = (f"{column_of(name).said} {self.entry.cells[name] or 'none'}" for name in taken)
+        given = (f"{label_of(name)} {self.entry.cells[name] or 'none'}" for name in taken)
         self._say(f"✓ {', '.join(given)}", "green")
 
     def _doubted(self) -> str:

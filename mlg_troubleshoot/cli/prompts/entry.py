@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date, datetime, timedelta
 
@@ -91,7 +90,7 @@ WORD_HELP = """At any question:
   temperature 21 (Celsius), pressure 3000 (psi)
   u takes the last answer back; q stops, every answer is saved"""
 _NAMES = "|".join(sorted((*_COLUMNS, *OUTCOMES), key=len, reverse=True))
-_WORD = re.compile(rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w)[\s=:]*", re.IGNORECASE)
+_WORD = re.compile(rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w|\.\s*[a-z])[\s=:]*", re.IGNORECASE)
 _NEXT_WORD = re.compile(rf"(?<![\w#])(?:{_NAMES})(?!\w)", re.IGNORECASE)
 _NEXT_JOINT = re.compile(rf"{_NEXT_WORD.pattern}|#", re.IGNORECASE)
 # The day of a part of an entry that has its own.
@@ -177,7 +176,8 @@ class Entry(msgspec.Struct, kw_only=True):
             read, problems = judge_length(name, each.strip(), options)
             if problems or not isinstance(read, Inspection):
                 raise UsageError(
-                    f"{each.strip()!r} is not accepted: expected {problems[0].expected}",
+                    f"{label_of(name)} {each.strip()!r} is not accepted: expected"
+                    f" {problems[0].expected}",
                     " ".join(at_prompt(problem.remedy) for problem in problems),
                 )
             rows.append(read)
@@ -255,25 +255,22 @@ class Entry(msgspec.Struct, kw_only=True):
                 rows.append(part.inspection(gear))
         return rows
 
-    def take(self, gear: Gear, words: Sequence[tuple[str, str]]) -> list[str]:
-        """Take columns and their texts, all or none; the columns that were given are returned."""
-        taken: dict[str, str] = {}
-        for name, typed in words:
-            text, _, day = typed.partition(" on ") if name in DAY_OF else (typed, "", "")
-            taken[name] = self.accepted(gear, name, text, taken.get(name, ""))
-            if day:
-                taken[DAY_OF[name]] = day_of(day, self.started.date())
-        for name in taken:
-            self.require_untyped(name)
-        for name, text in taken.items():
-            self.give(name, text)
+    def take(self, gear: Gear, name: str, typed: str) -> list[str]:
+        """Take a column and its day, both or none; the columns that were given are returned."""
+        text, _, day = typed.partition(" on ") if name in DAY_OF else (typed, "", "")
+        taken = {name: self.accepted(gear, name, text)}
+        if day:
+            taken[DAY_OF[name]] = day_of(day, self.started.date())
+        self.require_untyped(name)
+        for column, kept in taken.items():
+            self.give(column, kept)
         return [*taken]
 
-    def accepted(self, gear: Gear, name: str, typed: str, earlier: str = "") -> str:
-        """A text of a column as it is kept; a plunger reading stands after an `earlier` one."""
+    def accepted(self, gear: Gear, name: str, typed: str) -> str:
+        """A text of a column as it is kept; a plunger reading stands after an earlier one."""
         column = column_of(name)
         if not typed and name != OUTCOME.name:
-            raise UsageError(f"{column.plain} without a value", "Type ? for an example.")
+            raise UsageError(f"{label_of(name)} without a value", "Type ? for an example.")
         if name in (DATE.name, REPAIR_DATE):
             return day_of(typed, self.started.date())
         if name == SIDE.name:
@@ -287,7 +284,7 @@ class Entry(msgspec.Struct, kw_only=True):
         lengths = [with_unit(each.strip(), self.unit) for each in typed.split(";")]
         self.judge(gear, name, "; ".join(lengths))
         if name == PLUNGER:
-            lengths = [earlier or self.cells.get(name, ""), *lengths]
+            lengths = [self.cells.get(name, ""), *lengths]
         return "; ".join(filter(None, lengths))
 
 
@@ -300,7 +297,7 @@ def joint_of(name: str) -> int | None:
 def label_of(name: str) -> str:
     """What a column is called on the screen: ``#3``, or its name in words."""
     number = joint_of(name)
-    return f"#{number}" if number else column_of(name).plain
+    return f"#{number}" if number else column_of(name).said
 
 
 def column_of(name: str) -> Column:
