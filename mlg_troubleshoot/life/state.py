@@ -434,7 +434,7 @@ class _AsOf:
         if taken:
             by_visit = groupby(self._older, key=lambda fact: (fact.date, fact.record))
             listed = Sentence.joined((_of_one_visit([*facts]) for _, facts in by_visit), "; ")
-            self._said.append(Sentence.of("Readings of other visits stand as well: {}.", listed))
+            self._said.append(Sentence.of("Readings of other entries stand as well: {}.", listed))
         return {
             "clearance_in": clearance,
             "entered": entered,
@@ -468,7 +468,7 @@ class _AsOf:
             self._said.append(Sentence.of("Before the repair: {}. Not tried since.", listed))
             return event
         self._older += facts
-        self._said.append(Sentence.of("The plunger reading of another visit stands: {}.", listed))
+        self._said.append(Sentence.of("The plunger reading of another entry stands: {}.", listed))
         return event
 
     def _repeated(self, event: _Event) -> tuple[float, ...]:

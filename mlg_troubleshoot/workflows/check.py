@@ -458,7 +458,8 @@ def _judge(
     if counting is None:
         counting = _states(rows, found.gear, store, typed=found.read is None)
     if total > 1:
-        found = replace(found, notes=(*found.notes, *other_visits_count(counting)))
+        notes = *found.notes, *_warned(rows), *other_visits_count(counting)
+        found = replace(found, notes=notes)
     blocks = [slice(start, start + AT_ONCE) for start in range(0, total, AT_ONCE)]
     # As they were read, and what else counts of each gear: packed they take a tenth of the memory.
     stand = [state and (state.inspection, state.older) for state in counting]
@@ -535,6 +536,13 @@ def _made(
         for each, row, state in zip(judged, rows, stand, strict=True)
     ]
     return len(rows), [make(own) for make in makers]
+
+
+def _warned(rows: Sequence[Inspection | InvalidRow]) -> list[str]:
+    """What is to be checked of the first rows that have warnings, and how many more there are."""
+    said = [f"{row.tail_no} {row.side}: {' '.join(row.warnings)}" for row in rows if row.warnings]
+    more = f"{len(said) - _MOST_WARNED} more rows have warnings; --json lists all of them."
+    return [*said[:_MOST_WARNED], *[more] * (len(said) > _MOST_WARNED)]
 
 
 def _set_aside(count: int) -> str:
@@ -759,6 +767,8 @@ def write_template(
 
 # Wrong cells that an error names at most.
 _MOST_SAID = 20
+# Rows with warnings that are named. [1]
+_MOST_WARNED = 3
 # Columns of the verdicts; most bear the names of what an assessment, its row or its source holds.
 _ABOUT = (
     *("verdict", "basis", "predicted_displacement_in", "over_travel_in", "under_travel_in"),

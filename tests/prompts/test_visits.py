@@ -349,7 +349,10 @@ def test_a_corrected_tail_or_side_is_that_of_all_that_was_typed_here(
     lines = [each.replace("LINE", line) for each in typed]
     sit("N1 LH", *lines, "")
     assert (len(life(*gear).inspections), len(life().inspections)) == (2, 1)
-    assert f" entries from N1 LH to {gear[1]} {gear[0]}." in capsys.readouterr().err
+    left = life().inspections[0].kept.digest[:10]
+    said = capsys.readouterr().err
+    assert f" entries from N1 LH to {gear[1]} {gear[0]}." in said
+    assert f"not moved: {left}. Move one: mlg history move HASH {gear[1]} {gear[0]}" in said
 
 
 def test_an_undo_takes_a_corrected_side_back(sit, begun, life, capsys):

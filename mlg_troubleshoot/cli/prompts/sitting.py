@@ -88,6 +88,10 @@ class Sitting:
         if known is not None and entry.todo is not None and key != key_of(known.row):
             own = [each for each in known.records if each.record_id in self._own]
             moved = self._move(known, own or known.records[-1:] * (not entry.has_findings), key)
+            left = [each.digest[:10] for each in known.records if each not in own]
+            if own and left:
+                say = f"Not typed at this sitting and not moved: {', '.join(left)}. Move one:"
+                output.say(f"{say} mlg history move HASH {entry.identity} --why TEXT")
         if known is not None and not entry.has_findings:
             self._amend(entry, moved or known.records)
         else:
