@@ -63,9 +63,6 @@ def column_letters(index: int) -> str:
     return letters
 
 
-LETTERS: tuple[str, ...] = tuple(column_letters(i) for i in range(MAX_COLUMNS))
-
-
 def show_number(value: float) -> str:
     """Return a number as a spreadsheet program shows it when the column is wide enough."""
     return f"{value:.15g}"
@@ -316,10 +313,10 @@ MergedRange = tuple[int, int, int, int]
 MACROS = "the workbook holds macros: they are ignored, the values are read"
 
 
-@dataclass(slots=True)
-class SheetFacts:
-    """What was noticed in addition to the values while the rows were read; it fills up as they
-    come.
+class Sheet(ABC):
+    """A table of cells; its name is None in CSV.
+
+    What is noticed in addition to the values while the rows are read:
 
     hidden_rows: rows with something in them that are hidden or filtered out, counted from 1.
     formulas, struck: number of formula results, and of cells that are struck through, by column,
@@ -327,25 +324,17 @@ class SheetFacts:
     faulty: rows that cannot be read although the file can, with the reason.
     """
 
-    hidden_rows: set[int] = field(default_factory=set)
-    formulas: Counter[int] = field(default_factory=Counter)
-    struck: Counter[int] = field(default_factory=Counter)
-    faulty: dict[int, FileRefusedError] = field(default_factory=dict)
-
-
-class Sheet(ABC):
-    """A table of cells; its name is None in CSV."""
-
     def __init__(self, name: str | None = None, *, hidden: bool = False) -> None:
         self.name = name
         self.hidden = hidden
-        self.facts = SheetFacts()
+        self.hidden_rows: set[int] = set()
+        self.formulas: Counter[int] = Counter()
+        self.struck: Counter[int] = Counter()
+        self.faulty: dict[int, FileRefusedError] = {}
 
     @abstractmethod
     def rows(self) -> Iterator[NumberedRow]:
-        """Read the rows that are not blank, with their numbers counted from 1, and note the facts
-        on the way.
-        """
+        """Read the rows that are not blank, with their numbers counted from 1."""
 
     def merged(self) -> Sequence[MergedRange]:
         """Return merged ranges as first row, first column, last row, last column (rows from 1,

@@ -20,7 +20,6 @@ from contextlib import contextmanager, suppress
 
 from mlg_troubleshoot.records.cells import (
     COPY_THE_TABLE,
-    LETTERS,
     MAX_COLUMNS,
     MAX_ROWS,
     Cell,
@@ -102,7 +101,7 @@ class _CsvSheet(Sheet):
                 fields = self._quoted(line, lines, usual, number)
             if "\0" in line:
                 what = "a zero character: the file is damaged there"
-                self.facts.faulty[number] = FileRefusedError("csv_nul", what, row=number)
+                self.faulty[number] = FileRefusedError("csv_nul", what, row=number)
             usual = len(fields) or usual
             if "'" in line or '="' in line:
                 fields = [_PROTECTED.sub(r"\1\2", field) for field in fields]
@@ -137,7 +136,7 @@ class _CsvSheet(Sheet):
         # The quotation mark is a stray one: the row is named as faulty and the next line is a row
         # again.
         what = "a quotation mark that is not closed, or stands in the middle of a field"
-        self.facts.faulty[number] = FileRefusedError("csv_quote", what, row=number)
+        self.faulty[number] = FileRefusedError("csv_quote", what, row=number)
         return line.split(self._delimiter)
 
     def _parse(self, record: str) -> list[str] | None:
@@ -371,7 +370,7 @@ def outside_limits(sheet: str | None, column: int, row: int) -> FileRefusedError
     return FileRefusedError(
         "cell_outside_limits",
         f"something stands in cell {cell}",
-        f"nothing beyond column {LETTERS[-1]} ({MAX_COLUMNS} columns) and row {MAX_ROWS}",
+        f"nothing beyond column {column_letters(MAX_COLUMNS - 1)} ({MAX_COLUMNS} columns) and row {MAX_ROWS}",
         "Delete the cells far outside the table, or copy the table into a new workbook.",
         sheet=sheet,
         row=row,

@@ -57,7 +57,7 @@ class FrameSheet(Sheet):
 
     def __init__(self, frame: pd.DataFrame) -> None:
         super().__init__()
-        self.header = Header(1, tuple(map(str, frame.columns)), (1,))
+        self.header = Header((1,), tuple(map(str, frame.columns)))
         self.labels: list[object] = frame.index.tolist()
         self._columns = [_cells(frame.iloc[:, place]) for place in range(frame.shape[1])]
 

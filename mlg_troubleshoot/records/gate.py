@@ -52,7 +52,7 @@ def judge_row(
         lambda p: problems.append(replace(p, row=None, cell=None)),
         options.decimal_comma,
     )
-    columns = Columns(Header(1, tuple(values), (1,)), table, by_hand=True)
+    columns = Columns(Header((1,), tuple(values)), table, by_hand=True)
     for p in columns.placed:
         if p.field is None and not p.refused:
             expected = "a column of the inspection table"

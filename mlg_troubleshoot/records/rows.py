@@ -848,14 +848,9 @@ class RowReader:
         self._add(placed)
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
-        self._row = Row(0, [])
-        self._suffix = ""
-        self._cells: list[Cell] = []
-        self._bad: set[int] = set()
-        self._faults: list[tuple[int, CellFaultError]] = []
         # Somewhere it is tomorrow already.
         self._latest = min(date.today(), date.max - _A_DAY) + _A_DAY
-        self._days_of_visits: dict[str, date | None] = {"": None}
+        self._day_of = lru_cache(self._read_day_of_visit)
         # The dates of the column, and those of rows that wait for the others.
         self._days: set[Cell] = set()
         self._waiting: dict[RowSource, tuple[AmbiguousDateError, Cell, CellPlace]] = {}
@@ -1009,15 +1004,13 @@ class RowReader:
         if row.visit.day:
             found.values[DATE] = self._day_of(row.visit.day)
 
-    def _day_of(self, text: str) -> date | None:
+    def _read_day_of_visit(self, text: str) -> date | None:
         """The day of a visit, as the heading of its readings says it."""
-        if text not in self._days_of_visits:
-            self._days_of_visits[text] = None
-            try:
-                self._days_of_visits[text] = self._read_day(text)
-            except CellFaultError as fault:
-                self._table.tell_fault(fault, text, CellPlace(self._row.number, DATE.name))
-        return self._days_of_visits[text]
+        try:
+            return self._read_day(text)
+        except CellFaultError as fault:
+            self._table.tell_fault(fault, text, CellPlace(self._row.number, DATE.name))
+            return None
 
     def _one_value(self, index: int, column: Column, cell: Cell) -> Any:
         """Read a cell that holds no length."""
@@ -1087,7 +1080,7 @@ class RowReader:
         self._suffix = f" {row.visit}".rstrip() if self._is_several else ""
         self._cells = cells
         self._bad = {index for index in self._refused if cells[index] is not None}
-        self._faults = []
+        self._faults: list[tuple[int, CellFaultError]] = []
 
     def ask_about(self, cells: Cells, found: _Found | None = None) -> list[str]:
         """Ask about what stands in columns that are not read: numbers that may be readings, words

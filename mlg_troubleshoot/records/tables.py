@@ -35,6 +35,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import ROUNDING_IN
 from mlg_troubleshoot.records.cells import (
+    MAX_COLUMNS,
     Cell,
     Cells,
     FileRefusedError,
@@ -43,7 +44,6 @@ from mlg_troubleshoot.records.cells import (
     NumberedRow,
     OddCell,
     Sheet,
-    SheetFacts,
     column_letters,
     quote,
     show,
@@ -93,21 +93,23 @@ class Header:
 
     Attributes
     ----------
-    row : int
-        Its row (the lower one of two), counted from 1.
+    rows_used : tuple of int
+        Rows that belong to it, counted from 1: one, or more where the header has several rows or a
+        row of units below.
     texts : tuple of str
         One for each field, trailing blanks included.
-    rows_used : tuple of int
-        Rows that belong to it: one, or more where the header has several rows or a row of units
-        below.
     units : tuple of LengthUnit or None
         Unit of each column from a row of units; empty without one.
     """
 
-    row: int
-    texts: tuple[str, ...]
     rows_used: tuple[int, ...]
+    texts: tuple[str, ...]
     units: tuple[LengthUnit | None, ...] = ()
+
+    @property
+    def row(self) -> int:
+        """The lowest of its rows."""
+        return self.rows_used[-1]
 
     @property
     def places(self) -> Sequence[CellPlace]:
@@ -172,7 +174,7 @@ def find_header(
     for top, first, bottom, last in merged() if rows else ():
         if top == bottom and last > first:
             across.setdefault(top, []).append(slice(first, last + 1))
-    headers = [Header(number, tuple(map(_text, cells)), (number,)) for number, cells in rows]
+    headers = [Header((number,), tuple(map(_text, cells))) for number, cells in rows]
     scores = [header_score(cells, options) for _, cells in rows]
     for (upper, above), (lower, below) in pairwise(rows):
         is_text = all(c is None or isinstance(c, str) for c in above)
@@ -182,7 +184,7 @@ def find_header(
                 above_it[covered] = [above_it[covered.start]] * len(above_it[covered])
             joined = zip_longest(above_it, map(_text, below), fillvalue="")
             texts = tuple(" ".join(words).strip() for words in joined)
-            headers.append(Header(lower, texts, (upper, lower)))
+            headers.append(Header((upper, lower), texts))
             scores.append(header_score(texts, options))
     score = max(scores, default=0)
     if not score:
@@ -198,7 +200,7 @@ def _with_rows_below(header: Header, rows: Sequence[NumberedRow], options: ReadO
         used = (*header.rows_used, number)
         units = _unit_row(header, cells, options)
         if units is not None:
-            return replace(header, units=units, row=number, rows_used=used)
+            return replace(header, units=units, rows_used=used)
         # What names the gear stands in front, and says nothing in a row of headings.
         words = [] if cells[0] is not None else [*map(_text, cells)]
         for text, word in zip(header.texts, words, strict=False):
@@ -213,7 +215,7 @@ def _with_rows_below(header: Header, rows: Sequence[NumberedRow], options: ReadO
                 # A joint stands once above its columns.
                 above_it = upper_text or (above_it if lower_text else "")
                 joined.append(f"{above_it} {lower_text}".strip())
-            header = replace(header, texts=tuple(joined), row=number, rows_used=used)
+            header = replace(header, texts=tuple(joined), rows_used=used)
     return header
 
 
@@ -659,7 +661,6 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     unit = stated.pop() if len(stated) == 1 else None
     measured_from = min(of_joints or [joints[0].row, *headings])
     return Form(
-        row=lines[0].row,
         texts=tuple(line.label for line in lines),
         rows_used=(lines[0].row,),
         lines=lines,
@@ -962,7 +963,7 @@ def _read_one(
             if table.repeats(cells):
                 continue
             ahead = [(number, cells), *islice(rows, _HEADING_ROWS)]
-            top = Header(number, tuple(map(_text, cells)), (number,))
+            top = Header((number,), tuple(map(_text, cells)))
             below = _with_rows_below(top, ahead, options)
             rows = chain(ahead, rows)
             break
@@ -1078,18 +1079,6 @@ def _tells_failure(text: str) -> bool:
     return says_failed(text) and _LEGEND.search(in_words(text)) is None
 
 
-def _ragged(cells: Cells, width: int) -> FileRefusedError:
-    """Refuse a row that does not have as many fields as the header."""
-    remedy = "Check the separators and the quotation marks of this row."
-    if len(cells) > width and any(show(cell).strip() == "0" for cell in cells):
-        remedy = (
-            "A decimal comma in a comma-separated file splits a number in two: write 0.013, or"
-            " separate the columns by semicolons."
-        )
-    expected = f"{width} fields, as in the header"
-    return FileRefusedError("row_field_count", f"{len(cells)} fields", expected, remedy)
-
-
 class _Table:
     """The rows of one table: inspections, and what stands between them."""
 
@@ -1119,7 +1108,7 @@ class _Table:
         )
         self._texts = tuple(text or None for text in header.texts)
         is_fixed = delimiter is not None or columns.is_long or is_several
-        self._width = len(header.texts) if is_fixed else None
+        self._width = len(header.texts) if is_fixed else MAX_COLUMNS
         self._may_be_short = delimiter is None
         # A workbook's cell that is merged over several rows says the same of each; of a reading it
         # is not known which gear's it is, nor of which row a record's name.
@@ -1182,28 +1171,33 @@ class _Table:
             return
         if self._of_several:
             cells = self._with_merged(number, cells)
-        width = self._width
-        why = self._sheet.facts.faulty.get(number)
+        why = self._sheet.faulty.get(number) or self._ragged(cells)
         if why is not None:
             self._out.rows.append(self.reader.faulty(number, cells, why))
-        elif (
-            width is not None
-            and len(cells) != width
-            and (any(cells[width:]) or (len(cells) < width and not self._may_be_short))
-        ):
-            why = _ragged(cells, width)
-            self._out.rows.append(self.reader.faulty(number, cells, why))
-        else:
-            for row in self._by_visits(number, cells):
-                if self._folder is None:
-                    self._out.rows.append(self.reader.read(row))
-                else:
-                    self._folder.add(row)
+            return
+        for row in self._by_visits(number, cells):
+            if self._folder is None:
+                self._out.rows.append(self.reader.read(row))
+            else:
+                self._folder.add(row)
+
+    def _ragged(self, cells: Cells) -> FileRefusedError | None:
+        """Refuse a row that does not have as many fields as the header."""
+        width = self._width
+        is_longer = any(cells[width:])
+        if not is_longer and (len(cells) >= width or self._may_be_short):
+            return None
+        remedy = "Check the separators and the quotation marks of this row."
+        if is_longer and any(show(cell).strip() == "0" for cell in cells):
+            remedy = (
+                "A decimal comma in a comma-separated file splits a number in two: write 0.013, or"
+                " separate the columns by semicolons."
+            )
+        expected = f"{width} fields, as in the header"
+        return FileRefusedError("row_field_count", f"{len(cells)} fields", expected, remedy)
 
     def _by_visits(self, number: int, cells: Cells) -> list[Row]:
         """A row of the table for each visit that it holds readings of, without those of others."""
-        if len(self._own) == 1:
-            return [Row(number, [*cells], visit=visit) for visit in self._own]
         width = len(cells)
         filled = [
             visit
@@ -1351,15 +1345,13 @@ class _Table:
         dates = self.reader.settle_dates(found)
         if self._aside:
             self._judge_aside()
-        facts = self._sheet.facts
-        # The rows ahead of the next table were read before this one ends.
-        self._sheet.facts = SheetFacts(faulty=facts.faulty)
+        sheet = self._sheet
         words = self.reader.not_measured
         named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
         more = [f"{len(named) - 5} more"] if len(named) > 5 else []
-        hidden = sum(row > self._header_row for row in facts.hidden_rows)
+        hidden = sum(row > self._header_row for row in sheet.hidden_rows)
         said = ", ".join(map(repr, [*words][:4]))
-        merged = self._sheet.merged()
+        merged = sheet.merged()
         tops = {row.source.row for row in found} if merged else set()
         spread = [
             f"{column_letters(left)}{top}"
@@ -1377,12 +1369,15 @@ class _Table:
         notes = [f"{n} {what}{'s' * (n > 1)} {how}" for n, what, how in counted if n]
         self._out.unread += notes[: bool(named)]
         for what, cells in (
-            ("formulas were read by their last calculated values", facts.formulas),
-            ("cells that are struck through were also read", facts.struck),
+            ("formulas were read by their last calculated values", sheet.formulas),
+            ("cells that are struck through were also read", sheet.struck),
         ):
             width = len(self._columns.placed)
             shown = [f"{column_letters(i)} ({n})" for i, n in sorted(cells.items()) if i < width]
             notes += [f"{what}: column {', '.join(shown)}"] if shown else []
+            # The rows ahead of the next table were read before this one ends.
+            cells.clear()
+        sheet.hidden_rows.clear()
         if self._folder is not None:
             notes.append(
                 "long layout: one row is one joint's reading; rows with one record id are one"

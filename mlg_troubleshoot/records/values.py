@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from datetime import date, datetime, time
 from enum import StrEnum
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, TypeVar
 
 from mlg_troubleshoot.decision.columns import OUTCOME, Column, Holds
@@ -392,17 +392,11 @@ def is_no_name(cell: Filled) -> bool:
     return said in _NO_NAME or not any(character.isalnum() for character in said)
 
 
-@lru_cache(maxsize=16_384)
-def _shared(text: str) -> str:
-    """One object for a tail or a gauge that many rows name."""
-    return text
-
-
 def read_text(cell: Filled, expected: str, *, required: bool = False) -> str:
     """Read an identifier or another text; numbers keep the digits they show."""
     if isinstance(cell, str):
         if cell.isascii() and cell.isprintable():
-            return _shared(cell.strip())
+            return cell.strip()
         text = plain_text(cell)
         if UNWRITABLE.search(text):
             raise CellFaultError("text_unwritable", expected)

@@ -88,7 +88,7 @@ class _XlsSheet(Sheet):
                 raise outside_limits(self.name, len(cells) - 1, place + 1)
             info = sheet.rowinfo_map.get(place)
             if info is not None and info.hidden:
-                self.facts.hidden_rows.add(place + 1)
+                self.hidden_rows.add(place + 1)
             yield place + 1, cells
 
     def _cell(self, row: int, column: int) -> Cell:

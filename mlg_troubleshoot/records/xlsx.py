@@ -230,7 +230,7 @@ class XlsxSheet(Sheet):
                     cells.extend([None] * (index + 1 - len(cells)))
                     cells[index] = cell
                 if cells and element.get("hidden") in _TRUE:
-                    self.facts.hidden_rows.add(number)
+                    self.hidden_rows.add(number)
                 if cells:
                     yield number, cells
 
@@ -260,9 +260,9 @@ class XlsxSheet(Sheet):
         else:
             cell = None if inline is None else _text(inline)
         if cell is not None and style in self.book.struck:
-            self.facts.struck[index] += 1
+            self.struck[index] += 1
         if cell is not None and value and has_formula:
-            self.facts.formulas[index] += 1
+            self.formulas[index] += 1
         return cell
 
     def _value(self, kind: str, style: str | None, value: str) -> Cell:

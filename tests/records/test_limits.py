@@ -279,16 +279,16 @@ print(json.dumps([judged, peak, raw, library, *counts]))
 
 def write_workbook(path, package, rows):
     """Write a large workbook by hand, which is quicker than by a library."""
-    from mlg_troubleshoot.records.cells import LETTERS
+    from mlg_troubleshoot.records.cells import column_letters
 
     rng = random.Random(1)
     lines = []
     for number, written in enumerate([HEADER, *(row(n, rng, 0.0) for n in range(rows))], 1):
         xml = "".join(
             (
-                f'<c r="{LETTERS[i]}{number}" t="inlineStr"><is><t>{c}</t></is></c>'
+                f'<c r="{column_letters(i)}{number}" t="inlineStr"><is><t>{c}</t></is></c>'
                 if isinstance(c, str)
-                else f'<c r="{LETTERS[i]}{number}"><v>{c}</v></c>'
+                else f'<c r="{column_letters(i)}{number}"><v>{c}</v></c>'
             )
             for i, c in enumerate(written)
         )

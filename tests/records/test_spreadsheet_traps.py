@@ -12,7 +12,7 @@ import openpyxl
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records.cells import LETTERS
+from mlg_troubleshoot.records.cells import MAX_COLUMNS, column_letters
 from tests.machine import SLOWER
 from tests.records.reading import GOOD, HEADER, only
 
@@ -634,7 +634,15 @@ def test_36_a_cell_far_outside_is_refused(read, xlsx):
 
 def test_36_the_last_allowed_column_is_read(read, xlsx):
     result = read(
-        xlsx(change=with_cell(**{f"{LETTERS[-1]}1": "note", f"{LETTERS[-1]}2": "x"})), "t.xlsx"
+        xlsx(
+            change=with_cell(
+                **{
+                    f"{column_letters(MAX_COLUMNS - 1)}1": "note",
+                    f"{column_letters(MAX_COLUMNS - 1)}2": "x",
+                }
+            )
+        ),
+        "t.xlsx",
     )
     assert result.rows[0].carried == {"note": "x"}
 
