@@ -91,6 +91,12 @@ def quote(cell: Cell, limit: int = 300) -> str:
     return writable(_STEERING.sub(_visible, text))
 
 
+def first_of(names: Sequence[str]) -> str:
+    """The first of several names, and how many more there are."""
+    more = [f"{len(names) - 5} more"] if len(names) > 5 else []
+    return ", ".join([*names[:5], *more])
+
+
 def plain_text(text: str) -> str:
     """Return a text without blanks at its ends and without what nobody sees."""
     return text.strip() if text.isascii() else text.translate(_INVISIBLE).strip()
@@ -314,7 +320,7 @@ MACROS = "the workbook holds macros: they are ignored, the values are read"
 
 
 class Sheet(ABC):
-    """A table of cells; its name is None in CSV.
+    """A table of cells; its name is None in CSV, which alone has a delimiter of its fields.
 
     What is noticed in addition to the values while the rows are read:
 
@@ -327,6 +333,7 @@ class Sheet(ABC):
     def __init__(self, name: str | None = None, *, hidden: bool = False) -> None:
         self.name = name
         self.hidden = hidden
+        self.delimiter: str | None = None
         self.hidden_rows: set[int] = set()
         self.formulas: Counter[int] = Counter()
         self.struck: Counter[int] = Counter()
@@ -348,10 +355,8 @@ class Workbook:
     """A file with one or more tables of cells.
 
     kind: ``csv``, ``xlsx``, ``xlsm`` or ``xls``.
-    delimiter: what separates the fields of a CSV file.
     """
 
     kind: str
     sheets: Sequence[Sheet]
     notes: list[str] = field(default_factory=list)
-    delimiter: str | None = None

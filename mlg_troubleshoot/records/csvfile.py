@@ -75,7 +75,7 @@ class _CsvSheet(Sheet):
     def __init__(self, text: str, delimiter: str) -> None:
         super().__init__()
         self._text = text
-        self._delimiter = delimiter
+        self.delimiter: str = delimiter
         self._budget = _QUOTE_BUDGET
 
     def rows(self) -> Iterator[NumberedRow]:
@@ -84,7 +84,7 @@ class _CsvSheet(Sheet):
         lines = deque(
             (text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text).split("\n")
         )
-        delimiter = self._delimiter
+        delimiter = self.delimiter
         usual = 0
         number = 0
         while lines:
@@ -126,7 +126,7 @@ class _CsvSheet(Sheet):
                 break
             # A line inside the quotation marks with as many separators as a row is a row that they
             # would swallow.
-            if usual > 2 and lines[more].partition('"')[0].count(self._delimiter) >= usual - 1:
+            if usual > 2 and lines[more].partition('"')[0].count(self.delimiter) >= usual - 1:
                 break
             fields = self._parse(record) if '"' in lines[more] else None
             if fields is not None and usual in (0, len(fields)):
@@ -137,14 +137,14 @@ class _CsvSheet(Sheet):
         # again.
         what = "a quotation mark that is not closed, or stands in the middle of a field"
         self.faulty[number] = FileRefusedError("csv_quote", what, row=number)
-        return line.split(self._delimiter)
+        return line.split(self.delimiter)
 
     def _parse(self, record: str) -> list[str] | None:
         try:
             parsed = list(
                 csv.reader(
                     io.StringIO(record, newline=""),
-                    delimiter=self._delimiter,
+                    delimiter=self.delimiter,
                     skipinitialspace=True,
                     strict=True,
                 )
@@ -174,7 +174,7 @@ def csv_book(data: bytes, header_score: Callable[[Cells], int]) -> Workbook:
         notes.append(
             f"the first line names the separator {delimiter!r} and is not counted as a row"
         )
-    return Workbook("csv", (_CsvSheet(text, delimiter),), notes, delimiter)
+    return Workbook("csv", (_CsvSheet(text, delimiter),), notes)
 
 
 def _find_delimiter(head: str, header_score: Callable[[Cells], int]) -> str:
@@ -370,7 +370,8 @@ def outside_limits(sheet: str | None, column: int, row: int) -> FileRefusedError
     return FileRefusedError(
         "cell_outside_limits",
         f"something stands in cell {cell}",
-        f"nothing beyond column {column_letters(MAX_COLUMNS - 1)} ({MAX_COLUMNS} columns) and row {MAX_ROWS}",
+        f"nothing beyond column {column_letters(MAX_COLUMNS - 1)} ({MAX_COLUMNS} columns) and row"
+        f" {MAX_ROWS}",
         "Delete the cells far outside the table, or copy the table into a new workbook.",
         sheet=sheet,
         row=row,

@@ -50,7 +50,6 @@ def judge_row(
         None,
         None,
         lambda p: problems.append(replace(p, row=None, cell=None)),
-        options.decimal_comma,
     )
     columns = Columns(Header((1,), tuple(values)), table, by_hand=True)
     for p in columns.placed:

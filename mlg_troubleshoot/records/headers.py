@@ -165,18 +165,12 @@ _OTHER_MATTER = _words(
 )
 
 
-def _aliases(*, with_unit: bool) -> dict[str, Column]:
-    """Headers as people write them; of a number with a unit the unit belongs to the spelling."""
-    return {
-        spelling: column
-        for column in COLUMNS
-        if bool(column.unit) is with_unit
-        for spelling in (*filter(None, column.spellings.split("|")), column.plain)
-    }
-
-
-_ALIASES = _aliases(with_unit=False)
-_WITH_OTHER_UNIT = _aliases(with_unit=True)
+# Headers as people write them; of a number with a unit the unit belongs to the spelling.
+_ALIASES = {
+    spelling: column
+    for column in COLUMNS
+    for spelling in (*filter(None, column.spellings.split("|")), column.plain)
+}
 
 _CANONICAL = re.compile(
     r"(?P<name>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>[1-9]\d?))?(?:_(?P<unit>in|thou|mm))?", re.ASCII
@@ -271,8 +265,9 @@ def recognise(header: str, joints: Joints) -> Recognition:
     words, bracketed, units = _taken_apart(text)
     plain = " ".join(words)
     whole = " ".join([plain, *(part.replace("°", "") for part in bracketed)]).strip()
-    if whole in _WITH_OTHER_UNIT:
-        return Recognition(Field(_WITH_OTHER_UNIT[whole]))
+    named = _ALIASES.get(whole)
+    if named is not None and named.unit:
+        return Recognition(Field(named))
     return _numbered(words, units, joints) or _aliased(plain, units) or UNKNOWN
 
 

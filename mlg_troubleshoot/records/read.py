@@ -30,6 +30,7 @@ from mlg_troubleshoot.records.cells import (
     Sheet,
     Workbook,
     column_letters,
+    first_of,
     quote,
     show,
     writable,
@@ -64,14 +65,12 @@ _PACKED: tuple[tuple[str, bytes, str], ...] = (
     (".numbers", b"Index/Document.iwa", "a document of Apple Numbers (.numbers)"),
     (".xlsb", b"xl/workbook.bin", "a binary workbook (.xlsb)"),
     (".docx", b"word/document.xml", "a text document (.docx)"),
-    (".pptx", b"ppt/presentation.xml", "a presentation (.pptx)"),
     (".zip", b"\0no part\0", "a packed folder (.zip)"),
 )
 _SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods", ".numbers"))
 
 # How the verdicts of `mlg check --csv` begin.
 _OWN = b"record_id,tail_no,side,inspection_date,gear_landings,verdict,"
-_ZIP_MAGICS = (b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")
 _HTML = (b"<!doctype html", b"<html", b"<table", b"<head", b"<body")
 _OLE_MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _WORKBOOK_NAMES = frozenset((".xlsx", ".xlsm", ".xls", ".xlsb", ".xltx", ".xltm"))
@@ -135,14 +134,13 @@ def _passed_over(source: Source) -> Iterator[str]:
         return
     with suppress(OSError):
         found = [p for p in sorted(Path(source).iterdir()) if not p.name.startswith((".", "~$"))]
-        folders = [p for p in found if p.is_dir()]
-        others = [p for p in found if p.suffix.lower() not in _SUFFIXES and p not in folders]
-        tables = [f for f in folders if any(p.suffix.lower() in _SUFFIXES for p in f.iterdir())]
-        for what, paths in (("folders", tables), ("files", others)):
-            names = [writable(path.name) for path in paths]
-            more = [f"{len(names) - 5} more"] if len(names) > 5 else []
-            if names:
-                yield f"{source}: {what} in it were not read: {', '.join([*names[:5], *more])}"
+        names = [
+            writable(p.name)
+            for p in found
+            if (any(map(_is_table, p.iterdir())) if p.is_dir() else not _is_table(p))
+        ]
+        if names:
+            yield f"{source}: not read of it: {first_of(names)}"
 
 
 def expand(source: Source) -> list[Source]:
@@ -152,7 +150,7 @@ def expand(source: Source) -> list[Source]:
     path = Path(source)
     try:
         if path.is_dir():
-            found = [p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES and not _is_own(p)]
+            found = [p for p in path.iterdir() if _is_table(p) and not _is_own(p)]
         elif any(c in str(source) for c in "*?[") and not path.exists():
             pattern = str(path.relative_to(path.anchor))
             found = [p for p in Path(path.anchor).glob(pattern) if p.is_file()]
@@ -163,6 +161,10 @@ def expand(source: Source) -> list[Source]:
         return [source]
     # Spreadsheet programs lay lock files next to an open workbook.
     return [*sorted(p for p in found if not p.name.startswith(("~$", ".")))] or [source]
+
+
+def _is_table(path: Path) -> bool:
+    return path.suffix.lower() in _SUFFIXES
 
 
 def _is_own(path: Path) -> bool:
@@ -184,7 +186,7 @@ def _read(source: Source, options: ReadOptions) -> _Found:
             sheet = FrameSheet(as_frame(source))
             labels = sheet.labels
             rows = sheet.rows()
-            found = read_table(sheet, sheet.header, rows, options, file=FRAME, delimiter=None)
+            found = read_table(sheet, sheet.header, rows, options, FRAME)
         else:
             kind = "unreadable"
             file = cast("File", source)
@@ -200,8 +202,7 @@ def _read(source: Source, options: ReadOptions) -> _Found:
             for each in chosen:
                 if each.header is None:
                     raise _no_header([each])
-                how = each.header, each.rows, options
-                part = read_table(each.sheet, *how, file=label, delimiter=book.delimiter)
+                part = read_table(each.sheet, each.header, each.rows, options, label)
                 found.join(part, f"sheet {each.sheet.name!r}: " if len(chosen) > 1 else "")
         if not found.rows and not found.problems:
             raise FileRefusedError("no_rows", "it contains no inspection")
@@ -261,7 +262,7 @@ def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
 
         return xls_book(data)
     suffix = Path(label).suffix.lower()
-    if data.startswith(_ZIP_MAGICS):
+    if data.startswith((b"PK\3\4", b"PK\5\6", b"PK\7\b")):
         return _packed(data, suffix)
     head = data[:2048].lstrip(b"\xef\xbb\xbf \t\r\n")
     for magic, what in _OTHERS:
@@ -313,7 +314,7 @@ def _names(candidates: Iterable[_Candidate]) -> str:
 
 def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Candidate]:
     """Choose the sheets to read: the named one, the only table, or all filled-in forms."""
-    if book.delimiter is not None:
+    if book.kind == "csv":
         return [_candidate(book.sheets[0], options)]
     wanted = None if options.sheet == "*" else options.sheet
     if wanted is not None:

@@ -363,16 +363,12 @@ NOWHERE = CellPlace()
 class TableInHand:
     """The table or form that is being read: how, where it stands, and who receives its
     problems.
-
-    side: of every row of a table that has no column of sides.
     """
 
     options: ReadOptions
     file: str | None
     sheet: str | None
     report: Callable[[Problem], None]
-    decimal_comma: bool
-    side: Side | None = None
 
     def tell(
         self, code: str, value: str | None, expected: str, remedy: str, place: CellPlace
@@ -900,10 +896,9 @@ class RowReader:
         # Numbers of a table none of whose headers is a clearance are not facts of a gear.
         is_unknown = bool(asked) and CLEARANCE not in self._at
         if self._bad or row.bad or is_unknown or None in given.values():
-            bad = sorted(index for index in self._bad if index >= 0)
+            bad = sorted(self._bad)
             named = [*row.bad, *(self._placed[index].header for index in bad)]
             named += [c.name for c in IDENTITY if c not in self._at and identity[c.name] is None]
-            named += [CONVENTION.name] if -1 in self._bad else []
             named += [CLEARANCE.header(1, LengthUnit.INCH)] if is_unknown else []
             return InvalidRow(
                 **identity,
@@ -994,7 +989,7 @@ class RowReader:
                 found.carried[column.name] = value
             else:
                 found.values[column] = value
-        side = row.visit.side or self._table.side
+        side = row.visit.side or self._options.side
         if self._makes_ids:
             found.values[RECORD_ID] = self._made_id(side)
         elif self._suffix and RECORD_ID in found.values:
@@ -1027,7 +1022,7 @@ class RowReader:
         if column.holds is Holds.JOINTS:
             return read_joints(cell, self._options.joints.numbers)
         header = self._placed[index].header
-        return read_value(column, cell, header, decimal_comma=self._table.decimal_comma)
+        return read_value(column, cell, header, decimal_comma=self._options.decimal_comma)
 
     def _warn(self, found: _Found) -> None:
         """Say what of a good row is of no use, or unusual."""
@@ -1147,7 +1142,7 @@ class RowReader:
         with its unit.
         """
         # What is asked about may have either point.
-        comma = self._table.decimal_comma or (isinstance(cell, str) and "," in cell)
+        comma = self._options.decimal_comma or (isinstance(cell, str) and "," in cell)
         value, unit = written_number(cell, decimal_comma=comma)
         if unit is not None:
             units = [unit]
@@ -1183,7 +1178,7 @@ class RowReader:
         index = self._at.get(CONVENTION)
         fault = CellFaultError("convention_missing", *_MISSING_CONVENTION)
         if found is None and index is None:
-            self._bad.add(-1)
+            self._row.bad.append(CONVENTION.name)
             self._table.tell_fault(fault, None, CellPlace(self._row.number, CONVENTION.name))
         elif found is None and index is not None and self._cells[index] is None:
             self._fault(index, fault)
@@ -1240,7 +1235,7 @@ class RowReader:
                 unit,
                 row_unit,
                 signed=column.signed,
-                decimal_comma=self._table.decimal_comma,
+                decimal_comma=self._options.decimal_comma,
                 expected=expected(stated),
             )
         except CellFaultError as fault:

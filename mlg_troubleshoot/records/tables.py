@@ -45,6 +45,7 @@ from mlg_troubleshoot.records.cells import (
     OddCell,
     Sheet,
     column_letters,
+    first_of,
     quote,
     show,
     writable,
@@ -469,7 +470,7 @@ class Columns:
 
     def _look_for_missing(self) -> None:
         """Report the columns that a table needs, and those that the mapping names."""
-        is_known = self._table.side or all(visit.side for visit in self.visits)
+        is_known = self._options.side or all(visit.side for visit in self.visits)
         needed = (TAIL_NO,) if is_known else (TAIL_NO, SIDE)
         missing = {c.name: f"a column {c.name}" for c in needed if not self.at(c)}
         if not self.at(CLEARANCE) and not any(p.refused for p in self.placed):
@@ -765,25 +766,24 @@ class Folder:
         self._shared = [p for p in columns.placed if p not in own]
         # The joint's own columns stay in place but empty; each joint's reading gets a column behind
         # them.
-        self._placed = [
+        self.placed = [
             replace(p, field=None, refused=True) if p in own else p for p in columns.placed
         ]
         self._slots: dict[tuple[int, int], int] = {}
         for p in self._readings:
             for number in joints.numbers:
-                slot = self._slots[p.index, number] = len(self._placed)
+                slot = self._slots[p.index, number] = len(self.placed)
                 field = None if p.field is None else replace(p.field, number=number)
-                self._placed.append(replace(p, index=slot, field=field))
+                self.placed.append(replace(p, index=slot, field=field))
         # Without record ids the rows of one gear and day are one inspection.
         self._identity = columns.at(TAIL_NO, SIDE, DATE)
         self._above = [""] * len(self._identity)
         self.rows: dict[object, Row] = {}
-        self.reader = RowReader(self._placed, table, is_several=len(columns.visits) > 1)
 
-    def add(self, part: Row) -> None:
+    def add(self, part: Row, reader: RowReader) -> None:
         """Put the cells of a row of the table into the row of its record."""
         number = part.number
-        cells = [*part.cells, *[None] * (len(self._placed) - len(part.cells))]
+        cells = [*part.cells, *[None] * (len(self.placed) - len(part.cells))]
         if self._record is not None:
             record: object = show(cells[self._record.index]).strip() or number
         else:
@@ -792,10 +792,10 @@ class Folder:
             record = tuple(self._above)
         row = self.rows.get((record, part.visit))
         if row is None:
-            places = [CellPlace.at(number, p.index, p.header) for p in self._placed]
+            places = [CellPlace.at(number, p.index, p.header) for p in self.placed]
             row = Row(number, [None] * len(places), places, part.visit)
             self.rows[record, part.visit] = row
-        asked = self.reader.ask_about(cells)
+        asked = reader.ask_about(cells)
         row.questions += [each for each in asked if each not in row.questions]
         for p in self._shared:
             self._put(row, p, number, cells[p.index])
@@ -902,16 +902,14 @@ def read_table(
     header: Header,
     rows: Iterator[NumberedRow],
     options: ReadOptions,
-    *,
-    file: str | None,
-    delimiter: str | None,
+    file: str,
 ) -> Collected:
     """Read a table, or a form as the table of its visits, and the tables of other columns below."""
     out = Collected()
     below: Header | None = header
     while below is not None:
         top = below.row
-        part, below, rows = _read_one(sheet, below, rows, options, file=file, delimiter=delimiter)
+        part, below, rows = _read_one(sheet, below, rows, options, file)
         out.join(part, f"table in row {top}: " if below or out.layouts else "")
         if len(out.layouts) > MAX_TABLES:
             raise FileRefusedError(
@@ -932,9 +930,7 @@ def _read_one(
     header: Header,
     rows: Iterator[NumberedRow],
     options: ReadOptions,
-    *,
-    file: str | None,
-    delimiter: str | None,
+    file: str,
 ) -> tuple[Collected, Header | None, Iterator[NumberedRow]]:
     """Read a table; return the header of other columns below it, with the rows from there on."""
     out = Collected()
@@ -947,14 +943,15 @@ def _read_one(
     if form is None:
         options, side, said = _sides(sheet.name, header, first, options, file)
         placed = f"the header is in row {' and '.join(map(str, header.rows_used))}"
-        if delimiter is None:
+        if sheet.delimiter is None:
             wide = max((len(cells) for number, cells in first if number > header.row), default=0)
             blank = ("",) * (wide - len(header.texts))
             header = replace(header, texts=(*header.texts, *blank))
-    comma = options.decimal_comma or delimiter == ";"
-    in_hand = TableInHand(options, file, sheet.name, out.tell, comma, side)
+    comma = options.decimal_comma or sheet.delimiter == ";"
+    options = replace(options, decimal_comma=comma, side=side)
+    in_hand = TableInHand(options, file, sheet.name, out.tell)
     columns = Columns(header, in_hand, visits=visits.values())
-    table = _Table(sheet, header, columns, in_hand, delimiter, out)
+    table = _Table(sheet, header, columns, in_hand, out)
     titles: list[str] = []
     width = len(header.texts) if form is None else form.width
     rows = chain(first, rows)
@@ -1025,7 +1022,7 @@ def _sides(
     header: Header,
     rows: Sequence[NumberedRow],
     options: ReadOptions,
-    file: str | None,
+    file: str,
 ) -> tuple[ReadOptions, Side | None, str]:
     """Find the sides of a table without a column of them: in a column of gears that holds nothing
     else, as declared, or in the name of the sheet or the file. What was done is said in words.
@@ -1043,7 +1040,7 @@ def _sides(
             return replace(options, column_map=mapping), None, ""
     if options.side is not None:
         return options, options.side, f"every row is {options.side}"
-    for name, place in ((sheet or "", "sheet"), (PurePath(file or "").stem, "file")):
+    for name, place in ((sheet or "", "sheet"), (PurePath(file).stem, "file")):
         words_of_side = re.findall(r"(?<![^\W_])[LR]H(?![^\W_])", name)
         whole = Side.spelt(name)
         named = {whole} if whole else set(map(Side.spelt, words_of_side))
@@ -1088,7 +1085,6 @@ class _Table:
         header: Header,
         columns: Columns,
         table: TableInHand,
-        delimiter: str | None,
         out: Collected,
     ) -> None:
         self._sheet = sheet
@@ -1101,21 +1097,17 @@ class _Table:
             visit: [p.index for p in columns.placed if p.visit == visit] for visit in columns.visits
         }
         self._folder = Folder(columns, table) if columns.is_long else None
-        self.reader = (
-            RowReader(columns.placed, table, is_several=is_several)
-            if self._folder is None
-            else self._folder.reader
-        )
+        placed = columns.placed if self._folder is None else self._folder.placed
+        self.reader = RowReader(placed, table, is_several=is_several)
         self._texts = tuple(text or None for text in header.texts)
-        is_fixed = delimiter is not None or columns.is_long or is_several
-        self._width = len(header.texts) if is_fixed else MAX_COLUMNS
-        self._may_be_short = delimiter is None
+        is_fixed = sheet.delimiter is not None or columns.is_long or is_several
+        self._width = len(header.texts) + (0 if is_fixed else MAX_COLUMNS)
         # A workbook's cell that is merged over several rows says the same of each; of a reading it
         # is not known which gear's it is, nor of which row a record's name.
         self._of_several = [
             p.index
             for p in columns.placed
-            if delimiter is None and p.field is not None and not p.field.column.is_length
+            if sheet.delimiter is None and p.field is not None and not p.field.column.is_length
             if p.field.column is not RECORD_ID or columns.is_long
         ]
         self._above: dict[int, tuple[int, Filled]] = {}
@@ -1179,13 +1171,13 @@ class _Table:
             if self._folder is None:
                 self._out.rows.append(self.reader.read(row))
             else:
-                self._folder.add(row)
+                self._folder.add(row, self.reader)
 
     def _ragged(self, cells: Cells) -> FileRefusedError | None:
         """Refuse a row that does not have as many fields as the header."""
         width = self._width
         is_longer = any(cells[width:])
-        if not is_longer and (len(cells) >= width or self._may_be_short):
+        if not is_longer and (len(cells) >= width or self._sheet.delimiter is None):
             return None
         remedy = "Check the separators and the quotation marks of this row."
         if is_longer and any(show(cell).strip() == "0" for cell in cells):
@@ -1275,7 +1267,7 @@ class _Table:
             named = self._named
         for index in filled.intersection(named, texts):
             # A gear whose side stands elsewhere may have any tail.
-            is_whole = named[index] is TAIL_NO and self._table.side is not None
+            is_whole = named[index] is TAIL_NO and self._table.options.side is not None
             text = texts[index].strip()
             says = _STATISTIC.fullmatch(text) or (not is_whole and _NO_INSPECTION.match(text))
             others = sum(not (filled - {index}).isdisjoint(kind) for kind in self._telling)
@@ -1348,9 +1340,8 @@ class _Table:
         sheet = self._sheet
         words = self.reader.not_measured
         named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
-        more = [f"{len(named) - 5} more"] if len(named) > 5 else []
         hidden = sum(row > self._header_row for row in sheet.hidden_rows)
-        said = ", ".join(map(repr, [*words][:4]))
+        said = [*map(repr, words)]
         merged = sheet.merged()
         tops = {row.source.row for row in found} if merged else set()
         spread = [
@@ -1359,12 +1350,12 @@ class _Table:
             if top in tops and any(left <= i <= right for i in self._evidence)
         ]
         counted = (
-            (len(named), "row", f"set aside by name: {', '.join([*named[:5], *more])}"),
+            (len(named), "row", f"set aside by name: {first_of(named)}"),
             (self._repeated, "repeated header row", "skipped"),
             (self._filled_in, "blank cell", "merged with one above read as it is"),
-            (words.total(), "cell", f"with {said} read as not measured"),
+            (words.total(), "cell", f"with {first_of(said)} read as not measured"),
             (hidden, "hidden or filtered row", "also read"),
-            (len(spread), "reading", f"merged over cells read as blank: {', '.join(spread[:5])}"),
+            (len(spread), "reading", f"merged over cells read as blank: {first_of(spread)}"),
         )
         notes = [f"{n} {what}{'s' * (n > 1)} {how}" for n, what, how in counted if n]
         self._out.unread += notes[: bool(named)]

@@ -325,14 +325,7 @@ def read_value(
 ) -> Any:
     """Read a cell of a column that holds neither a length nor a date."""
     if column.holds is Holds.NUMBER:
-        return read_number(
-            cell,
-            column.low,
-            column.high,
-            decimal_comma=decimal_comma,
-            expected=column.asked,
-            unit=column.unit.lstrip("°").lower(),
-        )
+        return _read_number(column, cell, decimal_comma)
     if column.holds is Holds.YES_NO:
         if (answer := _yes_no(cell)) is None:
             raise CellFaultError("not_yes_or_no", "yes or no", "Enter yes or no.")
@@ -348,18 +341,12 @@ def read_value(
     return show(cell) if is_shown else read_text(cell, column.asked)
 
 
-def read_number(
-    cell: Filled,
-    low: float,
-    high: float,
-    *,
-    decimal_comma: bool,
-    expected: str,
-    unit: str,
-) -> float:
+def _read_number(column: Column, cell: Filled, decimal_comma: bool) -> float:
+    expected = column.asked
+    unit = column.unit.lstrip("°").lower()
     unclear = decimal_comma and isinstance(cell, str)
     value, _ = _parse(cell, decimal_comma, expected, partial(_number, expected, unit, unclear))
-    if not low <= value <= high:
+    if not column.low <= value <= column.high:
         raise CellFaultError("out_of_range", expected)
     if unit == "landings" and (value % 1.0 or _UNCLEAR_GROUP.fullmatch(show(cell).strip())):
         remedy = "Landings are whole: enter them without a separator for thousands."

@@ -809,7 +809,6 @@ def test_43_a_truncated_workbook_is_named_as_cut_off(read, xlsx, keep):
     ("part", "words"),
     [
         ("word/document.xml", "text document"),
-        ("ppt/presentation.xml", "presentation"),
         ("xl/workbook.bin", "xlsb"),
         ("Index/Document.iwa", "Apple Numbers"),
         ("table.csv", "packed folder"),
