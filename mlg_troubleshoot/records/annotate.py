@@ -9,7 +9,7 @@ import hashlib
 import io
 import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -387,7 +387,7 @@ def _annotate(
                 _mark(sheet, layout, problem)
         own = {s: v for s, v in verdicts.items() if s.file == label and s.sheet == layout.sheet}
         if layout.kind != "long":
-            _mark_over_limit(sheet, layout, {s: over_limit[s] for s in own if s in over_limit})
+            _mark_over_limit(sheet, layout, own, over_limit)
         if layout.kind == "form":
             _beside_form(sheet, layout, free, own)
         else:
@@ -445,9 +445,7 @@ def _load(source: str | Path, out: str | Path) -> tuple[bytes, XlsxFile]:
 
 
 def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:
-    place = problem.cell
-    if place is None:
-        place = f"A{problem.row or layout.header_row}"
+    place = problem.cell or f"A{problem.row or layout.header_row}"
     cell = sheet[place]
     if isinstance(cell, MergedCell):
         anchor = next(r for r in sheet.merged_cells.ranges if place in r)
@@ -463,10 +461,12 @@ def _fill(cell: Cell | MergedCell, colour: str, said: str = "") -> None:
         cell.comment = Comment(f"{before}{_AUTHOR}: {said}", _AUTHOR, height=160, width=360)
 
 
-def _mark_over_limit(sheet: Worksheet, layout: SheetLayout, over_limit: OverLimit) -> None:
+def _mark_over_limit(
+    sheet: Worksheet, layout: SheetLayout, own: Iterable[RowSource], over_limit: OverLimit
+) -> None:
     """Mark the clearances of a wide table or a form that are over their limit."""
-    for source, limits in over_limit.items():
-        for joint, limit_in in limits.items():
+    for source in own:
+        for joint, limit_in in over_limit.get(source, {}).items():
             names = {CLEARANCE.header(joint, unit) for unit in (None, *LengthUnit)}
             read = next((column for column in layout.columns if column.read_as in names), None)
             row = source.row if read is None else read.row or source.row

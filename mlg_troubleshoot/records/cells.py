@@ -343,6 +343,7 @@ class Sheet(ABC):
     def rows(self) -> Iterator[NumberedRow]:
         """Read the rows that are not blank, with their numbers counted from 1."""
 
+    @property
     def merged(self) -> Sequence[MergedRange]:
         """Return merged ranges as first row, first column, last row, last column (rows from 1,
         columns from 0).

@@ -255,7 +255,10 @@ def damage(what: str) -> Iterator[None]:
 
 
 class GuardedZip:
-    """A packed workbook, checked before anything in it is parsed."""
+    """A packed workbook, checked before anything in it is parsed.
+
+    parts: by their names, in lower case, with plain slashes.
+    """
 
     def __init__(self, data: bytes) -> None:
         with damage("its list of parts cannot be read"):
@@ -263,9 +266,9 @@ class GuardedZip:
             members = self._zip.infolist()
         if len(members) > MAX_MEMBERS:
             raise too_large(f"{len(members)} parts in one workbook")
-        self._members: dict[str, zipfile.ZipInfo] = {}
+        self.parts: dict[str, zipfile.ZipInfo] = {}
         for member in members:
-            self._members.setdefault(member.filename.replace("\\", "/").lstrip("/").lower(), member)
+            self.parts.setdefault(member.filename.replace("\\", "/").lstrip("/").lower(), member)
         if any(member.flag_bits & 1 for member in members):
             raise password_protected()
         if sum(member.file_size for member in members) > MAX_EXPANDED_BYTES:
@@ -279,7 +282,7 @@ class GuardedZip:
         self._refuse_declarations()
 
     def _refuse_declarations(self) -> None:
-        for name in self._members:
+        for name in self.parts:
             # A declaration stands before the first element; UTF-16 is read without its zero bytes.
             head = next(self.chunks(name), b"").replace(b"\0", b"")
             before = _BEFORE_ROOT.match(head)
@@ -291,13 +294,8 @@ class GuardedZip:
                 )
                 raise FileRefusedError("xml_declaration", found)
 
-    @property
-    def names(self) -> frozenset[str]:
-        """Names of the parts, in lower case, with plain slashes."""
-        return frozenset(self._members)
-
     def _member(self, name: str) -> zipfile.ZipInfo:
-        member = self._members.get(name.lower())
+        member = self.parts.get(name.lower())
         if member is None:
             raise damaged(f"{name} is missing")
         return member

@@ -51,7 +51,7 @@ def judge_row(
         None,
         lambda p: problems.append(replace(p, row=None, cell=None)),
     )
-    columns = Columns(Header((1,), tuple(values)), table, by_hand=True)
+    columns = Columns(Header((1,), tuple(values)), table)
     for p in columns.placed:
         if p.field is None and not p.refused:
             expected = "a column of the inspection table"

@@ -297,7 +297,7 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     rows = sheet.rows()
     peeked = list(islice(rows, _PEEKED_ROWS))
     near = [(number, cells) for number, cells in peeked if number <= HEADER_SEARCH_ROWS]
-    header = find_header(near, options, sheet.merged) or find_form(peeked, options)
+    header = find_header(near, options, sheet) or find_form(peeked, options)
     # A form that nobody touched holds no inspection; a header may stand too far below to be seen.
     if isinstance(header, Form):
         is_filled = not header.is_untouched
@@ -368,9 +368,8 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
 
 
 def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) -> _Candidate:
-    by_name = {(sheet.name or "").strip().casefold(): sheet for sheet in reversed(book.sheets)}
-    by_name |= {sheet.name or "": sheet for sheet in book.sheets}
-    sheet = by_name.get(wanted) or by_name.get(wanted.strip().casefold())
+    by_name = {(sheet.name or "").casefold(): sheet for sheet in book.sheets}
+    sheet = by_name.get(wanted.casefold())
     if sheet is None:
         known = f"one of its sheets: {', '.join(repr(sheet.name) for sheet in book.sheets)}"
         remedy = "Correct the name given with --sheet."

@@ -80,7 +80,6 @@ from mlg_troubleshoot.records.headers import (
 )
 from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
-    AmbiguousDateError,
     CellFaultError,
     DateOrder,
     answers_outcome,
@@ -829,9 +828,9 @@ class RowReader:
         ]
         # The readings of a fleet repeat: what was understood once is not taken apart again.
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)
-        value_of = lru_cache(_REMEMBERED)(self._one_value)
+        self._value_of = lru_cache(_REMEMBERED)(self._one_value)
         self._others = [
-            (index, known.column, self._one_value if known.column is RECORD_ID else value_of)
+            (index, known.column)
             for index, known in sorted(good, key=itemgetter(0))
             if not known.column.is_length and known.column not in (CONVENTION, UNIT, JOINT)
         ]
@@ -849,7 +848,7 @@ class RowReader:
         self._day_of = lru_cache(self._read_day_of_visit)
         # The dates of the column, and those of rows that wait for the others.
         self._days: set[Cell] = set()
-        self._waiting: dict[RowSource, tuple[AmbiguousDateError, Cell, CellPlace]] = {}
+        self._waiting: dict[RowSource, tuple[CellFaultError, Cell, CellPlace]] = {}
 
     def _add(self, placed: Iterable[PlacedField]) -> None:
         """Take columns whose cells travel to the report, each under its own name, and are searched
@@ -887,7 +886,7 @@ class RowReader:
         asked += [each for each in row.questions if each not in asked]
         source = RowSource(self._table.file, self._table.sheet, row.number)
         for index, fault in sorted(self._faults, key=itemgetter(0)):
-            if isinstance(fault, AmbiguousDateError):
+            if fault.days and index == self._at.get(DATE):
                 self._waiting[source] = fault, self._cells[index], self._place(index)
             else:
                 self._tell(index, fault)
@@ -974,14 +973,14 @@ class RowReader:
     def _read_others(self, found: _Found) -> None:
         """Read the cells that are not lengths, and whose they are."""
         row = self._row
-        for index, column, value_of in self._others:
+        for index, column in self._others:
             cell = self._cells[index]
             if cell is None and column not in IDENTITY:
                 continue
             if column is DATE:
                 self._days.add(cell)
             try:
-                value = value_of(index, column, cell)
+                value = self._value_of(index, column, cell)
             except CellFaultError as fault:
                 self._fault(index, fault)
                 continue
@@ -1043,14 +1042,12 @@ class RowReader:
             )
 
     def faulty(self, row: int, cells: Cells, why: FileRefusedError) -> InvalidRow:
-        """Refuse a row as a whole; its first cell may name it."""
+        """Refuse a row as a whole."""
         problem = why.problem
         shown = f"{why}: {quote(','.join(map(show, cells)), 80)}"
         self._table.tell(problem.code, shown, problem.expected, problem.remedy, CellPlace(row))
-        is_named = problem.code == "row_field_count" and self._at.get(RECORD_ID) == 0
-        name = plain_text(show(cells[0])) if is_named else ""
         source = RowSource(self._table.file, self._table.sheet, row)
-        return InvalidRow(name or None, None, None, ("row",), (), source)
+        return InvalidRow(None, None, None, ("row",), (), source)
 
     def _begin(self, row: Row) -> None:
         """Take up a row: fill it to the width of the header, and leave out what was not
@@ -1176,29 +1173,27 @@ class RowReader:
     def _read_convention(self) -> ClearanceConvention | None:
         found: ClearanceConvention | None = self._read_how(CONVENTION, self._options.convention)
         index = self._at.get(CONVENTION)
+        if found is not None or index in self._bad:
+            return found
         fault = CellFaultError("convention_missing", *_MISSING_CONVENTION)
-        if found is None and index is None:
+        if index is None:
             self._row.bad.append(CONVENTION.name)
             self._table.tell_fault(fault, None, CellPlace(self._row.number, CONVENTION.name))
-        elif found is None and index is not None and self._cells[index] is None:
+        else:
             self._fault(index, fault)
-        return found
+        return None
 
     def _read_row_unit(self) -> LengthUnit | None:
-        declared = self._options.unit
-        unit: LengthUnit | None = self._read_how(UNIT, declared)
-        index = self._at.get(UNIT)
-        if index is None or self._cells[index] is None:
-            return declared
+        unit: LengthUnit | None = self._read_how(UNIT, None)
         for i, of, _ in self._lengths if unit else ():
             if of.unit not in (None, unit) and self._cells[i] is not None:
                 expected = f"{of.unit}, as the header {self._placed[i].header!r} says"
                 remedy = (
                     "The row and the header name different units. Correct the one that is wrong."
                 )
-                self._fault(index, CellFaultError("unit_contradiction", expected, remedy))
-                return declared
-        return unit or declared
+                self._fault(self._at[UNIT], CellFaultError("unit_contradiction", expected, remedy))
+                return self._options.unit
+        return unit or self._options.unit
 
     def _one_length(
         self,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain, islice, pairwise, takewhile, zip_longest
 from pathlib import PurePath
@@ -40,7 +40,6 @@ from mlg_troubleshoot.records.cells import (
     Cells,
     FileRefusedError,
     Filled,
-    MergedRange,
     NumberedRow,
     OddCell,
     Sheet,
@@ -168,11 +167,9 @@ def header_score(cells: Cells, options: ReadOptions) -> int:
 _HEADING_ROWS = 3
 
 
-def find_header(
-    rows: Sequence[NumberedRow], options: ReadOptions, merged: Callable[[], Sequence[MergedRange]]
-) -> Header | None:
+def find_header(rows: Sequence[NumberedRow], options: ReadOptions, sheet: Sheet) -> Header | None:
     across: dict[int, list[slice]] = {}
-    for top, first, bottom, last in merged() if rows else ():
+    for top, first, bottom, last in sheet.merged if rows else ():
         if top == bottom and last > first:
             across.setdefault(top, []).append(slice(first, last + 1))
     headers = [Header((number,), tuple(map(_text, cells))) for number, cells in rows]
@@ -247,8 +244,6 @@ class Columns:
     """The columns of a table as its header, or the labels of a form, name them; what is wrong with
     them is reported.
 
-    by_hand: the program named the columns, so none can be renamed or mapped. mapped, carried:
-    headers that are not canonical with what they were read as; headers of what is only carried.
     visits: whose readings a row holds, one after the other. is_long: True if one row is one joint's
     reading.
     """
@@ -259,7 +254,6 @@ class Columns:
         table: TableInHand,
         *,
         visits: Collection[Occasion] = (),
-        by_hand: bool = False,
     ) -> None:
         self._table = table
         self._options = table.options
@@ -291,7 +285,7 @@ class Columns:
             self._doubt_readings()
         for p in self.placed:
             if p.refused:
-                self._doubt(p, by_hand=by_hand)
+                self._doubt(p)
         self.is_long = self._tell_long() and not visits
         self._settle_duplicates()
         self._look_for_missing()
@@ -393,7 +387,7 @@ class Columns:
         placed.refused = True
         self._table.tell(code, placed.header, expected, remedy, placed.place)
 
-    def _doubt(self, placed: PlacedField, *, by_hand: bool) -> None:
+    def _doubt(self, placed: PlacedField) -> None:
         found = placed.found
         code = found.code
         target = found.nearest or "clearance_3_in"
@@ -405,9 +399,7 @@ class Columns:
             )
         elif code == "joint_unknown":
             expected = f"a joint from {self._options.joints.span}"
-            remedy = f"{found.reason[:1].upper()}{found.reason[1:]}."
-            if not by_hand:
-                remedy += f' The nearest names are {target}: pass --map "{placed.header}=COLUMN".'
+            remedy = f"{found.reason[:1].upper()}{found.reason[1:]}. The nearest are {target}."
         else:
             expected = "a header that can be understood, such as clearance_3_mm"
             remedy = (
@@ -1099,7 +1091,6 @@ class _Table:
         self._folder = Folder(columns, table) if columns.is_long else None
         placed = columns.placed if self._folder is None else self._folder.placed
         self.reader = RowReader(placed, table, is_several=is_several)
-        self._texts = tuple(text or None for text in header.texts)
         is_fixed = sheet.delimiter is not None or columns.is_long or is_several
         self._width = len(header.texts) + (0 if is_fixed else MAX_COLUMNS)
         # A workbook's cell that is merged over several rows says the same of each; of a reading it
@@ -1212,7 +1203,7 @@ class _Table:
             elif index in self._above:
                 top, above = self._above[index]
                 if self._last_rows is None:
-                    self._last_rows = {each[:2]: each[2] for each in self._sheet.merged()}
+                    self._last_rows = {each[:2]: each[2] for each in self._sheet.merged}
                 if number <= self._last_rows.get((top, index), 0):
                     cells = [*cells, *[None] * (index + 1 - len(cells))]
                     cells[index] = above
@@ -1309,7 +1300,7 @@ class _Table:
         lowest = min(options.limit_in.values(), default=math.inf)
         known = row.understood if isinstance(row, InvalidRow) else row
         if isinstance(row, InvalidRow):
-            of_readings = {self._texts[index] for index in self._evidence}
+            of_readings = {self._columns.placed[index].header for index in self._evidence}
             yield from (
                 (f"an unclear {each}", 1.0) for each in of_readings.intersection(row.correct)
             )
@@ -1342,7 +1333,7 @@ class _Table:
         named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]
         hidden = sum(row > self._header_row for row in sheet.hidden_rows)
         said = [*map(repr, words)]
-        merged = sheet.merged()
+        merged = sheet.merged
         tops = {row.source.row for row in found} if merged else set()
         spread = [
             f"{column_letters(left)}{top}"

@@ -119,12 +119,21 @@ _T = TypeVar("_T")
 class CellFaultError(Exception):
     """A cell that does not hold what its column needs; caught by the row reader and made a
     `Problem`.
+
+    days: of a date whose numbers may be read in several orders, the day by each.
     """
 
-    def __init__(self, code: str, expected: str, remedy: str = "") -> None:
+    def __init__(
+        self,
+        code: str,
+        expected: str,
+        remedy: str = "",
+        days: Mapping[DateOrder, date] | None = None,
+    ) -> None:
         super().__init__(code)
         self.code = code
         self.expected = expected
+        self.days = days or {}
         self.remedy = remedy or _USUAL[code]
 
 
@@ -531,23 +540,12 @@ def _read_outcome(cell: Filled, header: str) -> Outcome:
     return Outcome.FAILED if said is asks_failure else Outcome.RETRACTED
 
 
-class AmbiguousDateError(CellFaultError):
-    """A date whose numbers may be read in several orders.
-
-    days: the day by each order.
-    """
-
-    def __init__(self, days: Mapping[DateOrder, date], expected: str) -> None:
-        super().__init__("date_ambiguous", expected)
-        self.days = days
-
-
 def read_date(cell: Filled, order: DateOrder | None = None, latest: date = date.max) -> date:
     """Read a day: ISO 8601, a month as a word, numbers in one order, or a cell that is formatted as
     a date.
 
     A day after `latest` is refused. Numbers of which only one order makes a day need no `order`;
-    others raise `AmbiguousDateError` without one.
+    without one the fault of others has their days.
     """
     expected = "a date such as 2026-03-04 (year-month-day) or 4 Mar 2026"
     if isinstance(cell, float):
@@ -568,7 +566,7 @@ def read_date(cell: Filled, order: DateOrder | None = None, latest: date = date.
         # A day to come is not one that was meant, where another reading is.
         days = {each: day for each, day in days.items() if day <= latest} or days
     if len(set(days.values())) > 1:
-        raise AmbiguousDateError(days, expected)
+        raise CellFaultError("date_ambiguous", expected, days=days)
     day = next(iter(days.values()), date.min)
     if not 1950 <= day.year <= 2100:
         raise CellFaultError("date_out_of_range", expected)
@@ -578,11 +576,8 @@ def read_date(cell: Filled, order: DateOrder | None = None, latest: date = date.
 
 
 def read_moment(cell: Filled, order: DateOrder | None = None, latest: date = date.max) -> date:
-    """Read a day, with its time where the cell states one; an ambiguous day is a fault."""
-    try:
-        day = read_date(cell, order, latest)
-    except AmbiguousDateError as fault:
-        raise CellFaultError("date_ambiguous", fault.expected) from None
+    """Read a day, with its time where the cell states one."""
+    day = read_date(cell, order, latest)
     clock = re.search(
         r"[T ](\d{2}:\d{2}(?::\d{2}(?:\.\d{1,6})?)?(?:Z|[+\-]\d{2}:?\d{2})?)", show(cell)
     )

@@ -70,6 +70,7 @@ class _XlsSheet(Sheet):
         self._sheet = sheet
         self._epoch_1904 = bool(book.datemode)
 
+    @property
     def merged(self) -> Sequence[MergedRange]:
         return [
             (top + 1, left, bottom, right - 1)
@@ -116,6 +117,4 @@ class _XlsSheet(Sheet):
         return None if known is None else _read_format(known.format_str)
 
 
-@lru_cache(1000)
-def _read_format(code: str | None) -> NumberFormat | None:
-    return NumberFormat.of(code)
+_read_format = lru_cache(1000)(NumberFormat.of)

@@ -76,7 +76,7 @@ class XlsxFile(Workbook):
 
     def __init__(self, data: bytes) -> None:
         self.archive = GuardedZip(data)
-        macros = any(name.endswith("vbaproject.bin") for name in self.archive.names)
+        macros = any(name.endswith("vbaproject.bin") for name in self.archive.parts)
         super().__init__("xlsm" if macros else "xlsx", (), [MACROS] if macros else [])
         with damage("its list of sheets cannot be read"), warnings.catch_warnings(action="ignore"):
             reader = ExcelReader(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
@@ -98,7 +98,7 @@ class XlsxFile(Workbook):
     def strings(self) -> list[str | None]:
         found: list[str | None] = []
         part = self._parts.get("sharedStrings", "")
-        if part.lower() in self.archive.names:
+        if part.lower() in self.archive.parts:
             stream = Stream(self.archive, part)
             with damage(f"{part} is not well-formed"):
                 for _, element in iterparse(stream):
@@ -111,7 +111,7 @@ class XlsxFile(Workbook):
     @cached_property
     def _styles(self) -> Element:
         part = self._parts.get("styles", "")
-        if part.lower() not in self.archive.names:
+        if part.lower() not in self.archive.parts:
             return Element("styleSheet")
         with damage(f"{part} is not well-formed"):
             return fromstring(self.archive.read(part))
@@ -174,11 +174,8 @@ class XlsxSheet(Sheet):
         self.part = part
         self.book = book
 
-    def merged(self) -> Sequence[MergedRange]:
-        return self._merged
-
     @cached_property
-    def _merged(self) -> Sequence[MergedRange]:
+    def merged(self) -> Sequence[MergedRange]:
         """Search the part: they stand behind the last row and are asked for before the first is
         judged.
         """
