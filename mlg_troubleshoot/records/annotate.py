@@ -468,12 +468,8 @@ def _mark_over_limit(
     for source in own:
         for joint, limit_in in over_limit.get(source, {}).items():
             names = {CLEARANCE.header(joint, unit) for unit in (None, *LengthUnit)}
-            read = next((column for column in layout.columns if column.read_as in names), None)
-            row = source.row if read is None else read.row or source.row
-            if read is None or row is None:
-                continue
-            cell = sheet.cell(row, read.index + 1)
-            if isinstance(cell, Cell):
+            found = layout.place(names, source.row or 0)
+            if found is not None and isinstance(cell := sheet[found[1]], Cell):
                 _fill(
                     cell, _OVER_FILL, f"over the limit of joint {joint}, {limit_in:.4f} in radial."
                 )

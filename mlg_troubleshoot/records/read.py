@@ -29,7 +29,6 @@ from mlg_troubleshoot.records.cells import (
     NumberedRow,
     Sheet,
     Workbook,
-    column_letters,
     first_of,
     quote,
     show,
@@ -351,9 +350,8 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
         if len(every) - len(hidden) > 1 and options.sheet is None:
             found.notes.append(f"read from sheet{'s' * (len(chosen) > 1)} {_names(chosen)}")
         return chosen
-    found_headers = [c for c in candidates if c.header]
-    if found_headers:
-        return [c for c in found_headers if not isinstance(c.header, Form)][:1]
+    if any(c.header for c in candidates):
+        return [c for c in candidates if c.header and not isinstance(c.header, Form)][:1]
     for candidate in hidden:
         if candidate.header:
             name = candidate.sheet.name
@@ -500,9 +498,8 @@ def cell_of(
     for layout in reversed(layouts):
         is_there = (layout.file, layout.sheet) == (source.file, source.sheet)
         is_there = is_there and layout.header_row <= row
-        for column in layout.columns if is_there else ():
-            if column.read_as == wanted.name:
-                return column.header, f"{column_letters(column.index)}{column.row or source.row}"
+        if is_there and (found := layout.place([wanted.name], row)):
+            return found
     return wanted.name, None
 
 

@@ -19,7 +19,7 @@ import math
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import date, timedelta
 from enum import IntEnum
@@ -407,6 +407,13 @@ class SheetLayout:
     header_row: int
     width: int
     columns: tuple[ColumnReading, ...]
+
+    def place(self, names: Collection[str | None], row: int) -> tuple[str, str] | None:
+        """Header of a column with one of the canonical names, and its cell in a row or a form."""
+        for column in self.columns:
+            if column.read_as in names:
+                return column.header, f"{column_letters(column.index)}{column.row or row}"
+        return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -439,7 +439,7 @@ class Columns:
             first = seen.setdefault(key, placed)
             if first is placed:
                 continue
-            plain = [p for p in (first, placed) if _in_one_word(p.header) == field.name]
+            plain = [p for p in (first, placed) if tidy(p.header).replace(" ", "_") == field.name]
             if not field.column.is_length and len(plain) == 1:
                 # The column that bears the name is meant; the other one is another matter, such as
                 # the aircraft's type.
@@ -480,10 +480,6 @@ class Columns:
                 remedy = f"Correct the header named in --map.{nearest(key, headers)}"
                 place = CellPlace(self._row, key)
                 self._table.tell("map_header_unknown", key, expected, remedy, place)
-
-
-def _in_one_word(header: str) -> str:
-    return tidy(header).replace(" ", "_")
 
 
 FORM_TITLE = "MLG inspection form"

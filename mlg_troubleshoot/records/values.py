@@ -105,12 +105,9 @@ def days_of(text: str) -> dict[DateOrder, date] | None:
     for order, (year, month_no, day_no) in orders.items():
         with suppress(ValueError):
             if len(year) in (2, 4):
-                days[order] = date(_year(year), int(month_no), int(day_no))
+                century = 2000 if len(year) == 2 else 0
+                days[order] = date(century + int(year), int(month_no), int(day_no))
     return days
-
-
-def _year(text: str) -> int:
-    return int(text) + (2000 if len(text) <= 2 else 0)
 
 
 _T = TypeVar("_T")
@@ -213,14 +210,6 @@ def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
     return CellFaultError(cell.kind if cell.kind in _USUAL else "cell_is_boolean", expected)
 
 
-def _number_of(cell: float | OddCell, expected: str) -> float:
-    if isinstance(cell, float):
-        return cell
-    if cell.kind not in (OddKind.PADDED, OddKind.WORDED) or cell.number is None:
-        raise odd_cell_fault(cell, expected)
-    return cell.number
-
-
 def read_length(
     cell: Filled,
     unit: LengthUnit | None,
@@ -281,8 +270,12 @@ def _parse(
             body = body.replace(",", ".")
         value, unit = parse(text, body)
         value = value if sign is None or sign[1] == "+" else -value
-    if not isinstance(cell, str):
-        value = _number_of(cell, expected)
+    if isinstance(cell, float):
+        value = cell
+    elif isinstance(cell, OddCell):
+        if cell.kind not in (OddKind.PADDED, OddKind.WORDED) or cell.number is None:
+            raise odd_cell_fault(cell, expected)
+        value = cell.number
     if not math.isfinite(value):
         raise CellFaultError("not_finite", expected)
     return value, unit
