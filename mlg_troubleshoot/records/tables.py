@@ -1150,7 +1150,9 @@ class _Table:
             return
         if self._of_several:
             cells = self._with_merged(number, cells)
-        why = self._sheet.faulty.get(number) or self._ragged(cells)
+        why = self._sheet.faulty.get(number)
+        if why is None and len(cells) != self._width:
+            why = self._ragged(cells)
         if why is not None:
             self._out.rows.append(self.reader.faulty(number, cells, why))
             return
@@ -1177,16 +1179,18 @@ class _Table:
 
     def _by_visits(self, number: int, cells: Cells) -> list[Row]:
         """A row of the table for each visit that it holds readings of, without those of others."""
-        width = len(cells)
+        if len(self._own) == 1:
+            return [Row(number, [*cells], visit=visit) for visit in self._own]
+        cells = [*cells, *[None] * (len(self._columns.placed) - len(cells))]
         filled = [
-            visit
-            for visit, own in self._own.items()
-            if any(i < width and cells[i] is not None for i in own)
+            visit for visit, own in self._own.items() if any(cells[i] is not None for i in own)
         ]
         rows = []
         for visit in filled or [*self._own][:1]:
-            others = {i for other, own in self._own.items() if other != visit for i in own}
-            kept = [None if i in others else cell for i, cell in enumerate(cells)]
+            kept = [*cells]
+            for other, own in self._own.items():
+                for i in own if other != visit else ():
+                    kept[i] = None
             rows.append(Row(number, kept, visit=visit))
         return rows
 
