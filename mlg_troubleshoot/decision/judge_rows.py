@@ -15,7 +15,7 @@ from operator import attrgetter
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.decision import prediction as plunger_reading
 from mlg_troubleshoot.decision import sentences
 from mlg_troubleshoot.decision.assessment import (
@@ -56,11 +56,12 @@ from mlg_troubleshoot.decision.prediction import (
     Extension,
     Prediction,
     chance_at,
+    ensemble,
     responses,
 )
 from mlg_troubleshoot.decision.verdict_rule import verdict, with_reading
-from mlg_troubleshoot.gear.gear import DEFAULT_PLUNGER_U_IN, ROUNDING_IN, Gear, JointSpec
-from mlg_troubleshoot.indices.index_table import IndexTable, JointIndices
+from mlg_troubleshoot.gear.gear import DEFAULT_PLUNGER_U_IN, ROUNDING_IN, Gear
+from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
 # Where one of these comes next a gear is not done with, whatever its joints predict.
@@ -84,45 +85,37 @@ def rank_joints(
     its limit, ties go to the larger total-order index. The range of a rank is over the ensemble of
     geometries.
     """
-    measured = np.isfinite(clearance_in)
     over = gear.over_limit(clearance_in)
-    assumed = np.where(measured, clearance_in, 0.5 * gear.limits_in)
-    contribution = (
-        np.array([linkage.amplification for linkage in responses(gear)]) * assumed[:, None, :]
+    places = _places(gear, table, clearance_in)
+    of_each = (
+        clearance_in,
+        over,
+        places[:, 0],
+        places.min(axis=1),
+        places.max(axis=1),
+        allowance_in,
     )
-    places = _places(over[:, None, :], contribution, table.total_order)
-    first = places.min(axis=1)
-    last = places.max(axis=1)
-
-    def finding(
-        joint: JointSpec,
-        indices: JointIndices,
-        clearance: float,
-        is_over: bool,
-        rank: int,
-        best: int,
-        worst: int,
-        left: float,
-    ) -> JointFinding:
-        return JointFinding(
-            joint=joint.number,
-            name=joint.name,
-            clearance_in=_number_or_none(clearance),
-            limit_in=joint.limit.value,
-            over_limit=is_over,
-            contribution_in=_number_or_none(indices.plunger_amplification * clearance),
-            first_order=indices.first_order,
-            total_order=indices.total_order,
-            plunger_amplification=indices.plunger_amplification,
-            rank=rank,
-            rank_range=(best, worst),
-            acts_like=gear.alike[joint.number],
-            allowance_in=_number_or_none(left),
-        )
-
-    of_each = (clearance_in, over, places[:, 0], first, last, allowance_in)
     return [
-        tuple(map(finding, gear.joints, table.joints, *row))
+        tuple(
+            JointFinding(
+                joint=joint.number,
+                name=joint.name,
+                clearance_in=_number_or_none(clearance),
+                limit_in=joint.limit.value,
+                over_limit=is_over,
+                contribution_in=_number_or_none(indices.plunger_amplification * clearance),
+                first_order=indices.first_order,
+                total_order=indices.total_order,
+                plunger_amplification=indices.plunger_amplification,
+                rank=rank,
+                rank_range=(best, worst),
+                acts_like=gear.alike[joint.number],
+                allowance_in=_number_or_none(left),
+            )
+            for joint, indices, clearance, is_over, rank, best, worst, left in zip(
+                gear.joints, table.joints, *row, strict=True
+            )
+        )
         for row in zip(*(each.tolist() for each in of_each), strict=True)
     ]
 
@@ -131,10 +124,13 @@ def _number_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _places(over: Mask, contribution: Array, total_order: Array) -> Places:
-    """Place of each joint on each linkage, from 1."""
+def _places(gear: Gear, table: IndexTable, clearance_in: Array) -> Places:
+    """Place of each joint of each gear on each linkage, from 1."""
+    assumed = np.where(np.isfinite(clearance_in), clearance_in, 0.5 * gear.limits_in)
+    contribution = ensemble(gear)[0] * assumed[:, None]
     # Rounded: both ends of one link contribute alike, and rounding noise must not order them.
-    keys = (-total_order, -np.round(contribution, 9), ~over)
+    within = ~gear.over_limit(clearance_in)[:, None]
+    keys = (-table.total_order, -np.round(contribution, 9), within)
     order = np.lexsort([np.broadcast_to(key, contribution.shape) for key in keys], axis=-1)
     return np.argsort(order, axis=-1) + 1
 
@@ -284,8 +280,7 @@ def assess(
                 approval = extension.approval
                 part = [_worse(*both, approval) for both in zip(part, extended, strict=True)]
             if sets:
-                judge = partial(_assess_valid, table=table, advice=False, sets=False)
-                part = with_consequences(part, cases, judge)
+                part = with_consequences(part, cases, partial(_judged, table=table))
             found += part
     judged = dict(zip(alike, found, strict=True))
     unjudged = tuple(UnjudgedJoint(joint.number, joint.name) for joint in gear.joints)
@@ -357,26 +352,32 @@ def _worse(plain: Assessment, extended: Assessment, approval: str) -> Assessment
 
 
 def _assess_valid(cases: Cases, table: IndexTable, advice: bool, sets: bool) -> list[Assessment]:
+    judged = _judged(cases, table)
+    findings = rank_joints(cases.gear, table, cases.clearance_in, allowances(cases, judged.lower))
+    wanted = np.isfinite(judged.lower.displacement_in) & sets
+    wanted &= np.array(judged.verdicts) != Verdict.WITHIN_MARGIN
+    sure = sure_sets(cases, judged.upper, np.flatnonzero(wanted))
+    courses = [*plans(cases, judged, sure, advice=advice, sets=sets)]
+    repairs = repair_sets(cases, courses)
+    return [
+        _assessment(cases, judged, i, *each)
+        for i, each in enumerate(zip(findings, courses, repairs, strict=True))
+    ]
+
+
+def _judged(cases: Cases, table: IndexTable) -> Judged:
+    """What a plan is made from."""
     lower, upper = cases.predict_bounds()
     p_lower, p_upper = (
         each.probability_within(cases.margin_in, cases.margin_u_in) for each in (lower, upper)
     )
-    closes = np.isfinite(lower.displacement_in)
     # A reading clears a gear by what is known of its joints: those that were not read count as 0.
     chance = chance_at(cases, cases.filled(0.0))
-    verdicts = _verdicts(cases, p_lower, p_upper, chance)
-    found = [verdict for verdict, _basis in verdicts]
-    wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in found]) & closes & sets
-    findings = rank_joints(
-        cases.gear,
-        table,
-        cases.clearance_in,
-        allowances(cases, lower),
-    )
-    order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
-    judged = Judged(
+    found, bases = zip(*_verdicts(cases, p_lower, p_upper, chance), strict=True)
+    order = _places(cases.gear, table, cases.clearance_in)[:, 0].argsort(axis=1)
+    return Judged(
         found,
-        [basis for _verdict, basis in verdicts],
+        bases,
         lower,
         upper,
         chance,
@@ -384,13 +385,6 @@ def _assess_valid(cases: Cases, table: IndexTable, advice: bool, sets: bool) -> 
         p_lower,
         lower.standard_uncertainty(cases.margin_u_in),
     )
-    sure = sure_sets(cases, upper, np.flatnonzero(wanted))
-    courses = [*plans(cases, judged, sure, advice=advice, sets=sets)]
-    repairs = repair_sets(cases, courses)
-    return [
-        _assessment(cases, judged, i, findings[i], courses[i], repairs[i])
-        for i in range(len(cases))
-    ]
 
 
 def _verdicts(
@@ -434,8 +428,8 @@ def _assessment(
     # unknown.
     known = closes and bool(np.isfinite(judged.u_in[i]))
 
-    def number_or_none(value: float, when: bool = closes) -> float | None:
-        return _number_or_none(value) if when else None
+    def number_or_none(value: float) -> float | None:
+        return _number_or_none(value) if closes else None
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.lower, cases, i) if known else None
@@ -443,7 +437,6 @@ def _assessment(
     size = math.nan if measured is None else measured
     # A failure that may be as new as a repair stands.
     is_new = inspection.is_since_repair(inspection.outcome_date) is not False
-    is_failed = inspection.outcome is Outcome.FAILED and is_new
     most = _explained_at_most(size, judged.upper, i)
     found = Assessment(
         inspection=inspection,
@@ -452,14 +445,12 @@ def _assessment(
         predicted_displacement_in=number_or_none(lower.displacement_in[i] + 0.0),
         over_travel_in=number_or_none(worst[0]),
         under_travel_in=number_or_none(worst[1]),
-        predicted_upper_in=number_or_none(judged.upper.displacement_in[i], True),
+        predicted_upper_in=_number_or_none(judged.upper.displacement_in[i]),
         margin_in=margin,
         remaining_in=number_or_none(margin - lower.displacement_in[i]),
         standard_uncertainty_in=number_or_none(judged.u_in[i]),
         probability_within_margin=float(judged.p_within[i]),
-        probability_exceed_random_directions=number_or_none(
-            judged.chance[i] if course.chance is None else course.chance
-        ),
+        probability_exceed_random_directions=number_or_none(judged.chance[i]),
         geometry_spread_in=(
             (
                 float(lower.spread_low_in[i]) + 0.0,
@@ -474,11 +465,14 @@ def _assessment(
         joints=findings,
         plan=course.plan,
         basis=judged.bases[i],
-        bound_in=number_or_none(lower.bound_in[i] + 0.0, True),
+        bound_in=_number_or_none(lower.bound_in[i] + 0.0),
         explained_at_most_in=number_or_none(most),
         unexplained_in=number_or_none(abs(size) - most),
         headline="",
-        alarm=sentences.alarms([f.joint for f in findings if f.over_limit], failed=is_failed),
+        alarm=sentences.alarms(
+            [f.joint for f in findings if f.over_limit],
+            failed=inspection.outcome is Outcome.FAILED and is_new,
+        ),
         repair_sets=sets if closes else None,
         warnings=_warnings(cases, i, findings, worst, float(judged.u_in[i])),
         posterior=course.posterior if closes else None,
@@ -618,7 +612,7 @@ def allowances(cases: Cases, lower: Prediction) -> Array:
     worst = lower.displacement_in
     slopes = reference.slopes(start)
     bend = np.diag(reference.worst_curvature)
-    sense = np.where(lower.worst.over_in >= -lower.worst.under_in, 1.0, -1.0)[:, None]
+    sense = reference.sense(start)[:, None]
     left = (cases.margin_in - worst)[:, None]
     room = np.maximum(gear.limits_in - start, 0.0)
     # Root of slope·t + ½·bend·t² = left, in the form that is stable where the curvature is zero.

@@ -109,7 +109,9 @@ def choose(
     minutes = minutes_of(gear, sets, opened[:, None])[1][of_row]
     check, reading = gear.rigging_check.value, gear.plunger_reading.value
     after = reading + gear.retraction.value
-    second = _second_minutes(gear)
+    # (13)
+    restore = median(joint.restore.value for joint in gear.joints)
+    second = restore / (THRESHOLDS.one_repair * gear.second_repair_chance.value)
     out *= second
     repeated = np.where(allowed, out, np.inf)
 
@@ -151,12 +153,6 @@ def choose(
     if not looked and checked.min() < now.min():
         return Choice(then=first_step(checked, place_checked))
     return first_step(now, place)
-
-
-def _second_minutes(gear: Gear) -> float:
-    """What a second repair costs (13). [min]"""
-    restore = median(joint.restore.value for joint in gear.joints)
-    return restore / (THRESHOLDS.one_repair * gear.second_repair_chance.value)
 
 
 def _bits(states: States, may: Mask, first: Mask) -> Wholes:
@@ -244,32 +240,39 @@ class Judged:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """The plan of one gear, its chance of leaving the margin with random directions where joints
-    were not read, the repairs that are offered, each with the chance of a second one, and which
-    joints explain its plunger.
+    """The plan of one gear, the repairs that are offered, each with the chance of a second one, and
+    which joints explain its plunger.
     """
 
     plan: Plan
-    chance: float | None
     repairs: Sequence[tuple[RepairKind, Mask, float | None]]
     posterior: Posterior | None
 
 
 def plans(
-    cases: Cases, judged: Judged, sure: Mapping[int, Sequence[Mask]], *, advice: bool, sets: bool
+    cases: Cases,
+    judged: Judged,
+    sure: Mapping[int, Sequence[Mask]] | None,
+    *,
+    advice: bool,
+    sets: bool,
 ) -> Iterator[Course]:
     """The course of each gear. `sure`: sets that bring the worst case within the margin."""
     complained = cases.beyond_margin & (cases.failed | cases.repaired)
-    unread = np.asarray((~cases.measured).any(axis=1)) & (cases.extension is None)
     needed = cases.failed | cases.repaired & (cases.beyond_margin | cases.over_limit.any(axis=1))
-    needed |= unread
-    beliefs = believed(cases, np.flatnonzero(needed).tolist())
+    unread = np.zeros_like(needed)
+    if sure is not None and cases.extension is None:
+        unread |= ~cases.measured.all(axis=1)
+        needed |= unread
+    # Failures are drawn of all that are believed of together.
+    drawn = (cases.failed & ~cases.clears_margin).astype(int)
+    beliefs = [believed(cases, np.flatnonzero(needed & (drawn == k)).tolist()) for k in (0, 1)]
     for row, is_needed in enumerate(needed.tolist()):
-        belief, place = next(beliefs) if is_needed else (None, 0)
+        belief, place = next(beliefs[drawn[row]]) if is_needed else (None, 0)
         builder = _PlanBuilder(cases, judged, belief, place, row)
         plan = builder.plan()
         repairs: list[tuple[RepairKind, Mask, float | None]] = []
-        for members in sure.get(row, ()):
+        for members in (sure or {}).get(row, ()):
             second = belief.second_repair(place, members) if belief and complained[row] else None
             repairs.append((RepairKind.SURE, members, second))
         if belief and sets and builder.tried is not None:
@@ -277,8 +280,9 @@ def plans(
             repairs.append((RepairKind.TRY, builder.tried, second))
         explained = advice and cases.failed[row] and builder.read_plunger
         posterior = explain(belief, place) if belief and explained else None
-        chance = float(belief.chance_random[place]) if belief and unread[row] else None
-        yield Course(plan, chance, repairs, posterior)
+        if belief and unread[row]:
+            judged.chance[row] = belief.chance_random[place]
+        yield Course(plan, repairs, posterior)
 
 
 class _PlanBuilder:
@@ -400,15 +404,18 @@ class _PlanBuilder:
         """A gear that failed: the plunger first, then what has the fewest expected minutes."""
         if not self.read_plunger or self._again():
             self._read_the_plunger(again=self.read_plunger)
+        cases = self.cases
+        i = self.row
+        over = cases.over_limit[i]
         joints, _rigging, elsewhere = self.belief.chances[self.place].tolist()
         if not self.read_plunger and joints < elsewhere:
             return self._restore_over_limit()._end(End.NOT_EXPLAINED)
-        cases = self.cases
-        i = self.row
+        if elsewhere > 1.0 - 1e-7:
+            return self._follow(Choice(restore=over if over.any() else None))
         choice = choose(
             self.gear,
             self.belief.states[self.place],
-            over=cases.over_limit[i],
+            over=over,
             worn=cases.removable[i],
             spare=cases.restorable[i],
             unread=~cases.measured[i] & cases.reachable[i],
@@ -722,7 +729,7 @@ _REPAIR_DAY, _LATER = date(9999, 12, 1), date(9999, 12, 2)
 
 
 def with_consequences(
-    found: Sequence[Assessment], cases: Cases, judge: Callable[[Cases], list[Assessment]]
+    found: Sequence[Assessment], cases: Cases, judge: Callable[[Cases], Judged]
 ) -> list[Assessment]:
     """Add to each plan what follows each outcome of its next action, judged by the same rule."""
     each = [[*_outcomes(a, cases.gear)] for a in found]
@@ -731,10 +738,13 @@ def with_consequences(
         for a, outcomes in zip(found, each, strict=True)
         for _outcome, changed in outcomes
     ]
-    judged = iter(judge(Cases.of(cases.gear, rows, fleet=cases.fleet)) if rows else ())
+    if not rows:
+        return [*found]
+    after = Cases.of(cases.gear, rows, fleet=cases.fleet)
+    courses = plans(after, judge(after), None, advice=False, sets=False)
 
     def follows(outcome: str) -> Consequence:
-        step = next(judged).next_action
+        step = next(courses).plan.steps[0]
         text = f"IF {outcome}, THEN {step.text[0].lower()}{step.text[1:]}"
         return Consequence(outcome, step.action, step.joints, step.minutes, text)
 

@@ -26,7 +26,7 @@ def sure_sets(cases: Cases, upper: Prediction) -> tuple[RepairSet, ...]:
     """Sets that hold in the worst case."""
     sure = repair.sure_sets(cases, upper, np.array([0])).get(0, ())
     offered = [(RepairKind.SURE, members, None) for members in sure]
-    return repair.repair_sets(cases, [repair.Course(repair.CONFIRM, None, offered, None)])[0]
+    return repair.repair_sets(cases, [repair.Course(repair.CONFIRM, offered, None)])[0]
 
 
 def repair_sets(
