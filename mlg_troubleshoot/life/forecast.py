@@ -510,7 +510,7 @@ class FleetLine:
 
     def by_when(self, gear: Gear) -> str:
         """When the gear is to be looked at: now, on a day, or after so many landings."""
-        if self.urgency.rank <= OVER_LIMIT:
+        if self.urgency.rank <= OVER_LIMIT or self.ahead.due_now:
             return "now"
         after = self.ahead.next_inspection_landings
         left = "-" if after is None else f"{landings_shown(after, gear)} landings"

@@ -120,7 +120,7 @@ def test_a_reading_counts_where_a_name_is_asked_for_and_an_initial_is_of_a_name(
 
 
 def test_of_a_line_only_what_is_wrong_is_refused_and_asked_for(sit: Sit, life: Life) -> None:
-    line = "#1 2 #2 0,15 #4 3 p 40 p 41 x p 42 landings x"
+    line = "#1 2 #2 0,15 landings x p 40 p 41 x #4 3 p 42"
     terminal = sit(*gear("f", "", line, "4", "done"), "")
     for said in ("#2 '0,15 thou' is", "Landings since overhaul 'x' is", "Plunger displacement '41"):
         assert f"✗ {said}" in terminal.screen

@@ -181,6 +181,12 @@ def test_an_undo_says_what_it_will_take_back(sit, begun, now, line, undone):
         assert getattr(now(), field) == getattr(before, field)
 
 
+def test_an_undo_of_a_doubted_reading_takes_back_no_visit_and_drops_nothing_else(sit, begun, now):
+    begun(*failed("8", "done"))
+    sit("N1 LH", "p 40", "#2 85 p 460 #3 9", "u", "u", "")
+    assert (now().clearance_in, now().readings_in) == ({3: 0.0045}, (0.046, 0.04))
+
+
 def test_undo_goes_back_visit_by_visit_to_the_first_one(sit, begun, life, now, capsys):
     begun(*LIMIT)
     sit("N1 LH", "restored 2", "", "4", "")

@@ -422,7 +422,8 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
     for n, own in enumerate(fleet_of(200, 4, 2)):
         last = own[-1]
         outside, over = ((True, False), (False, True), (True, True))[n % 3]
-        clearances = dict(last.clearance_in)
+        measured = outside and n % 2 == 0
+        clearances = dict.fromkeys(range(1, 11), 0.0074) if outside else dict(last.clearance_in)
         if over:
             clearances[int(rng.integers(1, 11))] = 0.0076 + 0.01 * float(rng.random())
         unknown = rng.random() < 0.2
@@ -430,7 +431,7 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
             last,
             clearance_in=clearances,
             gear_landings=None if unknown else last.gear_landings,
-            readings_in=(0.06,) if outside else (),
+            readings_in=(0.06,) if measured else (),
         )
         records += map(inspection_record, own)
     Store().add(records)
@@ -447,6 +448,7 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
     assert max(value for told in (*fleet, *pages) for value in shown(told)) == 0.0
     assert {told["next_inspection_landings"] for told in (*fleet, *pages)} == {0.0}
     assert all(line["due_date"] == line["inspection_date"] for line in fleet)
+    assert {line.by_when(gear) for line in lines} == {"now"}
 
 
 def test_a_joint_that_was_over_its_limit_before_and_is_not_read_again_still_counts() -> None:

@@ -278,12 +278,12 @@ class Asker:
         self._save()
 
     def _undo(self) -> None:
+        self._named.clear()
         if not self.entry.typed:
             self._say("   Nothing was typed yet.", "magenta")
             return
         name = self.entry.typed[-1]
         text = self.entry.cells.pop(name)
-        self._named.clear()
         self._say(f"– undone: {label_of(name)} {text or 'no answer'}", "magenta")
 
     def _answer(self, name: str, typed: str) -> None:
@@ -396,6 +396,8 @@ class Asker:
                     self._name_joint(name, text)
                 elif name not in READ_IN:
                     self._give(name, text)
+            except BackError:
+                self._undo()
             except UsageError as error:
                 self._refuse(error)
         return bool(words)

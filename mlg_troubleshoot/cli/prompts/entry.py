@@ -316,9 +316,9 @@ def split_words(line: str) -> list[tuple[str, str]]:
         rest = line[match.end() :]
         number = word.lstrip("# ")
         name = CLEARANCE.header(int(number)) if number.isdecimal() else _COLUMNS.get(word, "")
-        free = name and column_of(name).holds is Holds.TEXT
-        ends = _NEXT_JOINT if name in HEADING or joint_of(name) else _NEXT_WORD
-        following = None if free else ends.search(rest)
+        holds = column_of(name or OUTCOME.name).holds
+        ends = _NEXT_WORD if holds is Holds.JOINTS else _NEXT_JOINT
+        following = None if holds is Holds.TEXT else ends.search(rest)
         end = following.start() if following else len(rest)
         text, line = rest[:end].strip(" ,;"), rest[end:]
         if not name:
