@@ -142,7 +142,10 @@ def test_a_limit_stands_in_the_unit_and_the_convention_of_its_boxes(
     unit, convention, limit, gear, tmp_path
 ):
     write_form(tmp_path / "form.html", gear, unit=unit, convention=convention)
-    assert limit in readable((tmp_path / "form.html").read_text(encoding="utf-8"))
+    written = (tmp_path / "form.html").read_text(encoding="utf-8")
+    assert limit in readable(written)
+    # A choice that is made has no box to tick.
+    assert written.count('class="tick"') == 9 + 3 * (unit is None) + 3 * (convention is None)
 
 
 def test_the_form_asks_for_side_unit_convention_and_what_else_is_found_and_fills_in_none(
