@@ -77,6 +77,11 @@ def test_a_change_of_unit_or_convention_is_said(sit: Sit) -> None:
     assert "Readings are in mm, radial (before: thou, total play)." in screen
 
 
+def test_enter_alone_does_not_confirm_an_unusual_reading(sit: Sit, life: Life) -> None:
+    sit(*gear("f", "", "90", "", "9", "done"), "")
+    assert life().inspections[-1].inspection.clearance_in == {3: 0.0045}
+
+
 def test_a_word_that_is_no_outcome_is_refused_with_what_is_expected_and_asked_again(
     sit: Sit,
 ) -> None:

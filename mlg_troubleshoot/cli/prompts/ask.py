@@ -380,7 +380,9 @@ class Asker:
     def _instead(self, said: str, typed: str) -> str:
         """Say what is unusual; what is typed instead of it, empty if it is right."""
         self._say(said, "magenta")
-        again = self._typed("y = it is right; or type it again", said)
+        again = ""
+        while not again:
+            again = self._typed("y = it is right; or type it again", said)
         return "" if again.lower() in (*_YES, typed.lower()) else again
 
     # Lines of words.
