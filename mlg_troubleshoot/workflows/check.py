@@ -540,7 +540,11 @@ def _made(
 
 def _warned(rows: Sequence[Inspection | InvalidRow]) -> list[str]:
     """What is to be checked of the first rows that have warnings, and how many more there are."""
-    said = [f"{row.tail_no} {row.side}: {' '.join(row.warnings)}" for row in rows if row.warnings]
+    said = []
+    for row in rows:
+        if row.warnings:
+            gear = f"{row.tail_no} {row.side}: "
+            said.append(gear + " ".join(row.warnings).replace(gear, ""))
     more = f"{len(said) - _MOST_WARNED} more rows have warnings; --json lists all of them."
     return [*said[:_MOST_WARNED], *[more] * (len(said) > _MOST_WARNED)]
 
