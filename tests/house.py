@@ -60,7 +60,7 @@ WAYS = {
 # writes it down again.
 BUDGETS: dict[str, int] = {
     "(top)": 8614,
-    "cli": 25981,
+    "cli": 26000,
     "decision": 28353,
     "diagnosis": 33464,
     "gear": 11339,

@@ -55,6 +55,14 @@ def test_help_at_a_result_says_how_next_is_done(sit, begun):
     assert "Release the hydraulic pressure" in sit("N1 LH", "?", "").screen
 
 
+def test_what_is_read_where_next_asks_what_was_restored_is_of_the_new_joints(sit, life):
+    sit(*LIMIT, "")
+    screen = sit("N1 LH", "y", "#2 4", "2", "", "").screen
+    repaired, after = (kept.inspection for kept in life().inspections[-2:])
+    assert (repaired.restored_joints, repaired.clearance_in) == ((2,), {})
+    assert after.clearance_in == {2: 0.002}, screen
+
+
 def test_what_cannot_be_reached_changes_next_at_once(sit, capsys):
     sit(*LIMIT, "no spare 2", "cannot reach 5", "")
     said = capsys.readouterr().out

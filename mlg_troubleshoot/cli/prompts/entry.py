@@ -216,13 +216,17 @@ class Entry(msgspec.Struct, kw_only=True):
         """The columns that state a repair."""
         return [name for name in _REPAIR if self.cells.get(name) not in (None, "", "yes", "no")]
 
+    def _before_repair(self) -> set[str]:
+        """What was typed before a repair; nothing where the repair was NEXT, which was done."""
+        names, repair = [*self.cells], self._repair()
+        if not repair or {*repair} & {*(self.todo or ())}:
+            return set()
+        return {*names[: max(map(names.index, repair))]}
+
     def require_untyped(self, name: str) -> None:
         """Refuse a second value of what was found before a repair: one would be lost."""
-        names = [*self.cells]
         is_found = name in (OUTCOME.name, PLUNGER) or joint_of(name)
-        if not (is_found and self.cells.get(name)):
-            return
-        if any(names.index(each) > names.index(name) for each in self._repair()):
+        if is_found and self.cells.get(name) and name in self._before_repair():
             raise UsageError(
                 f"{label_of(name)} {self.cells[name]} was typed before the repair",
                 "End this entry with done; then type what was found after the repair.",
@@ -236,11 +240,10 @@ class Entry(msgspec.Struct, kw_only=True):
         repair = self._repair()
         if not repair:
             return [self.inspection(gear)]
-        last = max(map(names.index, repair))
         done = self.cells.get(REPAIR_DATE) or self.day.isoformat()
         facts = {name for name in names if joint_of(name) or name in (*_FACTS, *DAY_OF.values())}
         found = facts - {*repair, REPAIR_DATE}
-        before = {name for name in found if names.index(name) < last}
+        before = found & self._before_repair()
         parts = (
             ({*before}, self.day.isoformat()),
             ({*repair, REPAIR_DATE}, done),
