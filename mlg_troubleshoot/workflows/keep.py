@@ -351,9 +351,13 @@ def move(store: Store, wrong: Record, gear: GearKey, why: str) -> Record:
         raise UsageError(
             f"{wrong.record_id} is of {' '.join(gear)} already", "Give another tail or side."
         )
-    own = lives_of(store, [(wrong.tail_no, wrong.side)])[wrong.tail_no, wrong.side]
-    entered = next(each.place for each in own.inspections if each.kept.digest == wrong.digest)
-    row = under_a_free_id(replace(row, tail_no=gear[0], side=Side(gear[1])), store)
+    found = lives_of(store, [(wrong.tail_no, wrong.side), gear])
+    own = found[wrong.tail_no, wrong.side].inspections
+    entered = next(each.place for each in own if each.kept.digest == wrong.digest)
+    # What stood there under its name and no longer counts may be this one, before it was moved.
+    used = {each.kept.record_id for each in found[gear].inspections} if gear in found else ()
+    name = _free_id(row.record_id, used)
+    row = replace(row, record_id=name, tail_no=gear[0], side=Side(gear[1]))
     moved = inspection_record(row, moved_from=wrong.key, entered=entered)
     # Moved back it differs from the record that was moved away from there.
     moved = replace(moved, identity=())

@@ -81,6 +81,19 @@ def test_a_moved_inspection_is_one_inspection_of_the_other_gear(store: Path) -> 
     assert came.inspections[0].inspection.clearance_in[3] == 0.0121
 
 
+def test_what_was_amended_elsewhere_keeps_its_name_where_it_is_moved_back(store: Path) -> None:
+    keep(store, visit("R1", "2026-01-01", clearance_3_in="0.0121"))
+    more = ("--store", store)
+    for done in (
+        ("move", "R1", "N123", "RH", "--why", "wrong side"),
+        ("amend", "R1", "6=0.0121in"),
+        ("move", "R1", "N123", "LH", "--why", "the first was right"),
+    ):
+        assert mlg("history", *done, *more).code == 0
+    (life,) = [each for each in lives(Store(store)).values() if each.inspections]
+    assert [each.kept.record_id for each in life.inspections] == ["R1"]
+
+
 def test_an_inspection_is_not_moved_to_its_own_gear(store: Path) -> None:
     keep(store, visit("R1", "2026-01-01"))
     moved = mlg("history", "move", "R1", "N123", "LH", "--why", "x", "--store", store)
