@@ -60,7 +60,6 @@ _ENDS = {
     End.OUTSIDE_NO_COMPLAINT: "Refer to engineering: outside its margin, no failure recorded",
     End.CANNOT_CLEAR: "Refer to engineering: no repair brings it within its margin",
 }
-_DONE = "Done: no further action on the joints"
 # How a step begins that the day forces, whatever the end.
 STOP = "Stop for today"
 
@@ -68,7 +67,7 @@ STOP = "Stop for today"
 def in_brief(step: Step, end: End) -> str:
     """Say the next action in words that stand alone: the same on screen, in files and on paper."""
     if step.action is Action.DONE:
-        return _DONE
+        return step.text.partition(".")[0]
     if step.action is Action.CONTINUE:
         stops = step.text.startswith(STOP)
         return f"{STOP}: hand over what stays open" if stops else _ENDS[end]

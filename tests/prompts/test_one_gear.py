@@ -86,7 +86,7 @@ def test_a_word_that_is_no_outcome_is_refused_with_what_is_expected_and_asked_ag
     sit: Sit,
 ) -> None:
     screen = sit(*gear("total", "f", "", "done"), "").screen
-    refused = "'total' is not accepted: expected RETRACTED or FAILED. Did it retract?"
+    refused = "'total' is not accepted: expected r (retracted), f (failed) or n (not tried). Did it"
     assert refused in " ".join(screen.split())
 
 
@@ -182,10 +182,56 @@ def test_a_plunger_that_can_hardly_be_is_asked_for_again(sit, life, again, typed
     assert life().inspections[-1].inspection.readings_in == (0.046,)
 
 
-def test_undo_says_what_it_takes_back_and_asks_for_it_again(sit: Sit, life: Life) -> None:
-    screen = sit(*gear("f", "46", "18", "u", "8", "done"), "").screen
-    assert "– undone: #3 18 thou" in screen
-    assert life().inspections[-1].inspection.clearance_in == {3: 0.004}
+UNDONE = {
+    "#3 9": "#3 9 thou, 8 thou again",
+    "#3 none": "#3 none, 8 thou again",
+    "p 41": "plunger displacement 46 thou; 41 thou, 46 thou again",
+    "plunger none": "plunger displacement none, 46 thou again",
+    "r": "outcome RETRACTED, FAILED again",
+    "#5 2 landings 4000": "#5 2 thou, landings since overhaul 4000",
+    "done": "#5 none, #2 none, #4 none, #1 none, #6 none, #7 none, #8 none, #9 none, #10 none",
+}
+
+
+@pytest.mark.parametrize("line", UNDONE)
+def test_undo_says_what_it_takes_back_and_brings_back_what_was_there(sit, life, line) -> None:
+    terminal = sit(*gear("f", "46", "8", line, "u", "#4 3", "done"), "")
+    assert f"– undone: {UNDONE[line]}\n" in terminal.screen
+    found = life().inspections[-1].inspection
+    assert (found.outcome, found.readings_in) == ("FAILED", (0.046,))
+    assert (found.clearance_in, found.gear_landings) == ({3: 0.004, 4: 0.0015}, None)
+
+
+@pytest.mark.parametrize("line", ["p none", "plunger none"])
+def test_a_plunger_that_was_not_read_is_taken_out_and_said(sit, life, line) -> None:
+    screen = sit(*gear("f", "46; 41", "8", line, "done"), "").screen
+    assert "✓ plunger displacement none, was 46 thou; 41 thou" in screen
+    assert life().inspections[-1].inspection.readings_in == ()
+
+
+@pytest.mark.parametrize("again", ["u", "n"])
+def test_undo_at_a_doubt_takes_the_doubted_answer_back_and_no_good_one(sit, life, again) -> None:
+    terminal = sit(*gear("f", "46", "8", "85", again, "9", "p 460", again, "done"), "")
+    assert "– undone: #5 85" in terminal.screen
+    found = life().inspections[-1].inspection
+    assert (found.clearance_in, found.readings_in) == ({3: 0.004, 5: 0.0045}, (0.046,))
+
+
+@pytest.mark.parametrize("line", ["p 44", "f p 44", "#4 3 p 44", "landings 4000 p 44"])
+def test_words_are_understood_where_side_unit_and_convention_are_asked_for(sit, life, line) -> None:
+    for question in range(1, 4):
+        answers = [f"N{question}", "LH", "thou", "play"]
+        answers.insert(question, line)
+        sit(*answers, *["f"] * (line[0] != "f"), "done", *END, "")
+        assert life(tail=f"N{question}").inspections[-1].inspection.readings_in == (0.044,)
+
+
+@pytest.mark.parametrize("doubted", ["85", "p 460", "#4 85"])
+def test_words_are_understood_at_a_doubt(sit, life, doubted) -> None:
+    typed = ("f", "", doubted, "landings 4000", "p 44", "#4 3", *["y"] * (doubted == "85"))
+    sit(*gear(*typed, "done"), "")
+    found = life().inspections[-1].inspection
+    assert (found.readings_in, found.gear_landings) == ((0.044,), 4000)
 
 
 def test_a_joint_is_named_to_jump_to_it_or_to_give_its_reading(sit: Sit, life: Life) -> None:

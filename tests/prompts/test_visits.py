@@ -17,7 +17,7 @@ from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.store import Store
 from tests.cli.conftest import mlg
 from tests.prompts.scripted import Sit, sitting
-from tests.prompts.test_one_gear import TEN, failed
+from tests.prompts.test_one_gear import TEN, failed, gear
 
 Life = Callable[..., GearLife]
 Now = Callable[..., Inspection]
@@ -101,8 +101,9 @@ def test_five_visits_lead_to_done_with_few_keys(sit, now, capsys):
     assert 2 in found.restored_joints
     assert (found.outcome, found.standing_readings_in) == ("RETRACTED", (0.012,))
     assert "NEXT: Sign the repair off" in capsys.readouterr().out
-    assert "✗" not in sit("N1 LH", "y", "").screen
-    assert "report writes what is to be signed" in capsys.readouterr().err
+    screen = sit("N1 LH", "y", "").screen
+    assert "y = I did NEXT" not in screen
+    assert "✗ Nothing is typed for NEXT. report writes what is to be signed." in screen
 
 
 def test_a_failure_after_the_repair_on_its_day_counts(sit, begun, life, capsys):
@@ -187,6 +188,31 @@ def test_an_undo_says_what_it_will_take_back(sit, begun, now, line, undone):
     sit("N1 LH", "u", "")
     for field in ("readings_in", "outcome", "clearance_in", "rigging_checked"):
         assert getattr(now(), field) == getattr(before, field)
+
+
+CORRECTIONS = {
+    "plunger none": "correction of plunger +46 thou, plunger +41 thou",
+    "#3 none": "correction of #3 8 thou",
+    "landings 4000": "correction of landings since overhaul",
+    "side RH landings 4000": "move to N1 RH",
+}
+
+
+@pytest.mark.parametrize("line", CORRECTIONS)
+def test_an_undo_of_a_correction_brings_back_exactly_what_was_there(sit, begun, life, line, capsys):
+    begun(*gear("f", "46; 41", "8", "done"))
+    before = facts(life())
+    screen = sit("N1 LH", line, "u", "").screen
+    assert f"u = undo the {CORRECTIONS[line]}" in screen
+    assert f"Undone: the {CORRECTIONS[line]}." in capsys.readouterr().err
+    assert facts(life()) == before
+
+
+def test_a_plunger_that_was_none_is_taken_out_of_the_visit_that_has_it(sit, begun, now, capsys):
+    begun(*gear("f", "46; 41", "8", "done"))
+    sit("N1 LH", "#5 7", "p none", "")
+    assert now().readings_in == ()
+    assert "Not changed" not in capsys.readouterr().err
 
 
 def test_an_undo_of_a_doubted_reading_takes_back_no_visit_and_drops_nothing_else(sit, begun, now):

@@ -16,7 +16,11 @@ from .places import table
 SOUND = {f"clearance_{n}_in": "0.0011" for n in range(1, 11)}
 FAR, WORN = "0.06", "0.0121"
 # What comes next on a gear with which nothing is the matter.
-FINE = ("Done: no further action on the joints", "Go on with fault isolation: within its margin")
+FINE = (
+    "Nothing is required",
+    "Sign the repair off in the aircraft's records",
+    "Go on with fault isolation: within its margin",
+)
 REPAIRED = {"restored_joints": "6", "repair_date": "2026-01-05"}
 
 

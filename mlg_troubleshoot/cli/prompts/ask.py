@@ -19,6 +19,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     REPAIR_DATE,
     WORD_HELP,
     Entry,
+    column_of,
     joint_of,
     label_of,
     split_words,
@@ -45,6 +46,8 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, with_unit
 _FOLLOW_HELP = "new: a new inspection of this gear. gear: another gear. open: opens the report."
 _UNUSUAL = "unusual"
 _YES = ("y", "yes")
+# RH or radial, and "no", are not what the gear did.
+_NO_WORD = {SIDE.name: "r", UNIT.name: "r", CONVENTION.name: "r", _UNUSUAL: "n"}
 _HOW = {
     ClearanceConvention.RADIAL: "half of a dial reading from limit to limit, or of hole minus pin.",
     ClearanceConvention.DIAMETRAL: "hole by a bore gauge where it is worn most, minus pin by a"
@@ -135,19 +138,25 @@ class Asker:
         """
         self.known = visit
         day = self._stated.get(DATE.name)
-        keys = ["y = I did NEXT" + f" on {day}" * bool(day), "d = details", "report"]
+        keys = ["y = I did NEXT" + f" on {day}" * bool(day)] * bool(visit.todo)
+        keys += ["d = details", "report"]
         keys += [f"u = undo {visit.undoes}"] * bool(visit.undoes)
         self._say("   ".join([*keys, "new", "gear", "?"]), "dim")
         while True:
             try:
                 typed = self._typed("Enter ends", f"{visit.step.how}\n{_FOLLOW_HELP}".strip())
                 word = typed.lower()
-                if word in ("", "d", "report", "open") or (word == "y" and not visit.todo):
+                if word in ("", "d", "report", "open"):
                     return word
+                if word == "y" and not visit.todo:
+                    raise UsageError(
+                        "Nothing is typed for NEXT", "report writes what is to be signed."
+                    )
                 if word == "gear":
                     return self.begin({})
                 self.entry = self._next_entry(visit, word)
-                if not (word in ("new", "y") or self._take(typed)):
+                self.entry.mark()
+                if not (word in ("new", "y") or (word != "n" and self._take(typed))):
                     raise UsageError(f"{typed!r} is not understood", "Type ? for the words.")
             except (EOFError, KeyboardInterrupt):
                 self._say("")
@@ -220,7 +229,7 @@ class Asker:
             except UsageError as error:
                 # Answers that contradict each other: the last one is asked for again.
                 self._refuse(error)
-                if not self.entry.typed:
+                if not self.entry.past:
                     raise
                 self._undo()
             else:
@@ -267,7 +276,12 @@ class Asker:
                 self.entry = Entry.new(self.gear, kept)
                 self._named.clear()
             else:
+                self.entry.mark()
                 self._answer(name, typed)
+                if {*READ_IN} <= self.entry.cells.keys():
+                    lines, self.entry.waiting = self.entry.waiting, []
+                    for line in lines:
+                        self._take(line)
                 # The joint that was asked for waits until it is answered.
                 if joint_of(name) and name not in (*self.entry.cells, *self._named):
                     self._named.insert(0, name)
@@ -279,12 +293,8 @@ class Asker:
 
     def _undo(self) -> None:
         self._named.clear()
-        if not self.entry.typed:
-            self._say("   Nothing was typed yet.", "magenta")
-            return
-        name = self.entry.typed[-1]
-        text = self.entry.cells.pop(name)
-        self._say(f"– undone: {label_of(name)} {text or 'no answer'}", "magenta")
+        said = self.entry.take_back()
+        self._say(f"– undone: {said}" if said else "   Nothing was typed yet.", "magenta")
 
     def _answer(self, name: str, typed: str) -> None:
         """Take an answer, or a line of words, which counts at every question."""
@@ -294,14 +304,20 @@ class Asker:
                 if each not in self.entry.cells:
                     self.entry.give(each, "")
             return
-        if name == _UNUSUAL and PLUNGER in dict(split_words(typed)):
-            # It is typed again, not once more.
-            self.entry.cells.pop(PLUNGER, None)
         if name in _OPTIONAL and typed.lower() == "done":
             typed = ""
-        # One letter at the heading is a slip, or begins a tail number; it is no reading.
-        is_word = name not in HEADING or typed[1:2].isalpha()
-        if not (is_word and self._take(typed)):
+        # A letter that begins a tail number, or may answer the question otherwise, is no word.
+        is_word = typed.lower() != _NO_WORD.get(name)
+        if name == TAIL_NO.name:
+            is_word = typed[1:2].isalpha()
+        earlier = ""
+        if name == _UNUSUAL and PLUNGER in dict(split_words(typed)):
+            # It is typed again, not once more.
+            earlier = self.entry.cells.pop(PLUNGER, "")
+        is_taken = is_word and self._take(typed)
+        if earlier:
+            self.entry.cells.setdefault(PLUNGER, earlier)
+        if not is_taken:
             self._answer_question(name, typed or self._enters(name))
 
     def _answer_question(self, name: str, text: str) -> None:
@@ -369,21 +385,32 @@ class Asker:
             self._say(f"– #{number} not read{was}", "dim")
             return
         read, said = self.entry.judge(self.gear, name, with_unit(typed, self.entry.unit))
-        if said and (again := self._instead(f"#{number}: {said}", typed)):
-            self._answer(name, again)
+        if said and not self._confirmed(name, f"#{number}: {said}", typed):
             return
         self._named = [each for each in self._named if each != name]
         entered = read.entered.get(number)
         self.entry.give(name, str(entered) if entered else "")
         self._echo(number, read, was)
 
-    def _instead(self, said: str, typed: str) -> str:
-        """Say what is unusual; what is typed instead of it, empty if it is right."""
+    def _confirmed(self, name: str, said: str, text: str) -> bool:
+        """Say what is unusual, and whether it is right; else what was typed instead was taken."""
         self._say(said, "magenta")
-        again = ""
-        while not again:
-            again = self._typed("y = it is right; or type it again", said)
-        return "" if again.lower() in (*_YES, typed.lower()) else again
+        while True:
+            try:
+                again = self._typed("y = it is right; or type it again", said)
+            except BackError:
+                again = "no"
+            if again.lower() in (*_YES, text.lower()):
+                return True
+            if again.lower() in ("n", "no"):
+                self._named = [each for each in self._named if each != name]
+                self._say(f"– undone: {label_of(name)} {text}", "magenta")
+                return False
+            if again:
+                self._answer(name, again)
+                words = dict(split_words(again))
+                if not words or name in words:
+                    return False
 
     # Lines of words.
 
@@ -392,14 +419,17 @@ class Asker:
         words = split_words(line)
         if units := [text for name, text in words if name in READ_IN]:
             self._answer_unit(" ".join(units))
+        lengths = [name for name, _ in words if column_of(name).is_length]
+        if words and not {*READ_IN} <= self.entry.cells.keys() and (lengths or self.entry.waiting):
+            self.entry.waiting.append(line)
+            self._say(f"   {line} counts once unit and convention are known.")
+            return True
         for name, text in words:
             try:
                 if joint_of(name):
                     self._name_joint(name, text)
                 elif name not in READ_IN:
                     self._give(name, text)
-            except BackError:
-                self._undo()
             except UsageError as error:
                 self._refuse(error)
         return bool(words)
@@ -414,26 +444,28 @@ class Asker:
 
     def _give(self, name: str, text: str) -> None:
         """Give a column, and say what was taken."""
-        before = {**self.entry.cells}
-        taken = self.entry.take(self.gear, name, text)
-        said = self._doubted() if PLUNGER in taken else ""
-        if said and (again := self._instead(said, "")):
-            self.entry.cells = before
-            self._give(PLUNGER, again)
+        taken = self.entry.accepted_with_day(self.gear, name, text)
+        said = self._doubted(taken[PLUNGER]) if taken.get(PLUNGER) else ""
+        if said and not self._confirmed(PLUNGER, said, text):
             return
-        given = (f"{label_of(name)} {self.entry.cells[name] or 'none'}" for name in taken)
+        given = []
+        for column, kept in taken.items():
+            before = self.entry.cells.get(column)
+            was = f", was {before}" if before and not kept else ""
+            given.append(f"{label_of(column)} {kept or 'none'}{was}")
+            self.entry.give(column, kept)
         self._say(f"✓ {', '.join(given)}", "green")
 
-    def _doubted(self) -> str:
+    def _doubted(self, text: str) -> str:
         """What is said of a plunger reading beyond what all joints at their limits could cause, or
         in another unit.
         """
-        read = self._judged(PLUNGER)
+        read, _ = self.entry.judge(self.gear, PLUNGER, text)
         most_in = float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
         if max(map(abs, read.readings_in)) <= most_in:
             return read.unit_question
         return (
-            f"Plunger {self.entry.cells[PLUNGER]}: all joints at their limits could move it"
+            f"Plunger {text}: all joints at their limits could move it"
             f" {self._length(most_in)} at most."
         )
 

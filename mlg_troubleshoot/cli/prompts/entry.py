@@ -48,6 +48,7 @@ from mlg_troubleshoot.units import (
 )
 
 PLUNGER = PLUNGER_DISPLACEMENT.name
+PLUNGERS = tuple(map(PLUNGER_DISPLACEMENT.header, range(1, PLUNGER_DISPLACEMENT.copies + 1)))
 REPAIR_DATE = "repair_date"
 # What gear is entered, and what its readings are.
 IDENTITY = (TAIL_NO.name, SIDE.name)
@@ -58,6 +59,7 @@ FIRST = (*HEADING, OUTCOME.name, PLUNGER)
 LAST = (TECHNICIAN_ID.name, GAUGE_ID.name)
 OUTCOMES = {"f": "FAILED", "failed": "FAILED", "r": "RETRACTED", "retracted": "RETRACTED"}
 OUTCOMES |= {"n": "", "not tried": ""}
+_ANSWERS = "r (retracted), f (failed) or n (not tried)"
 # What is typed at any prompt, and its column.
 _COLUMNS = {
     **dict.fromkeys(("plunger", "p"), PLUNGER),
@@ -80,7 +82,7 @@ _COLUMNS = {
     "pressure": PRESSURE.name,
 }
 WORD_HELP = """At any question:
-  #7 13, p 46      joint 7, the plunger; #7 none clears it, #7 goes to it
+  #7 13, p 46      joint 7, the plunger; #7 none or p none clears it, #7 goes to it
   f, r, n          failed, retracted, not tried
   restored 3 5 on 25 Nov, rigging yes (checked and right; or corrected)
   date 20 Nov, unit mm, convention play      for what is typed from here on
@@ -105,7 +107,8 @@ class Entry(msgspec.Struct, kw_only=True):
     """The answers of one sitting as they were typed, in the order in which they came.
 
     A column that was asked for and not answered has an empty text. `todo`: the columns that NEXT
-    asks for, None for a new inspection; `given`: the columns that were not typed here.
+    asks for, None for a new inspection; `given`: the columns that were not typed here; `waiting`:
+    lines that wait for their unit; `past`: these three as they stood before each answer.
     """
 
     id: str
@@ -114,6 +117,8 @@ class Entry(msgspec.Struct, kw_only=True):
     cells: dict[str, str] = {}
     given: list[str] = []
     todo: list[str] | None = None
+    waiting: list[str] = []
+    past: list[tuple[dict[str, str], list[str], list[str]]] = []
 
     @classmethod
     def new(cls, gear: Gear, cells: dict[str, str], todo: list[str] | None = None) -> Entry:
@@ -167,6 +172,23 @@ class Entry(msgspec.Struct, kw_only=True):
         self.cells[name] = text
         self.given = [each for each in self.given if each != name]
 
+    def mark(self) -> None:
+        """Let the next answer be one that can be taken back."""
+        self.past.append(({**self.cells}, [*self.given], [*self.waiting]))
+
+    def take_back(self) -> str:
+        """Return to what stood before the last answer; that answer in words, empty if none."""
+        last, lines = self.cells, self.waiting
+        while self.past and (self.cells, self.waiting) == (last, lines):
+            self.cells, self.given, self.waiting = self.past.pop()
+        said = lines[len(self.waiting) :]
+        for name, text in last.items():
+            before = self.cells.get(name)
+            if before != text:
+                again = f", {before} again" if before else ""
+                said.append(f"{label_of(name)} {text or 'none'}{again}")
+        return ", ".join(said)
+
     def judge(self, gear: Gear, name: str, text: str) -> tuple[Inspection, str]:
         """Let the gate of tables judge an answer: what it reads, and what it wants confirmed."""
         is_joint = joint_of(name) is not None
@@ -175,9 +197,9 @@ class Entry(msgspec.Struct, kw_only=True):
         for each in text.split(";") if name == PLUNGER else [text]:
             read, problems = judge_length(name, each.strip(), options)
             if problems or not isinstance(read, Inspection):
+                expected = _ANSWERS if name == OUTCOME.name else problems[0].expected
                 raise UsageError(
-                    f"{label_of(name)} {each.strip()!r} is not accepted: expected"
-                    f" {problems[0].expected}",
+                    f"{label_of(name)} {each.strip()!r} is not accepted: expected {expected}",
                     " ".join(at_prompt(problem.remedy) for problem in problems),
                 )
             rows.append(read)
@@ -258,16 +280,14 @@ class Entry(msgspec.Struct, kw_only=True):
                 rows.append(part.inspection(gear))
         return rows
 
-    def take(self, gear: Gear, name: str, typed: str) -> list[str]:
-        """Take a column and its day, both or none; the columns that were given are returned."""
+    def accepted_with_day(self, gear: Gear, name: str, typed: str) -> dict[str, str]:
+        """The texts of a column and of its day as they are kept, both or none."""
         text, _, day = typed.partition(" on ") if name in DAY_OF else (typed, "", "")
         taken = {name: self.accepted(gear, name, text)}
         if day:
             taken[DAY_OF[name]] = day_of(day, self.started.date())
         self.require_untyped(name)
-        for column, kept in taken.items():
-            self.give(column, kept)
-        return [*taken]
+        return taken
 
     def accepted(self, gear: Gear, name: str, typed: str) -> str:
         """A text of a column as it is kept; a plunger reading stands after an earlier one."""
@@ -278,7 +298,7 @@ class Entry(msgspec.Struct, kw_only=True):
             return day_of(typed, self.started.date())
         if name == SIDE.name:
             return Side.parse(typed).value
-        if typed.lower() == "none" and name in ("cannot_reach", "no_spare"):
+        if typed.lower() == "none" and name not in HEADING:
             return ""
         if not column.is_length:
             if typed:

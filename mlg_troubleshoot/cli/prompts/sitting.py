@@ -11,15 +11,30 @@ from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.prompts.ask import Asker
-from mlg_troubleshoot.cli.prompts.entry import HEADING, Entry, joint_of
-from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit, continued, find_visit
+from mlg_troubleshoot.cli.prompts.entry import (
+    HEADING,
+    PLUNGER,
+    PLUNGERS,
+    Entry,
+    column_of,
+    joint_of,
+    label_of,
+)
+from mlg_troubleshoot.cli.prompts.visit import (
+    SavedEntries,
+    Terminal,
+    Visit,
+    continued,
+    facts,
+    find_visit,
+)
 from mlg_troubleshoot.decision.columns import UNIT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.judge_rows import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.state import GearKey, key_of
-from mlg_troubleshoot.store import inspection_from
+from mlg_troubleshoot.store import RecordKind, inspection_from, inspection_record
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.keep import add_typed, amend, move, voids
@@ -92,19 +107,20 @@ class Sitting:
             if own and left:
                 say = f"Not typed at this sitting and not moved: {', '.join(left)}. Move one:"
                 output.say(f"{say} mlg history move HASH {entry.identity} --why TEXT")
+        undoes = f"the move to {entry.identity}"
+        corrected: tuple[Record, ...] = ()
         if known is not None and not entry.has_findings:
-            self._amend(entry, moved or known.records)
+            said, corrected = self._amend(entry, moved or known.records)
+            undoes = undoes if moved else f"the correction of {said}"
         else:
             moved = []
             self._add(entry)
         visit = self._published(*key)
         self._asker.saved.finish(entry)
-        if known is None or not moved:
+        if known is None or not (moved or corrected):
             return visit
         ids = frozenset(each.record_id for each in moved)
-        return replace(
-            visit, undoes=f"the move to {entry.identity}", moved=(key_of(known.row), ids)
-        )
+        return replace(visit, undoes=undoes, moved=(key_of(known.row), ids), corrected=corrected)
 
     def _add(self, entry: Entry) -> None:
         """Keep what was found."""
@@ -133,29 +149,46 @@ class Sitting:
             output.say(f"Moved {of} from {' '.join(key_of(visit.row))} to {' '.join(key)}.")
         return moved
 
-    def _amend(self, entry: Entry, records: Sequence[Record]) -> None:
-        """Correct what does not belong to one finding in the visit that was recorded last; a joint
-        that was not read, in the last one that reads it.
+    def _amend(self, entry: Entry, records: Sequence[Record]) -> tuple[str, tuple[Record, ...]]:
+        """Correct what does not belong to one finding in the visit that was recorded last; what was
+        not found after all, in the last one that states it. What was corrected is returned, in
+        words and as it was.
         """
-        changed = [name for name in entry.typed if name not in HEADING]
-        changes = {name: entry.cells[name] for name in changed}
-        joints = {*map(joint_of, changed)}
-        read = [each for each in records if joints & inspection_from(each).clearance_in.keys()]
-        try:
-            if changes:
-                amend(self._place, self._gear, (read or records)[-1], changes)
-        except UsageError as error:
-            output.say(f"Not changed: {error.message}. {error.remedy}")
+        changes: dict[str, dict[str, str]] = {}
+        of = {each.key: each for each in records}
+        for name in (name for name in entry.typed if name not in HEADING):
+            text = entry.cells[name]
+            states = [each for each in records if text or _is_stated(each, name)]
+            columns = PLUNGERS if name == PLUNGER else (name,)
+            changes.setdefault((states or records)[-1].key, {}).update(dict.fromkeys(columns, text))
+        said: list[str] = []
+        corrected = []
+        for key, texts in changes.items():
+            row = inspection_from(of[key])
+            try:
+                right = inspection_from(amend(self._place, self._gear, of[key], texts))
+            except UsageError as error:
+                output.say(f"Not changed: {error.message}. {error.remedy}")
+                continue
+            were, are = (facts(each, self._gear, entry.unit) for each in (row, right))
+            said += [fact for fact in were if fact not in are] or map(label_of, texts)
+            corrected.append(of[key])
+        return ", ".join(said), tuple(corrected)
 
     def _undo(self, visit: Visit) -> Visit:
-        """Take the last visit back, or the move of visits to this gear."""
+        """Take the last visit back, or a correction or a move of visits to this gear."""
         if not visit.undoes:
             output.say("Nothing is left to undo.")
             return visit
         key, ids = visit.moved or (key_of(visit.row), ())
+        newest = {each.record_id: each for each in visit.records}
+        for each in visit.corrected:
+            row, wrong = inspection_from(each), newest[each.record_id].key
+            self._place.add([inspection_record(row, RecordKind.CORRECTION, supersedes=wrong)])
         if ids:
-            self._move(visit, [each for each in visit.records if each.record_id in ids], key)
-        else:
+            here = self._visit(visit.row.tail_no, visit.row.side) or visit
+            self._move(here, [each for each in here.records if each.record_id in ids], key)
+        elif not visit.corrected:
             self._place.add([voids(visit.records[-1], "taken back at the prompts")])
         output.say(f"Undone: {visit.undoes}.")
         return self._published(*key)
@@ -176,9 +209,6 @@ class Sitting:
 
     def _show(self, word: str, visit: Visit) -> None:
         unit = self._unit(visit)
-        if word == "y":
-            output.say("Nothing is typed for it. report writes what is to be signed; Enter ends.")
-            return
         if word == "d":
             self._run.show(visit.result, unit, detail=True)
             return
@@ -197,3 +227,9 @@ class Sitting:
         if other is not None and not listed(other.result.judgements)[0].is_fine:
             brief = other.result.judgements[0].in_brief
             output.say(f"Open on {other.row.tail_no} {side}: {brief}.")
+
+
+def _is_stated(record: Record, name: str) -> bool:
+    """Whether a visit says something in a column."""
+    row, joint = inspection_from(record), joint_of(name)
+    return joint in row.clearance_in if joint else bool(row.value(column_of(name).filled))

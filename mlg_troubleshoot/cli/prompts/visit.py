@@ -60,7 +60,8 @@ class Visit:
 
     row: what stands. records: its visits in the order of their entry. last: the last reading of
     each joint with its day. undoes: what an undo takes back, which is the last visit; empty if
-    nothing. moved: or the gear that visits were moved from, with their ids.
+    nothing. moved: or the gear that visits were moved from, with their ids. corrected: or what they
+    said before.
     """
 
     records: tuple[Record, ...]
@@ -69,6 +70,7 @@ class Visit:
     last: Mapping[int, str]
     undoes: str = ""
     moved: tuple[GearKey, frozenset[str]] | None = None
+    corrected: tuple[Record, ...] = ()
 
     @property
     def step(self) -> Step:
@@ -103,10 +105,14 @@ def find_visit(
     row = state.inspection
     undoes = ""
     if len(life.visits) > 1 and visits[-1].inspection.source.file is None:
-        lines = shortened(visit_lines(visits[-1].inspection, gear))
-        unit = row.unit_entered or LengthUnit.INCH
-        undoes = ", ".join(said_in(line.text, unit) for line in lines)
+        undoes = ", ".join(facts(visits[-1].inspection, gear, row.unit_entered))
     return Visit(tuple(each.kept for each in visits), row, judge(state), last, undoes)
+
+
+def facts(row: Inspection, gear: Gear, unit: LengthUnit | None) -> list[str]:
+    """What a visit found and did, as the log says it."""
+    lines = shortened(visit_lines(row, gear))
+    return [said_in(line.text, unit or LengthUnit.INCH) for line in lines]
 
 
 def continued(known: Visit, row: Inspection, entry: Entry) -> Inspection:
