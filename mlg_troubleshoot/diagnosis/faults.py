@@ -26,7 +26,7 @@ from scipy.special import gammaln, logsumexp
 from mlg_troubleshoot.arrays import Array, Mask, Places, Probability, log_sum, numbered
 from mlg_troubleshoot.decision.columns import LANDINGS
 from mlg_troubleshoot.decision.sentences import LEAST_ALIKE
-from mlg_troubleshoot.diagnosis.causes.base import Scene
+from mlg_troubleshoot.diagnosis.causes.base import MOST_UNREAD, Scene
 from mlg_troubleshoot.diagnosis.noise import FREEDOM, robust_scale, student
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import (
@@ -408,8 +408,6 @@ def _usual(table: DiagnosisTable, trusted: Mask) -> tuple[Array, Array]:
     return history.expected_in, np.sqrt(variance + _LEAST_SPREAD_IN**2)
 
 
-# Share of clearances that are known to be cut off, from which their effects are. [1]
-_MANY_CUT = 0.1
 # With fewer rows nothing is said of them. [1]
 LEAST_ROWS = 5
 # Chance of a false statement about the data of a table. [1]
@@ -525,7 +523,7 @@ def doubt_of(found: tuple[DataCondition, ...]) -> str:
     str
         The reason, empty without one.
     """
-    cut = "; ".join(c.where for c in found if c.doubtful and c.share > _MANY_CUT)
+    cut = "; ".join(c.where for c in found if c.doubtful and c.share > MOST_UNREAD)
     return (
         f"Causes of joints, of scale, of wear and of rigging are not named: {cut}." if cut else ""
     )

@@ -36,12 +36,11 @@ _LEAST_ROWS = 20
 # or 50 % of the clearances blank (seeds 2,001,555 and on) three had a worn gear named as re-rigged
 # at 1, none at this. [1]
 _HEAVY_TAILS = 1.5
-# Wear of a joint that nobody read over the mean of the read ones: standard deviation between joints
-# of the fleet, between gears, and between inspections of one gear. Supposed, from the read joints
-# of simulated fleets. [1]
-JOINTS_APART = 0.35
+# Wear of a joint that nobody read over the mean of the read ones: standard deviation between
+# gears, and the same between joints of the fleet and between inspections of one gear. Supposed,
+# from the read joints of simulated fleets. [1]
 GEARS_APART = 0.5
-ROWS_APART = 0.4
+APART = 0.4
 # Where landings fall in a larger share of visits they do not follow the dates: half of them would
 # fall by chance. [1]
 _MOST_FALLS = 1 / 3
@@ -52,13 +51,13 @@ LEAST_VALUES = 20
 # Steps to which people round, inches and millimetres; half an inch's where diameters are read. [in]
 _STEPS_IN = (
     *(n / 20000 for n in (2, 5, 10, 20, 40, 50, 100, 200)),
-    *(n / 20 / MM_PER_IN for n in (0.1, 0.2, 1, 2, 4)),
+    *(n / 200 / MM_PER_IN for n in (1, 2, 10, 20, 40)),
 )
 # A value is a multiple of a step within this share of it. [1]
 _ON_STEP = 0.02
 # How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the
 # others: the share of its variance that is the gear's. [1]
-OWN_GEAR = GEARS_APART**2 / (JOINTS_APART**2 + GEARS_APART**2 + ROWS_APART**2)
+OWN_GEAR = GEARS_APART**2 / (GEARS_APART**2 + 2 * APART**2)
 
 
 @dataclass(frozen=True)
@@ -140,7 +139,7 @@ def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
         rows_apart = np.sqrt(
             np.mean(history.scatter_in2[:, seen]) / max(np.mean(own**2), _TIGHT_IN**2)
         )
-        likely[:, ~seen], common[:, ~seen] = worn, JOINTS_APART * worn
+        likely[:, ~seen], common[:, ~seen] = worn, APART * worn
         shared[:, ~seen], spread[:, ~seen] = GEARS_APART * worn, rows_apart * worn
     return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common)
 
@@ -255,7 +254,7 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     least = np.maximum(_LEAST_LEVEL * mean, _TIGHT_IN)
     least_spread = 1e-6 * spread
     level = np.maximum(fleet[0] + fleet[1] * x, least)
-    scatter = np.full(y.shape[1], ROWS_APART**2)
+    scatter = np.full(y.shape[1], APART**2)
     share = np.ones(y.shape[1])
     far = np.ones(y.shape)
     seen = (read > 0.0) / np.maximum((read > 0.0).sum(axis=0), 1)

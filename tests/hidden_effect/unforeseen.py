@@ -29,7 +29,7 @@ ROWS = 150
 FIRST_SEED = 64_000_000
 Array = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 Table = dict[str, list[Any]]
-Hidden = Callable[[Table, np.random.Generator], None]
+Hidden = Callable[[Table, np.random.Generator], str | None]
 READINGS = ("plunger_displacement_in", "plunger_displacement_2_in")
 
 
@@ -71,11 +71,12 @@ def elevation(table: Table, rng: np.random.Generator) -> None:
     shifted(table, 8e-7 * feet)
 
 
-def station(table: Table, rng: np.random.Generator) -> None:
+def station(table: Table, rng: np.random.Generator) -> str:
     names = np.array(["LHR", "CDG", "TEB", "VNY", "DAL", "GVA", "LTN", "ORD"])
     at = rng.choice(names, len(table["side"]))
     table["station"] = at.tolist()
     shifted(table, 5.5e-3 * (at == "LHR"))
+    return "station LHR"
 
 
 def overhaul_date(table: Table, rng: np.random.Generator) -> None:
@@ -84,22 +85,26 @@ def overhaul_date(table: Table, rng: np.random.Generator) -> None:
     shifted(table, 4e-6 * np.maximum(days - 800.0, 0.0))
 
 
-def _of_one_gear(table: Table, rng: np.random.Generator, share: float) -> None:
+def _of_one_gear(table: Table, rng: np.random.Generator, share: float) -> str:
     gears = np.char.add(np.char.add(texts(table, "tail_no"), " "), texts(table, "side"))
-    scaled(table, 1.0 + share * (gears == one_of(gears, rng, 8)))
+    own = one_of(gears, rng, 8)
+    scaled(table, 1.0 + share * (gears == own))
+    return f"tail {own}"
 
 
-def bent_link(table: Table, rng: np.random.Generator) -> None:
-    _of_one_gear(table, rng, 0.35)
+def bent_link(table: Table, rng: np.random.Generator) -> str:
+    return _of_one_gear(table, rng, 0.35)
 
 
-def slightly_bent_link(table: Table, rng: np.random.Generator) -> None:
-    _of_one_gear(table, rng, 0.2)
+def slightly_bent_link(table: Table, rng: np.random.Generator) -> str:
+    return _of_one_gear(table, rng, 0.2)
 
 
-def dial(table: Table, rng: np.random.Generator) -> None:
+def dial(table: Table, rng: np.random.Generator) -> str:
     gauges = texts(table, "gauge_id")
-    scaled(table, 1.0 + 0.15 * (gauges == one_of(gauges, rng, 20)))
+    own = one_of(gauges, rng, 20)
+    scaled(table, 1.0 + 0.15 * (gauges == own))
+    return f"gauge {own}"
 
 
 def two_lots(table: Table, rng: np.random.Generator) -> None:
@@ -144,11 +149,12 @@ def nothing(table: Table, rng: np.random.Generator) -> None:
     table["station"] = rng.choice(["LHR", "CDG", "TEB", "VNY"], len(table["side"])).tolist()
 
 
-# What is hidden, and what a right answer says of it: a cause, or a column that it moves with.
+# What is hidden, and what a right answer says of it: a cause, or a column that it moves with. The
+# target of a cause that is listed is returned where it is hidden.
 KINDS: dict[str, tuple[Hidden, str]] = {
     "humidity": (humidity, "humidity_pct"),
     "elevation": (elevation, "elevation_ft"),
-    "station": (station, "station"),
+    "station": (station, "modification"),
     "overhaul_date": (overhaul_date, "shop_visit"),
     "bent_link": (bent_link, "gear_scale"),
     "slightly_bent_link": (slightly_bent_link, "gear_scale"),
@@ -162,16 +168,17 @@ KINDS: dict[str, tuple[Hidden, str]] = {
 }
 
 
-def draw(kind: str, seed: int) -> Table:
-    """The table of a fleet in which something is hidden."""
+def draw(kind: str, seed: int) -> tuple[Table, list[tuple[str, str]]]:
+    """The table of a fleet in which something is hidden, and the listed cause that it is."""
     nulls = [name for name in simulator.NULLS if name != "n500"]
     spec = simulator.draw_spec(seed, kind="null", null=nulls[0])
     rng = np.random.default_rng(seed)
     table: Table = {name: list(v) for name, v in simulator.simulate_fleet(spec, seed).table.items()}
     kept = np.sort(rng.permutation(len(table["side"]))[:ROWS])
     table = {name: [values[k] for k in kept] for name, values in table.items()}
-    KINDS[kind][0](table, rng)
-    return table
+    hide, cause = KINDS[kind]
+    target = hide(table, rng)
+    return table, [(cause, target)] if target else []
 
 
 def run(task: tuple[int, str]) -> dict[str, Any]:
@@ -179,8 +186,10 @@ def run(task: tuple[int, str]) -> dict[str, Any]:
     seed, kind = task
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "fleet.csv"
-        write_csv(draw(kind, seed), file)
-        found = diagnose_files([file]).to_dict()
+        table, truth = draw(kind, seed)
+        write_csv(table, file)
+        result = diagnose_files([file])
+    found = result.to_dict()
     named = [f"{c['cause']} {c['target'] or ''}" for c in found["causes"]]
     open_ = [f"{c['cause']} {c['target'] or ''}" for c in found["also_possible"]]
     moves = found["unlisted_variables"] if found["verdict"] == "UNLISTED" else []
@@ -190,11 +199,20 @@ def run(task: tuple[int, str]) -> dict[str, Any]:
     elif named:
         grade = "right" if all(expected in name for name in named) else "wrong name"
     elif moves:
-        grade = "right" if expected in moves else "other column"
+        grade = "right" if {expected, kind} & {*moves} else "other column"
     else:
         grade = "in the set" if any(expected in name for name in open_) else found["verdict"]
     said = named or moves or [found["verdict"], *open_[:3]]
-    return {"seed": seed, "kind": kind, "grade": grade, "said": said, "p": found["p_nothing"]}
+    return {
+        "seed": seed,
+        "group": kind,
+        "verdict": found["verdict"],
+        "named": [(c["cause"], c["target"]) for c in found["causes"]],
+        "truth": truth,
+        "grade": grade,
+        "said": said,
+        **study.stated(result.diagnosis),
+    }
 
 
 def main() -> None:
@@ -212,7 +230,7 @@ def main() -> None:
     ]
     records = study.mapped(run, [(n, task) for n, task in enumerate(listed)], 1, given.keep)
     for kind in given.kinds.split(","):
-        own = [r for r in records if r["kind"] == kind]
+        own = [r for r in records if r["group"] == kind]
         print(kind, dict(Counter(r["grade"] for r in own)))
         for r in own:
             if r["grade"] != "right":

@@ -63,8 +63,8 @@ class Scene:
 _APART_FROM_WEAR = frozenset(
     ("gauge_id", "technician_id", "side", "approach", "temperature_c", "hydraulic_pressure_psi")
 )
-# Where joints that were not read are more than this share of what all could move the plunger by,
-# their wear may be the effect. [1]
+# Where joints that were not read are more than this share of what all could move the plunger by, or
+# clearances that are cut off more than this share of them, their wear may be the effect. [1]
 MOST_UNREAD = 0.15
 
 
