@@ -11,6 +11,7 @@ Which joints explain a measured plunger displacement, in numbers and words.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from statistics import NormalDist
@@ -22,7 +23,7 @@ from mlg_troubleshoot.arrays import Array, Mask, Places, frozen
 from mlg_troubleshoot.decision.assessment import GroupChance, Posterior
 from mlg_troubleshoot.decision.inspection import Fleet, RiggingCheck
 from mlg_troubleshoot.decision.prediction import Cases, responses
-from mlg_troubleshoot.decision.priors import PRIORS
+from mlg_troubleshoot.decision.priors import BEYOND, PRIORS, WELL_WITHIN
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, tabled_normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
@@ -204,7 +205,7 @@ class Inference:
         levels, wear = (each[some] for each in given_readings(cases))
         self.gear, fleet = cases.gear, cases.fleet
         self.measured = cases.measured[some]
-        self.margin_in = margin = cases.margin_in[some]
+        self.margin_in = cases.margin_in[some]
         checks = [cases.inspections[row].rigging_checked for row in some]
         self.looked = [check not in (None, RiggingCheck.NO) for check in checks]
         self._levels, self._wear = levels, wear
@@ -213,7 +214,40 @@ class Inference:
         for j in range(self._transforms.shape[2]):
             whole = whole * self._transforms[:, :, j]
         self._stands = _density(whole)
-        y, u = cases.plunger_in[some], np.hypot(cases.plunger_u_in[some], 1e-4)
+        usual, overlooked = usual_of(self.gear, fleet)
+        before = np.array([1.0 - fleet.loaded, fleet.loaded])[:, None, None] * levels
+        often = usual[:, None, None]
+        elsewhere = before / (1.0 - often) / PRIORS.joints_for_one_elsewhere
+        # By cause, pins, gears and levels.
+        self._factors = np.array([before / often, elsewhere])
+        # (8): work that left the rigging wrong leaves few worn joints.
+        left = wear * np.where(_WORN, PRIORS.overlooked, 1.0)
+        sound = left.sum(axis=3)
+        self._of_levels = levels * np.prod(sound, axis=1) / overlooked
+        self._rigging_levels = self._of_levels / self._of_levels.sum(axis=1, keepdims=True)
+        self._left_worn = left[..., _WORN].sum(axis=3) / sound
+        self._plunger_u_in = np.hypot(cases.plunger_u_in[some], 1e-4)
+        self._unread = copy(self)
+        self._see(cases.plunger_in[some])
+
+    @cached_property
+    def within(self) -> Inference:
+        """What would be believed if the plunger were read within its margin."""
+        return self._read(WELL_WITHIN)
+
+    @cached_property
+    def beyond(self) -> Inference:
+        """What would be believed if the plunger were read beyond its margin."""
+        return self._read(BEYOND)
+
+    def _read(self, share: float) -> Inference:
+        found = copy(self._unread)
+        found._see(share * self.margin_in)
+        return found
+
+    def _see(self, y: Array) -> None:
+        """Weigh by the readings of the plunger, NaN without one."""
+        margin, u = self.margin_in, self._plunger_u_in
         is_read = np.isfinite(y)
         y = np.where(is_read, y, 0.0)
         # (6), and (7) of a wrong rigging.
@@ -224,31 +258,20 @@ class Inference:
         of_rigging = even * out / (2.0 * (PRIORS.offset - 1.0) * margin)
         of_rigging = np.where(is_read, of_rigging, 1.0)
         within = _share_within(margin[:, None])
-        usual, overlooked = usual_of(self.gear, fleet)
-        before = np.array([1.0 - fleet.loaded, fleet.loaded])[:, None, None] * levels
-        often = usual[:, None, None]
-        elsewhere = before / (1.0 - often) / PRIORS.joints_for_one_elsewhere
-        # By cause, pins, gears and levels; by cause, pins, gears and cells.
-        self._factors = np.array([before / often, elsewhere])
         likely = seen * np.array([1.0 - within, within])
-        # Held pins may rest with either sign.
+        # By cause, pins, gears and cells; held pins may rest with either sign.
         self._seen_at = np.stack([likely, 0.5 * (likely + likely[..., -_PLACES])], axis=1)
         fits = (self._stands @ self._seen_at[..., None])[..., 0]
-        free, held = np.sum(fits.sum(axis=0) * levels, axis=2)
+        free, held = np.sum(fits.sum(axis=0) * self._levels, axis=2)
         self.held = held / np.maximum(free, 1e-300)
         # By gears, causes, pins and levels.
         self._weights = np.ascontiguousarray(np.moveaxis(self._factors * fits, 2, 0))
-        # (8), (9): work that left the rigging wrong leaves few worn joints.
-        left = wear * np.where(_WORN, PRIORS.overlooked, 1.0)
-        sound = left.sum(axis=3)
-        of_levels = levels * np.prod(sound, axis=1) / overlooked
+        # (9)
         rigging = np.where(self.looked, PRIORS.overlooked, 1.0) * of_rigging
-        rigging *= of_levels.sum(axis=1) / PRIORS.joints_for_one_misrigged
-        joints, other = self._weights.reshape(len(some), 2, -1).sum(axis=2).T
+        rigging *= self._of_levels.sum(axis=1) / PRIORS.joints_for_one_misrigged
+        joints, other = self._weights.reshape(len(y), 2, -1).sum(axis=2).T
         total = np.maximum(joints + rigging + other, 1e-300)
         self.chances = np.transpose([joints / total, rigging / total, other / total])
-        self._rigging_levels = of_levels / of_levels.sum(axis=1, keepdims=True)
-        self._left_worn = left[..., _WORN].sum(axis=3) / sound
 
     def _of_joints(self, wear: Array) -> NDArray[np.complex128]:
         """Transforms of the joints that are worn beyond their limit, and of them all, by pins,

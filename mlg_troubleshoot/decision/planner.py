@@ -12,7 +12,9 @@ THEN …: each outcome is a typical reading, entered in the inspection and judge
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from datetime import date
 from functools import cached_property, lru_cache
@@ -47,7 +49,7 @@ from mlg_troubleshoot.decision.prediction import (
     model_uncertainty,
     responses,
 )
-from mlg_troubleshoot.decision.priors import PRIORS, THRESHOLDS
+from mlg_troubleshoot.decision.priors import BEYOND, PRIORS, THRESHOLDS, WELL_WITHIN
 from mlg_troubleshoot.decision.sentences import joints_are
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE
 from mlg_troubleshoot.gear.gear import BETTER_GAUGES_IN, Gear
@@ -144,13 +146,13 @@ def choose(
         # (15)
         right = causes * [1.0, PRIORS.overlooked, 1.0]
         checked, place_checked = ends(right)
-        checked += (causes - right).sum(axis=1) * minutes[rows, must]
-        now[1:] = np.minimum(now, checked + check * causes.sum(axis=1))[1:]
-        checked = check + right[0].sum() * read + np.add.reduceat(checked, starts)
-        checked = np.round(checked, 6)
+        wrong = (causes - right).sum(axis=1) * minutes[rows, must]
+        now[1:] = np.minimum(now, checked + wrong + check * causes.sum(axis=1))[1:]
+        checked = np.round(right[0].sum() * read + np.add.reduceat(checked, starts), 6)
+        wrong = np.add.reduceat(wrong, starts)
     # (16)
     now = np.round(read + np.add.reduceat(now, starts), 6)
-    if not looked and checked.min() < now.min():
+    if not looked and np.round(check + checked + wrong, 6).min() < now.min():
         return Choice(then=first_step(checked, place_checked))
     return first_step(now, place)
 
@@ -259,7 +261,8 @@ def plans(
 ) -> Iterator[Course]:
     """The course of each gear. `sure`: sets that bring the worst case within the margin."""
     complained = cases.beyond_margin & (cases.failed | cases.repaired)
-    needed = cases.failed | cases.repaired & (cases.beyond_margin | cases.over_limit.any(axis=1))
+    is_open = cases.beyond_margin | np.isfinite(cases.plunger_in) & cases.over_limit.any(axis=1)
+    needed = cases.failed | cases.repaired & is_open
     unread = np.zeros_like(needed)
     if sure is not None and cases.extension is None:
         unread |= ~cases.measured.all(axis=1)
@@ -269,7 +272,7 @@ def plans(
     beliefs = [believed(cases, np.flatnonzero(needed & (drawn == k)).tolist()) for k in (0, 1)]
     for row, is_needed in enumerate(needed.tolist()):
         belief, place = next(beliefs[drawn[row]]) if is_needed else (None, 0)
-        builder = _PlanBuilder(cases, judged, belief, place, row)
+        builder = _PlanBuilder(cases, judged, belief, place, row, sets=sets)
         plan = builder.plan()
         repairs: list[tuple[RepairKind, Mask, float | None]] = []
         for members in (sure or {}).get(row, ()):
@@ -289,7 +292,14 @@ class _PlanBuilder:
     """The course of one gear: each branch appends its steps and ends."""
 
     def __init__(
-        self, cases: Cases, judged: Judged, belief: Inference | None, place: int, row: int
+        self,
+        cases: Cases,
+        judged: Judged,
+        belief: Inference | None,
+        place: int,
+        row: int,
+        *,
+        sets: bool,
     ) -> None:
         self.cases = cases
         self.judged = judged
@@ -300,7 +310,9 @@ class _PlanBuilder:
         self.beyond = bool(cases.beyond_margin[row])
         self._belief = belief
         self.place = place
+        self.sets = sets
         self.steps: list[Step] = []
+        self.then: list[Consequence] = []
         self.tried: Mask | None = None
         self.taken_again = False
         # Joints whose areas are open.
@@ -309,7 +321,8 @@ class _PlanBuilder:
         self.over = self._joints(self.cases.must_restore[row])
         # Whether something over its limit must wait for its spare.
         self.waits = self.over != self.over_limit
-        self.read_plunger = bool(np.isfinite(self.cases.plunger_in[row]))
+        self.plunger_in = float(cases.plunger_in[row])
+        self.read_plunger = math.isfinite(self.plunger_in)
         self.looked = self.inspection.rigging_checked not in (None, RiggingCheck.NO)
 
     @property
@@ -345,7 +358,8 @@ class _PlanBuilder:
         if self.inspection.unit_question and not self.beyond:
             return CONFIRM
         found = self._course()
-        return replace(found, open_question=self._open_question(found))
+        then = tuple(self.then) if self.sets else ()
+        return replace(found, open_question=self._open_question(found), then=then)
 
     def _course(self) -> Plan:
         i = self.row
@@ -396,20 +410,62 @@ class _PlanBuilder:
         cases = self.cases
         i = self.row
         u = np.hypot(cases.plunger_u_in[i], cases.margin_u_in[i])
-        at_edge = abs(abs(cases.plunger_in[i]) - cases.margin_in[i]) < THRESHOLDS.doubtful * u
+        at_edge = abs(abs(self.plunger_in) - cases.margin_in[i]) < THRESHOLDS.doubtful * u
         once = len(self.inspection.standing_readings_in) < 2
         return bool(at_edge and once) or self.inspection.is_plunger_in_doubt
 
     def _failed(self) -> Plan:
         """A gear that failed: the plunger first, then what has the fewest expected minutes."""
-        if not self.read_plunger or self._again():
-            self._read_the_plunger(again=self.read_plunger)
+        if not self.read_plunger:
+            return self._once_read()
+        if self._again():
+            self._read_the_plunger(again=True)
+        return self._find_cause()
+
+    def _once_read(self) -> Plan:
+        """The plunger is read first; what follows a typical reading beyond its margin is expected
+        where the joints are the likelier cause.
+        """
+        self._read_the_plunger()
+        joints, _rigging, elsewhere = self.belief.chances[self.place].tolist()
+        if self.sets:
+            self._if_read("within", WELL_WITHIN)
+        if self.sets or joints >= elsewhere:
+            after, rest = self._if_read("beyond", BEYOND)
+        if joints < elsewhere:
+            return self._restore_over_limit()._end(End.NOT_EXPLAINED)
+        self.tried = after.tried
+        return Plan((*self.steps, *rest.steps), rest.end)
+
+    def _if_read(self, where: str, share: float) -> tuple[_PlanBuilder, Plan]:
+        """What follows if the plunger stands at a share of its margin."""
+        after = self._after(
+            _belief=getattr(self.belief, where),
+            beyond=share > 1.0,
+            read_plunger=True,
+            plunger_in=share * float(self.cases.margin_in[self.row]),
+        )
+        rest = after._find_cause()
+        self._follows(f"the plunger is {where} its margin", rest)
+        return after, rest
+
+    def _follows(self, outcome: str, rest: Plan) -> None:
+        """Note what follows an outcome of the next action."""
+        if len(self.steps) == 1:
+            self.then.append(_consequence(outcome, rest.steps[0]))
+
+    def _after(self, **changed: Any) -> _PlanBuilder:
+        """The same gear after its first step, without steps of its own."""
+        after = copy(self)
+        vars(after).update(steps=[], then=[], **changed)
+        return after
+
+    def _find_cause(self) -> Plan:
+        """The plunger was read: what has the fewest expected minutes."""
         cases = self.cases
         i = self.row
         over = cases.over_limit[i]
-        joints, _rigging, elsewhere = self.belief.chances[self.place].tolist()
-        if not self.read_plunger and joints < elsewhere:
-            return self._restore_over_limit()._end(End.NOT_EXPLAINED)
+        elsewhere = self.belief.chances[self.place, 2]
         if elsewhere > 1.0 - 1e-7:
             return self._follow(Choice(restore=over if over.any() else None))
         choice = choose(
@@ -420,7 +476,7 @@ class _PlanBuilder:
             spare=cases.restorable[i],
             unread=~cases.measured[i] & cases.reachable[i],
             doubted=self.doubted,
-            looked=self.looked or not self.read_plunger,
+            looked=self.looked,
         )
         return self._follow(choice)
 
@@ -429,10 +485,15 @@ class _PlanBuilder:
         joints, rigging, elsewhere = self.belief.chances[self.place].tolist()
         if choice.then is not None:
             self._check_rigging()
+            right = self._after(looked=True)
+            rest = right._follow(choice.then)
+            self._follows("the rigging is right", rest)
             if rigging > 0.5:
                 return self._restore_over_limit()._end(End.NOT_EXPLAINED)
+            self.tried = right.tried
+            return Plan((*self.steps, *rest.steps), rest.end)
+        if self.looked and not self.belief.looked[self.place]:
             rigging *= PRIORS.overlooked
-            choice = choice.then
         if choice.read:
             return self._read_and_restore(choice.read)
         if choice.restore is not None:
@@ -516,7 +577,7 @@ class _PlanBuilder:
                 & (self.cases.filled(0.0)[self.row] <= 2.0 * self.gear.new_parts_in)
             )
             text = sentences.check_rigging(
-                float(self.cases.plunger_in[self.row]) if self.beyond else None,
+                self.plunger_in if self.beyond else None,
                 () if self.inspection.is_repaired or not self.cases.failed[self.row] else as_new,
             )
             self._step(Action.CHECK_RIGGING, self.gear.rigging_check.value, text)
@@ -722,8 +783,6 @@ def repair_sets(cases: Cases, courses: Sequence[Course]) -> list[tuple[RepairSet
     return result
 
 
-# Typical readings: shares of a limit or a margin, well within it, and beyond it. [1]
-_WELL_WITHIN, _BEYOND = 0.4, 1.4
 # Days after whatever is known of a gear.
 _REPAIR_DAY, _LATER = date(9999, 12, 1), date(9999, 12, 2)
 
@@ -743,15 +802,16 @@ def with_consequences(
     after = Cases.of(cases.gear, rows, fleet=cases.fleet)
     courses = plans(after, judge(after), None, advice=False, sets=False)
 
-    def follows(outcome: str) -> Consequence:
-        step = next(courses).plan.steps[0]
-        text = f"IF {outcome}, THEN {step.text[0].lower()}{step.text[1:]}"
-        return Consequence(outcome, step.action, step.joints, step.minutes, text)
+    def follows(a: Assessment, outcomes: Sequence[tuple[str, Any]]) -> Assessment:
+        then = [_consequence(outcome, next(courses).plan.steps[0]) for outcome, _ in outcomes]
+        return replace(a, plan=replace(a.plan, then=(*a.plan.then, *then)))
 
-    return [
-        replace(a, plan=replace(a.plan, then=tuple(follows(outcome) for outcome, _ in outcomes)))
-        for a, outcomes in zip(found, each, strict=True)
-    ]
+    return [follows(*each) for each in zip(found, each, strict=True)]
+
+
+def _consequence(outcome: str, step: Step) -> Consequence:
+    text = f"IF {outcome}, THEN {step.text[0].lower()}{step.text[1:]}"
+    return Consequence(outcome, step.action, step.joints, step.minutes, text)
 
 
 def _outcomes(a: Assessment, gear: Gear) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -761,8 +821,8 @@ def _outcomes(a: Assessment, gear: Gear) -> Iterator[tuple[str, dict[str, Any]]]
     names_are = joints_are(step.joints)
     day = _LATER if row.is_repaired else row.plunger_date
     match step.action:
-        case Action.READ_PLUNGER:
-            for share, where in ((_WELL_WITHIN, "within"), (_BEYOND, "beyond")):
+        case Action.READ_PLUNGER if not a.plan.then:
+            for share, where in ((WELL_WITHIN, "within"), (BEYOND, "beyond")):
                 reading = (*row.standing_readings_in, share * a.margin_in)
                 changed = {"readings_in": reading, "plunger_date": day}
                 yield f"the plunger is {where} its margin", changed
@@ -774,7 +834,8 @@ def _outcomes(a: Assessment, gear: Gear) -> Iterator[tuple[str, dict[str, Any]]]
             yield f"{names_are} over the limit again", again
             yield f"{names_are} within the limit", again | _read(row, gear, step.joints, ())
         case Action.CHECK_RIGGING:
-            yield "the rigging is right", {"rigging_checked": RiggingCheck.YES}
+            if not a.plan.then:
+                yield "the rigging is right", {"rigging_checked": RiggingCheck.YES}
             corrected = {"rigging_checked": RiggingCheck.CORRECTED, "repair_date": _REPAIR_DAY}
             yield "the rigging was wrong and is set right", corrected
         case Action.RESTORE:
@@ -796,6 +857,6 @@ def _read(
     row: Inspection, gear: Gear, joints: tuple[int, ...], over: tuple[int, ...]
 ) -> dict[str, Any]:
     """Readings of joints, those at some places over their limits."""
-    shares = {n: _BEYOND if place in over else _WELL_WITHIN for place, n in enumerate(joints)}
+    shares = {n: BEYOND if place in over else WELL_WITHIN for place, n in enumerate(joints)}
     read = {n: share * gear.joint(n).limit.value for n, share in shares.items()}
     return {"clearance_in": {**row.clearance_in, **read}}

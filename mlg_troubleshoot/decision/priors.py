@@ -97,5 +97,7 @@ class Thresholds:
     together: int = 4
 
 
+# Typical readings, well within a limit or a margin and beyond it, as shares of it. [1]
+WELL_WITHIN, BEYOND = 0.4, 1.4
 PRIORS = Priors()
 THRESHOLDS = Thresholds()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
@@ -43,8 +44,27 @@ def test_before_any_reading_one_joint_is_expected_to_be_restored(judge: Judge) -
 
 def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) -> None:
     steps = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).plan.steps
-    # Sidestay 15 min with three joints of 35 min, still open for two restorations of 120 min each.
-    assert [step.minutes for step in steps[:3]] == [12.0, 50.0, 240.0]
+    # Sidestay 15 min with two joints of 25 min, still open for two restorations of 120 min each.
+    assert [step.minutes for step in steps[:3]] == [12.0, 40.0, 240.0]
+
+
+@pytest.mark.parametrize(
+    ("read", "known", "place", "then"),
+    [
+        ({3: 0.013, 5: 0.007}, {}, 1, {"readings_in": (0.042,)}),
+        (every_joint(0.0045), {}, 0, {"readings_in": (0.012,)}),
+        (every_joint(0.0045), {"readings_in": (0.036,)}, 0, {"rigging_checked": RiggingCheck.YES}),
+    ],
+)
+def test_what_follows_an_outcome_is_what_comes_next_once_it_is_entered(
+    judge: Judge, read: dict[int, float], known: Any, place: int, then: Any
+) -> None:
+    plan = judge(read, outcome=Outcome.FAILED, **known).plan
+    entered = judge(read, outcome=Outcome.FAILED, **known | then).next_action
+    assert (plan.then[place].action, plan.then[place].joints) == (entered.action, entered.joints)
+    # What is expected is that a reading is beyond the margin, and the rigging right.
+    if then != {"readings_in": (0.012,)}:
+        assert plan.steps[1].text == entered.text
 
 
 def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: Judge) -> None:
