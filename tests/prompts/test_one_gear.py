@@ -71,10 +71,28 @@ def test_readings_keep_the_unit_that_they_were_typed_in(sit: Sit, life: Life) ->
     assert found.readings_in == pytest.approx((0.0433,), abs=1e-4)
 
 
-def test_a_change_of_unit_or_convention_is_said(sit: Sit) -> None:
+def test_a_unit_of_one_inspection_is_said_and_not_offered_next(sit: Sit) -> None:
     assert "before:" not in sit(*failed("done"), "").screen
     screen = sit("N2 LH", "mm radial", "r", "", "done", "", "", "").screen
     assert "Readings are in mm, radial (before: thou, total play)." in screen
+    assert "For this inspection; Enter goes on offering thou, total play." in screen
+    assert "Readings are in thou, total play." in sit("N2 LH", "").screen
+    with pytest.raises(StoppedError, match="Readings are thou, total play"):
+        sit("N3 LH")
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        ("unit mm", "r", "", "done", "", ""),
+        ("", "r", "", "unit mm", "done", "", ""),
+        ("", "r", "", "done", "", "", "unit mm"),
+    ],
+)
+def test_a_unit_that_is_stated_by_its_word_is_offered_next(sit: Sit, typed) -> None:
+    sit(*failed("done"), "")
+    screen = sit("N2 LH", *typed, "gear", "N3 LH").screen
+    assert "Readings are mm, total play (Enter: yes" in screen
 
 
 def test_enter_alone_does_not_confirm_an_unusual_reading(sit: Sit, life: Life) -> None:

@@ -194,6 +194,9 @@ class Asker:
             at = f"{self.entry.started:%Y-%m-%d %H:%M}"
             self._say(f"Continued: {self.entry.identity}, begun {at}. new = begin anew.", "green")
         elif self.known:
+            row, offered = self.known.row, self.offered(self.known)
+            if {row.unit_entered, row.convention} != {offered[name] for name in READ_IN}:
+                self._say(f"   Readings are in {_heading(offered)}.")
             return self.known
         return self._ask_all()
 
@@ -331,6 +334,9 @@ class Asker:
             self._answer_tail(text)
         elif name in READ_IN:
             self._answer_unit(text)
+            offered = {n: t for n, t in self.saved.offered().items() if n in READ_IN}
+            if any(self.entry.cells.get(n, t) != t for n, t in offered.items()):
+                self._say(f"   For this inspection; Enter goes on offering {_heading(offered)}.")
         elif name == _UNUSUAL:
             if text.lower() not in _YES:
                 raise UsageError(f"{text!r} is not understood", "Type y, #3 13 or p 41.")
@@ -419,6 +425,8 @@ class Asker:
         words = split_words(line)
         if units := [text for name, text in words if name in READ_IN]:
             self._answer_unit(" ".join(units))
+            cells = self.entry.cells
+            self.saved.usual |= {name: cells[name] for name, _ in words if name in READ_IN}
         lengths = [name for name, _ in words if column_of(name).is_length]
         if words and not {*READ_IN} <= self.entry.cells.keys() and (lengths or self.entry.waiting):
             self.entry.waiting.append(line)

@@ -25,7 +25,6 @@ from mlg_troubleshoot.cli.prompts.visit import (
     Terminal,
     Visit,
     continued,
-    facts,
     find_visit,
 )
 from mlg_troubleshoot.decision.columns import UNIT
@@ -107,20 +106,20 @@ class Sitting:
             if own and left:
                 say = f"Not typed at this sitting and not moved: {', '.join(left)}. Move one:"
                 output.say(f"{say} mlg history move HASH {entry.identity} --why TEXT")
-        undoes = f"the move to {entry.identity}"
-        corrected: tuple[Record, ...] = ()
+        before = tuple(moved or known.records) if known else ()
         if known is not None and not entry.has_findings:
-            said, corrected = self._amend(entry, moved or known.records)
-            undoes = undoes if moved else f"the correction of {said}"
+            self._amend(entry, before)
         else:
             moved = []
             self._add(entry)
         visit = self._published(*key)
         self._asker.saved.finish(entry)
-        if known is None or not (moved or corrected):
+        if known is None or entry.has_findings or visit.records == known.records:
             return visit
+        changed = ", ".join(label_of(name) for name in entry.typed if name not in HEADING)
+        undoes = f"the move to {entry.identity}" if moved else f"the correction of {changed}"
         ids = frozenset(each.record_id for each in moved)
-        return replace(visit, undoes=undoes, moved=(key_of(known.row), ids), corrected=corrected)
+        return replace(visit, undoes=undoes, moved=(key_of(known.row), ids), before=before)
 
     def _add(self, entry: Entry) -> None:
         """Keep what was found."""
@@ -149,31 +148,21 @@ class Sitting:
             output.say(f"Moved {of} from {' '.join(key_of(visit.row))} to {' '.join(key)}.")
         return moved
 
-    def _amend(self, entry: Entry, records: Sequence[Record]) -> tuple[str, tuple[Record, ...]]:
+    def _amend(self, entry: Entry, records: Sequence[Record]) -> None:
         """Correct what does not belong to one finding in the visit that was recorded last; what was
-        not found after all, in the last one that states it. What was corrected is returned, in
-        words and as it was.
+        not found after all, in the last one that states it.
         """
-        changes: dict[str, dict[str, str]] = {}
-        of = {each.key: each for each in records}
+        changes: dict[Record, dict[str, str]] = {}
         for name in (name for name in entry.typed if name not in HEADING):
             text = entry.cells[name]
             states = [each for each in records if text or _is_stated(each, name)]
             columns = PLUNGERS if name == PLUNGER else (name,)
-            changes.setdefault((states or records)[-1].key, {}).update(dict.fromkeys(columns, text))
-        said: list[str] = []
-        corrected = []
-        for key, texts in changes.items():
-            row = inspection_from(of[key])
+            changes.setdefault((states or records)[-1], {}).update(dict.fromkeys(columns, text))
+        for record, texts in changes.items():
             try:
-                right = inspection_from(amend(self._place, self._gear, of[key], texts))
+                amend(self._place, self._gear, record, texts)
             except UsageError as error:
                 output.say(f"Not changed: {error.message}. {error.remedy}")
-                continue
-            were, are = (facts(each, self._gear, entry.unit) for each in (row, right))
-            said += [fact for fact in were if fact not in are] or map(label_of, texts)
-            corrected.append(of[key])
-        return ", ".join(said), tuple(corrected)
 
     def _undo(self, visit: Visit) -> Visit:
         """Take the last visit back, or a correction or a move of visits to this gear."""
@@ -181,14 +170,15 @@ class Sitting:
             output.say("Nothing is left to undo.")
             return visit
         key, ids = visit.moved or (key_of(visit.row), ())
-        newest = {each.record_id: each for each in visit.records}
-        for each in visit.corrected:
-            row, wrong = inspection_from(each), newest[each.record_id].key
-            self._place.add([inspection_record(row, RecordKind.CORRECTION, supersedes=wrong)])
+        newest = {each.record_id: each.key for each in visit.records}
+        for each in visit.before:
+            if (wrong := newest[each.record_id]) != each.key:
+                row = inspection_from(each)
+                self._place.add([inspection_record(row, RecordKind.CORRECTION, supersedes=wrong)])
         if ids:
             here = self._visit(visit.row.tail_no, visit.row.side) or visit
             self._move(here, [each for each in here.records if each.record_id in ids], key)
-        elif not visit.corrected:
+        elif not visit.before:
             self._place.add([voids(visit.records[-1], "taken back at the prompts")])
         output.say(f"Undone: {visit.undoes}.")
         return self._published(*key)

@@ -18,19 +18,17 @@ import msgspec
 
 from mlg_troubleshoot.cli.output import console, word
 from mlg_troubleshoot.cli.output import text as data_text
-from mlg_troubleshoot.cli.prompts.entry import LAST, PLUNGER, Entry
+from mlg_troubleshoot.cli.prompts.entry import LAST, PLUNGER, READ_IN, Entry
 from mlg_troubleshoot.decision.assessment import Action, Step
 from mlg_troubleshoot.decision.columns import (
     BY_NAME,
     CLEARANCE,
-    CONVENTION,
     LANDINGS,
     MARGIN,
     MARGIN_U,
     OUTCOME,
     RESTORED_JOINTS,
     RIGGING_CHECKED,
-    UNIT,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import assess
@@ -60,8 +58,8 @@ class Visit:
 
     row: what stands. records: its visits in the order of their entry. last: the last reading of
     each joint with its day. undoes: what an undo takes back, which is the last visit; empty if
-    nothing. moved: or the gear that visits were moved from, with their ids. corrected: or what they
-    said before.
+    nothing. moved: or the gear that visits were moved from, with their ids. before: or what stood
+    before a correction.
     """
 
     records: tuple[Record, ...]
@@ -70,7 +68,7 @@ class Visit:
     last: Mapping[int, str]
     undoes: str = ""
     moved: tuple[GearKey, frozenset[str]] | None = None
-    corrected: tuple[Record, ...] = ()
+    before: tuple[Record, ...] = ()
 
     @property
     def step(self) -> Step:
@@ -105,14 +103,10 @@ def find_visit(
     row = state.inspection
     undoes = ""
     if len(life.visits) > 1 and visits[-1].inspection.source.file is None:
-        undoes = ", ".join(facts(visits[-1].inspection, gear, row.unit_entered))
+        lines = shortened(visit_lines(visits[-1].inspection, gear))
+        unit = row.unit_entered or LengthUnit.INCH
+        undoes = ", ".join(said_in(line.text, unit) for line in lines)
     return Visit(tuple(each.kept for each in visits), row, judge(state), last, undoes)
-
-
-def facts(row: Inspection, gear: Gear, unit: LengthUnit | None) -> list[str]:
-    """What a visit found and did, as the log says it."""
-    lines = shortened(visit_lines(row, gear))
-    return [said_in(line.text, unit or LengthUnit.INCH) for line in lines]
 
 
 def continued(known: Visit, row: Inspection, entry: Entry) -> Inspection:
@@ -150,6 +144,8 @@ class SavedEntries:
         self.owner = login()
         self._run = secrets.token_hex(4)
         self._writers = {self._run}
+        # Unit and convention that were stated for all that follows.
+        self.usual: dict[str, str] = {}
 
     def save(self, entry: Entry, *, complete: bool = False) -> str:
         """Write an entry whole; what went wrong is returned."""
@@ -165,8 +161,11 @@ class SavedEntries:
             return f"Answers cannot be saved: {error.message}. {error.remedy} You can continue."
 
     def finish(self, entry: Entry) -> None:
-        """Close an entry whose result was kept; the last one says what Enter offers next time."""
-        self.save(entry, complete=True)
+        """Close an entry whose result was kept; the last one says what Enter offers next time. A
+        unit or convention of this entry alone is not offered.
+        """
+        usual = {name: text for name, text in self.offered().items() if name in READ_IN}
+        self.save(msgspec.structs.replace(entry, cells=entry.cells | usual), complete=True)
         for draft in [each for each in self._all() if each.complete][1:]:
             self.discard(draft.id)
 
@@ -201,14 +200,14 @@ class SavedEntries:
         return found, damaged
 
     def offered(self) -> dict[str, str]:
-        """Unit, convention, name and gauge of the user's last entry."""
+        """The user's unit and convention, name and gauge of the last entry."""
         try:
             entries = [_entry_of(draft) for draft in self._all() if draft.complete]
         except OutputError:
             entries = []
         cells = next((entry.cells for entry in entries if entry), {})
-        names = (UNIT.name, CONVENTION.name, *LAST)
-        return {name: cells[name] for name in names if cells.get(name)}
+        names = (*READ_IN, *LAST)
+        return {name: cells[name] for name in names if cells.get(name)} | self.usual
 
     def _all(self) -> list[Draft]:
         return self.drafts.newest_first(self.owner)
