@@ -64,6 +64,11 @@ def test_exit_code_1_is_explained_beside_the_command() -> None:
 
 # Pages of many long commands: run with the slow part.
 LONG = {"life-of-a-gear.md", "diagnosis-solution.md", "robot-arm.md", "groundwater-heads.md"}
+# Of these only the examples in Python take seconds.
+LONG_EXAMPLES = {
+    *LONG,
+    *("measured-gear.md", "why-named.md", "gear-eccentricity.md", "plotter-hysteresis.md"),
+}
 
 
 @pytest.mark.parametrize(
@@ -90,7 +95,7 @@ def test_there_are_sessions() -> None:
 @pytest.mark.parametrize(
     "example",
     [
-        pytest.param(example, marks=[pytest.mark.slow] * (example.path.name in LONG))
+        pytest.param(example, marks=[pytest.mark.slow] * (example.path.name in LONG_EXAMPLES))
         for example in find_examples(*PAGES)
         # Needs a cluster: tests/decision/test_workers.py starts one.
         if example.path.name != "cluster.md"

@@ -24,7 +24,10 @@ from mlg_troubleshoot.schemas import schema
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "inspection_data"
-EXAMPLES = sorted(DATA.glob("*.csv"))
+EXAMPLES = [
+    pytest.param(file, marks=[pytest.mark.slow] * ("measured" in file.name), id=file.stem)
+    for file in sorted(DATA.glob("*.csv"))
+]
 BAD = ("x", "-0.002", "0,007", "0.9", "<0.002x", "1/8", "#REF!")
 
 
@@ -74,7 +77,7 @@ def judged(source: Any) -> tuple[list[Any], list[Any]]:
     return verdicts, [(p.code, p.column, p.value, p.expected, p.remedy) for p in found.problems]
 
 
-EVERY_DAY = 16
+EVERY_DAY = 6
 
 
 @pytest.mark.parametrize(
@@ -141,7 +144,7 @@ def test_predict_names_the_wrong_cell_of_a_frame() -> None:
         mlg.predict(frame)
 
 
-@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", EXAMPLES)
 def test_read_inspections_loses_nothing_of_an_example(file: Path) -> None:
     read = mlg.read_inspections(file)
     wrong = {problem.row for problem in read.attrs["problems"]}
@@ -209,6 +212,8 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "picture": lambda: result("gear").plot(),
 }
 NO_TABLE = ("inspection", "extension", "picture")
+# The fit of a linkage takes seconds.
+NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name == "survey")) for name in RESULTS]
 
 
 @cache
@@ -226,7 +231,7 @@ COPIES: dict[str, Callable[[Any], Any]] = {
 
 
 @pytest.mark.parametrize("how", COPIES)
-@pytest.mark.parametrize("name", RESULTS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_copy_of_a_result_is_equal_to_it(name: str, how: str) -> None:
     given = result(name)
     assert COPIES[how](given) == given
@@ -244,14 +249,14 @@ def test_results_travel_to_two_processes_and_back() -> None:
         assert list(two.map(same_again, given)) == given
 
 
-@pytest.mark.parametrize("name", RESULTS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_result_says_itself_in_twenty_lines(name: str) -> None:
     text = repr(result(name))
     assert len(text.splitlines()) <= 20
     assert len(text) <= 4000
 
 
-@pytest.mark.parametrize("name", [n for n in RESULTS if n not in NO_TABLE])
+@pytest.mark.parametrize("name", [n for n in NAMES if n.values[0] not in NO_TABLE])
 def test_a_result_is_a_table_of_which_a_notebook_keeps_two_kilobytes(name: str) -> None:
     assert not result(name).to_frame().empty
     shown = result(name)._repr_html_()
@@ -408,7 +413,6 @@ def test_every_file_may_be_given_by_its_name(tmp_path: Path) -> None:
     few = (DATA / "measured_pressure.csv").read_text(encoding="utf-8").splitlines()[:61]
     (tmp_path / "few.csv").write_text("\n".join(few), encoding="utf-8")
     assert mlg.diagnose(str(tmp_path / "few.csv"), **options).diagnosis is not None
-    assert result("survey").write(str(tmp_path / "gear.toml")).path == tmp_path / "gear.toml"
     found = mlg.check(str(DATA / "failure_case.csv"))
     (report,) = mlg.write_reports(found, mlg.CheckOptions(), str(tmp_path / "pages"), **PAGES)
     assert report.html is not None and report.html.parent == tmp_path / "pages"

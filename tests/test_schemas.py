@@ -150,12 +150,14 @@ def test_the_json_of_a_check_has_what_the_gear_did(outcome: str, said: str | Non
     "options",
     [
         (),
-        ("--design", "lhs", "--size", "4,20,2", "--gear", FOUR_BAR),
+        ("--design", "lhs", "--size", "4,20,2", "--workers", "1", "--gear", FOUR_BAR),
         ("--design", "ccd", "--size", "4,0,2"),
     ],
     ids=["exact", "paper's design", "without total order"],
 )
-def test_a_study_of_any_kind_fits_its_schema(options: tuple[object, ...]) -> None:
+def test_a_study_of_any_kind_fits_its_schema(options, monkeypatch):
+    # To compile takes longer than so small a study.
+    monkeypatch.setattr("mlg_troubleshoot.paper.study.numba_is_installed", lambda: False)
     assert complain("study", mlg("study", *options, "--json").json) == []
 
 

@@ -49,9 +49,9 @@ EVERY_DAY = [
     (MLG, "check table.csv --csv verdicts.csv"),
     (MLG, "check one.csv --report report --keep"),
     (AS_A_MODULE, "check few.csv --json"),
-    (MLG, "fleet"),
 ]
 SLOW = [
+    (MLG, "fleet"),
     (AS_A_MODULE, "check table.csv"),
     (MLG, "history"),
     (MLG, "diagnose few.csv"),

@@ -109,12 +109,12 @@ def loads(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Eighty gears that the plain model calls outside."""
+    """Twenty gears that the plain model calls outside."""
     rng = np.random.default_rng(58)
     file = tmp_path_factory.mktemp("drawn") / "gears.csv"
     header = ["record_id", "tail_no", "side", "clearance_convention"]
     joints = [f"clearance_{joint}_in" for joint in range(1, 11)]
-    lines = [[f"R{k}", f"N{k}", "LH", "RADIAL", *rng.uniform(0.004, 0.0074, 10)] for k in range(80)]
+    lines = [[f"R{k}", f"N{k}", "LH", "RADIAL", *rng.uniform(0.004, 0.0074, 10)] for k in range(20)]
     with file.open("w", encoding="utf-8", newline="") as opened:
         csv.writer(opened).writerows([[*header, *joints], *lines])
     found = mlg("check", file, "--json")

@@ -200,7 +200,7 @@ def test_rows_that_were_corrected_get_their_reports_beside_those_that_exist(tmp_
 @pytest.mark.parametrize(
     "command",
     [
-        ("diagnose", "-q"),
+        pytest.param(("diagnose", "-q"), marks=pytest.mark.slow),
         ("history", "not-stated", "LH", "-q"),
         ("fleet", "-q"),
     ],

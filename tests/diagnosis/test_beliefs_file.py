@@ -108,11 +108,13 @@ def measured_gear(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return gear
 
 
+@pytest.mark.slow
 def test_another_linkage_is_less_likely_where_the_gear_was_measured(measured_gear: Path) -> None:
     drawn = probability_of_another_linkage("hawker-800xp")
     assert probability_of_another_linkage(measured_gear) < 0.15 * drawn
 
 
+@pytest.mark.slow
 def test_how_rare_another_linkage_is_of_a_measured_gear_can_be_stated(measured_gear, tmp_path):
     alike = written(tmp_path, "schema = 1\nsurveyed = 1.0")
     assert probability_of_another_linkage(measured_gear, alike) == pytest.approx(

@@ -60,7 +60,7 @@ def test_of_clean_data_nothing_is_said(gear: Gear) -> None:
     assert kinds(histories(gear), gear) == set()
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_of_a_simulated_sound_fleet_nothing_is_said_but_of_overhauls(seed, tmp_path):
     rows, _truth = blemished_fleet("sound", "mild", 61_000 + seed, rows=100)
     write_rows(rows, tmp_path / "sound.csv")
@@ -353,6 +353,7 @@ def test_landings_that_fall_are_said_of_the_data_and_not_row_by_row(tmp_path: Pa
     assert not [note for note in said["warnings"] if "never fall" in note]
 
 
+@pytest.mark.slow
 def test_a_gauge_that_was_read_as_a_diameter_for_a_time_is_named_with_its_dates(tmp_path):
     rows, _truth = blemished_fleet("diametral_month", "strong", 61_000, rows=150)
     write_rows(rows, tmp_path / "diametral.csv")

@@ -89,22 +89,7 @@ def test_the_seeds_in_the_description_are_those_of_the_command() -> None:
         ("measured_pin_direction", (), "NAMED", [("direction_not_worst_case", "joint 3")]),
         ("measured_frozen_grease", (), "UNLISTED", []),
         ("measured_nothing_wrong", (), "NONE", []),
-        pytest.param(
-            "measured_pressure",
-            ("own_cause.py",),
-            "NAMED",
-            [("elastic_compliance", None)],
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "measured_pin_direction",
-            ("own_cause.py",),
-            "NAMED",
-            [("direction_not_worst_case", "joint 3")],
-            marks=pytest.mark.slow,
-        ),
         ("measured_frozen_grease", ("own_cause.py",), "NAMED", [("frozen_grease", None)]),
-        ("measured_nothing_wrong", ("own_cause.py",), "NONE", []),
     ],
 )
 def test_what_is_hidden_is_named_and_nothing_else(file, causes, verdict, named):
@@ -112,6 +97,13 @@ def test_what_is_hidden_is_named_and_nothing_else(file, causes, verdict, named):
     assert found.verdict == verdict
     assert [c.candidate.key for c in found.causes] == named
     assert found.unlisted_variables == (("temperature_c",) if verdict == "UNLISTED" else ())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["pressure", "pin_direction", "nothing_wrong"])
+def test_a_cause_of_ones_own_is_not_named_for_another(name: str) -> None:
+    alone, beside = (diagnosis(f"measured_{name}.csv", *own) for own in ((), ("own_cause.py",)))
+    assert [c.candidate.key for c in beside.causes] == [c.candidate.key for c in alone.causes]
 
 
 def test_nothing_wrong_has_no_fault() -> None:
@@ -124,6 +116,7 @@ def test_the_row_in_millimetres_is_found() -> None:
     assert {record for record, _kind in faults} <= {"R0097", "R0190"}
 
 
+@pytest.mark.slow
 def test_the_directions_under_load_are_named_and_take_back_most_false_outside() -> None:
     found = diagnosis("measured_far_below.csv")
     assert [c.candidate.cause.name for c in found.causes] == ["load_directions"]

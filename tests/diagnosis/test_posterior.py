@@ -405,6 +405,7 @@ for rows in (np.arange(len(table)), np.random.default_rng(0).permutation(len(tab
 """
 
 
+@pytest.mark.slow
 def test_neither_hashes_nor_the_order_of_rows_choose_between_two_columns_of_one_shape() -> None:
     said = [
         subprocess.run(

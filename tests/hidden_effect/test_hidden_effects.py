@@ -40,11 +40,17 @@ from .simulator.records import write_csv as write_columns
 
 FIRST_SEED, STRENGTH = 40_000, 20.0
 CAUSES = tuple(CATALOGUE)
-# Of the linkage, of joints, of one tail and of reading; the others run in the slow part.
-EVERY_DAY = ("elastic_compliance", "oval_wear", "rigging_offset", "gauge_bias")
-each_cause = pytest.mark.parametrize(
-    "cause", [pytest.param(c, marks=() if c in EVERY_DAY else pytest.mark.slow) for c in CAUSES]
-)
+# Of the linkage and of reading, and two sound fleets; the others run in the slow part.
+EVERY_DAY = ("elastic_compliance", "gauge_bias", "iid", "confounded")
+
+
+def each(kind: str, names: tuple[str, ...]) -> pytest.MarkDecorator:
+    """All of a kind; those of `EVERY_DAY` every day."""
+    marked = [pytest.param(n, marks=[pytest.mark.slow] * (n not in EVERY_DAY)) for n in names]
+    return pytest.mark.parametrize(kind, marked)
+
+
+each_cause, each_null = each("cause", CAUSES), each("null", NULLS)
 OFF_CATALOGUE = ("grease_drag", "cold_oil_under_load")
 CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     *(("single", {"cause": cause, "strength": STRENGTH}) for cause in CAUSES),
@@ -125,13 +131,7 @@ def test_the_extension_gains_on_rows_that_the_fit_never_saw(cause: str) -> None:
     assert gain.rms_after_in < 0.85 * gain.rms_before_in
 
 
-# One of each kind every day: of the linkage and of reading.
-CHECKED_DAILY = ("elastic_compliance", "gauge_bias")
-
-
-@pytest.mark.parametrize(
-    "cause", [pytest.param(c, marks=() if c in CHECKED_DAILY else pytest.mark.slow) for c in CAUSES]
-)
+@each_cause
 def test_a_check_of_later_inspections_is_better_with_the_extension(cause: str) -> None:
     assert misfit_later(cause, extended=True) < 0.95 * misfit_later(cause, extended=False)
 
@@ -141,12 +141,12 @@ def test_what_is_left_looks_like_noise(cause: str) -> None:
     assert case(cause).diagnosis.remainder_is_noise
 
 
-@pytest.mark.parametrize("null", NULLS)
+@each_null
 def test_nothing_is_found_where_nothing_is_wrong(null: str) -> None:
     assert case(null).diagnosis.verdict == "NONE"
 
 
-@pytest.mark.parametrize("null", NULLS)
+@each_null
 def test_nothing_found_comes_with_what_would_have_been_found(null: str) -> None:
     assert 0.0 < case(null).diagnosis.detectable[0][1] < 0.004
 
@@ -227,7 +227,10 @@ def test_two_causes_of_single_joints_are_not_taken_for_another_linkage_or_direct
 
 @pytest.mark.parametrize(
     ("unlisted", "part"),
-    [("lost_motion_under_load", "elastic_compliance"), ("pressure_of_one_gauge", "gauge_bias")],
+    [
+        ("lost_motion_under_load", "elastic_compliance"),
+        pytest.param("pressure_of_one_gauge", "gauge_bias", marks=pytest.mark.slow),
+    ],
 )
 def test_what_an_unlisted_effect_has_of_a_listed_cause_is_not_put_down_to_that(unlisted, part):
     seed = 40_100

@@ -261,8 +261,9 @@ def test_two_first_visits_begun_in_two_windows_are_two_visits(sit, life, now):
     assert now().clearance_in == {3: 0.013, 5: 0.004}
 
 
-@pytest.mark.parametrize("place", range(1, 4))
-@pytest.mark.parametrize("typed", [("p 50", "#3 9"), ("#3 9", "p 50")])
+@pytest.mark.parametrize(
+    ("place", "typed"), [(1, ("#3 9", "p 50")), (2, ("p 50", "#3 9")), (3, ("#3 9", "p 50"))]
+)
 def test_two_windows_open_on_one_gear_lose_nothing_and_count_nothing_twice(
     sit, begun, life, now, place, typed
 ):
@@ -377,17 +378,19 @@ def test_a_corrected_tail_or_side_moves_the_inspection(sit, begun, life, line, g
     assert life().inspections == ()
 
 
-@pytest.mark.parametrize(("line", "gear"), [("side RH", ("RH", "N1")), ("tail N2", ("LH", "N2"))])
 @pytest.mark.parametrize(
-    "typed",
-    [("#5 7", "p 38", "LINE"), ("#5 7", "#3 4", "LINE", "y"), ("#5 7", "y", "LINE", "9", "done")],
+    ("typed", "gear"),
+    [
+        (("#5 7", "p 38", "side RH"), ("RH", "N1")),
+        (("#5 7", "#3 4", "tail N2", "y"), ("LH", "N2")),
+        (("#5 7", "y", "tail N2", "9", "done"), ("LH", "N2")),
+    ],
 )
 def test_a_corrected_tail_or_side_is_that_of_all_that_was_typed_here(
-    sit, begun, life, line, gear, typed, capsys
+    sit, begun, life, gear, typed, capsys
 ):
     begun(*failed("8", "done"))
-    lines = [each.replace("LINE", line) for each in typed]
-    sit("N1 LH", *lines, "")
+    sit("N1 LH", *typed, "")
     assert (len(life(*gear).inspections), len(life().inspections)) == (2, 1)
     left = life().inspections[0].kept.digest[:10]
     said = capsys.readouterr().err

@@ -54,7 +54,11 @@ print(len(found.problems), time.process_time() - start, peak / 1000)
 
 @pytest.mark.parametrize(
     "made",
-    ["blank lines", "blank lines below", "commas", "commas below", "one line", "wide letters"],
+    [
+        *("blank lines below", "commas below", "wide letters"),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("blank lines", "commas")),
+        pytest.param("one line", marks=pytest.mark.slow),
+    ],
 )
 def test_a_monster_is_refused_within_10_s_and_500_mb(made: str) -> None:
     run = [sys.executable, "-c", _READ, made]

@@ -106,9 +106,12 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 EVERY_DAY = {*OTHERS, "a list", "a clearance below zero"}
 
 
-@pytest.mark.parametrize(
+each_day = pytest.mark.parametrize(
     "name", [pytest.param(n, marks=() if n in EVERY_DAY else pytest.mark.slow) for n in EVIL]
 )
+
+
+@each_day
 def test_wrong_content_that_stands_in_a_store_ends_no_command_with_an_internal_error(
     tmp_path, place, name
 ):
@@ -129,7 +132,7 @@ def test_wrong_content_that_stands_in_a_store_ends_no_command_with_an_internal_e
         assert run.code != 5 or "mlg history verify" in run.err, (command, run.err)
 
 
-@pytest.mark.parametrize("name", EVIL)
+@each_day
 def test_a_record_that_cannot_be_read_is_not_imported_named_by_verify_and_put_aside_by_voiding_it(
     tmp_path, place, name
 ):

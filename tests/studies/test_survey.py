@@ -110,6 +110,7 @@ def test_lengths_alone_leave_several_linkages() -> None:
     assert survey(table_of(LENGTHS, 2e-3), FOUR_BAR).fits > 1
 
 
+@pytest.mark.slow
 def test_a_distance_in_another_unit_is_named_alone_and_does_not_bend_the_linkage() -> None:
     """In a table of millimetres, of which a row without a value was not read."""
     table = table_of((*BRACED, ("O2", "B", LATER), ("A", "B", LATER)), 2e-3)
@@ -165,6 +166,7 @@ def secant(numbers: Sequence[float] | np.ndarray) -> float:
     return float(1.0 / np.sqrt(1.0 - ((crank * np.sin(turn + 1.0) + offset) / rod) ** 2))
 
 
+@pytest.mark.slow
 def test_the_slider_crank_has_the_amplification_and_the_uncertainty_of_its_closed_form() -> None:
     u = {"DISTANCE": 2e-3, "PLUNGER": 5e-4}
     values = slider_readings(SLIDER)
@@ -186,8 +188,8 @@ def test_the_slider_crank_has_the_amplification_and_the_uncertainty_of_its_close
 
 def test_the_gear_file_of_a_survey_is_its_gear(tmp_path: Path) -> None:
     found = braced()
-    gear = found.write(tmp_path / "mine.toml")
-    assert len(gear.ensemble) == 12
+    gear = found.write(str(tmp_path / "mine.toml"))
+    assert (gear.path, len(gear.ensemble)) == (tmp_path / "mine.toml", 12)
     assert predict({1: 0.005}, gear).over_in == pytest.approx(
         predict({1: 0.005}, found.gear).over_in, abs=1e-12
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import webbrowser
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,7 +31,7 @@ from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.judge_rows import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.life.state import GearKey, key_of
+from mlg_troubleshoot.life.state import GearKey, GearState, key_of
 from mlg_troubleshoot.store import RecordKind, inspection_from, inspection_record
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
@@ -57,6 +56,7 @@ class Sitting:
         self._asker = Asker(self._gear, Terminal(), saved, self._visit)
         # The ids of what was typed here.
         self._own: set[str] = set()
+        self._judged: tuple[GearState, task.CheckResult] | None = None
 
     def hold(self, tail: str | None) -> task.CheckResult:
         """Ask until the user ends; what was found last is returned."""
@@ -86,12 +86,17 @@ class Sitting:
 
     def _visit(self, tail: str, side: Side | str) -> Visit | None:
         """What is kept of a gear; records that cannot be read do not prevent a new entry."""
-        judge = partial(task.check_gear, options=self._run.asked, store=self._place)
         try:
-            return find_visit(self._place, self._gear, tail, Side(side), judge)
+            return find_visit(self._place, self._gear, tail, Side(side), self._judge)
         except OutputError as error:
             output.say(f"The records of {tail} {side} cannot be read: {error}. {error.remedy}")
             return None
+
+    def _judge(self, state: GearState) -> task.CheckResult:
+        """What is said of a gear; once as long as the same stands of it."""
+        if self._judged is None or self._judged[0] != state:
+            self._judged = state, task.check_gear(state, self._run.asked, self._place)
+        return self._judged[1]
 
     def _keep(self, entry: Entry, known: Visit | None) -> Visit:
         """Keep an entry, and show the verdict; the entry stays open until then. A tail or side that
