@@ -406,7 +406,8 @@ class Assessment(_Planned, Result):
         Probability that the worst-case bound is within the margin, unmeasured joints taken as 0.
         [1]
     probability_exceed_random_directions : float or None
-        Chance with uniformly random directions. [1]
+        Chance with uniformly random directions, unmeasured joints worn as usual; of a gear that is
+        within its margin by a reading, unmeasured joints taken as 0. [1]
     geometry_spread_in : tuple of float or None
         Least and largest prediction over the ensemble of geometries. [in]
     budget : UncertaintyBudget or None

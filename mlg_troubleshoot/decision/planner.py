@@ -265,7 +265,10 @@ def plans(
     needed = cases.failed | cases.repaired & is_open
     unread = np.zeros_like(needed)
     if sure is not None and cases.extension is None:
-        unread |= ~cases.measured.all(axis=1)
+        within = Verdict.WITHIN_MARGIN, Basis.MEASURED
+        cleared = [each == within for each in zip(judged.verdicts, judged.bases, strict=True)]
+        # A reading clears a gear by the joints that were read alone, and that chance is stated.
+        unread = ~cases.measured.all(axis=1) & ~np.array(cleared)
         needed |= unread
     # Failures are drawn of all that are believed of together.
     drawn = (cases.failed & ~cases.clears_margin).astype(int)

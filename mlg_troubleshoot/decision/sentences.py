@@ -110,8 +110,6 @@ def headline(a: Assessment, measured_in: float) -> Sentence:
 
 
 def _worst(a: Assessment) -> Sentence:
-    if len(a.unread) == len(a.joints):
-        return Sentence.of("No joint was read: chance of leaving the margin {}.", _chance(a))
     alone = " from the joints that were read" if a.unread else ""
     return Sentence.of(
         "Worst directions could reach {}{}, chance {}.",
