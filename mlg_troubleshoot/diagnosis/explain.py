@@ -12,7 +12,7 @@ and which?
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, islice
@@ -26,7 +26,7 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, leve
 from mlg_troubleshoot.diagnosis.causes.linkage import Block
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, less_expected, standardised
 from mlg_troubleshoot.misfit.beliefs import SHORT, Beliefs
-from mlg_troubleshoot.misfit.columns import FAR, EffectColumns, NoiseModel, fit
+from mlg_troubleshoot.misfit.columns import EffectColumns, NoiseModel, fit
 from mlg_troubleshoot.misfit.posterior import (
     UNLISTED,
     Context,
@@ -34,7 +34,6 @@ from mlg_troubleshoot.misfit.posterior import (
     Explanation,
     Key,
     MisfitPosterior,
-    Search,
     posterior,
 )
 from mlg_troubleshoot.misfit.simulation_result import Conclusion
@@ -79,7 +78,7 @@ def build_bank(scene: Scene, catalogue: EffectColumns) -> Bank:
     """
     smooth = _quantities(scene)
     populations = [(own, ("tail_no",)) for own in _populations(scene)]
-    columns, variables = _distinct(lambda: chain(_shapes(scene, smooth), populations), catalogue)
+    columns, variables = _distinct(chain(_shapes(scene, smooth), populations), catalogue)
     tails = len(np.unique(scene.table.tails))
     rare = np.array([own == ("tail_no",) for own in variables])
     return Bank(columns, variables, smooth, rare * (1.0 - tails) * np.log(2.0))
@@ -175,33 +174,30 @@ def _quantities(scene: Scene) -> dict[str, Array]:
 
 
 def _distinct(
-    shapes: Callable[[], Iterator[tuple[Array, tuple[str, ...]]]],
-    catalogue: EffectColumns,
+    shapes: Iterator[tuple[Array, tuple[str, ...]]], catalogue: EffectColumns
 ) -> tuple[EffectColumns, tuple[tuple[str, ...], ...]]:
     """Drop shapes that are constant, or that a candidate of the catalogue has already; but one that
     is the same in all rows.
-
-    They are made twice: all of them at once would fill the memory.
     """
     n = len(catalogue.full)
-
-    def varied() -> Iterator[tuple[Array, tuple[str, ...]]]:
-        return (s for s in shapes() if np.std(s[0]) > 1e-9 * np.max(np.abs(s[0])))
-
     mean = catalogue.onto(np.full((1, n), 1.0 / n))[0]
     size = np.sqrt(np.maximum(catalogue.squares / n - mean**2, 0.0))
     varying = np.flatnonzero(size)
-    each = varied()
-    alike = list[float]()
-    while block := [(shape - shape.mean()) / shape.std() for shape, _n in islice(each, _AT_ONCE)]:
-        product = catalogue.onto(np.array(block))[:, varying] / (n * size[varying])
-        alike += np.max(np.abs(product), axis=1, initial=0.0).tolist()
-    # With few rows all may look like a candidate: then the least alike one is asked.
-    most = max(0.97, 1.000001 * min(alike, default=1.0))
-    names = [own for (_shape, own), near in zip(varied(), alike, strict=True) if near < most]
-    kept = (shape for (shape, _n), near in zip(varied(), alike, strict=True) if near < most)
-    every = chain((shape / rms(shape[shape != 0.0]) for shape in kept), [np.ones(n)])
-    return EffectColumns.made(n, every), (*names, ("all rows",))
+    varied = (s for s in shapes if np.std(s[0]) > 1e-9 * np.max(np.abs(s[0])))
+    names = list[tuple[str, ...]]()
+
+    def kept() -> Iterator[Array]:
+        while block := list(islice(varied, _AT_ONCE)):
+            scores = np.array([(shape - shape.mean()) / shape.std() for shape, _names in block])
+            product = catalogue.onto(scores)[:, varying] / (n * size[varying])
+            alike = np.max(np.abs(product), axis=1, initial=0.0)
+            for (shape, own), near in zip(block, alike.tolist(), strict=True):
+                if near < 0.97:
+                    names.append(own)
+                    yield shape / rms(shape[shape != 0.0])
+
+    columns = EffectColumns.made(n, chain(kept(), [np.ones(n)]))
+    return columns, (*names, ("all rows",))
 
 
 # The noise is estimated again from the residual as long as that changes the likeliest explanation,
@@ -497,67 +493,8 @@ def explain(problem: MisfitProblem) -> Finding:
     contexts = problem.contexts(noise.scale_in)
     first = posterior(noise, problem.expected, problem.effects(noise), contexts, problem.beliefs)
     found, settled = _with_noise_settled(problem, first, noise)
-    slips = int(np.sum(problem.beliefs.slip_odds(noise.distance) > 0.0))
-    if slips > 1:
-        found, settled = _with_far_rows(problem, found, settled, slips)
     finding = Finding(problem, _concluded(problem, found), settled)
     return replace(finding, noise=_settled(finding))
-
-
-def _with_far_rows(
-    problem: MisfitProblem, found: MisfitPosterior, settled: NoiseModel, slips: int
-) -> tuple[MisfitPosterior, NoiseModel]:
-    """What is found, or what is likelier where rows far out, at most so many of them slips, count
-    in full, because one effect moves them together.
-    """
-    beliefs = problem.beliefs
-    near = build_noise(problem.expected, problem.rows, far=np.inf)
-    given = near, problem.expected, problem.effects(near), found.contexts, beliefs
-    likeliest = found.likeliest[0]
-    if not more_than_slips(*given, likeliest, slips):
-        return found, settled
-    other = posterior(*given)
-    if other.names_of(other.likeliest[0]) == found.names_of(likeliest):
-        return found, settled
-    other, near = _with_noise_settled(problem, other, near)
-    lead = other.log_evidence - found.log_evidence
-    lead += _as_slips(near, beliefs) - _as_slips(settled, beliefs)
-    return (other, near) if lead > beliefs.odds else (found, settled)
-
-
-def more_than_slips(
-    noise: NoiseModel,
-    data: Array,
-    effects: Effects,
-    contexts: Sequence[Context],
-    beliefs: Beliefs,
-    start: Explanation,
-    slips: int,
-) -> bool:
-    """Tell whether an effect that has a name likely acts beside an explanation and its slips, which
-    are added to it as long as one is the likeliest further effect, at most so many.
-    """
-    search = Search(noise, data, effects, contexts, beliefs, len(start.members) + slips + 1)
-    members = frozenset(start.members)
-    while True:
-        search.extend(start.context, members)
-        at = search.extended[start.context, members]
-        (nearest, *_) = at.leading
-        if at.further[nearest] <= at.own.log_posterior:
-            return False
-        if effects.names[nearest] is not None:
-            return True
-        members |= {nearest}
-
-
-def _as_slips(noise: NoiseModel, beliefs: Beliefs) -> float:
-    """Logarithm of how much less likely far rows are as entry errors than as what was made of their
-    scatter.
-    """
-    far = noise.distance > FAR
-    odds = beliefs.slip_odds(noise.distance)[far]
-    out = noise.distance[far]
-    return float(np.sum(np.logaddexp(odds, 0.0) - 0.5 * (out**2 - FAR**2) + np.log(out / FAR)))
 
 
 def _with_noise_settled(

@@ -172,23 +172,19 @@ def less_expected(misfit: Array, predicted_in: Array) -> Array:
     return misfit - EXPECTED_SLOPE * predicted_in
 
 
-def build_noise(
-    misfit: Array, rows: Rows, explained: Array | None = None, far: float = FAR
-) -> NoiseModel:
-    """Estimate V and σ of Eq. M2 from the misfit. Rows further out than `far` standard deviations
-    scatter more than others.
-    """
+def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:
+    """Estimate V and σ of Eq. M2 from the misfit. Rows far out scatter more than others."""
     rest = misfit if explained is None else misfit - explained
-    noise = _scatter(rest, rest, rows, far)
+    noise = _scatter(rest, rest, rows)
     gears = numbered(rows.gears)
     for _ in range(_ROUNDS if rows.unread_in.any() else 0):
         alone = rest - noise.share_of(rows.unread_in, rest)
         alone -= noise.share_of_groups(rows.u_shared_in, gears, rest)
-        noise = _scatter(rest, alone, rows, far)
+        noise = _scatter(rest, alone, rows)
     return noise
 
 
-def _scatter(rest: Array, alone: Array, rows: Rows, far: float) -> NoiseModel:
+def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     """Noise of the rows; `alone` is the residual without what unread joints most likely add to
     gears. [in]
     """
@@ -206,7 +202,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows, far: float) -> NoiseModel:
     gears = numbered(rows.gears)
     relative = np.hypot(relative, rows.u_filled_in / scale)
     # Rows far out in the tails of the distribution count less, but never as nothing.
-    far_out = np.maximum(1.0, np.abs(centred) / (scale * relative) / far)
+    far_out = np.maximum(1.0, np.abs(centred) / (scale * relative) / FAR)
     bias = [SLOPE * predicted / scale, SHARE_DOUBT * rows.drawn_in / scale]
     loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, HABIT * rows.trends])
     noise = NoiseModel(

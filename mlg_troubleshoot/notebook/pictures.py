@@ -54,10 +54,12 @@ def _residuals(
     if against not in known:
         raise UsageError(f"no column {against!r}", f"Give one of {', '.join(known)}.")
     column = diagnosis_figures.against_column(residuals, against)
-    before = diagnosis_figures.residual_plot(residuals, column, "before")
+    before = diagnosis_figures.residual_plot(residuals.rows, column, "before")
     if not result.diagnosis.causes:
         return [before]
-    after = diagnosis_figures.residual_plot(residuals, column, "with the extension", after=True)
+    after = diagnosis_figures.residual_plot(
+        residuals.rows, column, "with the extension", after=True
+    )
     return [before, after]
 
 

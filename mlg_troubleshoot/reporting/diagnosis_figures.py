@@ -217,6 +217,27 @@ _UNITS = {c.variable: "in" if c.is_length else c.unit for c in COVARIATES}
 
 
 @dataclass(frozen=True)
+class FittedRows:
+    """Rows as they were measured, predicted before and after a fit, in the unit that is drawn."""
+
+    measured: Array
+    predicted: Array
+    fitted: Array
+    is_fitted: bool
+    unit: str
+
+    @property
+    def axis(self) -> Axis:
+        """The axis that all plots of residuals share, so that they can be compared."""
+        both = np.concatenate([self.left(after=False), self.left(after=True)])
+        return Axis.around(f"measured − predicted, {self.unit}", both.tolist())
+
+    def left(self, *, after: bool) -> Array:
+        """What the prediction leaves of each row."""
+        return self.measured - (self.fitted if after else self.predicted)
+
+
+@dataclass(frozen=True)
 class Residuals:
     """The rows behind a diagnosis, before and after its extension, and the unit that they are drawn
     in.
@@ -230,10 +251,16 @@ class Residuals:
         return lengths_in * self.unit.per_inch
 
     @property
-    def axis(self) -> Axis:
-        """The axis that all plots of residuals share, so that they can be compared."""
-        both = self.drawn(np.concatenate([self.before_in, self.after_in]))
-        return Axis.around(f"measured − predicted, {self.unit}", both.tolist())
+    def rows(self) -> FittedRows:
+        """The rows as they are drawn."""
+        d = self.diagnosis
+        return FittedRows(
+            self.drawn(d.used.measured_in),
+            self.drawn(d.predicted_in),
+            self.drawn(d.predicted_in + self.effect_in),
+            bool(d.causes),
+            str(self.unit),
+        )
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -260,11 +287,6 @@ class Residuals:
         effects = [cause.effect_in for cause in self.diagnosis.causes]
         total: Array = np.sum([np.zeros_like(self.before_in), *effects], axis=0)
         return total
-
-    @property
-    def after_in(self) -> Array:
-        """What the extended model leaves, shape (n,). [in]"""
-        return self.before_in - self.effect_in
 
     def clearance(self, joint: int) -> Array:
         """Clearance of one joint in each row, NaN where not measured. [in]"""
@@ -378,7 +400,7 @@ def _day_label(residuals: Residuals) -> str:
 
 
 def residual_plot(
-    residuals: Residuals,
+    fitted: FittedRows,
     against: ResidualAxis,
     title: str,
     *,
@@ -388,10 +410,10 @@ def residual_plot(
     """Draw residuals against a column, with the mean of each stretch or group and twice its
     standard error.
     """
-    y = residuals.drawn(residuals.after_in if after else residuals.before_in)
+    y = fitted.left(after=after)
     if only is not None:
         y = np.where(only, y, np.nan)
-    axis = residuals.axis
+    axis = fitted.axis
     x = against.values
     names = against.names
     canvas = Canvas(*_PLOT, title, f"{axis.label}, against {against.label}")
@@ -489,7 +511,8 @@ def tail_strips(residuals: Residuals) -> list[Markup]:
     extended, after; the square is their mean.
     """
     tails = residuals.diagnosis.used.tails
-    before = residuals.drawn(residuals.before_in)
+    rows = residuals.rows
+    before = rows.left(after=False)
 
     def size(name: str) -> float:
         return abs(float(np.mean(before[tails == name])))
@@ -497,11 +520,11 @@ def tail_strips(residuals: Residuals) -> list[Markup]:
     names = sorted(np.unique(tails).tolist(), key=size, reverse=True)
     shown = sorted(names[:MOST_TAILS])
     panels = [("by tail, before", before, False)]
-    if residuals.diagnosis.causes:
-        panels.append(("by tail, with the extension", residuals.drawn(residuals.after_in), True))
+    if rows.is_fitted:
+        panels.append(("by tail, with the extension", rows.left(after=True), True))
     figures = []
     for title, values, after in panels:
-        plot = lanes(title, residuals.axis, shown, 13.0)
+        plot = lanes(title, rows.axis, shown, 13.0)
         for place, tail in enumerate(shown):
             own = values[tails == tail].tolist()
             for value in own:
@@ -511,22 +534,14 @@ def tail_strips(residuals: Residuals) -> list[Markup]:
     return figures
 
 
-def measured_against_predicted(residuals: Residuals) -> Markup:
-    d = residuals.diagnosis
-    unit = residuals.unit
-    predicted = residuals.drawn(d.predicted_in)
-    measured = residuals.drawn(d.used.measured_in)
-    extended = predicted + residuals.drawn(residuals.effect_in)
-    description = (
-        "Measured displacement of each inspection against the predicted one; on the line both are"
-        " equal"
-    )
+def measured_against_predicted(rows: FittedRows) -> Markup:
+    description = "Each measured value against the predicted one; on the line both are equal"
     canvas = Canvas(*_PLOT, "Measured against predicted", description)
-    values = np.concatenate([predicted, extended, measured]).tolist()
+    values = np.concatenate([rows.predicted, rows.fitted, rows.measured]).tolist()
     plot = Plot(
         canvas,
-        Axis.around(f"predicted, {unit}", values),
-        Axis.around(f"measured, {unit}", values),
+        Axis.around(f"predicted, {rows.unit}", values),
+        Axis.around(f"measured, {rows.unit}", values),
         top=24,
     )
     plot.draw_axes(x_ticks=8)
@@ -534,13 +549,13 @@ def measured_against_predicted(residuals: Residuals) -> Markup:
     high = plot.x.high
     canvas.line(*plot.at(low, low), *plot.at(high, high), colour=SOFT, dash="6 3")
     shown = [
-        ("before", predicted, False),
-        *([("with the extension", extended, True)] if d.causes else []),
+        ("before", rows.predicted, False),
+        *([("with the extension", rows.fitted, True)] if rows.is_fitted else []),
     ]
     for k, (label, x_values, is_after) in enumerate(shown):
-        for x, y in zip(x_values, measured, strict=True):
+        for x, y in zip(x_values, rows.measured, strict=True):
             _point(canvas, *plot.at(float(x), float(y)), after=is_after)
-        if d.causes:
+        if rows.is_fitted:
             x = plot.area[0] + 6 + 62 * k
             _point(canvas, x, 10, after=is_after)
             canvas.text(x + 7, 13.5, label, size=10)

@@ -97,7 +97,7 @@ def _context(
             if chance >= _LEAST_LIKELY
         ],
         "plots": _plots(residuals),
-        "scatter": drawn.measured_against_predicted(residuals),
+        "scatter": drawn.measured_against_predicted(residuals.rows),
         "strips": drawn.tail_strips(residuals),
         "by_column": _against_each(residuals),
         "tails": len(np.unique(d.used.tails)),
@@ -128,15 +128,15 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
         pairs = []
         for cause in d.causes:
             column = drawn.against_cause(residuals, cause.candidate)
-            left = drawn.residual_plot(residuals, column, "before")
-            right = drawn.residual_plot(residuals, column, "with the extension", after=True)
+            left = drawn.residual_plot(residuals.rows, column, "before")
+            right = drawn.residual_plot(residuals.rows, column, "with the extension", after=True)
             pairs.append((left, right, cause_words(cause)))
         return pairs
-    scatter = drawn.measured_against_predicted(residuals)
+    scatter = drawn.measured_against_predicted(residuals.rows)
     if d.verdict == "AMBIGUOUS":
         panels = [
             drawn.residual_plot(
-                residuals,
+                residuals.rows,
                 drawn.against_cause(residuals, c.candidate),
                 f"{name_words(c.candidate.cause.name)} {c.candidate.target or ''}".strip(),
             )
@@ -151,7 +151,7 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
         ]
     if d.unlisted_variables:
         return [_unlisted_plots(residuals, d.unlisted_variables, scatter)]
-    left = drawn.residual_plot(residuals, drawn.against_column(residuals, "predicted"), "")
+    left = drawn.residual_plot(residuals.rows, drawn.against_column(residuals, "predicted"), "")
     return [(left, scatter, "Against the prediction")]
 
 
@@ -166,8 +166,8 @@ def _against_each(residuals: Residuals) -> list[tuple[Markup, Markup | None]]:
 
     return [
         (
-            drawn.residual_plot(residuals, axis, "before"),
-            drawn.residual_plot(residuals, axis, "with the extension", after=True)
+            drawn.residual_plot(residuals.rows, axis, "before"),
+            drawn.residual_plot(residuals.rows, axis, "with the extension", after=True)
             if d.causes
             else None,
         )
@@ -187,10 +187,10 @@ def _unlisted_plots(residuals: Residuals, variables: tuple[str, ...], scatter: M
     if len(columns) > 1:
         split = drawn.split_by(residuals, variables[1 - first], columns[first])
     if split is None:
-        return drawn.residual_plot(residuals, columns[0], ""), scatter, caption
+        return drawn.residual_plot(residuals.rows, columns[0], ""), scatter, caption
     rows, these, others = split
     return (
-        drawn.residual_plot(residuals, columns[first], these, only=rows),
-        drawn.residual_plot(residuals, columns[first], others, only=~rows),
+        drawn.residual_plot(residuals.rows, columns[first], these, only=rows),
+        drawn.residual_plot(residuals.rows, columns[first], others, only=~rows),
         caption,
     )

@@ -386,5 +386,5 @@ def test_the_points_of_an_aircraft_stand_level_with_their_mean(gear: Gear) -> No
 
 def test_figures_side_by_side_are_equally_wide(named: Made, gear: Gear) -> None:
     residuals = Residuals(named.diagnosis, gear.joint_numbers, LengthUnit.INCH)
-    figures = [*tail_strips(residuals), measured_against_predicted(residuals)]
+    figures = [*tail_strips(residuals), measured_against_predicted(residuals.rows)]
     assert len({re.findall(r'width="([^"]*)"', svg)[0] for svg in figures}) == 1
