@@ -302,6 +302,7 @@ PICTURES = [
     ("diagnose", {}),
     ("diagnose", {"against": "hydraulic_pressure_psi"}),
     ("diagnose", {"against": "technician_id"}),
+    ("simulation", {}),
     ("lives", {}),
 ]
 

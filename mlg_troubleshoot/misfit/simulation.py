@@ -684,6 +684,9 @@ class _Study:
             notes=tuple(self.notes(in_sequence)),
             calls=run.calls,
             failed=len(run.failures),
+            measured=run.reading,
+            predicted=run.at(start),
+            fitted=run.at(best.values),
         )
 
     def folds(self, at: _Point, causes: Sequence[int]) -> tuple[Wholes, str]:

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.posterior import UNLISTED, Explanation, Key, MisfitPosterior
 from mlg_troubleshoot.results import Result
@@ -341,6 +342,9 @@ class SimulationDiagnosis(Result):
         Times that the simulation was called.
     failed : int
         Calls that gave no number for some reading, or failed.
+    measured, predicted, fitted : ndarray, shape (N,)
+        The readings; their prediction with the suspects nominal, and that with `parameters`,
+        nuisance parameters fitted in both. [unit of the readings]
     """
 
     json_names = """
@@ -365,6 +369,9 @@ class SimulationDiagnosis(Result):
     notes: tuple[str, ...]
     calls: int
     failed: int
+    measured: Array
+    predicted: Array
+    fitted: Array
 
     @property
     def suspects_named(self) -> list[SuspectNamed]:

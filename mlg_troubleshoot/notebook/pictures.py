@@ -10,6 +10,7 @@ from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.misfit.simulation_result import SimulationDiagnosis
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.reporting import diagnosis_figures
 from mlg_troubleshoot.reporting.figures import Lengths
@@ -63,6 +64,19 @@ def _residuals(
     return [before, after]
 
 
+def _fit(result: SimulationDiagnosis) -> list[Markup]:
+    rows = diagnosis_figures.FittedRows(
+        result.measured, result.predicted, result.fitted, "fitted", "unit of the readings"
+    )
+    predicted = diagnosis_figures.ResidualAxis("predicted", result.predicted)
+    fitted = diagnosis_figures.ResidualAxis("fitted", result.fitted)
+    return [
+        diagnosis_figures.measured_against_predicted(rows),
+        diagnosis_figures.residual_plot(rows, predicted, "before"),
+        diagnosis_figures.residual_plot(rows, fitted, "fitted", after=True),
+    ]
+
+
 def _life(result: Lives, tail: str = "", side: str = "", unit: str = "in") -> list[Markup]:
     for life in result.lives:
         if life.latest and tail in ("", life.key[0]) and side in ("", life.key[1]):
@@ -78,6 +92,7 @@ _DRAW = {
     StudyFindings: _indices,
     IndexTable: _indices,
     DiagnoseResult: _residuals,
+    SimulationDiagnosis: _fit,
     Lives: _life,
 }
 

@@ -218,12 +218,15 @@ _UNITS = {c.variable: "in" if c.is_length else c.unit for c in COVARIATES}
 
 @dataclass(frozen=True)
 class FittedRows:
-    """Rows as they were measured, predicted before and after a fit, in the unit that is drawn."""
+    """Rows as they were measured, predicted before and after a fit, in the unit that is drawn.
+
+    fit: what the fit is; empty without one.
+    """
 
     measured: Array
     predicted: Array
     fitted: Array
-    is_fitted: bool
+    fit: str
     unit: str
 
     @property
@@ -258,7 +261,7 @@ class Residuals:
             self.drawn(d.used.measured_in),
             self.drawn(d.predicted_in),
             self.drawn(d.predicted_in + self.effect_in),
-            bool(d.causes),
+            "with the extension" if d.causes else "",
             str(self.unit),
         )
 
@@ -520,8 +523,8 @@ def tail_strips(residuals: Residuals) -> list[Markup]:
     names = sorted(np.unique(tails).tolist(), key=size, reverse=True)
     shown = sorted(names[:MOST_TAILS])
     panels = [("by tail, before", before, False)]
-    if rows.is_fitted:
-        panels.append(("by tail, with the extension", rows.left(after=True), True))
+    if rows.fit:
+        panels.append((f"by tail, {rows.fit}", rows.left(after=True), True))
     figures = []
     for title, values, after in panels:
         plot = lanes(title, rows.axis, shown, 13.0)
@@ -550,12 +553,12 @@ def measured_against_predicted(rows: FittedRows) -> Markup:
     canvas.line(*plot.at(low, low), *plot.at(high, high), colour=SOFT, dash="6 3")
     shown = [
         ("before", rows.predicted, False),
-        *([("with the extension", rows.fitted, True)] if rows.is_fitted else []),
+        *([(rows.fit, rows.fitted, True)] if rows.fit else []),
     ]
     for k, (label, x_values, is_after) in enumerate(shown):
         for x, y in zip(x_values, rows.measured, strict=True):
             _point(canvas, *plot.at(float(x), float(y)), after=is_after)
-        if rows.is_fitted:
+        if rows.fit:
             x = plot.area[0] + 6 + 62 * k
             _point(canvas, x, 10, after=is_after)
             canvas.text(x + 7, 13.5, label, size=10)
