@@ -1,4 +1,4 @@
-"""What rows do when nothing is wrong: scatter of readings, scatter between tails, small
+"""What rows do when nothing is wrong: scatter of readings, scatter between tails, small bias and
 slope.
 
 Rows of one aircraft are not exchangeable, noise may grow with the displacement and have heavy
@@ -26,7 +26,9 @@ from mlg_troubleshoot.misfit.columns import FAR, NoiseModel
 # Pins scatter by up to some 6° about the worst direction, so a healthy fleet reads less than the
 # bound by this share. [1]
 EXPECTED_SLOPE = -0.0045
-# Bias of the slope that the null model allows beyond that, one standard deviation. [1]
+# Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the
+# slope [1].
+BIAS_IN = 0.0001
 SLOPE = 0.003
 # Wear, landings and misfits have heavier tails than a normal distribution: degrees of freedom of
 # Student's t. [1]
@@ -203,7 +205,11 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     relative = np.hypot(relative, rows.u_filled_in / scale)
     # Rows far out in the tails of the distribution count less, but never as nothing.
     far_out = np.maximum(1.0, np.abs(centred) / (scale * relative) / FAR)
-    bias = [SLOPE * predicted / scale, SHARE_DOUBT * rows.drawn_in / scale]
+    bias = [
+        np.full(len(rest), BIAS_IN / scale),
+        SLOPE * predicted / scale,
+        SHARE_DOUBT * rows.drawn_in / scale,
+    ]
     loadings = np.hstack([np.column_stack(bias), rows.unread_in / scale, HABIT * rows.trends])
     noise = NoiseModel(
         relative * far_out,
