@@ -299,7 +299,7 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     header = find_header(near, options, sheet) or find_form(peeked, options)
     # A form that nobody touched holds no inspection; a header may stand too far below to be seen.
     if isinstance(header, Form):
-        is_filled = not header.is_untouched
+        is_filled = header.is_filled
     elif header is not None:
         is_filled = any(number > header.row for number, _ in peeked)
     else:

@@ -141,13 +141,6 @@ class Heading:
         return {*re.findall(r"[^\W_]+", self.rest)} <= _NO_MATTER
 
     @property
-    def unit(self) -> LengthUnit | None:
-        """The only unit that it names."""
-        words = re.findall(r"[^\W_]+", self.rest)
-        units = {UNIT_SPELLINGS[word] for word in words if word in UNIT_SPELLINGS}
-        return units.pop() if len(units) == 1 else None
-
-    @property
     def is_said(self) -> bool:
         return self.is_reading is not None or self.visit != ONE_VISIT
 
@@ -353,6 +346,11 @@ class CellPlace(NamedTuple):
     @classmethod
     def at(cls, row: int, index: int, header: str) -> CellPlace:
         return cls(row, header, f"{column_letters(index)}{row}")
+
+    @property
+    def letters(self) -> str:
+        """The column."""
+        return (self.cell or "").rstrip("0123456789")
 
 
 NOWHERE = CellPlace()
@@ -733,7 +731,7 @@ def _tells_failure(header: str, cell: Filled) -> bool:
 
 
 @lru_cache(4096)
-def _spoken(cell: Filled) -> tuple[ClearanceConvention | None, LengthUnit | None, bool]:
+def spoken(cell: Filled) -> tuple[ClearanceConvention | None, LengthUnit | None, bool]:
     """The convention or the unit that a cell is, and whether it says above of a number."""
     is_word = isinstance(cell, str) and not _CODE.fullmatch(cell)
     text = plain_text(show(cell)).lower() if is_word else ""
@@ -873,7 +871,7 @@ class RowReader:
                 self._unread_words.append((p, nearest, is_sure))
             if column is not None or p.refused:
                 continue
-            name = p.header or f"column {column_letters(p.index)}"
+            name = p.header or f"column {p.place.letters}"
             while name in taken:
                 name = f"{name} (again)"
             taken.add(name)
@@ -982,7 +980,8 @@ class RowReader:
         row = self._row
         for index, column in self._others:
             cell = self._cells[index]
-            if cell is None and column not in IDENTITY:
+            is_own = self._placed[index].visit in (None, row.visit)
+            if cell is None and not (is_own and column in IDENTITY):
                 continue
             if column is DATE:
                 self._days.add(cell)
@@ -1064,7 +1063,8 @@ class RowReader:
         width = len(self._placed)
         if len(cells) > width:
             # Something stands to the right of the last header.
-            self._add(PlacedField(i, "", None) for i in range(width, len(cells)))
+            places = [CellPlace.at(row.number, i, "") for i in range(width, len(cells))]
+            self._add(PlacedField(i, "", None, place=p) for i, p in enumerate(places, width))
         cells += [None] * (width - len(cells))
         for index in self._blankable:
             cell = cells[index]
@@ -1095,7 +1095,7 @@ class RowReader:
             cell = cells[placed.index]
             if cell is None or not self._matters(place, cell):
                 continue
-            header = placed.header or column_letters(placed.index)
+            header = placed.header or placed.place.letters
             is_unread = placed.field is None and (nearest is not None or of_joint)
             is_unread = is_unread or placed.is_misread
             # Under a header that names nothing only a number that may decide is asked about, or any
@@ -1103,7 +1103,7 @@ class RowReader:
             is_named = nearest or is_sure or of_joint or CLEARANCE not in self._at
             smallest = 0.0 if is_named else min(self._options.limit_in.values(), default=0.0)
             any_number = is_sure or units == {LengthUnit.THOU}
-            said, unit, is_above = _spoken(cell)
+            said, unit, is_above = spoken(cell)
             if is_unread and self._may_be_length(cell, smallest, is_sure=any_number):
                 target = nearest or CLEARANCE.name
                 meant = f'a reading, pass --map "{header}={target}" (a length with its unit)'
@@ -1128,7 +1128,7 @@ class RowReader:
         """Whether a cell of a column that is not read may be asked about in any row."""
         placed = self._unread_words[place][0]
         is_length = self._may_be_length(cell, 0.0, is_sure=True)
-        return is_length or any(_spoken(cell)) or self._may_say_outcome(placed, cell, None)
+        return is_length or any(spoken(cell)) or self._may_say_outcome(placed, cell, None)
 
     def _may_say_outcome(self, placed: PlacedField, cell: Filled, outcome: Outcome | None) -> bool:
         """Whether an unread cell says that the gear failed or, where no outcome is known, may say

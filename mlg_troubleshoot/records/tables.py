@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from itertools import chain, islice, pairwise, takewhile, zip_longest
+from itertools import chain, islice, pairwise, zip_longest
 from pathlib import PurePath
 from typing import Any, NamedTuple
 
@@ -41,7 +40,6 @@ from mlg_troubleshoot.records.cells import (
     FileRefusedError,
     Filled,
     NumberedRow,
-    OddCell,
     Sheet,
     column_letters,
     first_of,
@@ -73,6 +71,7 @@ from mlg_troubleshoot.records.rows import (
     RowReader,
     SheetLayout,
     TableInHand,
+    spoken,
     take_apart,
     visits_of,
 )
@@ -116,24 +115,24 @@ class Header:
         return [CellPlace.at(self.row, index, text) for index, text in enumerate(self.texts)]
 
 
-def _names(key: str, text: str, index: int) -> bool:
+def _names(key: str, text: str, letters: str) -> bool:
     """Whether a key of a mapping is this header, or the letters of its column."""
-    return tidy(key) == tidy(text) or key == column_letters(index)
+    return tidy(key) == tidy(text) or key == letters
 
 
-def mapped_to(options: ReadOptions, text: str, index: int) -> str | None:
+def mapped_to(options: ReadOptions, text: str, letters: str = "") -> str | None:
     """What the caller reads a header as; None if it is not mapped."""
     named = options.column_map
     for key, target in (*named.items(), *options.shared_map.items()):
         # Letters name a place in one table, not in several.
-        if _names(key, text, index if key in named else -1):
+        if _names(key, text, letters if key in named else ""):
             return target
     return None
 
 
-def _understood(text: str, index: int, options: ReadOptions) -> tuple[Recognition, bool]:
+def _understood(text: str, letters: str, options: ReadOptions) -> tuple[Recognition, bool]:
     """What a header is understood as, and whether the caller said so."""
-    target = mapped_to(options, text, index)
+    target = mapped_to(options, text, letters)
     if target is None:
         return recognise(text, options.joints), False
     named = None if tidy(target) == "carry" else parse_target(target, options.joints, "--map")
@@ -148,7 +147,7 @@ def header_score(cells: Cells, options: ReadOptions) -> int:
     for index, cell in enumerate(cells):
         if not isinstance(cell, str):
             continue
-        found, is_mapped = _understood(cell, index, options)
+        found, is_mapped = _understood(cell, column_letters(index), options)
         mapped += is_mapped
         doubtful += bool(found.reason)
         nearest_field = parse_canonical(found.nearest or "", options.joints)
@@ -244,8 +243,7 @@ class Columns:
     """The columns of a table as its header, or the labels of a form, name them; what is wrong with
     them is reported.
 
-    visits: whose readings a row holds, one after the other. is_long: True if one row is one joint's
-    reading.
+    visits: whose readings a row holds. is_long: True if one row is one joint's reading.
     """
 
     def __init__(
@@ -253,17 +251,17 @@ class Columns:
         header: Header,
         table: TableInHand,
         *,
-        visits: Collection[Occasion] = (),
+        is_form: bool = False,
     ) -> None:
         self._table = table
         self._options = table.options
         self._row = header.row
-        self.visits = tuple(visits) or (ONE_VISIT,)
+        self.visits: tuple[Occasion, ...] = (ONE_VISIT,)
         self.placed: list[PlacedField] = []
         for index, (text, place, unit) in enumerate(
             zip_longest(header.texts, header.places, header.units)
         ):
-            found, is_settled = _understood(text, index, self._options)
+            found, is_settled = _understood(text, place.letters, self._options)
             if found is UNKNOWN and text:
                 found = near_miss(text, self._options.joints)
             known = found.field
@@ -286,7 +284,7 @@ class Columns:
         for p in self.placed:
             if p.refused:
                 self._doubt(p)
-        self.is_long = self._tell_long() and not visits
+        self.is_long = self._tell_long() and not is_form
         self._settle_duplicates()
         self._look_for_missing()
 
@@ -358,15 +356,18 @@ class Columns:
                     named = replace(named, unit=named.unit or unit)
             if (
                 named is not None
-                and (named.column.needs_joint or named.column in (PLUNGER_DISPLACEMENT, OUTCOME))
+                and named.column not in (SIDE, JOINT, CONVENTION, UNIT)
                 and (heading.is_said or p.field is not None)
             ):
                 groups.setdefault(named.quantity, []).append((p, named, heading))
         several: dict[Occasion, None] = {}
-        for group in groups.values():
+        measured = [key for key in groups if key[0].needs_joint or key[0] in _MEASURED]
+        for key in (*measured, *(key for key in groups if key not in measured)):
+            group = groups[key]
             visits = visits_of([heading for *_, heading in group])
             has_side = self.at(SIDE) and any(visit and visit.side for visit in visits)
-            if has_side or all(p.field is not None for p, *_ in group):
+            is_apart = key in measured or several.keys() - {ONE_VISIT} >= {*visits}
+            if has_side or not is_apart or all(p.field is not None for p, *_ in group):
                 continue
             for (p, named, _), visit in zip(group, visits, strict=False):
                 p.is_settled = True
@@ -377,7 +378,7 @@ class Columns:
         if not {*several} - {ONE_VISIT}:
             return
         self.visits = tuple(several)
-        for p in [p for group in groups.values() for p, *_ in group]:
+        for p in [p for key in measured for p, *_ in groups[key]]:
             if p.visit is None and p.field is not None:
                 # Of the visit of the row, if other columns are.
                 p.visit = ONE_VISIT if ONE_VISIT in several else None
@@ -456,7 +457,7 @@ class Columns:
                     placed,
                     f"one column for {field.name}; {first.place.cell} {first.header!r} is one"
                     " already",
-                    f"Remove one of the two, or pass --map {column_letters(placed.index)}=carry to"
+                    f"Remove one of the two, or pass --map {placed.place.letters}=carry to"
                     " use the other.",
                 )
 
@@ -475,7 +476,7 @@ class Columns:
             self._table.tell("column_missing", None, expected, remedy, place)
         headers = [p.header for p in self.placed if p.header]
         for key in self._options.column_map:
-            if not any(_names(key, p.header, p.index) for p in self.placed):
+            if not any(_names(key, p.header, p.place.letters) for p in self.placed):
                 expected = f"one of the headers of the table: {', '.join(headers)[:200]}"
                 remedy = f"Correct the header named in --map.{nearest(key, headers)}"
                 place = CellPlace(self._row, key)
@@ -492,224 +493,193 @@ _NUMBER = re.compile(r"[^\w]*\d")
 _SAID = re.compile(r"\s*([^:]{1,40}):\s*(\S.*)")
 
 
-class _Line(NamedTuple):
-    """A row with a label, and the column of a table that this names; None if it names none.
-
-    said: what the cell of the label says behind it, as in ``Tail: N123``, and the cell's column.
-    """
+class _Entry(NamedTuple):
+    """A cell of a form below the header that its label and its heading make."""
 
     row: int
-    label: str
-    column: Column | None
-    cells: Cells
-    said: tuple[int, str] | None = None
+    at: int
+    text: str
+    cell: Cell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form(Header):
-    """A form as found: a table on its side, whose headers are the labels of its lines.
+    """A form as found, turned into a table of one row."""
 
-    value_column: of what is said once, above the row `measured_from` of readings as well. columns:
-    of numbers next to joints, each with its heading and how it is called in a message.
-    """
-
-    lines: Sequence[_Line]
+    entries: Sequence[_Entry]
     width: int
-    label_column: int
-    value_column: int
-    columns: Mapping[int, tuple[Heading, str]]
-    measured_from: int
-    is_ours: bool
+    is_filled: bool
 
     @property
     def places(self) -> Sequence[CellPlace]:
-        return [CellPlace.at(line.row, self.label_column, line.label) for line in self.lines]
+        return [CellPlace.at(each.row, each.at, each.text) for each in self.entries]
 
     @property
-    def is_untouched(self) -> bool:
-        at = self.value_column
-        filled = [line.column for line in self.lines if line.said or any(line.cells[at : at + 1])]
-        return not self.columns and all(column in _DECLARATIONS for column in filled)
-
-    def visits(self, sheet: str | None) -> dict[int, Occasion]:
-        """The columns that are read, each with its visit; what cannot be decided is refused."""
-        if not self.columns:
-            return {self.value_column: ONE_VISIT}
-        visits = visits_of([heading for heading, _ in self.columns.values()])
-        sides = {visit.side for visit in visits if visit is not None and visit.side}
-        stated = [
-            side
-            for line in self.lines
-            if line.column is SIDE
-            for cell in line.cells[self.label_column + 1 :]
-            if isinstance(cell, str) and (side := Side.spelt(cell))
-        ]
-        is_elsewhere = self.is_ours and [*self.columns] != [self.value_column]
-        contradicts = len(stated) == 1 and sides - {*stated}
-        if visits and not is_elsewhere and not contradicts:
-            return {i: v for i, v in zip(self.columns, visits, strict=True) if v is not None}
-        named = ", ".join(name for _, name in self.columns.values())
-        remedy = "Delete the columns that are not readings, or write found above those that are."
-        if self.is_ours:
-            remedy = f"Move the readings to column {column_letters(self.value_column)}."
-        raise FileRefusedError(
-            "form_columns",
-            f"it holds numbers next to its joints in columns {named}",
-            "one column of readings, or headings that tell found from limit, LH from RH, or the"
-            " days",
-            remedy,
-            sheet=sheet,
-        )
-
-    def upright(self, columns: Columns, visits: Mapping[int, Occasion]) -> Iterator[Row]:
-        """The form as rows of a table, one for each visit."""
-        ids = columns.at(RECORD_ID)
-        row = self.lines[ids[0]].row if ids else self.row
-        for column, visit in visits.items():
-            found = Row(row, [], visit=visit)
-            for line, p in zip(self.lines, columns.placed, strict=True):
-                cells = dict(enumerate(line.cells))
-                at, shared = line.said or (column, cells.get(self.value_column))
-                own = cells.get(column)
-                is_measured = p.field is None or p.field.column in _MEASURED
-                # Above the readings a line may say it once for all columns.
-                is_below = len(visits) > 1 if line.said else line.row >= self.measured_from
-                is_own = is_measured and is_below
-                is_read = any(cells.get(i) is not None for i in visits)
-                is_apart = line.said or line.column is not CLEARANCE
-                if is_own and not is_read and shared is not None and is_apart:
-                    # So may one that no column of readings fills; next to a reading stands a limit.
-                    is_own = line.column in _READ
-                    if is_own:
-                        found.questions.append(
-                            f"{line.label!r} says {quote(shared, 40)} in a column that is not read:"
-                            f" if it is a reading, move it to column {column_letters(column)}; else"
-                            " delete it."
-                        )
-                found.cells.append(own if own is not None or is_own else shared)
-                found.places.append(CellPlace.at(line.row, at, line.label))
-            yield found
-
-    def note(self, visits: Mapping[int, Occasion]) -> str:
-        """Say which columns of numbers are the readings, if there are several."""
-        if len(self.columns) < 2:
-            return ""
-        shown = [name for column, (_, name) in self.columns.items() if column in visits]
-        left = [name for column, (_, name) in self.columns.items() if column not in visits]
-        not_read = f"; not read: {', '.join(left)}" if left else ""
-        return f"the readings are those of column {', '.join(shown)}{not_read}"
+    def as_row(self) -> Row:
+        """The row, by whose number a person finds the form."""
+        return Row(self.row, [each.cell for each in self.entries], [*self.places])
 
 
 def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
-    named: Counter[int] = Counter()
-    for _, cells in rows:
-        known = (i for i, cell in enumerate(cells[:4]) if _column(cell, options))
-        named.update(islice(known, 1))
-    at = max(named, key=lambda index: named[index], default=0)
-    lines = _lines(rows, at, options)
-    columns = [line.column for line in lines if line.column]
-    joints = [line for line in lines if line.column in _READ]
-    if len(columns) < 3 or not {*IDENTITY} & {*columns} or CLEARANCE not in columns:
+    # The first label of each row that has one, and the rows that say label and value in one cell.
+    labels: dict[int, tuple[int, Column]] = {}
+    told: dict[int, Column | None] = {}
+    lines, corner = _with_joints(rows, options)
+    for row, cells in lines:
+        texts = {i: cell for i, cell in enumerate(cells) if isinstance(cell, str)}
+        for i, text in texts.items():
+            column = _column(text, options)
+            said = None if column else _said(text, options)
+            if said is not None:
+                told[row] = _column(said[0], options)
+            # Behind a text the last cell is a value.
+            elif column is not None and i < 4 and (i == min(texts) or any(cells[i + 1 :])):
+                labels.setdefault(row, (i, column))
+    kinds = {row: column for row, (_, column) in labels.items()}
+    columns = [*kinds.values(), *filter(None, told.values())]
+    if len(columns) < 3 or not {*IDENTITY} & {*columns} or CLEARANCE not in kinds.values():
         return None
-    is_ours = any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1])
-    filled = {i for line in lines for i, c in enumerate(line.cells) if i > at and c is not None}
-    # Merged labels push the values further to the right.
-    value_column = at + 1 if is_ours else min(filled, default=at + 1)
+    if any(cell == FORM_TITLE for _, cells in lines[:2] for cell in cells[:1]):
+        # Next to its lines the template explains them.
+        lines = [
+            (
+                row,
+                [c if i < 2 or _is_number(c) or _matters(c) else None for i, c in enumerate(cells)],
+            )
+            for row, cells in lines
+        ]
     numbers = {
         i
-        for line in joints
-        for i, cell in enumerate(line.cells)
-        if (_is_number(cell) if i > at else _is_fraction(cell))
+        for row, cells in lines
+        if kinds.get(row) in _READ
+        for i, cell in enumerate(cells)
+        if (_is_number(cell) if i > labels[row][0] else _is_fraction(cell))
     }
-    # Up to three rows above the first joint hold headings, none of them a line.
-    kinds = {line.row: line.column for line in lines if line.column is not JOINT}
-    above = [(row, cells) for row, cells in reversed(rows) if row < joints[0].row]
-    headings = dict(takewhile(lambda each: not kinds.get(each[0]), above[:3]))
-    # So does a row that says joint, wherever the plunger's line stands.
-    of_joints = {
-        line.row: line.cells
-        for line in lines
-        if line.column is JOINT and not any(map(_is_number, line.cells[at + 1 :]))
-    }
-    headings |= of_joints
-    lines = [
-        line
-        for line in lines
-        if line.said or (line.row not in headings and _is_line(line, at, options))
-    ]
+    # Up to three rows above the first joint hold headings, and one that says joint.
+    top = min(row for row, column in kinds.items() if column is CLEARANCE)
+    heads = {row: cells for row, cells in lines if row == corner}
+    above = (each for each in reversed(lines) if each[0] < top)
+    for row, cells in islice((each for each in above if kinds.get(each[0]) not in _MEASURED), 3):
+        if row in kinds or row in told or any(map(_matters, cells)):
+            break
+        heads[row] = cells
+    begin = corner or min(heads, default=top)
     # Lines of a side or a day that several columns fill also head them.
-    told_apart = [
-        line.cells
-        for line in lines
-        if line.column in (SIDE, DATE)
-        and sum(cell is not None for cell in line.cells[at + 1 :]) > 1
+    heads |= {
+        row: cells
+        for row, cells in lines
+        if kinds.get(row) in (SIDE, DATE)
+        if sum(cells[i] is not None for i in numbers if labels[row][0] < i < len(cells)) > 1
+    }
+    headings = {i: _heading(i, [heads[row] for row in sorted(heads)]) for i in sorted(numbers)}
+    for i, text in headings.items():
+        if len(headings) == 1:
+            # A single column of readings may have any heading.
+            headings[i] = text if take_apart(text).is_bare else ""
+        elif any(headings.values()):
+            headings[i] = text or f"column {column_letters(i)}"
+    entries = [
+        entry
+        for row, cells in lines
+        if row not in heads
+        for entry in _entries(row, cells, labels.get(row), headings, row >= begin, options)
     ]
-    heads = [*reversed(headings.values()), *told_apart]
-    headed = {i: _heading(i, heads) for i in sorted(numbers)}
-    stated = {heading.unit for heading, _ in headed.values() if heading.is_reading is not False}
-    unit = stated.pop() if len(stated) == 1 else None
-    measured_from = min(of_joints or [joints[0].row, *headings])
+    named = [each.row for each in entries if _column(each.text, options) is RECORD_ID]
+    filled = [_column(each.text, options) for each in entries if each.cell is not None]
     return Form(
-        texts=tuple(line.label for line in lines),
-        rows_used=(lines[0].row,),
-        lines=lines,
-        width=max(len(cells) for _, cells in rows),
-        label_column=at,
-        value_column=value_column,
-        columns=headed,
-        measured_from=measured_from,
-        units=tuple(
-            unit if line.column in _READ and line.row > measured_from else None for line in lines
-        ),
-        is_ours=is_ours,
+        texts=tuple(each.text for each in entries),
+        rows_used=tuple((named or [entries[0].row])[:1]),
+        entries=entries,
+        width=max(len(cells) for _, cells in lines),
+        is_filled=any(column not in _DECLARATIONS for column in filled),
     )
 
 
-def _lines(rows: Sequence[NumberedRow], at: int, options: ReadOptions) -> list[_Line]:
-    """The rows with a label; numbers below a label that says joint are the names of joints."""
-    lines: list[_Line] = []
+def _with_joints(
+    rows: Sequence[NumberedRow], options: ReadOptions
+) -> tuple[list[NumberedRow], int]:
+    """Name the joints whose numbers stand below a heading that says joint; and its row, or 0."""
+    corner, at = 0, -1
+    lines: list[NumberedRow] = []
     for row, cells in rows:
-        said = [line for i in range(len(cells)) if (line := _said(row, cells, i, at, options))]
-        lines += said
-        is_said = any(line.said and line.said[0] == at for line in said)
-        label = cells[at] if at < len(cells) and not is_said else None
-        number = show(label).strip()
-        if number.isdecimal() and any(line.column is JOINT for line in lines):
-            label = f"joint {number}"
-        if isinstance(label, str):
-            # A cell alone in its row is a title or a hint, but not one that tells of a failure.
-            is_told = says_failed(label) and not any(cells[at + 1 :])
-            told = (at, label) if is_told else None
-            lines.append(_Line(row, label, _column(label, options), cells, told))
-    return lines
+        named = [
+            f"joint {show(c)}" if i == at and show(c).strip().isdecimal() else c
+            for i, c in enumerate(cells)
+        ]
+        lines.append((row, named))
+        for i, cell in enumerate(cells):
+            behind = cells[i + 1 :]
+            is_joint = _column(cell, options) is JOINT
+            if is_joint and not any(show(c).isdecimal() or _is_fraction(c) for c in behind):
+                corner, at = row, i
+    return lines, corner
 
 
-def _said(row: int, cells: Cells, index: int, at: int, options: ReadOptions) -> _Line | None:
-    """The line that one cell is, label and value; a number next to it makes it a label alone. With
-    a label that is not known it is one in the column of labels if its value may matter.
-    """
-    cell = cells[index]
-    parts = _SAID.fullmatch(cell) if isinstance(cell, str) and not _column(cell, options) else None
+def _entries(
+    row: int,
+    cells: Cells,
+    first: tuple[int, Column] | None,
+    headings: Mapping[int, str],
+    is_below: bool,
+    options: ReadOptions,
+) -> Iterator[_Entry]:
+    """A line of a form: labels, each with what stands behind it; and what else may matter."""
+    at, column = first or (-1, None)
+    label = _text(cells[at]) if first else ""
+    filled = [i for i, cell in enumerate(cells) if cell is not None]
+    is_paired = sum(i in headings for i in filled if i > at) > 1
+    is_read = column in _READ and bool(headings)
+    is_waiting = False
+    # A blank below found is a joint that was not measured.
+    blanks = headings if column is CLEARANCE and is_below else ()
+    for i in sorted({*filled, *blanks}):
+        cell = cells[i] if i < len(cells) else None
+        text = cell if isinstance(cell, str) else ""
+        known = _column(cell, options)
+        said = None if known else _said(text, options)
+        is_label = i > at and i < filled[-1] and (known or (at < 0 and not _is_number(cell)))
+        if said is not None:
+            yield _Entry(row, i, *said)
+        elif len(filled) == 1 and _tells_failure(text):
+            yield _Entry(row, i, text, text)
+            return
+        elif i == at or (text and is_label):
+            if is_waiting:
+                yield _Entry(row, at + 1, label, None)
+            at, label, column, is_waiting = i, _text(cell), known, True
+        else:
+            is_own = is_paired or (is_below and column in _MEASURED)
+            is_value = i in headings if is_read else is_waiting or (i in headings and is_own)
+            if not (is_value or _matters(cell) or (cell is not None and any(spoken(cell)))):
+                continue
+            header = label if is_value or column is None else ""
+            heading = headings.get(i, "") if is_value and is_own and column else ""
+            yield _Entry(row, i, f"{header} {heading}".strip(), cell)
+            is_waiting = False
+    if is_waiting and column:
+        yield _Entry(row, at + 1, label, None)
+
+
+def _said(text: str, options: ReadOptions) -> tuple[str, str] | None:
+    """The label and the value of a line in one cell; without a known label only what matters."""
+    parts = _SAID.fullmatch(text)
     column = _column(parts[1], options) if parts else None
-    if parts is None or column is JOINT or any(map(_is_number, cells[index + 1 :][:1])):
+    if parts is None or column is JOINT:
         return None
-    if column is None and not (index == at and _matters(parts[2])):
+    if column is None and not _matters(parts[2]):
         return None
     if column in _READ and math.isnan(written_number(parts[2], decimal_comma=True)[0]):
         return None
-    return _Line(row, parts[1], column, (), (index, parts[2]))
+    return parts[1], parts[2]
 
 
-def _heading(index: int, rows: Sequence[Cells]) -> tuple[Heading, str]:
+def _heading(index: int, rows: Sequence[Cells]) -> str:
     cells = [cells[index] for cells in rows if index < len(cells)]
-    words = [cell.text if isinstance(cell, OddCell) else show(cell) for cell in cells]
-    text = " ".join(filter(None, words))
-    letters = column_letters(index)
-    return take_apart(text), f"{letters} ({text[:40]!r})" if text else letters
+    return " ".join(filter(None, map(_text, cells)))
 
 
 def _column(cell: Cell, options: ReadOptions) -> Column | None:
-    field = recognise(cell, options.joints).field if isinstance(cell, str) else None
+    field = _understood(cell, "", options)[0].field if isinstance(cell, str) else None
     return None if field is None else field.column
 
 
@@ -724,17 +694,10 @@ def _is_fraction(cell: Cell) -> bool:
     return number % 1.0 > 0.0
 
 
-def _is_line(line: _Line, at: int, options: ReadOptions) -> bool:
-    """Leave out titles, hints and signature lines, but not a label that may be a reading."""
-    is_known = recognise(line.label, options.joints) is not UNKNOWN
-    is_named = mapped_to(options, line.label, -1) is not None or line.label.rstrip().endswith(":")
-    return is_known or is_named or any(map(_matters, line.cells[at + 1 :]))
-
-
 def _matters(cell: Cell) -> bool:
     """Whether a cell may be a reading, or what the gear did, whatever stands next to it."""
     return cell is not None and (
-        _is_fraction(cell) or may_be_outcome(cell, asked=False) or says_failed(show(cell))
+        _is_fraction(cell) or may_be_outcome(cell, asked=False) or _tells_failure(show(cell))
     )
 
 
@@ -924,8 +887,7 @@ def _read_one(
     out = Collected()
     below: Header | None = None
     form = header if isinstance(header, Form) else None
-    visits = {} if form is None else form.visits(sheet.name)
-    side = next((visit.side for visit in visits.values()), None)
+    side = None
     first = list(islice(rows, _LOOKED_AT))
     said = placed = ""
     if form is None:
@@ -938,7 +900,7 @@ def _read_one(
     comma = options.decimal_comma or sheet.delimiter == ";"
     options = replace(options, decimal_comma=comma, side=side)
     in_hand = TableInHand(options, file, sheet.name, out.tell)
-    columns = Columns(header, in_hand, visits=visits.values())
+    columns = Columns(header, in_hand, is_form=form is not None)
     table = _Table(sheet, header, columns, in_hand, out)
     titles: list[str] = []
     width = len(header.texts) if form is None else form.width
@@ -959,23 +921,20 @@ def _read_one(
         elif number > header.row:
             table.take(number, cells)
     if form is not None:
-        out.rows += map(table.reader.read, form.upright(columns, visits))
+        out.rows += map(table.reader.read, table.by_visits(form.as_row))
     about = "; ".join(table.finish())
     read, carried, left = columns.notes()
     read = "; ".join(filter(None, (placed * (header.row > 1), read, said)))
-    which = "" if form is None else form.note(visits)
     against = _against_title(titles, options.convention)
-    out.notes += filter(None, (against, read, carried, about, which))
+    out.notes += filter(None, (against, read, carried, about))
     out.notes += left
     out.unread += left
-    kind, readings = _layout(columns, form, visits)
+    kind, readings = _layout(columns, form)
     out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, width, readings))
     return out, below, rows
 
 
-def _layout(
-    columns: Columns, form: Form | None, visits: Collection[int]
-) -> tuple[str, tuple[ColumnReading, ...]]:
+def _layout(columns: Columns, form: Form | None) -> tuple[str, tuple[ColumnReading, ...]]:
     """The kind of a table, and how its columns, or the lines of a form, were read."""
     kind = "long" if columns.is_long else "wide"
     if len(columns.visits) > 1:
@@ -984,9 +943,8 @@ def _layout(
         kind = "form"
     readings = [ColumnReading(p.index, p.header, p.read_as) for p in columns.placed]
     if form is not None:
-        at = next(iter(visits))
-        lines = zip(readings, form.lines, strict=True)
-        readings = [replace(each, index=at, row=line.row) for each, line in lines]
+        entries = zip(readings, form.entries, strict=True)
+        readings = [replace(each, index=entry.at, row=entry.row) for each, entry in entries]
     return kind, tuple(readings)
 
 
@@ -1156,7 +1114,7 @@ class _Table:
         if why is not None:
             self._out.rows.append(self.reader.faulty(number, cells, why))
             return
-        for row in self._by_visits(number, cells):
+        for row in self.by_visits(Row(number, [*cells])):
             if self._folder is None:
                 self._out.rows.append(self.reader.read(row))
             else:
@@ -1177,11 +1135,12 @@ class _Table:
         expected = f"{width} fields, as in the header"
         return FileRefusedError("row_field_count", f"{len(cells)} fields", expected, remedy)
 
-    def _by_visits(self, number: int, cells: Cells) -> list[Row]:
+    def by_visits(self, row: Row) -> list[Row]:
         """A row of the table for each visit that it holds readings of, without those of others."""
         if len(self._own) == 1:
-            return [Row(number, [*cells], visit=visit) for visit in self._own]
-        cells = [*cells, *[None] * (len(self._columns.placed) - len(cells))]
+            (row.visit,) = self._own
+            return [row]
+        cells = [*row.cells, *[None] * (len(self._columns.placed) - len(row.cells))]
         filled = [
             visit for visit, own in self._own.items() if any(cells[i] is not None for i in own)
         ]
@@ -1191,7 +1150,7 @@ class _Table:
             for other, own in self._own.items():
                 for i in own if other != visit else ():
                     kept[i] = None
-            rows.append(Row(number, kept, visit=visit))
+            rows.append(replace(row, cells=kept, visit=visit))
         return rows
 
     def _with_merged(self, number: int, cells: Cells) -> Cells:

@@ -229,14 +229,16 @@ def test_a_form_of_two_gears_side_by_side_is_two_inspections(read, xlsx):
     ]
 
 
-def test_a_form_filled_in_over_its_hints_says_where_the_values_belong(read, template):
+def test_a_form_filled_in_over_its_hints_says_where_its_values_are_missing(read, template):
     book = openpyxl.load_workbook(template)
     for row, value in ((4, "X1"), (5, "N1"), (6, "LH"), (7, "RADIAL"), (8, "in"), (11, 0.003)):
         book["Form"].cell(row, 3, value)
     buffer = io.BytesIO()
     book.save(buffer)
-    (problem,) = read(buffer.getvalue(), "f.xlsx").problems
-    assert (problem.code, problem.remedy) == ("form_columns", "Move the readings to column B.")
+    result = read(buffer.getvalue(), "f.xlsx")
+    assert not result.inspections
+    assert {"tail_no_missing", "side_missing"} <= {problem.code for problem in result.problems}
+    assert {"B5", "B6"} <= {problem.cell for problem in result.problems}
 
 
 def test_the_template_has_lists_of_choices_and_explains_each_column(template):

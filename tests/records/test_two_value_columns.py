@@ -69,9 +69,10 @@ def test_what_was_found_is_read_at_every_visit_or_refused_and_no_worn_gear_exits
 @pytest.mark.parametrize(
     ("headings", "said"),
     [
-        (("new part", "found"), "column C ('found'); not read: B ('new part')"),
-        (("Drawing max", "as found", "as left"), "column C ('as found'), D ('as left')"),
-        (("LH", "RH"), "column B ('LH'), C ('RH')"),
+        (("new part", "found"), '"J3 (in) found" clearance_3_in'),
+        (("new part", "found"), 'carried to the report: "J3 (in) new part"'),
+        (("Drawing max", "as found", "as left"), '"J3 (in) as left" clearance_3_in'),
+        (("LH", "RH"), '"J3 (in) RH" clearance_3_in'),
     ],
 )
 def test_the_columns_that_are_read_are_said(headings: tuple[str, ...], said: str) -> None:
@@ -83,11 +84,15 @@ def test_the_columns_that_are_read_are_said(headings: tuple[str, ...], said: str
 
 
 def test_the_columns_are_named_with_the_remedy() -> None:
-    lines = [["Tail", "N1"], ["Side", "LH"], ["J3 (in)", 0.001, "ok", 0.013], ["J5 (in)", 0.001]]
-    (problem,) = read_many([workbook(lines)], ReadOptions.of(GEAR)).problems
-    assert problem.code == "form_columns"
-    assert "columns B, D" in str(problem.value)
-    assert "write found above" in problem.remedy
+    lines = [["Tail", "N1"], ["Side", "LH"], ["Convention", "RADIAL"]]
+    lines += [["J3 (in)", 0.001, "ok", 0.013], ["J5 (in)", 0.001]]
+    three, five = read_many([workbook(lines)], ReadOptions.of(GEAR)).problems
+    assert (three.code, three.cell, five.cell) == ("header_duplicate", "D4", "D5")
+    assert "B4 'J3 (in)' is one already" in three.expected
+    assert "--map D=carry" in three.remedy
+    options = ReadOptions.of(GEAR, column_map={"D": "carry"})
+    (row,) = read_many([workbook(lines)], options).inspections
+    assert dict(row.clearance_in) == {3: 0.001, 5: 0.001}
 
 
 def test_readings_in_front_of_the_joints_are_a_column_and_numbers_of_lines_are_not() -> None:
@@ -96,8 +101,11 @@ def test_readings_in_front_of_the_joints_are_a_column_and_numbers_of_lines_are_n
     options = ReadOptions.of(GEAR)
     assert read_many([workbook([*lines, *joints])], options).problems == ()
     joints = [["0.013 in", "J3 (in)", 0.001], [0.021, "J5 (in)", 0.001]]
-    (problem,) = read_many([workbook([*lines, *joints])], options).problems
-    assert "columns A, C" in str(problem.value)
+    found = read_many([workbook([*lines, *joints])], options).problems
+    assert {(problem.code, problem.cell) for problem in found} == {
+        ("header_duplicate", "C4"),
+        ("header_duplicate", "C5"),
+    }
 
 
 def test_words_next_to_a_reading_are_not_a_second_column() -> None:
@@ -135,8 +143,9 @@ def test_numbers_of_joints_below_a_heading_are_joints() -> None:
 def test_what_may_be_a_reading_is_not_taken_for_a_limit(headings: tuple[str, str]) -> None:
     lines = [["Tail", "N1"], ["Side", "LH"], ["Convention", "RADIAL"], ["Item", *headings]]
     lines += [[f"J{n} (in)", 0.001, 0.001] for n in (3, 5)]
-    (problem,) = read_many([workbook(lines)], OPTIONS).problems
-    assert problem.code == "form_columns"
+    found = read_many([workbook(lines)], OPTIONS)
+    assert {problem.code for problem in found.problems} == {"header_doubtful"}
+    assert not found.inspections
 
 
 def test_days_and_sides_of_a_visit_are_its_own() -> None:
@@ -180,8 +189,9 @@ def test_sides_in_the_headings_of_a_table_with_sides_are_refused() -> None:
 def test_sides_in_the_headings_of_a_form_that_says_its_side_are_refused() -> None:
     lines = [["Tail", "N1"], ["Side", "LH"], ["Convention", "RADIAL"], ["Item", "LH", "RH"]]
     lines += [[f"J{n} (in)", 0.001, 0.029] for n in (3, 5)]
-    (problem,) = read_many([workbook(lines)], OPTIONS).problems
-    assert problem.code == "form_columns"
+    found = read_many([workbook(lines)], OPTIONS)
+    assert {problem.code for problem in found.problems} == {"header_doubtful"}
+    assert not found.inspections
 
 
 def test_a_plunger_whose_visit_is_not_said_is_refused() -> None:
@@ -209,3 +219,27 @@ def test_what_stands_once_beside_columns_that_are_not_read_counts(line, label, a
     who.insert(at, [label if line[0] == "Outcome" else line[0], line[1]])
     result = check(workbook([*lines, [], *who]), advice=False)
     assert result.exit_code is not ExitCode.FINE
+
+
+@pytest.mark.parametrize(
+    ("at", "line"),
+    [
+        (3, ["Plunger (in)", None, 0.06]),
+        (3, [None, "Result: FAILED"]),
+        (4, [None, "Spiel 6", 0.031]),
+        (5, ["Joint 7: 0.03 in"]),
+        (6, [None, "Slop", None, None, "0.031"]),
+        (7, [None, "Plunger displacement (in)", None, None, 0.06]),
+        (8, ["The gear did not retract"]),
+    ],
+)
+def test_what_stands_anywhere_in_a_form_is_read_or_asked_about(at, line):
+    lines = [[None, "Tail", "N1"], [None, "Side", "LH"], [None, "Convention", "RADIAL"]]
+    lines += [[None, "Unit", "in"], [], [None, "Item", "limit", "found", "Dev"]]
+    lines += [[None, f"J{n} (in)", 0.0075, 0.001, 0.0] for n in (3, 5)]
+    (without,) = read_many([workbook(lines)], OPTIONS).inspections
+    assert (dict(without.clearance_in), without.unit_question) == ({3: 0.001, 5: 0.001}, "")
+    result = read_many([workbook([*lines[:at], line, *lines[at:]])], OPTIONS)
+    (row,) = result.rows
+    if isinstance(row, Inspection):
+        assert row.unit_question or row.readings_in or row.clearance_in[7] == 0.03
