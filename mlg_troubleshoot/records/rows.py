@@ -94,6 +94,7 @@ from mlg_troubleshoot.records.values import (
     read_moment,
     read_value,
     says_failed,
+    says_reading,
     written_number,
 )
 from mlg_troubleshoot.results import JsonOutput
@@ -1104,7 +1105,9 @@ class RowReader:
             smallest = 0.0 if is_named else min(self._options.limit_in.values(), default=0.0)
             any_number = is_sure or units == {LengthUnit.THOU}
             said, unit, is_above = spoken(cell)
-            if is_unread and self._may_be_length(cell, smallest, is_sure=any_number):
+            is_said = not placed.header and says_reading(show(cell))
+            is_length = self._may_be_length(cell, smallest, is_sure=any_number)
+            if is_unread and (is_said or is_length):
                 target = nearest or CLEARANCE.name
                 meant = f'a reading, pass --map "{header}={target}" (a length with its unit)'
             elif self._may_say_outcome(placed, cell, outcome):
@@ -1128,6 +1131,7 @@ class RowReader:
         """Whether a cell of a column that is not read may be asked about in any row."""
         placed = self._unread_words[place][0]
         is_length = self._may_be_length(cell, 0.0, is_sure=True)
+        is_length = is_length or says_reading(show(cell))
         return is_length or any(spoken(cell)) or self._may_say_outcome(placed, cell, None)
 
     def _may_say_outcome(self, placed: PlacedField, cell: Filled, outcome: Outcome | None) -> bool:

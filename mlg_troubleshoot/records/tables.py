@@ -81,6 +81,7 @@ from mlg_troubleshoot.records.values import (
     in_words,
     may_be_outcome,
     says_failed,
+    says_reading,
     written_number,
 )
 from mlg_troubleshoot.units import UNIT_SPELLINGS, ClearanceConvention, LengthUnit
@@ -570,12 +571,15 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
             headings[i] = text if take_apart(text).is_bare else ""
         elif any(headings.values()):
             headings[i] = text or f"column {column_letters(i)}"
-    entries = [
+    read = [
         entry
         for row, cells in lines
         if row not in heads
         for entry in _entries(row, cells, labels.get(row), headings, row >= begin, options)
     ]
+    # What two forms next to each other both say is said once; what was measured, of each.
+    own = [(e.row, e.at) if _column(e.text, options) in _MEASURED else e[2:] for e in read]
+    entries = [*dict(zip(own, read, strict=True)).values()]
     named = [each.row for each in entries if _column(each.text, options) is RECORD_ID]
     filled = [_column(each.text, options) for each in entries if each.cell is not None]
     return Form(
@@ -619,7 +623,7 @@ def _entries(
     at, column = first or (-1, None)
     label = _text(cells[at]) if first else ""
     filled = [i for i, cell in enumerate(cells) if cell is not None]
-    is_paired = sum(i in headings for i in filled if i > at) > 1
+    is_paired = len({cells[i] for i in filled if i in headings and i > at}) > 1
     is_read = column in _READ and bool(headings)
     is_waiting = False
     # A blank below found is a joint that was not measured.
@@ -642,7 +646,8 @@ def _entries(
         else:
             is_own = is_paired or (is_below and column in _MEASURED)
             is_value = i in headings if is_read else is_waiting or (i in headings and is_own)
-            if not (is_value or _matters(cell) or (cell is not None and any(spoken(cell)))):
+            is_said = says_reading(text) or (cell is not None and any(spoken(cell)))
+            if not (is_value or _matters(cell) or is_said):
                 continue
             header = label if is_value or column is None else ""
             heading = headings.get(i, "") if is_value and is_own and column else ""
@@ -1001,9 +1006,6 @@ _NO_INSPECTION = re.compile(
       |no\ further)(?![^\s:.,'\u2019_/(\-])""",
     re.VERBOSE | re.IGNORECASE,
 )
-# Words of a reading that somebody wrote below the table; a day is not one.
-_JOINT_SAID = re.compile(r"\b(?:joints?|jt|plunger|clearance|gelenk)\b|#\s*\d", re.IGNORECASE)
-_FRACTION = re.compile(r"(?<![\d.,/\-])\d{0,3}[.,]\d+(?![\d.,/\-])|\d\s*(?:thou|mm)\b")
 _RULE = re.compile(r"[-=_*.\s]{3,}")
 # Both outcomes next to each other: a legend.
 _LEGEND = re.compile(r"\bretracted(?: \w{1,3})? failed\b|\bfailed(?: (?!not )\w{1,3})? retracted\b")
@@ -1077,7 +1079,8 @@ class _Table:
         others = [cell for cell in cells if not isinstance(cell, str) or not fields[cell]]
         is_of_gear = any(map(Side.spelt, texts)) and any(map(_is_fraction, cells))
         is_number = is_told and any(map(_is_number, others))
-        if is_number or is_of_gear or any(map(_tells_failure, texts)):
+        is_said = any(_tells_failure(text) or says_reading(text) for text in texts)
+        if is_number or is_of_gear or is_said:
             why = FileRefusedError(
                 "row_above",
                 "above the header of the inspections",
@@ -1231,7 +1234,7 @@ class _Table:
             found = self._alarms(reader.read(Row(number, [*cells])))
             alarms = [what for what, value in found if value > worst.get(what, 0.0)]
             texts = [*filter(None, map(show, cells))]
-            if _JOINT_SAID.search(" ".join(texts)) and any(map(_FRACTION.search, texts)):
+            if says_reading(" ".join(texts)):
                 alarms.append("a joint and a number in words")
             if not worst.get(Outcome.FAILED) and any(map(_tells_failure, texts)):
                 alarms.append("a failure in words")

@@ -466,6 +466,16 @@ def says_failed(text: str) -> bool:
     return _OUTCOME_WORDS.get(words) is Outcome.FAILED or _TELLS_FAILURE.search(words) is not None
 
 
+# Words of a reading that somebody wrote outside its column; a day is not one.
+_JOINT_SAID = re.compile(r"\b(?:joints?|jt|plunger|clearance|gelenk)\b|#\s*\d", re.IGNORECASE)
+_FRACTION = re.compile(r"(?<![\d.,/\-])\d{0,3}[.,]\d+(?![\d.,/\-])|\d\s*(?:thou|mm)\b")
+
+
+def says_reading(text: str) -> bool:
+    """Whether a text names a joint or the plunger, and a number that may be its reading."""
+    return _JOINT_SAID.search(text) is not None and _FRACTION.search(text) is not None
+
+
 def may_be_outcome(cell: Filled, *, asked: bool | None) -> bool:
     """Whether a cell may say what the gear did: whatever is not plainly good where its header asks
     for that, else an answer to a question that is not known or one that doubts itself; nothing

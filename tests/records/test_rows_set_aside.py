@@ -140,6 +140,7 @@ def test_what_was_set_aside_is_said_by_a_quiet_check_and_decides_its_exit_code(
         "N2,LH,0.002,0.06\n",
         "Plunger displacement (in),0.060\n",
         "Outcome,FAILED\n",
+        "Plunger: 0.060\n",
         "The gear of N2 did not retract on 3 May\n",
     ],
 )
@@ -163,3 +164,16 @@ def test_a_failure_in_words_below_the_table_is_a_row_to_correct_unless_a_row_say
     for outcome, kinds in (("", [Inspection, InvalidRow]), ("FAILED", [Inspection])):
         found = read(f"{WIDE}N1,0.001,0.002,,{outcome}\n{line}", "LH.csv")
         assert [type(row) for row in found.rows] == kinds
+
+
+@pytest.mark.parametrize("words", ["plunger 1.5 mm", "joint 3 read 0.013", "Result: FAILED"])
+def test_words_behind_the_last_column_of_a_table_are_asked_about(words: str) -> None:
+    book = openpyxl.Workbook()
+    sheet = book.worksheets[0]
+    sheet.title = "LH"
+    sheet.append(["tail_no", "clearance_3_in", "clearance_5_in"])
+    sheet.append(["N1", 0.001, 0.001, None, words])
+    data = io.BytesIO()
+    book.save(data)
+    (row,) = read_many([Named(data.getvalue(), "t.xlsx")], OPTIONS).inspections
+    assert words in row.unit_question

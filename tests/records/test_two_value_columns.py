@@ -231,6 +231,7 @@ def test_what_stands_once_beside_columns_that_are_not_read_counts(line, label, a
         (6, [None, "Slop", None, None, "0.031"]),
         (7, [None, "Plunger displacement (in)", None, None, 0.06]),
         (8, ["The gear did not retract"]),
+        (8, [None, None, "plunger 1.5 mm"]),
     ],
 )
 def test_what_stands_anywhere_in_a_form_is_read_or_asked_about(at, line):
@@ -243,3 +244,16 @@ def test_what_stands_anywhere_in_a_form_is_read_or_asked_about(at, line):
     (row,) = result.rows
     if isinstance(row, Inspection):
         assert row.unit_question or row.readings_in or row.clearance_in[7] == 0.03
+
+
+def test_two_forms_next_to_each_other_are_two_inspections() -> None:
+    said = (("Tail", "N1", "N2"), ("Side", "LH", "RH"), ("Convention", "RADIAL", "RADIAL"))
+    lines = [
+        [label, one, None, label, two] for label, one, two in (*said, ("J3 (in)", 0.001, 0.029))
+    ]
+    found = read_many([workbook(lines)], OPTIONS)
+    assert found.problems == ()
+    assert [(row.tail_no, row.side, row.clearance_in[3]) for row in found.inspections] == [
+        ("N1", "LH", 0.001),
+        ("N2", "RH", 0.029),
+    ]
