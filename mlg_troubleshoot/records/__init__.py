@@ -7,7 +7,6 @@ from __future__ import annotations
 from mlg_troubleshoot.records.gate import admit, judge_again, judge_length, made_record_id
 from mlg_troubleshoot.records.read import expand, read_many
 from mlg_troubleshoot.records.rows import (
-    ColumnReading,
     FileRead,
     ReadOptions,
     ReadResult,
@@ -15,7 +14,6 @@ from mlg_troubleshoot.records.rows import (
 )
 
 __all__ = [
-    "ColumnReading",
     "FileRead",
     "ReadOptions",
     "ReadResult",

@@ -414,18 +414,9 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         )
     )
     frames = {file.name: file.labels for file, _ in results if file.labels}
-    many = {
-        "Tails look alike": alike,
-        "Landings fall": [*dict.fromkeys(backwards.values())],
-    }
-    for what, notes in many.items():
-        out.notes += notes[:_NAMED]
-        more = len(notes) - _NAMED
-        if more > 0:
-            places_said = f"{more} more place{'s' * (more > 1)}"
-            out.notes.append(
-                f"{what} at {places_said}; the notes of their rows name them (--json, --report)."
-            )
+    for notes in (alike, [*dict.fromkeys(backwards.values())]):
+        more = f"{len(notes) - _NAMED} more of these: the rows name them (--json, --report)"
+        out.notes += notes if len(notes) <= _NAMED else [*notes[:_NAMED], more]
     return ReadResult(
         tuple(rows),
         tuple(in_frame(p, frames[p.file]) if p.file in frames else p for p in problems),

@@ -379,25 +379,10 @@ class TableInHand:
 
 
 @dataclass(frozen=True, slots=True)
-class ColumnReading:
-    """How one column (or one line of a form) was read.
-
-    index: column, counted from 0.
-    read_as: canonical column; None for a column that is only carried.
-    row: of the value in a form; None in a table.
-    """
-
-    index: int
-    header: str
-    read_as: str | None
-    row: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class SheetLayout:
-    """Where the parts of a table were found.
+    """Where the parts of a table were found, and how its columns were read.
 
-    header_row: the lower row of the header, counted from 1.
+    header_row: the lower row of the header, counted from 1, or the one by which a form is called.
     """
 
     file: str | None
@@ -405,13 +390,14 @@ class SheetLayout:
     kind: str
     header_row: int
     width: int
-    columns: tuple[ColumnReading, ...]
+    columns: Sequence[PlacedField]
 
     def place(self, names: Collection[str | None], row: int) -> tuple[str, str] | None:
         """Header of a column with one of the canonical names, and its cell in a row or a form."""
-        for column in self.columns:
-            if column.read_as in names:
-                return column.header, f"{column_letters(column.index)}{column.row or row}"
+        for p in self.columns:
+            if p.read_as in names:
+                at = row if p.place.row == self.header_row else p.place.row
+                return p.header, f"{p.place.letters}{at}"
         return None
 
 
@@ -1039,13 +1025,6 @@ class RowReader:
             found.warnings.append(
                 "every clearance is 0: a zero is read as measured; leave a joint blank if it was"
                 " not measured"
-            )
-        gauges = found.lengths.get(GAUGE_U, {})
-        idle = ", ".join(f"#{joint}" for joint in gauges if joint and joint not in clearance)
-        if idle:
-            found.warnings.append(
-                f"standard uncertainty of the gauge at joint {idle} is not used: the joint has no"
-                " reading"
             )
 
     def faulty(self, row: int, cells: Cells, why: FileRefusedError) -> InvalidRow:

@@ -62,7 +62,6 @@ from mlg_troubleshoot.records.headers import (
 from mlg_troubleshoot.records.rows import (
     ONE_VISIT,
     CellPlace,
-    ColumnReading,
     Heading,
     Occasion,
     PlacedField,
@@ -926,23 +925,10 @@ def _read_one(
     out.notes += filter(None, (against, read, carried, about))
     out.notes += left
     out.unread += left
-    kind, readings = _layout(columns, form)
-    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, width, readings))
+    kind = "long" if columns.is_long else "wide" if form is None else "form"
+    kind = "visits" if len(columns.visits) > 1 else kind
+    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, width, columns.placed))
     return out, below, rows
-
-
-def _layout(columns: Columns, form: Form | None) -> tuple[str, tuple[ColumnReading, ...]]:
-    """The kind of a table, and how its columns, or the lines of a form, were read."""
-    kind = "long" if columns.is_long else "wide"
-    if len(columns.visits) > 1:
-        kind = "visits"
-    elif form is not None:
-        kind = "form"
-    readings = [ColumnReading(p.index, p.header, p.read_as) for p in columns.placed]
-    if form is not None:
-        entries = zip(readings, form.entries, strict=True)
-        readings = [replace(each, index=entry.at, row=entry.row) for each, entry in entries]
-    return kind, tuple(readings)
 
 
 def _against_title(titles: Sequence[str], declared: ClearanceConvention | None) -> str:
