@@ -87,7 +87,6 @@ INSTEAD = {
     r"\bis not taken: ": "is not accepted: …",
     r"\benters nothing\b": "is not an answer",
     r"\bsays no day\b": "is not a date",
-    r"\bmay wear further\b|\bMay wear<br>": "wear allowance",
     r"\bsplits them\b": "distinguishes them",
     r"\bstands? in row\b": "is in row …",
 }

@@ -224,9 +224,6 @@ class JointFinding:
         First and last place over the ensemble of geometries.
     acts_like : tuple of int
         Joints at the other end of the same link: plunger data alone cannot distinguish them.
-    allowance_in : float or None
-        How much further this joint alone may wear until the worst case reaches the margin; None if
-        it is not measured or the worst case is beyond the margin already. [in]
     """
 
     joint: int
@@ -241,7 +238,6 @@ class JointFinding:
     rank: int
     rank_range: tuple[int, int]
     acts_like: tuple[int, ...]
-    allowance_in: Size | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -554,21 +550,6 @@ class Assessment(_Planned, Result):
     def rigid_verdict(self) -> str | None:
         """The plain model's verdict; None without an extension."""
         return None if self.rigid is None else str(self.rigid.verdict)
-
-    @property
-    def chance_wrong(self) -> float | None:
-        """Chance that the predicted worst case is on the other side of the margin than a verdict of
-        this gear says.
-
-        Specific consumer's and producer's risk in the words of JCGM 106; None where no prediction
-        decides. [1]
-        """
-        within = self.probability_within_margin
-        if self.basis is Basis.MEASURED or self.standard_uncertainty_in is None or within is None:
-            return None
-        return {Verdict.WITHIN_MARGIN: 1.0 - within, Verdict.OUTSIDE_MARGIN: within}.get(
-            self.verdict
-        )
 
     @property
     def ranked(self) -> tuple[JointFinding, ...]:

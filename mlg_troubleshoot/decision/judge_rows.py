@@ -57,7 +57,6 @@ from mlg_troubleshoot.decision.prediction import (
     Prediction,
     chance_at,
     ensemble,
-    responses,
 )
 from mlg_troubleshoot.decision.verdict_rule import verdict, with_reading
 from mlg_troubleshoot.gear.gear import DEFAULT_PLUNGER_U_IN, ROUNDING_IN, Gear
@@ -73,13 +72,10 @@ WORST_FIRST = (
 
 
 def rank_joints(
-    gear: Gear,
-    table: IndexTable,
-    clearance_in: Array,
-    allowance_in: Array,
+    gear: Gear, table: IndexTable, clearance_in: Array
 ) -> list[tuple[JointFinding, ...]]:
     """Rank the joints of each gear in the order in which to inspect them; NaN where nothing was
-    measured or found.
+    measured.
 
     Joints over their limit come first, then by contribution; an unmeasured joint counts with half
     its limit, ties go to the larger total-order index. The range of a rank is over the ensemble of
@@ -87,14 +83,7 @@ def rank_joints(
     """
     over = gear.over_limit(clearance_in)
     places = _places(gear, table, clearance_in)
-    of_each = (
-        clearance_in,
-        over,
-        places[:, 0],
-        places.min(axis=1),
-        places.max(axis=1),
-        allowance_in,
-    )
+    of_each = (clearance_in, over, places[:, 0], places.min(axis=1), places.max(axis=1))
     return [
         tuple(
             JointFinding(
@@ -110,9 +99,8 @@ def rank_joints(
                 rank=rank,
                 rank_range=(best, worst),
                 acts_like=gear.alike[joint.number],
-                allowance_in=_number_or_none(left),
             )
-            for joint, indices, clearance, is_over, rank, best, worst, left in zip(
+            for joint, indices, clearance, is_over, rank, best, worst in zip(
                 gear.joints, table.joints, *row, strict=True
             )
         )
@@ -256,7 +244,7 @@ def assess(
     extension: Extension | None = None,
     fleet: Fleet | None = None,
 ) -> tuple[Judgement, ...]:
-    """Judge rows: verdict, plan and allowances; with `advice` the joints that are likely worn, with
+    """Judge rows: verdict and plan; with `advice` the joints that are likely worn, with
     `sets` the repair sets and what follows each outcome of NEXT. `fleet` is what other gears teach.
     """
     valid = [row for row in rows if isinstance(row, Inspection)]
@@ -353,7 +341,7 @@ def _worse(plain: Assessment, extended: Assessment, approval: str) -> Assessment
 
 def _assess_valid(cases: Cases, table: IndexTable, advice: bool, sets: bool) -> list[Assessment]:
     judged = _judged(cases, table)
-    findings = rank_joints(cases.gear, table, cases.clearance_in, allowances(cases, judged.lower))
+    findings = rank_joints(cases.gear, table, cases.clearance_in)
     wanted = np.isfinite(judged.lower.displacement_in) & sets
     wanted &= np.array(judged.verdicts) != Verdict.WITHIN_MARGIN
     sure = sure_sets(cases, judged.upper, np.flatnonzero(wanted))
@@ -596,34 +584,3 @@ def _warnings(
         over = [f.joint for f in findings if f.over_limit]
         warnings += sentences.older_than_the_repair(inspection, over)
     return tuple(warnings)
-
-
-def allowances(cases: Cases, lower: Prediction) -> Array:
-    """How much further each measured joint may wear, alone, until the worst case reaches the margin
-    or it its limit.
-
-    NaN for a joint that was not measured, and for a gear that is beyond its margin already. The
-    second-order expansion, anchored at the exact worst case, gives the wear; one exact worst case
-    along its directions corrects it. [in]
-    """
-    gear = cases.gear
-    reference = responses(cases.gear)[0]
-    start = cases.filled(0.0)
-    worst = lower.displacement_in
-    slopes = reference.slopes(start)
-    bend = np.diag(reference.worst_curvature)
-    sense = reference.sense(start)[:, None]
-    left = (cases.margin_in - worst)[:, None]
-    room = np.maximum(gear.limits_in - start, 0.0)
-    # Root of slope·t + ½·bend·t² = left, in the form that is stable where the curvature is zero.
-    root = np.sqrt(np.maximum(slopes**2 + 2.0 * sense * bend * left, 0.0))
-    wear = np.minimum(2.0 * left / np.maximum(slopes + root, 1e-9), room)
-    if cases.extension is None:
-        worn = start[:, None, :] + wear[:, :, None] * np.eye(start.shape[1])
-        senses = np.repeat(sense[:, 0], start.shape[1])
-        links = reference.worst_links(worn.reshape(-1, start.shape[1]), senses)
-        exact = (senses * gear.model.displacement(list(links))).reshape(wear.shape)
-        wear = np.clip(
-            wear + (cases.margin_in[:, None] - exact) / np.maximum(slopes, 1e-9), 0.0, room
-        )
-    return np.where(cases.measured & (left >= 0.0), wear, np.nan)

@@ -254,12 +254,12 @@ class Course:
 def plans(
     cases: Cases,
     judged: Judged,
-    sure: Mapping[int, Sequence[Mask]] | None,
+    sure: Mapping[int, Mask] | None,
     *,
     advice: bool,
     sets: bool,
 ) -> Iterator[Course]:
-    """The course of each gear. `sure`: sets that bring the worst case within the margin."""
+    """The course of each gear. `sure`: sets that bring its worst case within the margin."""
     complained = cases.beyond_margin & (cases.failed | cases.repaired)
     is_open = cases.beyond_margin | np.isfinite(cases.plunger_in) & cases.over_limit.any(axis=1)
     needed = cases.failed | cases.repaired & is_open
@@ -278,9 +278,9 @@ def plans(
         builder = _PlanBuilder(cases, judged, belief, place, row, sets=sets)
         plan = builder.plan()
         repairs: list[tuple[RepairKind, Mask, float | None]] = []
-        for members in (sure or {}).get(row, ()):
-            second = belief.second_repair(place, members) if belief and complained[row] else None
-            repairs.append((RepairKind.SURE, members, second))
+        if sure and row in sure:
+            second = belief.second_repair(place, sure[row]) if belief and complained[row] else None
+            repairs.append((RepairKind.SURE, sure[row], second))
         if belief and sets and builder.tried is not None:
             second = belief.second_repair(place, builder.tried)
             repairs.append((RepairKind.TRY, builder.tried, second))
@@ -658,8 +658,6 @@ class _PlanBuilder:
         return sentences.open_question(unread, over)
 
 
-# Repair sets that are shown. [1]
-_SHOWN = 5
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
 # may be off. [in]
 _ABOUT_IN = 5e-4
@@ -723,45 +721,44 @@ class Sets:
         # Rounded: both ends of one link leave the same, and noise must not choose between them.
         self.slack_in = np.round(cases.margin_in[row] - worst - SCORE * np.sqrt(variance), 7)
 
-    def quickest(self, among: Mask) -> int:
-        """The quickest of some; of equally many joints in equal minutes that with most slack."""
+    def quickest(self, least_in: float) -> int | None:
+        """The quickest with so much slack, of equally many joints in equal minutes that with most;
+        None if there is none.
+        """
+        among = self.slack_in >= least_in
+        if not among.any():
+            return None
         first = int(np.argmax(among))
         size = self.members.sum(axis=1)
         alike = among & (self.minutes == self.minutes[first]) & (size == size[first])
         return int(np.argmax(np.where(alike, self.slack_in, -np.inf)))
 
-    def sufficient(self) -> list[int]:
-        """Those that suffice, the quickest first, none within another; none if none is needed."""
-        left = self.slack_in >= 0.0
-        found: list[int] = []
-        while left.any() and len(found) < _SHOWN:
-            found.append(self.quickest(left))
-            left &= (self.members[found[-1]] & ~self.members).any(axis=1)
-        return [k for k in found if self.members[k].any()]
 
-
-def sure_sets(cases: Cases, upper: Prediction, wanted: Places) -> dict[int, list[Mask]]:
-    """Find the sets of joints which, restored, bring the worst case of the wanted gears within the
-    margin by the expansion; `upper`: with unmeasured joints at their limit.
+def sure_sets(cases: Cases, upper: Prediction, wanted: Places) -> dict[int, Mask]:
+    """Find the quickest set of joints which, restored, brings the worst case of each wanted gear
+    within the margin by the expansion; `upper`: with unmeasured joints at their limit.
 
     Unmeasured joints count with their limit: what holds with them at 0 sends every fifth gear back.
-    Of sure sets only those that contain no smaller sufficient set are returned, the quickest first.
     """
     near = []
     for row in wanted.tolist():
         sets = Sets(cases, upper, row)
-        about = sets.slack_in >= -_ABOUT_IN
-        if about.any():
-            near.append((sets, sets.quickest(about)))
+        about = sets.quickest(-_ABOUT_IN)
+        if about is not None:
+            near.append((sets, about))
     if not near:
         return {}
     # Shifted so that it is exact for the quickest set that is about sufficient.
     some, after = restored(cases, [s.row for s, _ in near], [s.members[k] for s, k in near])
     guard = SCORE * after.standard_uncertainty(some.margin_u_in)
     exact = some.margin_in - after.displacement_in - guard
+    found = {}
     for (sets, k), slack in zip(near, exact.tolist(), strict=True):
         sets.slack_in = sets.slack_in + np.nan_to_num(slack - sets.slack_in[k])
-    return {sets.row: [sets.members[k] for k in sets.sufficient()] for sets, _ in near}
+        best = sets.quickest(0.0)
+        if best is not None and sets.members[best].any():
+            found[sets.row] = sets.members[best]
+    return found
 
 
 def repair_sets(cases: Cases, courses: Sequence[Course]) -> list[tuple[RepairSet, ...]]:

@@ -296,18 +296,6 @@ def correct(columns: Sequence[str]) -> str:
     return f"CANNOT BE JUDGED. Correct: {what}."
 
 
-def chance_wrong_sentence(a: Assessment) -> str | None:
-    """The chance that a verdict by the prediction is wrong; None where no prediction decides."""
-    if a.chance_wrong is None:
-        return None
-    what = "worst case" if a.decided_by_bound else "displacement as loaded"
-    unread = " Joints that were not measured count as 0." if a.unread else ""
-    return (
-        f"The chance that the {what} lies on the other side of the margin is"
-        f" {percent(a.chance_wrong)}.{unread}"
-    )
-
-
 def no_repair_set(a: Assessment) -> str:
     """Why no repair is offered."""
     if (a.probability_within_margin or 0.0) >= CONFORMANCE:

@@ -15,7 +15,6 @@ from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import Outcome, RowSource, Side
 from mlg_troubleshoot.decision.judge_rows import WORST_FIRST, latest_of_each_gear, listed
 from mlg_troubleshoot.decision.sentences import (
-    chance_wrong_sentence,
     no_repair_set,
 )
 from mlg_troubleshoot.errors import OutputError, Problem
@@ -126,7 +125,6 @@ def _inspection(
         "gauge": margin_gauge(a, lengths),
         "drawing": schematic(gear, a),
         "legend": [(joint_mark("", state), words) for state, words in JOINT_STATES.items()],
-        "wrong": chance_wrong_sentence(a),
         "no_repair": no_repair_set(a),
         "areas": partial(_areas, gear),
         "rows": _joints(gear, a),

@@ -150,10 +150,10 @@ def test_every_view_says_that_it_is_not_an_approval_and_where_its_geometry_comes
 
 
 @pytest.mark.parametrize("read", [True, False])
-def test_the_chance_of_a_wrong_verdict_says_how_unread_joints_count(read, table):
+def test_the_chance_of_lying_within_says_how_unread_joints_count(read, table):
     unread = {} if read else {"clearance_9_in": ""}
     words = " ".join(mlg("check", table(row(**unread)), "--detail").out.split())
-    assert "lies on the other side of the margin is" in words
+    assert "Probability that the worst case is within the margin" in words
     assert ("Joints that were not measured count as 0." in words) is not read
 
 

@@ -104,6 +104,6 @@ def test_the_order_on_each_linkage_is_that_of_its_own_amplification(gear: Gear) 
 
 
 def test_the_table_agrees_with_the_model_it_was_computed_from(gear, table):
-    (findings,) = rank_joints(gear, table, *np.full((2, 1, 10), np.nan))
+    (findings,) = rank_joints(gear, table, np.full((1, 10), np.nan))
     exact = gear.model.plunger_amplification()
     assert [f.plunger_amplification for f in findings] == pytest.approx(exact.tolist(), rel=1e-8)

@@ -9,7 +9,6 @@ from rich.text import Text
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, show_page, text, word
 from mlg_troubleshoot.cli.views.batch import MARKS, TONES
 from mlg_troubleshoot.decision.assessment import Action, Assessment, Judgement, Step
-from mlg_troubleshoot.decision.sentences import chance_wrong_sentence
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, Sentence
 
@@ -118,5 +117,4 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
         gear=gear,
         alike=", ".join(pairs),
         parts=sorted({gear.joint(number).new_part.value for number in restored}),
-        wrong=chance_wrong_sentence(a),
     )
