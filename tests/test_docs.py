@@ -68,6 +68,7 @@ LONG = {"life-of-a-gear.md", "diagnosis-solution.md", "robot-arm.md", "groundwat
 LONG_EXAMPLES = {
     *LONG,
     *("measured-gear.md", "why-named.md", "gear-eccentricity.md", "plotter-hysteresis.md"),
+    "python.md",
 }
 
 

@@ -380,6 +380,7 @@ def test_the_sentence_of_a_cause_stands_in_the_json() -> None:
     assert cause["sentence"] == named.candidate.cause.sentence
 
 
+@pytest.mark.slow
 def test_a_gauge_that_is_wrong_in_all_rows_is_an_alias_of_the_calibration_rate():
     frame, share = mlg.read_inspections(DATA / "measured_nothing_wrong.csv"), 1.15
     readings = [name for name in frame.columns if name.startswith("plunger_displacement")]

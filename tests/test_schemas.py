@@ -115,7 +115,9 @@ def diagnosed(fleet: str) -> tuple[Any, Any]:
         return found, as_read(extension) if extension.exists() else None
 
 
-@pytest.mark.parametrize("fleet", FLEETS)
+@pytest.mark.parametrize(
+    "fleet", [pytest.param(f, marks=[pytest.mark.slow] * (f == "not on the list")) for f in FLEETS]
+)
 def test_every_diagnosis_and_its_extension_fit_their_schemas(fleet: str) -> None:
     found, extension = diagnosed(fleet)
     assert complain("diagnose", found) == []

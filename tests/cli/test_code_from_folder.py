@@ -44,15 +44,15 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, ...], P
     }
 
 
-# With worker processes, with the engine of pages, and as a module; the others start alike.
+# With worker processes and with the engine of pages; the others start alike.
 EVERY_DAY = [
     (MLG, "check table.csv --csv verdicts.csv"),
     (MLG, "check one.csv --report report --keep"),
-    (AS_A_MODULE, "check few.csv --json"),
 ]
 SLOW = [
     (MLG, "fleet"),
     (AS_A_MODULE, "check table.csv"),
+    (AS_A_MODULE, "check few.csv --json"),
     (MLG, "history"),
     (MLG, "diagnose few.csv"),
     (MLG, "study --design lhs --size 4,60,1"),

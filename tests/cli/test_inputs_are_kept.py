@@ -144,7 +144,7 @@ def test_another_store_is_not_replaced_by_an_export(store: Path) -> None:
     [
         "check in.csv --csv",
         f"check {WORKBOOK} --annotate",
-        "diagnose fleet.csv --write-extension",
+        pytest.param("diagnose fleet.csv --write-extension", marks=pytest.mark.slow),
         "history export",
         "template",
     ],

@@ -98,13 +98,6 @@ def test_an_interrupt_says_how_to_go_on_and_exits_130(start: Start) -> None:
     assert finish(child) == 130
 
 
-def test_flags_answer_questions_beforehand(start: Start) -> None:
-    child = start("check", "N77", "RH", "--unit", "thou", "--convention", "TOTAL_PLAY")
-    child.expect_exact("Did it retract?")
-    interrupt(child)
-    assert finish(child) == 130
-
-
 def test_a_tail_from_a_flag_that_is_none_is_refused_before_anything_is_asked(start: Start) -> None:
     child = start("check", "--tail", "n/a", "--side", "RH")
     child.expect_exact("'n/a' is not accepted: expected a tail number")
@@ -113,7 +106,11 @@ def test_a_tail_from_a_flag_that_is_none_is_refused_before_anything_is_asked(sta
 
 @pytest.mark.parametrize(
     "plain",
-    [{"NO_COLOR": "1"}, {"TERM": "dumb"}, pytest.param({"MLG_PLAIN": "1"}, marks=pytest.mark.slow)],
+    [
+        {"TERM": "dumb"},
+        pytest.param({"NO_COLOR": "1"}, marks=pytest.mark.slow),
+        pytest.param({"MLG_PLAIN": "1"}, marks=pytest.mark.slow),
+    ],
 )
 def test_a_plain_terminal_has_the_same_words_without_colour_and_boxes(start, plain):
     child = start("check", FLEET, **plain)
@@ -123,14 +120,18 @@ def test_a_plain_terminal_has_the_same_words_without_colour_and_boxes(start, pla
     finish(child)
 
 
-def test_a_large_batch_shows_its_progress(start: Start, tmp_path: Path) -> None:
+def test_a_large_batch_shows_its_progress_unless_it_is_to_be_quiet(start, tmp_path):
     write_csv(tmp_path / "batch.csv", 400, blank=0.05)
     child = start("check", tmp_path / "batch.csv")
     child.expect(r"Judging .*/400")
     child.expect_exact("400 inspections:")
     assert finish(child) == 1
+    child = start("check", tmp_path / "batch.csv", "--quiet")
+    child.expect(pexpect.EOF)
+    assert "Judging" not in child.before
 
 
+@pytest.mark.slow
 def test_a_batch_fits_the_terminal(start: Start) -> None:
     child = start("check", FLEET)
     child.expect_exact("verdict")
@@ -140,7 +141,7 @@ def test_a_batch_fits_the_terminal(start: Start) -> None:
     finish(child)
 
 
-@pytest.mark.parametrize("columns", [60, 80])
+@pytest.mark.parametrize("columns", [60, pytest.param(80, marks=pytest.mark.slow)])
 def test_a_message_is_folded_between_words(start: Start, tmp_path: Path, columns: int) -> None:
     table = tmp_path / "bad.csv"
     table.write_text("record_id,tail_no,side,clearance_3_in\nR1,N1,middle,many\n")

@@ -107,13 +107,13 @@ def in_a_shell(line: str, folder: Path) -> tuple[int, str, str]:
     [
         ("mlg check FILE 2>&-", 1, ""),
         pytest.param("mlg check nope.csv 2>&-", 3, "", marks=pytest.mark.slow),
-        ("mlg check - <&-", 3, "the file is empty"),
+        pytest.param("mlg check - <&-", 3, "the file is empty", marks=pytest.mark.slow),
         pytest.param("mlg check <&-", 2, "nothing to check", marks=pytest.mark.slow),
         ("mlg check FILE >&-", 5, "standard output is closed"),
         pytest.param(
             "mlg template new.xlsx >&-", 5, "standard output is closed", marks=pytest.mark.slow
         ),
-        ("mlg check FILE <&- >&- 2>&-", 5, ""),
+        pytest.param("mlg check FILE <&- >&- 2>&-", 5, "", marks=pytest.mark.slow),
         pytest.param(
             "mlg check FILE --keep --report r --format html <&- 2>&-", 1, "", marks=pytest.mark.slow
         ),

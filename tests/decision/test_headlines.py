@@ -234,7 +234,7 @@ def screen(a: Assessment, gear: Gear) -> str:
     return " ".join(said.getvalue().split())
 
 
-@pytest.mark.parametrize("n", [100, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("n", [50, pytest.param(2000, marks=pytest.mark.slow)])
 def test_no_two_sentences_of_one_screen_contradict_each_other(gear, table, n):
     for a in judged(gear, table, n, advice=True):
         text = screen(a, gear)

@@ -57,7 +57,9 @@ def test_one_gear_is_told_alone_what_it_is_told_in_a_batch(worked: tuple, tmp_pa
         assert (alone["end"], alone["verdict"]) == (among_others["end"], among_others["verdict"])
 
 
-@pytest.mark.parametrize("name", ["A one joint shut", "A one area shut"])
+@pytest.mark.parametrize(
+    "name", ["A one area shut", pytest.param("A one joint shut", marks=pytest.mark.slow)]
+)
 def test_a_plan_ends_without_asking_for_what_cannot_be_reached(name: str, tmp_path: Path) -> None:
     hangar = Hangar(_BY_NAME[name], 12, 1902).work(tmp_path)
     assert all(gear.shut and gear.end for gear in hangar.gears)

@@ -126,7 +126,7 @@ def inverse(block: int) -> int:
 
 
 def test_an_error_in_a_block_reaches_the_caller() -> None:
-    with WorkerProcesses(2) as executor, pytest.raises(ZeroDivisionError):
+    with WorkerProcesses(1) as executor, pytest.raises(ZeroDivisionError):
         list(map_blocks(inverse, [0, 1], executor))
 
 
@@ -137,7 +137,7 @@ def wait_long(block: int) -> int:
 
 def test_an_interruption_ends_what_is_being_computed() -> None:
     start = time.monotonic()
-    with pytest.raises(KeyboardInterrupt), WorkerProcesses(2) as executor:
+    with pytest.raises(KeyboardInterrupt), WorkerProcesses(1) as executor:
         for _ in map_blocks(wait_long, [0, 1, 1, 1], executor):
             raise KeyboardInterrupt
     assert time.monotonic() - start < 30

@@ -73,10 +73,10 @@ def test_a_table_that_cannot_answer_says_why_and_what_to_record_next_time(case, 
 @pytest.mark.parametrize(
     ("column", "value", "factor"),
     [
-        ("temperature_c", 15.0, "gauge_id"),
         ("hydraulic_pressure_psi", 2500.0, "technician_id"),
-        ("gear_landings", 0.0, "side"),
-        ("day", 3.0, "approach"),
+        pytest.param("temperature_c", 15.0, "gauge_id", marks=pytest.mark.slow),
+        pytest.param("gear_landings", 0.0, "side", marks=pytest.mark.slow),
+        pytest.param("day", 3.0, "approach", marks=pytest.mark.slow),
     ],
 )
 def test_a_constant_column_and_a_constant_name_name_nothing(column, value, factor, gear, plain):

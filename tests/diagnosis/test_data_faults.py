@@ -229,6 +229,7 @@ def test_rows_whose_worst_joint_was_restored_between_the_readings_are_named_and_
     assert "joint restored between its reading and the plunger's" in said[0].text
 
 
+@pytest.mark.slow
 def test_such_rows_are_found_beside_a_cause(gear: Gear) -> None:
     table, rows, _moved = restored_between_the_readings(gear)
     shifted = 0.004 * (table.factors["gauge_id"] == "G-1")

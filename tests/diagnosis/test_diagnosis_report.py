@@ -124,6 +124,7 @@ def three_at_once(table: DiagnosisTable, over: Array) -> Array:
     return technician_off(table, over) + right + 2e-4 * (table.quantities["temperature_c"] - 20.0)
 
 
+@pytest.mark.slow
 def test_each_of_three_causes_is_drawn_before_and_after(gear: Gear, make: Make) -> None:
     made = make(fleet(gear.model, three_at_once, rows=200))
     assert len(made.diagnosis.causes) == 3

@@ -45,7 +45,7 @@ def test_a_model_that_is_right_to_the_last_digit_has_no_cause(gear: Gear) -> Non
 
 
 @every_day_and_slow
-@pytest.mark.parametrize("high_in", [0.005, 0.010])
+@pytest.mark.parametrize("high_in", [0.005, pytest.param(0.010, marks=pytest.mark.slow)])
 def test_clearances_drawn_evenly_and_read_exactly_are_not_a_cause(high_in, seeds, allowed, gear):
     assert alarms(gear, lambda seed: read_exactly(gear, seed, high_in), seeds) <= allowed
 

@@ -47,6 +47,7 @@ def test_a_gear_that_was_rerigged_far_off_is_named_after_three_visits(gear: Gear
     assert cause.candidate.target == "tail N103 LH"
 
 
+@pytest.mark.slow
 def test_what_a_cause_explains_is_not_far_off(gear: Gear) -> None:
     assert not found(gear, *LATEST).far_off_in
 

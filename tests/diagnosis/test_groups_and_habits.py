@@ -62,6 +62,7 @@ def test_lost_motion_in_the_rows_of_one_technician_is_named_with_the_technician(
     assert cause.candidate.cause.words(cause.candidate.target).endswith("of technician T-2")
 
 
+@pytest.mark.slow
 def test_lost_motion_of_all_is_not_one_technicians(gear: Gear) -> None:
     def of_all(table: DiagnosisTable, _over: Array) -> Array:
         return 0.004 * (table.factors["approach"] == "RETRACTING")
@@ -81,6 +82,7 @@ def test_bases_that_differ_are_not_scatter_of_the_readers_who_work_there(tmp_pat
     assert {(c["cause"], c["target"]) for c in said["causes"]} == set(truth.causes)
 
 
+@pytest.mark.slow
 def test_aircraft_that_wander_each_on_its_own_are_on_no_list(tmp_path: Path) -> None:
     rows, _truth = blemished_fleet("walk", "strong", 61_003, rows=150)
     write_rows(rows, tmp_path / "fleet.csv")

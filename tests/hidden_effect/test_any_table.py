@@ -75,10 +75,8 @@ def test_any_table_is_diagnosed_or_refused_without_a_warning(first: int, tmp_pat
     assert diagnosed > 5
 
 
-EVERY_DAY = ("humidity", "bent_link", "nothing")
 ALL = [
-    pytest.param(kind, marks=() if kind in EVERY_DAY else pytest.mark.slow)
-    for kind in unforeseen.KINDS
+    pytest.param(kind, marks=[pytest.mark.slow] * (kind != "humidity")) for kind in unforeseen.KINDS
 ]
 
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import random
-import re
-import sys
 import zipfile
 
 import openpyxl
@@ -22,9 +19,6 @@ from mlg_troubleshoot.workflows.check import (
     json_lines,
 )
 from tests.cli.conftest import FLEET, mlg
-
-needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs a terminal of POSIX")
-
 
 HEADER = (
     "record_id",
@@ -202,30 +196,6 @@ def test_a_text_in_the_results_never_becomes_a_formula(tmp_path):
     mlg("check", tmp_path / "in.csv", "--csv", tmp_path / "out.csv")
     line = (tmp_path / "out.csv").read_text().splitlines()[1]
     assert line.startswith("'=cmd(),'+1,")
-
-
-def in_a_terminal(*arguments, columns=80):
-    """Run the command in a terminal and return everything that it showed."""
-    pexpect = pytest.importorskip("pexpect")
-    environment = {**os.environ, "TERM": "xterm-256color", "NO_COLOR": "1"}
-    child = pexpect.spawn(
-        sys.executable,
-        ["-m", "mlg_troubleshoot", *(str(a) for a in arguments)],
-        encoding="utf-8",
-        timeout=120,
-        dimensions=(24, columns),
-        env=environment,
-    )
-    shown = child.read()
-    child.close()
-    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown)
-
-
-@needs_posix
-def test_quiet_shows_no_progress(tmp_path):
-    rows = [sound(f"R{n}", clearance_3_in=0.001 + n * 1e-6) for n in range(600)]
-    (tmp_path / "t.csv").write_text(as_csv(HEADER, *rows))
-    assert "Judging" not in in_a_terminal("check", tmp_path / "t.csv", "--quiet")
 
 
 def test_the_json_of_a_batch_written_in_pieces_is_the_whole_form(gear, mixed):

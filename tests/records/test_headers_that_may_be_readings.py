@@ -313,10 +313,14 @@ def test_a_margin_under_another_header_is_asked_about(header: str) -> None:
     assert "margin" in asked.row.unit_question
 
 
-@pytest.mark.parametrize("value", ["0.06", 60.0, "1.5 mm"])
-@pytest.mark.parametrize("row", [1, 60])
-@pytest.mark.parametrize("gap", [0, 1, 2])
-@pytest.mark.parametrize("joint", [False, True])
+@pytest.mark.parametrize(
+    ("value", "row", "gap", "joint"),
+    [
+        *(("0.06", 60, 0, joint) for joint in (False, True)),
+        *((60.0, 1, 1, joint) for joint in (False, True)),
+        *(("1.5 mm", 60, 2, joint) for joint in (False, True)),
+    ],
+)
 def test_a_number_to_the_right_of_the_headers_is_never_dropped(value, row, gap, joint):
     book = openpyxl.Workbook()
     sheet = book.worksheets[0]

@@ -79,14 +79,14 @@ def test_a_stray_quotation_mark_in_every_row_is_named_within_10_s() -> None:
 
 
 def test_thousands_of_rows_of_one_record_id_are_each_named_in_linear_time() -> None:
-    rows = [f"R1,N{n},LH,RADIAL,0.013,0.00{n % 9}" for n in range(16_000)]
+    rows = [f"R1,N{n},LH,RADIAL,0.013,0.00{n % 9}" for n in range(6_000)]
     # Lines as an old Macintosh ends them.
     data = "\r".join([TWO_JOINTS.strip(), *rows]).encode()
     start = time.process_time()
     result = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv")
     assert time.process_time() - start < 10 * SLOWER
-    assert [p.row for p in result.problems] == list(range(2, 16_002))
-    assert "row 3 of t.csv and 15998 more" in result.problems[0].expected
+    assert [p.row for p in result.problems] == list(range(2, 6_002))
+    assert "row 3 of t.csv and 5998 more" in result.problems[0].expected
 
 
 ENDLESS = ("\u0301" * 60_000, "1" * 5000, "0" * 5000 + "6", "1/" + "1" * 5000)

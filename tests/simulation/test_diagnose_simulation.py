@@ -45,7 +45,11 @@ def test_classes_and_what_cannot_be_tested_do_not_depend_on_what_was_read() -> N
 
 
 @pytest.mark.parametrize(
-    ("rig_name", "cause", "change"), [("two_link", "offset_2", 6.0), ("thermal", "decay", 0.4)]
+    ("rig_name", "cause", "change"),
+    [
+        ("two_link", "offset_2", 6.0),
+        pytest.param("thermal", "decay", 0.4, marks=pytest.mark.slow),
+    ],
 )
 def test_a_large_change_is_fitted_until_it_stands(rig_name: str, cause: str, change: float) -> None:
     rng = np.random.default_rng(3)

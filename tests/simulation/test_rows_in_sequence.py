@@ -108,6 +108,7 @@ def test_intervals_of_correlated_rows_hold_the_true_value() -> None:
     assert np.mean(held) >= 0.85
 
 
+@pytest.mark.slow
 def test_without_series_the_result_says_that_rows_follow_each_other() -> None:
     blind, told, white = (
         diagnosed(1, 0.7, 2.0, stated=False),

@@ -18,7 +18,8 @@ from tests.cli.conftest import Run, mlg, row
 from . import places
 
 BY_HAND = ("check", "--tail", "N1", "--convention", "RADIAL", "--set", "3=0.001in", "-q", "--keep")
-SPELLINGS = ["LH", "lh", "left", "L", "L/H", "Left side", "port", "MLG L", "left gear"]
+# How a side is spelt is read in one place: tests/records/test_inspection_columns.py has them all.
+SPELLINGS = ["LH", "Left side", "port"]
 REPAIR = ("history", "repair", "N1", "LH", "--joint", "3")
 
 
