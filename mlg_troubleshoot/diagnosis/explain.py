@@ -26,7 +26,7 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, leve
 from mlg_troubleshoot.diagnosis.causes.linkage import Block
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, less_expected, standardised
 from mlg_troubleshoot.misfit.beliefs import SHORT, Beliefs
-from mlg_troubleshoot.misfit.columns import EffectColumns, NoiseModel, fit
+from mlg_troubleshoot.misfit.columns import FAR, EffectColumns, NoiseModel, fit
 from mlg_troubleshoot.misfit.posterior import (
     UNLISTED,
     Context,
@@ -34,6 +34,7 @@ from mlg_troubleshoot.misfit.posterior import (
     Explanation,
     Key,
     MisfitPosterior,
+    Search,
     posterior,
 )
 from mlg_troubleshoot.misfit.simulation_result import Conclusion
@@ -493,8 +494,67 @@ def explain(problem: MisfitProblem) -> Finding:
     contexts = problem.contexts(noise.scale_in)
     first = posterior(noise, problem.expected, problem.effects(noise), contexts, problem.beliefs)
     found, settled = _with_noise_settled(problem, first, noise)
+    slips = int(np.sum(problem.beliefs.slip_odds(noise.distance) > 0.0))
+    if slips > 1:
+        found, settled = _with_far_rows(problem, found, settled, slips)
     finding = Finding(problem, _concluded(problem, found), settled)
     return replace(finding, noise=_settled(finding))
+
+
+def _with_far_rows(
+    problem: MisfitProblem, found: MisfitPosterior, settled: NoiseModel, slips: int
+) -> tuple[MisfitPosterior, NoiseModel]:
+    """What is found, or what is likelier where rows far out, at most so many of them slips, count
+    in full, because one effect moves them together.
+    """
+    beliefs = problem.beliefs
+    near = build_noise(problem.expected, problem.rows, far=np.inf)
+    given = near, problem.expected, problem.effects(near), found.contexts, beliefs
+    likeliest = found.likeliest[0]
+    if not more_than_slips(*given, likeliest, slips):
+        return found, settled
+    other = posterior(*given)
+    if other.names_of(other.likeliest[0]) == found.names_of(likeliest):
+        return found, settled
+    other, near = _with_noise_settled(problem, other, near)
+    lead = other.log_evidence - found.log_evidence
+    lead += _as_slips(near, beliefs) - _as_slips(settled, beliefs)
+    return (other, near) if lead > beliefs.odds else (found, settled)
+
+
+def more_than_slips(
+    noise: NoiseModel,
+    data: Array,
+    effects: Effects,
+    contexts: Sequence[Context],
+    beliefs: Beliefs,
+    start: Explanation,
+    slips: int,
+) -> bool:
+    """Tell whether an effect that has a name likely acts beside an explanation and its slips, which
+    are added to it as long as one is the likeliest further effect, at most so many.
+    """
+    search = Search(noise, data, effects, contexts, beliefs, len(start.members) + slips + 1)
+    members = frozenset(start.members)
+    while True:
+        search.extend(start.context, members)
+        at = search.extended[start.context, members]
+        (nearest, *_) = at.leading
+        if at.further[nearest] <= at.own.log_posterior:
+            return False
+        if effects.names[nearest] is not None:
+            return True
+        members |= {nearest}
+
+
+def _as_slips(noise: NoiseModel, beliefs: Beliefs) -> float:
+    """Logarithm of how much less likely far rows are as entry errors than as what was made of their
+    scatter.
+    """
+    far = noise.distance > FAR
+    odds = beliefs.slip_odds(noise.distance)[far]
+    out = noise.distance[far]
+    return float(np.sum(np.logaddexp(odds, 0.0) - 0.5 * (out**2 - FAR**2) + np.log(out / FAR)))
 
 
 def _with_noise_settled(

@@ -174,19 +174,23 @@ def less_expected(misfit: Array, predicted_in: Array) -> Array:
     return misfit - EXPECTED_SLOPE * predicted_in
 
 
-def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:
-    """Estimate V and σ of Eq. M2 from the misfit. Rows far out scatter more than others."""
+def build_noise(
+    misfit: Array, rows: Rows, explained: Array | None = None, far: float = FAR
+) -> NoiseModel:
+    """Estimate V and σ of Eq. M2 from the misfit. Rows further out than `far` standard deviations
+    scatter more than others.
+    """
     rest = misfit if explained is None else misfit - explained
-    noise = _scatter(rest, rest, rows)
+    noise = _scatter(rest, rest, rows, far)
     gears = numbered(rows.gears)
     for _ in range(_ROUNDS if rows.unread_in.any() else 0):
         alone = rest - noise.share_of(rows.unread_in, rest)
         alone -= noise.share_of_groups(rows.u_shared_in, gears, rest)
-        noise = _scatter(rest, alone, rows)
+        noise = _scatter(rest, alone, rows, far)
     return noise
 
 
-def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
+def _scatter(rest: Array, alone: Array, rows: Rows, far: float) -> NoiseModel:
     """Noise of the rows; `alone` is the residual without what unread joints most likely add to
     gears. [in]
     """
@@ -204,7 +208,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
     gears = numbered(rows.gears)
     relative = np.hypot(relative, rows.u_filled_in / scale)
     # Rows far out in the tails of the distribution count less, but never as nothing.
-    far_out = np.maximum(1.0, np.abs(centred) / (scale * relative) / FAR)
+    far_out = np.maximum(1.0, np.abs(centred) / (scale * relative) / far)
     bias = [
         np.full(len(rest), BIAS_IN / scale),
         SLOPE * predicted / scale,

@@ -18,7 +18,7 @@ from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
 from mlg_troubleshoot.diagnosis.causes.linkage import CalibrationRate, JointContact, JointFactors
 from mlg_troubleshoot.diagnosis.causes.reading import GaugeBias
-from mlg_troubleshoot.diagnosis.explain import Bank, MisfitProblem
+from mlg_troubleshoot.diagnosis.explain import Bank, MisfitProblem, more_than_slips
 from mlg_troubleshoot.diagnosis.noise import Rows
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import EffectColumns, NoiseModel
@@ -26,6 +26,7 @@ from mlg_troubleshoot.misfit.posterior import (
     UNLISTED,
     Context,
     Effects,
+    Explanation,
     Key,
     Marginal,
     MisfitPosterior,
@@ -298,6 +299,21 @@ def test_an_entry_error_is_nothing_that_is_wrong() -> None:
     found = posterior(NOISE, data, replace(slip, size=np.full(P, 9.0)), CONTEXTS, BELIEFS)
     assert found.likeliest[0].members == (5,)
     assert found.nothing > 0.5
+
+
+@pytest.mark.parametrize(("step", "more"), [(0.0, False), (4.0, True)])
+def test_only_an_effect_that_has_a_name_is_more_than_slips(step: float, more: bool) -> None:
+    rng, n = np.random.default_rng(12), 40
+    late = np.arange(n) >= 30
+    data = rng.standard_normal(n) + step * late
+    data[[3, 8, 35]] += (25.0, -30.0, 28.0)
+    names: list[Key | None] = [("step", None), *([None] * n)]
+    columns = np.column_stack([late.astype(float), np.eye(n)])
+    every = Effects.free(columns, names, -4.0, 20.0)
+    contexts = (Context.none(n),)
+    given = NoiseModel.white(n), data, every, contexts, BELIEFS
+    nothing = Explanation(0, (), 0.0, np.empty(0))
+    assert more_than_slips(*given, nothing, 3) is more
 
 
 def test_what_is_rarer_beforehand_is_rarer_afterwards_by_as_much() -> None:
