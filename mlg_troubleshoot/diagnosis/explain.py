@@ -578,7 +578,7 @@ def _settled(finding: Finding) -> NoiseModel:
     held = found.contexts[finding.best.context].within(finding.noise)
     columns = found.effects.kept.take(finding.best.members)
     fitted = fit(held, columns, finding.problem.expected)
-    return finding.noise.with_tails(fitted.tail_ratio)
+    return finding.noise.with_tails(*fitted.noise.tail_ratios)
 
 
 def _noise_beside(problem: MisfitProblem, explained: Array) -> NoiseModel:
@@ -608,7 +608,7 @@ def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
     (Bonferroni).
     """
     fitted = fit(noise, np.ones((len(left), 1)), left)
-    product = noise.with_tails(fitted.tail_ratio).precision_times(left[:, None])
+    product = fitted.noise.precision_times(left[:, None])
     shapes = problem.bank.columns
     spread = fitted.scale * np.sqrt(noise.squares(shapes)[0])
     largest = float(np.max(np.abs(shapes.onto(product.T)[0]) / spread))

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse import csc_array, csr_array, hstack
+from scipy.special import stdtrit
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, Wholes
 
@@ -213,12 +214,6 @@ class NoiseModel:
     of_gear: Array | None = None
     of_tail: Array | None = None
     far_out: Array | None = None
-
-    @classmethod
-    def white(cls, n: int) -> NoiseModel:
-        """Noise of rows that are whitened already: equal, independent and of unit size."""
-        none = np.zeros(n, np.int64)
-        return cls(np.ones(n), none, none, np.empty((n, 0)), 0.0, 0.0, (0.0,), 1.0)
 
     @property
     def tail_levels(self) -> list[tuple[float, float]]:
@@ -410,8 +405,8 @@ class Fit:
         Parameters, and their standard errors.
     log_likelihood : float
         Profiled over scale and scatter between tails. [1]
-    tail_ratio : float
-        Scatter between tails over scatter of a row. [1]
+    noise : NoiseModel
+        The noise with the scatter between tails that is likeliest.
     scale : float
         Common standard deviation. [in]
     """
@@ -419,8 +414,14 @@ class Fit:
     values: Array
     errors: Array
     log_likelihood: float
-    tail_ratio: float
+    noise: NoiseModel
     scale: float
+
+    @property
+    def half_width(self) -> Array:
+        """Half the 95 % interval of each parameter, by Student's t of the rows that are left."""
+        rows = self.noise.worth - self.noise.absorbed - len(self.values)
+        return self.errors * stdtrit(max(rows, 1.0), 0.975)
 
 
 def shrunk(
@@ -456,7 +457,7 @@ def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
         if best is None or likelihood > best.log_likelihood:
             scale = np.sqrt(rest / max(n - k, 1))
             errors = scale * np.sqrt(np.maximum(np.diag(inverse), 0.0))
-            best = Fit(values, errors, float(likelihood), ratio, float(scale))
+            best = Fit(values, errors, float(likelihood), noise.with_tails(ratio), float(scale))
     if best is None:
         raise ValueError("no tail ratio to try")
     return best
@@ -513,7 +514,7 @@ def held_out_part(
     columns: Array,
     data: Array,
     fold: Wholes,
-    known: tuple[Array, Array] | None,
+    known: tuple[Array, Array] | None = None,
 ) -> Array:
     """What a model explains of each row that was fitted to the rows of the other folds alone. [in]
 

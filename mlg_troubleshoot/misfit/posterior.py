@@ -91,7 +91,7 @@ class Effects:
         columns: Array | EffectColumns,
         names: Sequence[Key | None],
         log_prior: Array | float,
-        size: float,
+        size: Array | float,
     ) -> Effects:
         """Effects that are on no list and may have any sign."""
         p = len(names)

@@ -4,16 +4,13 @@ The simulation is linearised where the likeliest of its suspects fit best; all e
 of any misfit. Smooth discrepancies that no suspect makes are its contexts: a cause must explain the
 data better than they do (Kennedy and O'Hagan 2001).
 
-What a caller can get wrong, refused with words before anything is computed.
-
-A simulation that is asked for readings: what it predicts, how its parameters move that, and the
-values with which it comes nearest to the readings.
+Changes of parameters are counted in their trials from nominal.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from inspect import signature
 from typing import Any
@@ -21,14 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cholesky, orth
-from scipy.special import stdtrit
 from threadpoolctl import threadpool_limits
 
-from mlg_troubleshoot.arrays import Array, Wholes, numbered, rms
+from mlg_troubleshoot.arrays import Array, Places, Wholes, numbered, rms
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.columns import (
     FAR,
+    EffectColumns,
     Fit,
     NoiseModel,
     blocks_of,
@@ -37,22 +34,15 @@ from mlg_troubleshoot.misfit.columns import (
     held_out_part,
     likelier,
 )
-from mlg_troubleshoot.misfit.posterior import (
-    UNLISTED,
-    Context,
-    Effects,
-    Explanation,
-    Key,
-    posterior,
-)
+from mlg_troubleshoot.misfit.posterior import UNLISTED, Context, Effects, Key, posterior
 from mlg_troubleshoot.misfit.simulation_result import (
     Conclusion,
     HeldOutGain,
+    MisfitVerdict,
     SimulationDiagnosis,
     Suspect,
     SuspectFound,
 )
-from mlg_troubleshoot.misfit.simulation_result import MisfitVerdict as Verdict
 
 
 def read_numbers(values: Any, name: str, *shapes: tuple[int, ...], above: float = -np.inf) -> Array:
@@ -64,7 +54,7 @@ def read_numbers(values: Any, name: str, *shapes: tuple[int, ...], above: float 
         given = np.ma.array(values)
         if given.dtype.kind in "UO" and any(isinstance(each, str) for each in given.flat):
             raise TypeError(f"{values!r} holds text")
-        numbers = np.array(np.ma.filled(given.astype(float), np.nan))
+        numbers: Array = np.array(np.ma.filled(given.astype(float), np.nan))
     except (TypeError, ValueError) as error:
         raise UsageError(
             f"{name} is not an array of numbers: {error}", "give numbers, NaN where not read"
@@ -79,17 +69,27 @@ def read_numbers(values: Any, name: str, *shapes: tuple[int, ...], above: float 
     return numbers
 
 
-def read_measured(measured: Any) -> tuple[Array, list[str]]:
-    """Readings as (n, m), and names of their outputs if they have any."""
-    names = list(measured) if isinstance(measured, Mapping) or hasattr(measured, "columns") else []
-    data = read_numbers([measured[name] for name in names] if names else measured, "measured")
-    data = data.T if names else data[:, None] if data.ndim == 1 else data
-    if data.ndim != 2 or not data.size or np.isinf(data).any():
+def channels_of(values: Any) -> list[str]:
+    """Names of the outputs of a mapping or a DataFrame; none of an array."""
+    return list(values) if isinstance(values, Mapping) or hasattr(values, "columns") else []
+
+
+def read_rows(values: Any, name: str, channels: Sequence[str]) -> Array:
+    """Numbers of shape (n, m), of named channels or of an array."""
+    try:
+        rows = read_numbers([values[each] for each in channels] if channels else values, name)
+    except KeyError as error:
         raise UsageError(
-            f"measured has shape {data.shape}, infinite readings: {np.sum(np.isinf(data))}",
+            f"{name} has no channel {error}",
+            "name the channels of the simulation as those of the readings",
+        ) from error
+    rows = rows.T if channels else rows[:, None] if rows.ndim == 1 else rows
+    if rows.ndim != 2:
+        raise UsageError(
+            f"{name} has shape {rows.shape}",
             "give one row for each row read, one column for each output, NaN where not read",
         )
-    return data, names
+    return rows
 
 
 def read_labels(labels: ArrayLike | None, n: int, name: str) -> Wholes:
@@ -119,6 +119,32 @@ def read_times(time: ArrayLike | None, chain: Wholes) -> Array:
     return when / (np.median(step) if len(step) else 1.0)
 
 
+def read_suspects(every: Sequence[Suspect]) -> Array:
+    """Nominal value, trial, bounds and standard deviation of each parameter, shape (5, p); refuse
+    parameters that cannot be.
+    """
+    numbers: dict[str, Array] = {}
+    for s in every:
+        if not isinstance(s, Suspect):
+            raise UsageError(
+                f"{s!r} is not a Suspect", "write Suspect(name, nominal, trial) for each parameter"
+            )
+        own = read_numbers([s.nominal, s.trial, s.low, s.high, s.prior_sd], s.name)
+        nominal, trial, low, high, sd = own.tolist()
+        is_out = not low <= nominal <= high or low == high
+        if is_out or sd <= 0.0 or not trial or not np.isfinite(nominal + trial):
+            raise UsageError(
+                f"{s.name}: nominal {nominal:g}, trial {trial:g}, low {low:g}, high {high:g},"
+                f" prior_sd {sd:g}",
+                "give a nominal value between low and high, a finite trial other than 0, and a"
+                " prior_sd above 0",
+            )
+        if s.name in numbers:
+            raise UsageError(f"{s.name} is named twice", "give each parameter its own name")
+        numbers[s.name] = own
+    return np.transpose(list(numbers.values()))
+
+
 def check_predict(predict: Callable[..., Any]) -> None:
     """Refuse a simulation that does not take its parameters in one mapping."""
     try:
@@ -133,138 +159,16 @@ def check_predict(predict: Callable[..., Any]) -> None:
         return
 
 
-def read_suspects(every: Sequence[Suspect], readings: int, count: int) -> Array:
-    """Nominal value, trial, bounds and standard deviation of each parameter, shape (5, p), the
-    first so many of them suspects; refuse parameters that cannot be, and more than readings tell.
-    """
-    if not count or readings < len(every) - count + 3:
-        raise UsageError(
-            f"No suspects were given, or too few readings: {readings}, nuisance parameters:"
-            f" {len(every) - count}",
-            "name one suspect at least, and measure three readings more than nuisance parameters",
-        )
-    numbers = []
-    for s in every:
-        if not isinstance(s, Suspect):
-            raise UsageError(
-                f"{s!r} is not a Suspect", "write Suspect(name, nominal, trial) for each parameter"
-            )
-        low, high = (-np.inf if s.low is None else s.low, np.inf if s.high is None else s.high)
-        own = read_numbers([s.nominal, s.trial, low, high, s.prior_sd], s.name)
-        nominal, trial, low, high, sd = own.tolist()
-        is_within = low <= nominal <= high and low < high
-        if not is_within or not np.isfinite(trial) or not trial or sd <= 0.0:
-            raise UsageError(
-                f"{s.name}: nominal {nominal:g}, trial {trial:g}, low {low:g}, high {high:g},"
-                f" prior_sd {sd:g}",
-                "give a nominal value between low and high, a finite trial other than 0, and a"
-                " prior_sd above 0",
-            )
-        if [each.name for each in every].count(s.name) > 1:
-            raise UsageError(f"{s.name} is named twice", "give each parameter its own name")
-        numbers.append(own)
-    return np.transpose(numbers)
-
-
 Predict = Callable[[Mapping[str, float]], Any]
 
 # Shares of a trial by which a derivative is taken: the next one where one does nothing or fails.
 _STEPS = (0.1, 1)
-
-
-class Runner:
-    """The simulation with its parameters: suspects first, then nuisance parameters.
-
-    row, output, shape (N,): place of each reading. failures: calls without a number for each
-    reading.
-    """
-
-    def __init__(
-        self, predict: Predict, measured: Any, suspects: Sequence[Suspect], count: int
-    ) -> None:
-        self.predict = predict
-        data, self.channels = read_measured(measured)
-        self.shape = data.shape
-        self.row, self.output = np.nonzero(np.isfinite(data))
-        self.reading = data[self.row, self.output]
-        self.suspects = suspects
-        self.count = count
-        numbers = read_suspects(suspects, len(self.row), count)
-        self.nominal, self.trial, self.low, self.high, self.prior_sd = numbers
-        self.names = [s.name for s in suspects]
-        self.calls = 0
-        self.failures: list[str] = []
-        self._known: dict[bytes, Array] = {}
-
-    def call(self, values: Array) -> Array:
-        """Predict all rows and outputs, shape (n, m); NaN where the simulation has no answer.
-
-        What it raises there is an ArithmeticError, a ValueError or a RuntimeError. All else is a
-        fault in its code, or in how it is called, and is passed on.
-        """
-        parameters = dict(zip(self.names, values.tolist(), strict=True))
-        self.calls += 1
-        try:
-            predicted = self.predict(parameters)
-        except (ArithmeticError, ValueError, RuntimeError) as error:
-            self.failures.append(f"{parameters}: {error!r}")
-            return np.full(self.shape, np.nan)
-        except LookupError as error:
-            error.add_note(f"The simulation is given: {', '.join(self.names)}.")
-            raise
-        if self.channels and hasattr(predicted, "keys"):
-            for name in self.channels:
-                if name not in predicted:
-                    raise UsageError(
-                        f"The simulation returned no channel {name!r}",
-                        "name the channels of the simulation as those of the readings",
-                    )
-            predicted = np.transpose([predicted[name] for name in self.channels])
-        rows = np.array(predicted, float)
-        if rows.ndim == 1:
-            rows = rows[:, None]
-        if rows.shape != self.shape:
-            raise UsageError(
-                f"The simulation returned an array of shape {rows.shape}, the readings have"
-                f" shape {self.shape}",
-                "predict must return one row for each row read and one column for each output",
-            )
-        if not np.isfinite(rows[self.row, self.output]).all():
-            self.failures.append(f"{parameters}: not finite")
-        return rows
-
-    def at(self, values: Array) -> Array:
-        """Predict the readings, shape (N,). The same values are asked once."""
-        key = values.tobytes()
-        if key not in self._known:
-            self._known[key] = self.call(values)[self.row, self.output]
-        return self._known[key]
-
-    def columns(self, values: Array, which: Iterable[int]) -> Array:
-        """Change of the readings for a change of some parameters by their trials, shape (N, k)."""
-        return np.array([self._column(values, k) for k in which]).reshape(-1, len(self.row)).T
-
-    def _column(self, values: Array, k: int) -> Array:
-        for step in _STEPS:
-            usable = []
-            for change in (step, -step):
-                moved = values.copy()
-                moved[k] += change * self.trial[k]
-                if self.low[k] <= moved[k] <= self.high[k]:
-                    usable.append((self.at(moved) - self.at(values)) / change)
-            usable = [slope for slope in usable if np.isfinite(slope).all()]
-            if np.any(usable):
-                both = np.mean(usable, axis=0)
-                # What is even about the value, as of a play, has an effect all the same.
-                return both if np.any(both) else usable[0]
-        return np.zeros(len(self.row))
-
-
 # What is tried of a size that nobody knows, over the usual one.
 _SIZES = 3.0 ** np.arange(-1, 5)
 # Scatter between groups over that of a reading: its median beforehand, about which its logarithm
 # has a standard deviation of one.
-_GROUP_RATIO = 0.15
+_GROUP_RATIOS = tuple((0.15 * _SIZES).tolist())
+_GROUP_CHANCES = tuple(np.exp(-(np.log(_SIZES) ** 2) / 2).tolist())
 # Correlations of neighbouring rows that are tried: equal steps of Fisher's z.
 _CORRELATIONS = np.tanh(0.35 * np.arange(8)).tolist()
 # Standard deviation of nuisance parameters, over the scatter of a reading: whatever they are.
@@ -349,8 +253,20 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
         gives no number.
     """
     check_predict(predict)
-    run = Runner(predict, measured, [*suspects, *nuisance], len(suspects))
-    n = run.shape[0]
+    every = [*suspects, *nuisance]
+    channels = channels_of(measured)
+    data = read_rows(measured, "measured", channels)
+    output, row = np.nonzero(np.isfinite(data.T))
+    infinite = np.sum(np.isinf(data))
+    if not suspects or len(row) < len(nuisance) + 3 or infinite:
+        raise UsageError(
+            f"No suspects were given, too few readings: {len(row)}, nuisance parameters:"
+            f" {len(nuisance)}, or infinite ones: {infinite}",
+            "name one suspect at least, and measure three readings more than nuisance parameters,"
+            " NaN where not read",
+        )
+    nominal, trial, low, high, prior_sd = read_suspects(every)
+    n = len(data)
     group = read_labels(groups, n, "groups")
     chain = read_labels(series, n, "series")
     when = read_times(time, chain)
@@ -358,454 +274,503 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
         raise UsageError(
             "time was given without series", "say with series= which rows follow each other"
         )
-    moving = dict(covariates) if covariates is not None else {}
+    moving = {} if covariates is None else dict(covariates)
     known = {str(name): read_numbers(own, repr(name), (n,)) for name, own in moving.items()}
-    declared = None
+    u = np.ones(data.shape)
     if reading_u is not None:
-        stated = read_numbers(reading_u, "reading_u", (), run.shape[1:], run.shape, above=0.0)
-        declared = np.broadcast_to(stated, run.shape)[run.row, run.output]
-    bad = np.flatnonzero(~np.isfinite(run.at(run.nominal)))
-    if len(bad):
-        raise UsageError(
-            f"The simulation gives no number for {len(bad)} of {len(run.row)} readings at the"
-            f" nominal values, the first at row {run.row[bad[0]]}, output {run.output[bad[0]]}"
-            f" (counted from 0); {run.failures[0]}",
-            "set these readings to NaN or correct the simulation",
-        )
-    follow = None if series is None else (chain, when)
+        u *= read_numbers(reading_u, "reading_u", (), data.shape[1:], data.shape, above=0.0)
+    plain = NoiseModel(
+        u[row, output],
+        numbered(group[row] + 1j * output),
+        np.zeros(len(row), np.int64),
+        np.empty((len(row), 0)),
+        floor_in=1e-4,
+        gear_ratio=0.0,
+        tail_ratios=_GROUP_RATIOS if group.any() else (0.0,),
+        scale_in=1.0,
+        tail_chances=_GROUP_CHANCES if group.any() else (),
+        chain=numbered(chain[row] + 1j * output),
+        time=when[row],
+    )
+    study = _Study(
+        predict,
+        every,
+        len(suspects),
+        channels,
+        data.shape,
+        row,
+        output,
+        data[row, output],
+        nominal,
+        trial,
+        low,
+        high,
+        prior_sd,
+        group=group,
+        block=None if series is None else blocks_of(chain, when)[row],
+        plain=plain,
+        alike=numbered(output) if reading_u is None else 0 * row,
+        beliefs=replace(beliefs or Beliefs(), sizes=tuple(_SIZES.tolist())),
+        changes=np.zeros(len(every)),
+        scale=plain.relative,
+    )
+    check_nominal(study)
     # The matrices are small: threads that wait for each other cost several times what they save.
     with threadpool_limits(1, "blas"):
-        return _Study(run, group, follow, declared, beliefs or Beliefs(), known).diagnosis()
+        return replace(study, contexts=_discrepancies(study, known)).diagnosis()
 
 
 @dataclass(frozen=True)
-class _Point:
-    """The simulation at some values of its parameters, and what is believed there, over the scatter
-    of each output.
+class _Study:
+    """A simulation with some changes of its parameters, its readings, and what is believed of both.
 
-    rest, shape (N,): reading less prediction. columns, shape (N, p): effects of a trial of each
-    parameter. whole: misfit with all suspects at nominal, as far as the columns say. unit: scatter
-    of each output. [unit of the readings] classes: suspects that look alike here.
+    Parameters stand in one order, suspects first. Arrays are of readings, output by output, over
+    the scatter of an output where nothing else is said.
+
+    row, output, shape (N,): place of each reading. readings, scale: in their own unit. group, shape
+    (n,): number of the group of each row. block: fold of each reading of a series. plain: noise
+    without what is estimated. alike: readings of one number have a scatter in common. contexts:
+    nothing, or a smooth discrepancy. known: what was predicted. failures: calls without a number
+    for each reading.
     """
 
-    values: Array
-    unit: Array
-    rest: Array
-    columns: Array
-    whole: Array
-    noise: NoiseModel
-    classes: list[list[int]]
-    effects: Effects
-    contexts: Sequence[Context]
+    predict: Predict
+    suspects: Sequence[Suspect]
+    count: int
+    channels: Sequence[str]
+    shape: tuple[int, ...]
+    row: Places
+    output: Places
+    readings: Array
+    nominal: Array
+    trial: Array
+    low: Array
+    high: Array
+    prior_sd: Array
+    group: Wholes
+    block: Wholes | None
+    plain: NoiseModel
+    alike: Wholes
     beliefs: Beliefs
+    changes: Array
+    scale: Array
+    known: dict[bytes, Array] = field(default_factory=dict)
+    failures: list[str] = field(default_factory=list)
+    contexts: Sequence[Context] = ()
+    correlation: float = 0.0
+
+    def parameters(self, changes: Array) -> dict[str, float]:
+        """Value of each parameter."""
+        values = np.clip(self.nominal + self.trial * changes, self.low, self.high)
+        return {s.name: v for s, v in zip(self.suspects, values.tolist(), strict=True)}
+
+    @property
+    def ends(self) -> Array:
+        """Least and largest change of each parameter, shape (2, p)."""
+        bounds = np.array([self.low, self.high])
+        return np.sort((bounds - self.nominal) / self.trial, axis=0)
+
+    def call(self, changes: Array) -> Array:
+        """Predict all rows and outputs, shape (n, m); NaN where the simulation has no answer.
+
+        What it raises there is an ArithmeticError, a ValueError or a RuntimeError. All else is a
+        fault in its code, or in how it is called, and is passed on.
+        """
+        parameters = self.parameters(changes)
+        try:
+            predicted = self.predict(parameters)
+        except (ArithmeticError, ValueError, RuntimeError) as error:
+            self.failures.append(f"{parameters}: {error!r}")
+            return np.full(self.shape, np.nan)
+        except LookupError as error:
+            error.add_note(f"The simulation is given: {', '.join(parameters)}.")
+            raise
+        name = "what the simulation returned"
+        rows = read_rows(predicted, name, channels_of(predicted) and self.channels)
+        if rows.shape != self.shape:
+            raise UsageError(
+                f"{name} has shape {rows.shape}, the readings have shape {self.shape}",
+                "predict must return one row for each row read and one column for each output",
+            )
+        if not np.isfinite(rows[self.row, self.output]).all():
+            self.failures.append(f"{parameters}: not finite")
+        return rows
+
+    def at(self, changes: Array) -> Array:
+        """Predict the readings; the same changes are asked once. [unit of the readings]"""
+        key = changes.tobytes()
+        if key not in self.known:
+            self.known[key] = self.call(changes)[self.row, self.output]
+        return self.known[key]
+
+    def slopes(self, changes: Array, which: Sequence[int]) -> Array:
+        """Effect of one trial of some parameters, shape (N, k). [unit of the readings]"""
+        here = self.at(changes)
+        low, high = self.ends
+        slopes = np.zeros((len(which), len(here)))
+        for place, k in enumerate(which):
+            for step in _STEPS:
+                usable = []
+                for change in (step, -step):
+                    moved = changes.copy()
+                    moved[k] += change
+                    if low[k] <= moved[k] <= high[k]:
+                        usable.append((self.at(moved) - here) / change)
+                usable = [slope for slope in usable if np.isfinite(slope).all()]
+                if np.any(usable):
+                    both = np.mean(usable, axis=0)
+                    # What is even about the value, as of a play, has an effect all the same.
+                    slopes[place] = both if np.any(both) else usable[0]
+                    break
+        return slopes.T
+
+    @cached_property
+    def unit(self) -> Array:
+        """Scatter of the output of each reading. [unit of the readings]"""
+        return _of_each(self.output, np.median, self.scale)
+
+    @cached_property
+    def columns(self) -> Array:
+        """Effect of a trial of each parameter, shape (N, p)."""
+        return self.slopes(self.changes, range(len(self.changes))) / self.unit[:, None]
+
+    @cached_property
+    def rest(self) -> Array:
+        """Readings less predictions."""
+        return (self.readings - self.at(self.changes)) / self.unit
+
+    @cached_property
+    def whole(self) -> Array:
+        """Misfit with all suspects at nominal, as far as the columns say."""
+        return self.rest + self.columns[:, : self.count] @ self.changes[: self.count]
+
+    @cached_property
+    def noise(self) -> NoiseModel:
+        """What rows do when nothing is wrong; nuisance parameters may have any value."""
+        relative = (self.scale / self.unit)[:, None]
+        free = self.columns[:, self.count :] / relative
+        basis = orth(free / np.maximum(np.linalg.norm(free, axis=0), 1e-300), 1e-7)
+        return replace(
+            self.plain,
+            relative=relative[:, 0],
+            loadings=_WIDE * relative * basis,
+            absorbed=basis.shape[1],
+            correlation=self.correlation,
+        )
+
+    @cached_property
+    def classes(self) -> list[list[int]]:
+        """Suspects that can be tested beside nuisance parameters, those in one class that only
+        differ in size.
+        """
+        columns = self.columns[:, : self.count]
+        whole = np.linalg.norm(self.noise.own(columns), axis=0)
+        inner = self.noise.with_tails(0.0).products(columns)
+        own = np.sqrt(np.abs(np.diag(inner)))
+        seen = np.flatnonzero((own > _TESTABLE * whole) & (whole > 1e-9 * whole.max()))
+        alike = inner[np.ix_(seen, seen)] / np.outer(own[seen], own[seen])
+        first = np.argmax(1.0 - alike**2 < _TESTABLE**2, axis=1)
+        return [seen[first == k].tolist() for k in np.unique(first)]
 
     @cached_property
     def follows(self) -> Conclusion:
-        """What the readings say here."""
-        given = self.noise, self.whole, self.effects, self.contexts, self.beliefs
-        return Conclusion(posterior(*given, (), _MOST), self.beliefs)
+        """What the readings say here, one effect of each class of suspects."""
+        beliefs = self.beliefs
+        first = [own[0] for own in self.classes]
+        columns = EffectColumns.of(self.columns[:, first])
+        often = beliefs.expected * (1.0 - beliefs.unlisted) / max(len(first), 1)
+        sd = (self.prior_sd / abs(self.trial))[first]
+        size = np.where(np.isnan(sd), beliefs.shape_size / columns.acting, sd)
+        low, high = self.ends[:, first] == 0.0
+        effects = replace(
+            Effects.free(columns, [self.keys[k] for k in first], np.log(often), size),
+            listed=np.ones(len(first), bool),
+            scales=np.isnan(sd),
+            # A suspect whose nominal value is one of its bounds can move in one way only.
+            sign=1.0 * low - high,
+        )
+        found = posterior(self.noise, self.whole, effects, self.contexts, beliefs, most=_MOST)
+        return Conclusion(found, beliefs)
 
     @property
-    def likeliest(self) -> Explanation:
-        """The likeliest explanation."""
-        return self.follows.posterior.likeliest[0]
+    def keys(self) -> list[Key]:
+        """What the posterior calls the parameters."""
+        return [("suspect", s.name) for s in self.suspects]
 
-    def linear(self, chosen: Sequence[int], context: int = 0) -> tuple[Fit, NoiseModel]:
-        """Fit changes of some suspects in their trials; noise with a discrepancy, and with the
-        scatter between groups that they leave.
-        """
+    def linear(self, chosen: Sequence[int], context: int = 0) -> Fit:
+        """Fit changes of some suspects beside a discrepancy, if any."""
         noise = self.noise.with_effects(self.contexts[context].shared_in)
-        found = fit(noise, self.columns[:, list(chosen)], self.whole)
-        return found, noise.with_tails(found.tail_ratio)
+        return fit(noise, self.columns[:, list(chosen)], self.whole)
 
     def less_nuisance(self, data: Array) -> Array:
         """Data less what the nuisance parameters explain of them. [unit of the readings]"""
         return (data - self.noise.share_of(self.noise.loadings, data)) * self.unit
 
-
-@dataclass(frozen=True)
-class _Study:
-    """A simulation, its readings and what is believed: suspects come first, then nuisance."""
-
-    run: Runner
-    group: Wholes
-    follow: tuple[Wholes, Array] | None
-    declared: Array | None
-    beliefs: Beliefs
-    covariates: Mapping[str, Array]
-
-    @property
-    def nuisance(self) -> list[int]:
-        """Places of the nuisance parameters."""
-        return list(range(self.run.count, len(self.run.names)))
-
-    @property
-    def outputs(self) -> list[Wholes]:
-        """Readings of each output."""
-        return [np.flatnonzero(self.run.output == k) for k in np.unique(self.run.output)]
-
-    @cached_property
-    def contexts(self) -> list[Context]:
-        """Nothing, or a smooth discrepancy of some size, each output by itself."""
-        run = self.run
-        n = len(self.group)
-        moves = np.zeros((*run.shape, run.count))
-        moves[run.row, run.output] = run.columns(run.nominal, range(run.count))
-        features = {
-            "prediction": np.nan_to_num(run.call(run.nominal)),
-            "effects of the suspects": moves,
-            _ORDER: np.arange(n, dtype=float),
-            **self.covariates,
-        }
-        shapes = [
-            (name, shape)
-            for name, own in features.items()
-            for shape in _smooth_shapes(own.reshape(n, -1), self.group, name == _ORDER)
-        ]
-        sizes = self.beliefs.shape_size * np.array(Beliefs().sizes)
-        share = self.beliefs.expected * self.beliefs.unlisted / max(len(shapes) * len(sizes), 1)
-        own = (run.output[:, None] == np.unique(run.output))[:, :, None]
-        return [
-            Context.none(len(run.row)),
-            *(
-                Context(
-                    (UNLISTED, name),
-                    float(np.log(share)),
-                    size * (own * shape[run.row][:, None]).reshape(len(own), -1),
-                    listed=False,
-                )
-                for name, shape in shapes
-                for size in sizes
-            ),
-        ]
-
-    def scale(self, left: Array, spare: float) -> Array:
+    def scatter(self, left: Array, spare: float) -> Array:
         """Scatter of each reading by itself, from residuals of which a share is spare; far ones
         count less. [unit of the readings]
         """
-        relative = np.ones(len(left)) if self.declared is None else self.declared
-        size = np.abs(left) / relative
-        level = np.empty(len(left))
-        for index in self.outputs if self.declared is None else [np.arange(len(left))]:
-            near = FAR * 1.4826 * np.median(size[index]) / np.sqrt(spare)
-            level[index] = np.sqrt(np.mean(np.minimum(size[index], near) ** 2) / spare)
-        least = _DIGITS * np.max(np.abs([*self.run.reading, *self.run.at(self.run.nominal)]))
-        return np.asarray(np.maximum(relative * np.maximum(level, size / FAR), least))
 
-    def noise(self, scale: Array, free: Array, correlation: float) -> tuple[NoiseModel, Array]:
-        """Noise over the scatter of each output, free columns absorbed, and these scatters."""
-        run = self.run
-        unit = np.empty(len(scale))
-        for index in self.outputs:
-            unit[index] = np.median(scale[index])
-        chain, time = self.follow or (self.group, self.group)
-        basis = _basis_of(free / scale[:, None])
-        sizes = _SIZES if self.group.any() else np.zeros(1)
-        noise = replace(
-            NoiseModel.white(len(scale)),
-            relative=scale / unit,
-            tails=numbered(self.group[run.row] + 1j * run.output),
-            loadings=_WIDE * (scale / unit)[:, None] * basis,
-            floor_in=1e-4,
-            tail_ratios=tuple((_GROUP_RATIO * sizes).tolist()),
-            absorbed=basis.shape[1],
-            tail_chances=tuple(np.exp(-0.5 * np.log(sizes + (sizes == 0.0)) ** 2).tolist()),
-            chain=numbered(chain[run.row] + 1j * run.output),
-            time=np.asarray(time[run.row], float),
-            correlation=correlation,
-        )
-        return noise, unit
+        def level(size: Array) -> Any:
+            near = FAR * 1.4826 * np.median(size) / np.sqrt(spare)
+            return np.sqrt(np.mean(np.minimum(size, near) ** 2) / spare)
 
-    def linearised(self, values: Array, scale: Array, correlation: float) -> _Point:
-        """Linearise the simulation, rows that follow each other so much alike."""
-        run = self.run
-        columns = run.columns(values, range(len(values)))
-        change = ((values - run.nominal) / run.trial)[: run.count]
-        rest = run.reading - run.at(values)
-        whole = rest + columns[:, : run.count] @ change
-        classes = _alias_classes(columns / scale[:, None], run.count)
-        noise, unit = self.noise(scale, columns[:, self.nuisance], correlation)
-        seen = columns / unit[:, None]
-        effects = self.effects([own[0] for own in classes], seen)
-        beliefs = replace(self.beliefs, sizes=tuple(_SIZES.tolist()))
-        given = noise, classes, effects, self.contexts, beliefs
-        return _Point(values, unit, rest / unit, seen, whole / unit, *given)
+        size = np.abs(left) / self.plain.relative
+        least = _DIGITS * np.max(np.abs([*self.readings, *self.at(0.0 * self.changes)]))
+        wide = np.maximum(_of_each(self.alike, level, size), size / FAR)
+        return np.asarray(np.maximum(self.plain.relative * wide, least))
 
-    def point(self, values: Array, scale: Array) -> _Point:
-        """The same with rows as alike as all explanations together make likeliest; beforehand those
-        that forget soon are likelier.
-        """
-        return max(
-            (
-                self.linearised(values, scale, own)
-                for own in _CORRELATIONS[: None if self.follow else 1]
-            ),
-            key=lambda at: at.follows.posterior.log_evidence + np.log1p(-(at.noise.correlation**2)),
-        )
-
-    def effects(self, first: list[int], columns: Array) -> Effects:
-        """One effect of each class of suspects."""
-        run = self.run
-        own = columns[:, first]
-        acting = np.sqrt(np.sum(own**2, axis=0) / np.sum(own != 0.0, axis=0))
-        stated = (run.prior_sd / abs(run.trial))[first]
-        # A suspect whose nominal value is one of its bounds can move in one way only.
-        way = (run.nominal == run.low).astype(float) - (run.nominal == run.high)
-        often = self.beliefs.expected * (1.0 - self.beliefs.unlisted) / max(len(first), 1)
-        return replace(
-            Effects.free(own, [self.key(k) for k in first], np.log(often), 0.0),
-            listed=np.ones(len(first), bool),
-            size=np.where(np.isnan(stated), self.beliefs.shape_size / acting, stated),
-            scales=np.isnan(stated),
-            sign=(way * np.sign(run.trial))[first],
-        )
-
-    def key(self, k: int) -> Key:
-        """What the posterior calls a suspect."""
-        return "suspect", self.run.names[k]
-
-    def chosen(self, names: Iterable[Key]) -> list[int]:
-        """Places of the suspects among some names."""
-        return sorted(self.run.names.index(str(name)) for what, name in names if what != UNLISTED)
-
-    def fit(self, at: _Point, chosen: list[int], context: int = 0) -> Array:
+    def fit(self, chosen: Sequence[int], context: int = 0) -> Array:
         """Fit some suspects and all nuisance parameters within their bounds by least squares, the
-        other suspects nominal: all values.
+        other suspects nominal: all changes.
         """
-        run = self.run
-        free = [*chosen, *self.nuisance]
-        start = np.where(np.isin(np.arange(len(at.values)), free), at.values, run.nominal)
+        free = [*chosen, *range(self.count, len(self.changes))]
         if not free:
-            return start
+            return 0.0 * self.changes
         # Only where it is needed: the diagnosis of a fleet starts without it.
         from scipy.optimize import least_squares
 
-        _found, noise = at.linear(chosen, context)
+        noise = self.linear(chosen, context).noise
         bare = replace(noise, loadings=noise.loadings[:, noise.absorbed :], absorbed=0)
-        root = cholesky(bare.precision_times(np.eye(len(at.unit))))
-        white = root / at.unit
-
-        def there(some: Array) -> Array:
-            moved = start.copy()
-            moved[free] = some
-            return moved
+        white = cholesky(bare.precision_times(np.eye(len(self.unit)))) / self.unit
+        placed = np.eye(len(self.changes))[free]
+        low, high = self.ends[:, free]
 
         def residual(some: Array) -> Array:
-            return np.asarray(white @ (run.reading - run.at(there(some))))
+            return np.asarray(white @ (self.readings - self.at(some @ placed)))
 
         def slopes(some: Array) -> Array:
-            return np.asarray(-white @ run.columns(there(some), free) / trial)
+            return np.asarray(-white @ self.slopes(some @ placed, free))
 
-        low, high, trial = (own[free] for own in (run.low, run.high, run.trial))
+        start = self.changes[free]
         found = least_squares(
-            residual,
-            start[free],
-            slopes,
-            (low, high),
-            "dogbox",
-            x_scale=np.abs(trial),
-            ftol=1e-6,
-            max_nfev=30,
+            residual, start, slopes, (low, high), "dogbox", ftol=1e-6, max_nfev=30
         )
-        return there(found.x)
+        return np.asarray(found.x @ placed)
 
-    def search(self, values: Array) -> _Point:
-        """Judge, fit what is likeliest and linearise there, until the same is likeliest again; at
-        first all that is left is scatter.
+    def settled(self) -> _Study:
+        """Judge, fit what is likeliest and linearise there, until the same is likeliest again. Rows
+        are as alike as all explanations together make likeliest; beforehand those that forget soon
+        are likelier.
         """
-        scale = self.scale(self.run.reading - self.run.at(values), 1.0)
+        changes = self.changes
+        left, spare = self.readings - self.at(changes), 1.0
         tried = set[tuple[int, ...]]()
         while True:
-            at = self.point(values, scale)
-            chosen = self.chosen(at.follows.posterior.names_of(at.likeliest))
-            state = (at.likeliest.context, *chosen)
+            scale = self.scatter(left, spare)
+            at = max(
+                (
+                    replace(self, changes=changes, scale=scale, correlation=own)
+                    for own in _CORRELATIONS[: 1 if self.block is None else None]
+                ),
+                key=lambda at: at.follows.posterior.log_evidence + np.log1p(-(at.correlation**2)),
+            )
+            likeliest = at.follows.posterior.likeliest[0]
+            state = (likeliest.context, *likeliest.members)
             if state in tried or len(tried) == _ROUNDS:
                 return at
             tried.add(state)
-            values = self.fit(at, chosen, at.likeliest.context)
-            _found, noise = at.linear(chosen, at.likeliest.context)
-            own, spare = noise.own_part((self.run.reading - self.run.at(values)) / at.unit)
+            chosen = [at.classes[k][0] for k in likeliest.members]
+            changes = at.fit(chosen, likeliest.context)
+            noise = at.linear(chosen, likeliest.context).noise
+            own, spare = noise.own_part((self.readings - self.at(changes)) / at.unit)
             spare = max(spare - len(chosen) / len(own), 1.0 / len(own))
-            scale = self.scale(own * at.unit, spare)
+            left = own * at.unit
 
-    def diagnosis(self) -> SimulationDiagnosis:
-        """Say what is wrong, what may be, what that gains, and how residuals look."""
-        run = self.run
-        names = run.names
-        first = self.scale(run.reading - run.at(run.nominal), 1.0)
-        start = self.fit(self.linearised(run.nominal, first, 0.0), [])
-        at = self.search(start)
-        follows = at.follows
-        verdict = follows.verdict
-        causes = self.causes(at)
-        open_ = self.chosen(follows.open_beside([self.key(k) for k in causes]))
-        if verdict is Verdict.NAMED and not causes:
-            # Held-out rows veto what these rows name.
-            verdict = Verdict.AMBIGUOUS
-            open_ = self.chosen(follows.sure)
-        scale = at.unit * at.noise.relative
-        final = self.linearised(self.fit(at, causes), scale, at.noise.correlation)
-        # What would only move beyond its bound is not a cause.
-        causes = [k for k in causes if final.values[k] != run.nominal[k]]
-        best = at if verdict is Verdict.AMBIGUOUS else final
-        fold, by = self.folds(final, causes)
-        explained = held_out_part(final.noise, final.columns[:, causes], final.whole, fold, None)
-        before = final.less_nuisance((run.reading - run.at(start)) / final.unit)
-        told = {
-            k: self.describe(at, final, k, causes)
-            for k in {*causes, *open_, *(own[0] for own in at.classes)}
-        }
-        _found, noise = at.linear(causes, at.likeliest.context if self.follow else 0)
-        own, _spare = noise.own_part(at.rest)
-        pairs = [own[index][1:] @ own[index][:-1] for index in self.outputs]
-        in_sequence = bool(sum(pairs) > FAR * (own @ own) / np.sqrt(len(own)))
-        testable = [k for members in at.classes for k in members]
-        moves = [str(name) for what, name in follows.posterior.names if what == UNLISTED]
-        reason = {True: "absorbed by the nuisance parameters", False: "no effect here"}
-        return SimulationDiagnosis(
-            verdict=verdict,
-            causes=tuple(sorted((told[k] for k in causes), key=lambda c: -c.effect_rms)),
-            also_possible=tuple(told[k] for k in open_ if k not in causes),
-            suspects=tuple(sorted(told.values(), key=lambda c: (-round(c.probability, 9), c.name))),
-            aliases=tuple(tuple(names[k] for k in own) for own in at.classes if len(own) > 1),
-            why_untestable={
-                names[k]: reason[bool(self.nuisance and at.columns[:, k].any())]
-                for k in range(run.count)
-                if k not in testable
-            },
-            p_nothing=follows.posterior.nothing,
-            p_unlisted=min(follows.posterior.unlisted, 1.0),
-            unlisted_variable=moves[0] if moves and follows.unlisted_acts else "",
-            gain=HeldOutGain(rms(before), rms(final.less_nuisance(final.whole - explained)), by),
-            parameters=dict(zip(names, best.values.tolist(), strict=True)),
-            noise=tuple(float(at.unit[index[0]]) for index in self.outputs),
-            correlation=at.noise.correlation,
-            in_sequence=in_sequence,
-            notes=tuple(self.notes(in_sequence)),
-            calls=run.calls,
-            failed=len(run.failures),
-            measured=run.reading,
-            predicted=run.at(start),
-            fitted=run.at(best.values),
-        )
-
-    def folds(self, at: _Point, causes: Sequence[int]) -> tuple[Wholes, str]:
+    def folds(self, causes: Sequence[int]) -> tuple[Wholes, str]:
         """Number the fold in which each reading is held out, and what is held out together."""
-        row = self.run.row
-        if self.follow:
-            return blocks_of(*self.follow)[row], "block"
+        if self.block is not None:
+            return self.block, "block"
         # Rows are dealt to folds in an order that no pattern of the rows has.
         shuffled = np.random.default_rng(0).permutation(len(self.group))
-        return folds_of(row, self.group, at.columns[:, list(causes)], shuffled)
+        return folds_of(self.row, self.group, self.columns[:, list(causes)], shuffled)
 
-    def causes(self, at: _Point) -> list[int]:
+    def held_out(self, noise: NoiseModel, causes: Sequence[int], fold: Wholes) -> Array:
+        """What causes leave of rows that they were not fitted to."""
+        columns = self.columns[:, list(causes)]
+        return self.whole - held_out_part(noise, columns, self.whole, fold)
+
+    def causes(self) -> list[int]:
         """Suspects that are sure, and given a discrepancy also those that take away most of the
         misfit where they act; without those that make held-out rows worse, and those whose interval
         contains the nominal value.
         """
 
-        def share(k: int) -> float:
-            """Share of the squared misfit where a suspect acts that it takes away. [1]"""
-            acts = at.columns[:, k] != 0.0
-            left = [
-                at.whole - at.columns[:, own] @ at.linear(own)[0].values
-                for own in (causes, [*causes, k])
-            ]
-            square = [np.sum(at.less_nuisance(own)[acts] ** 2) for own in left]
-            return float(1.0 - square[1] / max(square[0], 1e-300))
+        def left(k: int) -> float:
+            """Share of the squared misfit where a suspect acts that it leaves. [1]"""
+            acts = self.columns[:, k] != 0.0
+            after, before = (
+                self.whole - self.columns[:, own] @ self.linear(own).values
+                for own in ([*causes, k], causes)
+            )
+            return rms(self.less_nuisance(after)[acts]) / rms(self.less_nuisance(before)[acts])
 
-        causes = self.chosen(at.follows.sure)
-        others = [own[0] for own in at.classes if own[0] not in causes]
-        while at.follows.verdict is Verdict.UNLISTED and others:
-            most = max(others, key=share)
-            if share(most) <= 0.5:
+        causes = self.chosen(self.follows.sure)
+        others = [own[0] for own in self.classes if own[0] not in causes]
+        while others and self.follows.verdict is MisfitVerdict.UNLISTED:
+            most = min(others, key=left)
+            if left(most) ** 2 >= 0.5:
                 break
             others.remove(most)
             causes.append(most)
-        fold, _by = self.folds(at, causes)
+        fold, _by = self.folds(causes)
         for k in causes[::-1]:
             others = [j for j in causes if j != k]
-            found, noise = at.linear([k, *others])
-            before, after = (
-                at.whole - held_out_part(noise, at.columns[:, own], at.whole, fold, None)
-                for own in (others, causes)
-            )
-            sure = abs(found.values[0]) > self.reach(at, k, others)[1]
-            if not (sure and likelier(noise, before, after, fold)):
+            found = self.linear([k, *others])
+            before, after = (self.held_out(found.noise, own, fold) for own in (others, causes))
+            sure = abs(found.values[0]) > self.beside(k, others).half_width[0]
+            if not (sure and likelier(found.noise, before, after, fold)):
                 causes = others
         return causes
 
-    def reach(self, at: _Point, k: int, others: Sequence[int]) -> tuple[float, float]:
-        """A suspect's change and half its 95 % interval, what looks like a discrepancy being one.
-        [trials]
-        """
-        found, noise = at.linear([k, *others], at.follows.reported([self.key(k)]).context)
-        degrees = max(noise.worth - noise.absorbed - len(others) - 1, 1.0)
-        return float(found.values[0]), float(stdtrit(degrees, 0.975) * found.errors[0])
+    def chosen(self, names: Collection[Key]) -> list[int]:
+        """Places of the suspects among some names."""
+        return [k for k, key in enumerate(self.keys) if key in names]
 
-    def describe(self, at: _Point, final: _Point, k: int, causes: Sequence[int]) -> SuspectFound:
-        """Describe a cause, or what may be one in addition to the causes."""
-        run = self.run
-        change, half = self.reach(at, k, [j for j in causes if j != k])
-        if k in causes:
-            change = (final.values[k] - run.nominal[k]) / run.trial[k]
-        ends = run.nominal[k] + run.trial[k] * change + abs(run.trial[k]) * half * np.arange(-1, 2)
-        low, value, high = np.clip(ends, run.low[k], run.high[k]).tolist()
+    def beside(self, k: int, others: Sequence[int]) -> Fit:
+        """Fit a suspect and others, what looks like a discrepancy being one."""
+        context = self.follows.reported([self.keys[k]]).context
+        return self.linear([k, *others], context)
+
+    def describe(
+        self, final: _Study, members: Sequence[int], causes: Sequence[int], is_named: bool
+    ) -> SuspectFound:
+        """Describe a class of suspects, as a cause or as what may be one in addition to these."""
+        k = members[0]
+        found = self.beside(k, [j for j in causes if j != k])
+        half = found.half_width[0]
+        change = float(final.changes[k] if k in causes else found.values[0])
+        values = self.nominal[k] + self.trial[k] * (change + half * np.arange(-1, 2))
+        low, value, high = np.sort(np.clip(values, self.low[k], self.high[k])).tolist()
         return SuspectFound(
-            suspect=run.suspects[k],
+            suspect=self.suspects[k],
             value=value,
-            interval=(low, high),
+            low=low,
+            high=high,
             effect_rms=rms(final.less_nuisance(final.columns[:, k] * change)),
-            probability=min(at.follows.listed.get(self.key(k), 0.0), 1.0),
-            aliases=tuple(run.names[j] for own in at.classes if k in own for j in own if j != k),
+            probability=self.follows.probability(self.keys[k]),
+            aliases=tuple(self.suspects[j].name for j in members[1:]),
+            is_named=is_named and k in causes,
         )
 
-    def notes(self, in_sequence: bool) -> Iterator[str]:
-        """What to know before the numbers are used, as sentences."""
-        run = self.run
-        again = run.call(run.nominal)[run.row, run.output]
-        if not np.allclose(again, run.at(run.nominal), 1e-9, 1e-300):
-            yield (
-                "Two calls with the same values gave different numbers: let the simulation draw the"
-                " same random numbers in each call (one seed)."
+    def diagnosis(self) -> SimulationDiagnosis:
+        """Say what is wrong, what may be, what that gains, and how residuals look."""
+        scale = self.scatter(self.readings - self.at(self.changes), 1.0)
+        start = replace(self, scale=scale).fit([])
+        at = replace(self, changes=start).settled()
+        causes = at.causes()
+        # Held-out rows veto what these rows name.
+        vetoed = frozenset(at.follows.sure) - {self.keys[k] for k in causes}
+        follows = replace(at.follows, never=vetoed)
+        open_ = follows.open_beside([self.keys[k] for k in causes])
+        final = replace(at, changes=at.fit(causes))
+        # What would only move beyond its bound is not a cause.
+        causes = [k for k in causes if final.changes[k]]
+        best = at if follows.verdict is MisfitVerdict.AMBIGUOUS else final
+        fold, by = final.folds(causes)
+        before = (self.readings - self.at(start)) / final.unit
+        after = final.held_out(final.noise, causes, fold)
+        is_named = follows.verdict is MisfitVerdict.NAMED
+        told = {own[0]: at.describe(final, own, causes, is_named) for own in at.classes}
+        context = 0 if self.block is None else follows.posterior.likeliest[0].context
+        own, _spare = at.linear(causes, context).noise.own_part(at.rest)
+        in_sequence = bool(own[1:] @ own[:-1] > FAR * (own @ own) / np.sqrt(len(own)))
+        again = self.call(0.0 * self.changes)[self.row, self.output]
+        notes = {
+            "Two calls with the same values gave different numbers: let the simulation draw the"
+            " same random numbers in each call (one seed).": not np.allclose(
+                again, self.at(0.0 * self.changes), 1e-9, 1e-300
+            ),
+            "Residuals of neighbouring rows are correlated beyond what series= and time= say of"
+            " them: probabilities and intervals are too sharp.": in_sequence,
+            f"{len(self.failures)} of {len(self.known)} calls gave no number for some reading, the"
+            f" first with {''.join(self.failures[:1])}.": self.failures,
+        }
+        moves = [str(name) for what, name in follows.posterior.names if what == UNLISTED]
+        return SimulationDiagnosis(
+            verdict=follows.verdict,
+            causes=tuple(sorted((told[k] for k in causes), key=lambda c: -c.effect_rms)),
+            also_possible=tuple(told[k] for k in self.chosen(open_) if k not in causes),
+            suspects=tuple(sorted(told.values(), key=lambda c: (-round(c.probability, 9), c.name))),
+            aliases=tuple((c.name, *c.aliases) for c in told.values() if c.aliases),
+            why_untestable={
+                self.suspects[k].name: (
+                    "absorbed by the nuisance parameters"
+                    if at.noise.absorbed and at.columns[:, k].any()
+                    else "no effect here"
+                )
+                for k in set(range(self.count)).difference(*at.classes)
+            },
+            p_nothing=follows.posterior.nothing,
+            p_unlisted=min(follows.posterior.unlisted, 1.0),
+            unlisted_variable=moves[0] if moves and follows.unlisted_acts else "",
+            gain=HeldOutGain(rms(final.less_nuisance(before)), rms(final.less_nuisance(after)), by),
+            parameters=self.parameters(best.changes),
+            correlation=at.correlation,
+            in_sequence=in_sequence,
+            notes=tuple(note for note, holds in notes.items() if holds),
+            failed=len(self.failures),
+            measured=self.readings,
+            predicted=self.at(start),
+            fitted=self.at(best.changes),
+        )
+
+
+def check_nominal(study: _Study) -> None:
+    """Refuse a simulation that gives no number for a reading at the nominal values."""
+    bad = np.flatnonzero(~np.isfinite(study.at(study.changes)))
+    if len(bad):
+        raise UsageError(
+            f"The simulation gives no number for {len(bad)} of {len(study.row)} readings at the"
+            f" nominal values, the first at row {study.row[bad[0]]}, output"
+            f" {study.output[bad[0]]} (counted from 0); {study.failures[0]}",
+            "set these readings to NaN or correct the simulation",
+        )
+
+
+def _of_each(kind: Places, of: Callable[[Array], Any], values: Array) -> Array:
+    """A number of each kind of readings, at each reading."""
+    return np.array([of(values[kind == k]) for k in np.unique(kind)])[numbered(kind)]
+
+
+def _discrepancies(study: _Study, covariates: Mapping[str, Array]) -> list[Context]:
+    """Nothing, or a smooth discrepancy of some size, each output by itself."""
+    n, m = study.shape
+    nominal = 0.0 * study.changes
+    moves = np.zeros((n, m, study.count))
+    moves[study.row, study.output] = study.slopes(nominal, range(study.count))
+    features = {
+        "prediction": np.nan_to_num(study.call(nominal)),
+        "effects of the suspects": moves,
+        _ORDER: np.arange(n, dtype=float),
+        **covariates,
+    }
+    shapes = [
+        (name, shape[study.row])
+        for name, own in features.items()
+        for shape in _smooth_shapes(own.reshape(n, -1), study.group * (name != _ORDER))
+    ]
+    sizes = study.beliefs.shape_size * np.array(Beliefs().sizes)
+    share = study.beliefs.expected * study.beliefs.unlisted / max(len(shapes) * len(sizes), 1)
+    of_output = study.output == np.unique(study.output)[:, None]
+    return [
+        Context.none(len(study.row)),
+        *(
+            Context(
+                (UNLISTED, name),
+                float(np.log(share)),
+                np.hstack([size * shape * own[:, None] for own in of_output]),
+                listed=False,
             )
-        if in_sequence:
-            yield (
-                "Residuals of neighbouring rows are correlated beyond what series= and time= say of"
-                " them: probabilities and intervals are too sharp."
-            )
-        if run.failures:
-            yield (
-                f"{len(run.failures)} of {run.calls} calls gave no number for some reading, the"
-                f" first with {run.failures[0]}."
-            )
+            for name, shape in shapes
+            for size in sizes
+        ),
+    ]
 
 
-def _basis_of(columns: Array) -> Array:
-    """Orthonormal basis of what some columns of equal worth span."""
-    size = np.linalg.norm(columns, axis=0)
-    return np.asarray(orth(columns / np.where(size > 0.0, size, 1.0), 1e-7))
-
-
-def _alias_classes(columns: Array, count: int) -> list[list[int]]:
-    """Places of the suspects that can be tested beside nuisance parameters, those in one class that
-    only differ in size.
-    """
-    basis = _basis_of(columns[:, count:])
-    whole = columns[:, :count]
-    left = whole - basis @ (basis.T @ whole)
-    size, own = np.linalg.norm([whole, left], axis=1)
-    seen = np.flatnonzero((own > _TESTABLE * size) & (size > 1e-9 * size.max()))
-    unit = left[:, seen] / own[seen]
-    from scipy.sparse.csgraph import connected_components
-
-    number, label = connected_components(1.0 - (unit.T @ unit) ** 2 < _TESTABLE**2)
-    return [seen[label == k].tolist() for k in range(number)]
-
-
-def _smooth_shapes(feature: Array, group: Wholes, alone: bool) -> Iterator[Array]:
-    """Ways in which a discrepancy may move with a feature of the rows, the same in every group or,
-    unless it moves alone, not: a factor of its covariance, shape (n, r).
+def _smooth_shapes(feature: Array, group: Wholes) -> Iterator[Array]:
+    """Ways in which a discrepancy may move with a feature of the rows, the same in every group or
+    not: a factor of its covariance, shape (n, r).
 
     What has few values only (a direction, a place) is not a quantity along which something could
     move smoothly.
@@ -822,7 +787,7 @@ def _smooth_shapes(feature: Array, group: Wholes, alone: bool) -> Iterator[Array
     for length in _LENGTHS * np.median(apart[apart > 0.0]):
         alike = np.exp(-0.5 * (apart / length) ** 2)
         kinds = [alike, alike * (group[:, None] == group[landmarks])]
-        for own in kinds[: 1 if alone or not group.any() else 2]:
+        for own in kinds[: 1 + bool(group.any())]:
             # The covariance of which these columns are given (Nyström).
             values, vectors = np.linalg.eigh(own[landmarks])
             kept = values > 1e-6 * values[-1]

@@ -199,8 +199,8 @@ class Suspect:
     inspect: str = ""
     separates: str = ""
     prior_sd: float | None = None
-    low: float | None = None
-    high: float | None = None
+    low: float = -np.inf
+    high: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -213,8 +213,9 @@ class SuspectFound(Result):
         What was suspected.
     value : float
         The parameter as fitted: nominal plus change. [unit of the suspect]
-    interval : tuple of float
-        95 % interval of `value`, what looks like it taken to be right. [unit of the suspect]
+    low, high : float
+        Ends of the 95 % interval of `value`, what looks like it taken to be right. [unit of the
+        suspect]
     effect_rms : float
         Root mean square over the readings of what the change does to the prediction, less what the
         nuisance parameters absorb of it. [unit of the readings]
@@ -223,17 +224,22 @@ class SuspectFound(Result):
     aliases : tuple of str
         Suspects that these rows cannot tell from it, whatever is measured: the class is named, not
         this member.
+    is_named : bool
+        True if it is one of the causes that the verdict stands for.
     """
 
     json_names = """
         name nominal=suspect.nominal value low high probability effect_rms unit=suspect.unit aliases
+        named=is_named
     """
     suspect: Suspect
     value: float
-    interval: tuple[float, float]
+    low: float
+    high: float
     effect_rms: float
     probability: float
     aliases: tuple[str, ...]
+    is_named: bool
 
     @property
     def name(self) -> str:
@@ -241,37 +247,22 @@ class SuspectFound(Result):
         return self.suspect.name
 
     @property
-    def low(self) -> float:
-        """Lower end of the interval."""
-        return self.interval[0]
-
-    @property
-    def high(self) -> float:
-        """Upper end of the interval."""
-        return self.interval[1]
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the value."""
+        return self.low, self.high
 
     def words(self) -> str:
         """Say its value, its interval and how sure it is."""
-        low, high = self.interval
         unit = f" {self.suspect.unit}" if self.suspect.unit else ""
         return (
             f"{' or '.join((self.name, *self.aliases))} = {self.value:.6g}{unit}"
-            f" (95 % {low:.6g} to {high:.6g}), probability {self.probability:.3f}"
+            f" (95 % {self.low:.6g} to {self.high:.6g}), probability {self.probability:.3f}"
         )
 
     @property
     def separates(self) -> str:
         """The reading that would distinguish it from its aliases."""
         return self.suspect.separates
-
-
-@dataclass(frozen=True, slots=True)
-class SuspectNamed:
-    """A suspect, and whether it is named."""
-
-    json_names = "*found named"
-    found: SuspectFound
-    named: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,8 +319,6 @@ class SimulationDiagnosis(Result):
         Value of every suspect and nuisance parameter, to predict with: the causes as fitted, all
         else nominal; where the posterior leaves rivals (AMBIGUOUS), those of the likeliest
         explanation.
-    noise : tuple of float
-        Standard deviation of a reading of each output. [unit of the readings]
     correlation : float
         Of the scatter of two rows of a series one usual step apart, as it is likeliest; 0 where no
         series was given. [1]
@@ -338,8 +327,6 @@ class SimulationDiagnosis(Result):
         `series` accounts for: then probabilities are too sharp.
     notes : tuple of str
         What to know before these numbers are used, one sentence or two each; empty if nothing.
-    calls : int
-        Times that the simulation was called.
     failed : int
         Calls that gave no number for some reading, or failed.
     measured, predicted, fitted : ndarray, shape (N,)
@@ -348,9 +335,8 @@ class SimulationDiagnosis(Result):
     """
 
     json_names = """
-        verdict causes also_possible suspects=suspects_named aliases why_untestable p_nothing
-        p_unlisted unlisted_variable gain parameters noise correlation in_sequence notes calls
-        failed
+        verdict causes also_possible suspects aliases why_untestable p_nothing p_unlisted
+        unlisted_variable gain parameters correlation in_sequence notes failed
     """
     verdict: MisfitVerdict
     causes: tuple[SuspectFound, ...]
@@ -363,25 +349,18 @@ class SimulationDiagnosis(Result):
     unlisted_variable: str
     gain: HeldOutGain
     parameters: Mapping[str, float]
-    noise: tuple[float, ...]
     correlation: float
     in_sequence: bool
     notes: tuple[str, ...]
-    calls: int
     failed: int
     measured: Array
     predicted: Array
     fitted: Array
 
     @property
-    def suspects_named(self) -> list[SuspectNamed]:
-        """The suspects, each with whether it is named."""
-        return [SuspectNamed(each, each in self.named) for each in self.suspects]
-
-    @property
     def named(self) -> tuple[SuspectFound, ...]:
         """The causes that the verdict stands for."""
-        return self.causes if self.verdict is MisfitVerdict.NAMED else ()
+        return tuple(cause for cause in self.causes if cause.is_named)
 
     @property
     def remainder_p(self) -> float:

@@ -82,7 +82,7 @@ def test_a_fit_is_that_of_generalised_least_squares_with_its_errors() -> None:
         dense(0.4)
     ) @ RNG.standard_normal(N)
     found = fit(NOISE, columns, data)
-    inverse = np.linalg.inv(dense(found.tail_ratio))
+    inverse = np.linalg.inv(dense(*found.noise.tail_ratios))
     covariance = np.linalg.inv(columns.T @ inverse @ columns)
     values = covariance @ columns.T @ inverse @ data
     left = data - columns @ values

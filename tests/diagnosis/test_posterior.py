@@ -59,6 +59,12 @@ BELIEFS = Beliefs(sizes=(0.5, 2.0))
 SIGN = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
 
 
+def white(n: int) -> NoiseModel:
+    """Noise of rows that are equal, independent and of unit size."""
+    none = np.zeros(n, np.int64)
+    return NoiseModel(np.ones(n), none, none, np.empty((n, 0)), 0.0, 0.0, (0.0,), 1.0)
+
+
 def effects(columns: Array = COLUMNS, mean: float = 0.0) -> Effects:
     none = np.zeros(P)
     exact = np.array([0.0, 0.0, 0.0, mean, 0.0, 0.0])
@@ -130,7 +136,7 @@ def test_sizes_that_are_skewed_beforehand_make_a_context_as_likely_as_written_ou
     free = Effects.free(columns, [("a", None), ("b", None)], 0.0, 0.3)
     free = replace(free, scales=np.zeros(2, bool))
     context = Context(("all", None), 0.0, shared, np.std(sizes) * np.eye(3), sizes)
-    marginal = Marginal(Products(NoiseModel.white(n), free, data, Beliefs()), context)
+    marginal = Marginal(Products(white(n), free, data, Beliefs()), context)
     held = 0.3 * columns[:, list(members)]
     inner = np.eye(n) + held @ held.T
     rest = data - np.array([*product(sizes, repeat=3)]) @ shared.T
@@ -216,7 +222,7 @@ def test_four_that_act_together_are_found() -> None:
     names: list[Key | None] = [(name, None) for name in "abcdef"]
     data = columns[:, :4] @ np.full(4, 5.0) + rng.standard_normal(n)
     listed = Effects.free(columns, names, -3.0, 5.0)
-    found = posterior(NoiseModel.white(n), data, listed, (Context.none(n),), Beliefs())
+    found = posterior(white(n), data, listed, (Context.none(n),), Beliefs())
     assert found.likeliest[0].members == (0, 1, 2, 3)
 
 
@@ -253,7 +259,7 @@ def test_a_context_far_ahead_of_every_single_effect_does_not_hide_two_that_act_t
     names: list[Key | None] = [(name, None) for name in "abcde"]
     listed = Effects.free(columns, names, -6.0, 5.0)
     contexts = Context.none(n), Context(("all", None), -11.0, 5.0 * bent[:, None])
-    found = posterior(NoiseModel.white(n), data, listed, contexts, Beliefs())
+    found = posterior(white(n), data, listed, contexts, Beliefs())
     assert (found.likeliest[0].context, found.likeliest[0].members) == (0, (0, 1))
 
 
@@ -269,7 +275,7 @@ def test_two_explain_together_unless_they_cancel_each_other_by_more_than_the_dat
     data = 8.0 * (first - second) + rng.standard_normal(n)
     names: list[Key | None] = [(name, None) for name in "abcde"]
     listed = Effects.free(columns, names, -3.0, 5.0)
-    found = posterior(NoiseModel.white(n), data, listed, (Context.none(n),), Beliefs())
+    found = posterior(white(n), data, listed, (Context.none(n),), Beliefs())
     assert (set(found.likeliest[0].members) == {0, 1}) == found_together
 
 
@@ -280,7 +286,7 @@ def test_a_sure_name_is_said_beside_something_unlisted_that_leaves_its_form_alon
     data = columns @ np.full(2, 5.0) + rng.standard_normal(n)
     free = Effects.free(columns, [("a", None), (UNLISTED, "x")], -3.0, 5.0)
     listed = replace(free, listed=np.array([True, False]))
-    found = posterior(NoiseModel.white(n), data, listed, (Context.none(n),), Beliefs())
+    found = posterior(white(n), data, listed, (Context.none(n),), Beliefs())
     names = frozenset({("a", None)}) if firm else frozenset()
     assert Conclusion(found, Beliefs(), firm=names).verdict == verdict
 
