@@ -97,10 +97,13 @@ class Header:
         row of units below.
     texts : tuple of str
         One for each field, trailing blanks included.
+    units : tuple of LengthUnit or None
+        Unit of each column from a row of units; empty without one.
     """
 
     rows_used: tuple[int, ...]
     texts: tuple[str, ...]
+    units: tuple[LengthUnit | None, ...] = ()
 
     @property
     def row(self) -> int:
@@ -194,11 +197,7 @@ def _with_rows_below(header: Header, rows: Sequence[NumberedRow], options: ReadO
         used = (*header.rows_used, number)
         units = _unit_row(header, cells, options)
         if units is not None:
-            texts = [
-                text if unit is None or mapped_to(options, text) else f"{text} {unit}"
-                for text, unit in zip_longest(header.texts, units)
-            ]
-            return replace(header, texts=tuple(texts), rows_used=used)
+            return replace(header, units=units, rows_used=used)
         # What names the gear stands in front, and says nothing in a row of headings.
         words = [] if cells[0] is not None else [*map(_text, cells)]
         for text, word in zip(header.texts, words, strict=False):
@@ -259,11 +258,18 @@ class Columns:
         self._row = header.row
         self.visits: tuple[Occasion, ...] = (ONE_VISIT,)
         self.placed: list[PlacedField] = []
-        for index, (text, place) in enumerate(zip(header.texts, header.places, strict=True)):
+        for index, (text, place, unit) in enumerate(
+            zip_longest(header.texts, header.places, header.units)
+        ):
             found, is_settled = _understood(text, place.letters, self._options)
             if found is UNKNOWN and text:
                 found = near_miss(text, self._options.joints)
             known = found.field
+            if known is not None and unit and known.unit not in (None, unit):
+                found = Recognition(None, f"below it stands {unit.value}", known.name)
+                known = None
+            if known is not None:
+                known = replace(known, unit=known.unit or unit)
             refused = bool(found.reason)
             named = recognise(text, self._options.joints).field if is_settled else None
             meant = None if known is None else known.column
@@ -272,7 +278,7 @@ class Columns:
                 PlacedField(index, text, known, refused, place, is_settled, misread, found=found)
             )
         if any(p.field is None and not p.is_settled for p in self.placed):
-            self._settle_visits()
+            self._settle_visits(header.units)
         if not self.at(CLEARANCE):
             self._doubt_readings()
         for p in self.placed:
@@ -332,20 +338,22 @@ class Columns:
                 reason = "it may be a joint's clearance, but does not say so"
                 p.found = Recognition(None, reason, target)
 
-    def _settle_visits(self) -> None:
+    def _settle_visits(self, units: Sequence[LengthUnit | None]) -> None:
         """Settle the columns whose headings name a reading, a number next to it, or a visit, where
         they leave no doubt.
         """
         joints = self._options.joints
         in_long = bool(self.at(JOINT))
         groups: dict[tuple[Column, int | None], list[tuple[PlacedField, Field, Heading]]] = {}
-        for p in self.placed:
+        for p, unit in zip_longest(self.placed, units):
             named = p.field
             heading = Heading(is_reading=True)
             if named is None and not p.is_settled:
                 heading = take_apart(p.header)
                 rest = f"clearance {heading.rest}" if in_long and heading.is_bare else heading.rest
                 named = recognise(rest, joints).field
+                if named is not None and named.column.is_length:
+                    named = replace(named, unit=named.unit or unit)
             if (
                 named is not None
                 and named.column not in (SIDE, JOINT, CONVENTION, UNIT)
