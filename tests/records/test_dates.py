@@ -39,7 +39,8 @@ def days(tmp_path, *texts, **options):
         ("2100-12-31", date(2100, 12, 31)),
         ("2026-03-04", date(2026, 3, 4)),
         ("2026/03/04", date(2026, 3, 4)),
-        ("4-Mar-2026", date(2026, 3, 4)),
+        *((t, date(2025, 1, 14)) for t in ("14-Jan-25", "14 Jan 2025", "14 January 2025")),
+        *((t, date(2025, 1, 14)) for t in ("Jan 14, 2025", "14.jan.2025", "14Jan2025")),
         ("31/12/2025", date(2025, 12, 31)),
         ("12/31/2025", date(2025, 12, 31)),
         ("25.01.24", date(2024, 1, 25)),
@@ -57,6 +58,7 @@ def test_a_date_that_can_be_read_in_one_way_only_is_read(text, day):
         ("1949-12-31", None, "date_out_of_range"),
         ("2101-12-31", None, "date_out_of_range"),
         *((text, None, "date_invalid") for text in ("31/02/2026", "13.13.2025", "13.1.4")),
+        *((text, None, "date_invalid") for text in ("31 Feb 2025", "14 Jon 2025", "Jan 2025")),
         ("2026-02-30", None, "date_invalid"),
         ("25/01/2024", DateOrder.MDY, "date_invalid"),
         *(

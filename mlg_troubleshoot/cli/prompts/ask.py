@@ -115,6 +115,8 @@ class Asker:
     # Unit, convention and day that were typed for the gear.
     _stated: dict[str, str] = field(default_factory=dict)
     _messages: set[str] = field(default_factory=set)
+    # The order of the joints with what was typed when it was planned.
+    _order: tuple[dict[str, str], tuple[int, ...]] = ({}, ())
 
     def begin(self, given: Mapping[str, str]) -> Entry | Visit:
         """Ask for a new entry with what flags gave already; the visit of a gear that is known."""
@@ -264,7 +266,9 @@ class Asker:
         if {*names} <= known or not {*FIRST} <= known:
             return names
         rest = sorted(self.gear.joints, key=lambda joint: not joint.critical)
-        order = (*reading_order(self.gear, self.entry), *(joint.number for joint in rest))
+        if self._order[0] != self.entry.cells:
+            self._order = dict(self.entry.cells), reading_order(self.gear, self.entry)
+        order = (*self._order[1], *(joint.number for joint in rest))
         return [CLEARANCE.header(n) for n in dict.fromkeys(order)]
 
     def _turn(self, name: str) -> None:

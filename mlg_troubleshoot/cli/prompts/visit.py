@@ -146,6 +146,8 @@ class SavedEntries:
         self._writers = {self._run}
         # Unit and convention that were stated for all that follows.
         self.usual: dict[str, str] = {}
+        # What the last complete entry offers, read once until another is complete.
+        self._last: dict[str, str] | None = None
 
     def save(self, entry: Entry, *, complete: bool = False) -> str:
         """Write an entry whole; what went wrong is returned."""
@@ -168,6 +170,7 @@ class SavedEntries:
         self.save(msgspec.structs.replace(entry, cells=entry.cells | usual), complete=True)
         for draft in [each for each in self._all() if each.complete][1:]:
             self.discard(draft.id)
+        self._last = None
 
     def discard(self, entry_id: str) -> None:
         try:
@@ -181,6 +184,7 @@ class SavedEntries:
         """
         found = []
         damaged = []
+        self._last = None
         try:
             for draft in self._all():
                 if draft.complete:
@@ -201,13 +205,14 @@ class SavedEntries:
 
     def offered(self) -> dict[str, str]:
         """The user's unit and convention, name and gauge of the last entry."""
-        try:
-            entries = [_entry_of(draft) for draft in self._all() if draft.complete]
-        except OutputError:
-            entries = []
-        cells = next((entry.cells for entry in entries if entry), {})
-        names = (*READ_IN, *LAST)
-        return {name: cells[name] for name in names if cells.get(name)} | self.usual
+        if self._last is None:
+            try:
+                entries = [_entry_of(draft) for draft in self._all() if draft.complete]
+            except OutputError:
+                entries = []
+            cells = next((entry.cells for entry in entries if entry), {})
+            self._last = {name: cells[name] for name in (*READ_IN, *LAST) if cells.get(name)}
+        return self._last | self.usual
 
     def _all(self) -> list[Draft]:
         return self.drafts.newest_first(self.owner)
