@@ -129,7 +129,8 @@ def read_suspects(every: Sequence[Suspect]) -> Array:
             raise UsageError(
                 f"{s!r} is not a Suspect", "write Suspect(name, nominal, trial) for each parameter"
             )
-        own = read_numbers([s.nominal, s.trial, s.low, s.high, s.prior_sd], s.name)
+        low, high = (-np.inf if s.low is None else s.low, np.inf if s.high is None else s.high)
+        own = read_numbers([s.nominal, s.trial, low, high, s.prior_sd], s.name)
         nominal, trial, low, high, sd = own.tolist()
         is_out = not low <= nominal <= high or low == high
         if is_out or sd <= 0.0 or not trial or not np.isfinite(nominal + trial):
@@ -257,13 +258,15 @@ def diagnose_simulation(  # noqa: PLR0913 - what is measured, what may be wrong,
     channels = channels_of(measured)
     data = read_rows(measured, "measured", channels)
     output, row = np.nonzero(np.isfinite(data.T))
-    infinite = np.sum(np.isinf(data))
-    if not suspects or len(row) < len(nuisance) + 3 or infinite:
+    if np.isinf(data).any():
         raise UsageError(
-            f"No suspects were given, too few readings: {len(row)}, nuisance parameters:"
-            f" {len(nuisance)}, or infinite ones: {infinite}",
-            "name one suspect at least, and measure three readings more than nuisance parameters,"
-            " NaN where not read",
+            f"measured has {np.sum(np.isinf(data))} infinite readings", "give NaN where not read"
+        )
+    if not suspects or len(row) < len(nuisance) + 3:
+        raise UsageError(
+            f"No suspects were given, or too few readings: {len(row)}, nuisance parameters:"
+            f" {len(nuisance)}",
+            "name one suspect at least, and measure three readings more than nuisance parameters",
         )
     nominal, trial, low, high, prior_sd = read_suspects(every)
     n = len(data)

@@ -199,8 +199,8 @@ class Suspect:
     inspect: str = ""
     separates: str = ""
     prior_sd: float | None = None
-    low: float = -np.inf
-    high: float = np.inf
+    low: float | None = None
+    high: float | None = None
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)

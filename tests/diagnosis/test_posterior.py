@@ -317,7 +317,7 @@ def test_only_an_effect_that_has_a_name_is_more_than_slips(step: float, more: bo
     columns = np.column_stack([late.astype(float), np.eye(n)])
     every = Effects.free(columns, names, -4.0, 20.0)
     contexts = (Context.none(n),)
-    given = NoiseModel.white(n), data, every, contexts, BELIEFS
+    given = white(n), data, every, contexts, BELIEFS
     nothing = Explanation(0, (), 0.0, np.empty(0))
     assert more_than_slips(*given, nothing, 3) is more
 

@@ -60,7 +60,7 @@ def test_the_parameters_are_those_of_least_squares_of_the_same_names() -> None:
 
 
 def test_a_value_and_its_interval_stay_within_their_bounds() -> None:
-    suspects = [Suspect("size", 1.0, 0.05, low=0.9, high=1.1), *SWING[1:]]
+    suspects = [Suspect("size", 1.0, 0.05, low=None, high=1.1), *SWING[1:]]
     found = diagnose_simulation(swing, noisy({"size": 1.3}), suspects, ZERO)
     assert found.parameters["size"] <= 1.1
     (cause,) = found.causes
