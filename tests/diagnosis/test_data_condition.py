@@ -334,6 +334,7 @@ def test_a_gauge_is_named_though_clearances_are_cut_off(gear: Gear) -> None:
     assert [c.candidate.cause.name for c in found.causes] == ["gauge_bias"]
 
 
+@pytest.mark.slow
 def test_a_scale_is_not_named_where_clearances_are_cut_off(gear: Gear) -> None:
     table = histories(gear)
     over = worst_case(gear.model, table.clearance_in).over_in
@@ -345,6 +346,7 @@ def test_a_scale_is_not_named_where_clearances_are_cut_off(gear: Gear) -> None:
     assert doubted.causes == ()
 
 
+@pytest.mark.slow
 def test_landings_that_fall_are_said_of_the_data_and_not_row_by_row(tmp_path: Path) -> None:
     rows, _truth = blemished_fleet("overhaul", "strong", 61_000, rows=200)
     write_rows(rows, tmp_path / "overhaul.csv")

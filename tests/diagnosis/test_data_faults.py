@@ -248,6 +248,7 @@ def test_a_row_that_may_be_restored_counts_by_its_probability(gear: Gear) -> Non
     assert np.all(found.used.clearance_in[undecided, 3] > 0.0015)
 
 
+@pytest.mark.slow
 def test_rows_that_scatter_as_far_the_other_way_were_not_restored(gear: Gear) -> None:
     table, _rows, moved = restored_between_the_readings(gear)
     clearance = table.clearance_in.copy()

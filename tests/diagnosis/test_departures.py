@@ -277,12 +277,14 @@ def test_readings_against_the_prediction_are_not_a_wrong_sign_where_clearances_e
     assert d.probabilities[DIRECTIONS] > d.probabilities[OTHER_LINKAGE]
 
 
+@pytest.mark.slow
 def test_a_bend_beside_the_directions_is_on_no_list_and_leaves_them_as_likely() -> None:
     d = found("loads and a slight bend")
     assert (d.verdict, d.unlisted_variables) == ("UNLISTED", ("predicted",))
     assert d.probabilities[("load_directions", None)] > 0.99
 
 
+@pytest.mark.slow
 def test_one_scale_that_the_data_do_not_reject_is_likelier_than_factors_of_all_joints() -> None:
     chances = found("readings 1.1 times as large").probabilities
     assert next(iter(chances)) == ("calibration_rate", None)
@@ -323,6 +325,7 @@ def test_a_set_says_in_which_gear_its_likeliest_causes_differ_most(gear, open_se
     assert found.further.apart_in < 0.43 * 2.4 * table.clearance_in[most, 3]
 
 
+@pytest.mark.slow
 def test_after_the_further_inspections_that_are_asked_for_the_cause_is_named(gear, open_set):
     further = open_set.further
     assert further is not None
@@ -488,6 +491,7 @@ def test_an_aircraft_whose_unread_joints_may_be_worn_is_not_named_as_re_rigged()
     }
 
 
+@pytest.mark.slow
 def test_an_aircraft_is_not_named_as_re_rigged_from_a_day_on_from_which_joints_were_not_read():
     assert "rigging_offset" not in {cause for cause, _target in named("worn when not read")}
 

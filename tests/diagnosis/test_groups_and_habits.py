@@ -91,6 +91,7 @@ def test_aircraft_that_wander_each_on_its_own_are_on_no_list(tmp_path: Path) -> 
     assert said["unlisted_variables"] == ["tail_no", "day"]
 
 
+@pytest.mark.slow
 def test_a_step_of_all_aircraft_is_not_a_modification(gear: Gear) -> None:
     def all_from(table: DiagnosisTable, _over: Array) -> Array:
         return 0.006 * (table.quantities["day"] >= 350)

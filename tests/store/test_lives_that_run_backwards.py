@@ -416,10 +416,10 @@ def shown(told: Mapping[str, Any]) -> list[float]:
     ]
 
 
-def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
+def test_a_gear_that_is_due_now_shows_no_landings_left_in_60_lives() -> None:
     rng = np.random.default_rng(29)
     records = []
-    for n, own in enumerate(fleet_of(200, 4, 2)):
+    for n, own in enumerate(fleet_of(60, 4, 2)):
         last = own[-1]
         outside, over = ((True, False), (False, True), (True, True))[n % 3]
         measured = outside and n % 2 == 0
@@ -444,7 +444,7 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
     pages = [
         LifeAhead(life, forecast([life], model, gear)[life.key], gear).to_dict() for life in found
     ]
-    assert len(fleet) == len(pages) == 200
+    assert len(fleet) == len(pages) == 60
     assert max(value for told in (*fleet, *pages) for value in shown(told)) == 0.0
     assert {told["next_inspection_landings"] for told in (*fleet, *pages)} == {0.0}
     assert all(line["due_date"] == line["inspection_date"] for line in fleet)
