@@ -139,7 +139,9 @@ def test_numbers_of_joints_below_a_heading_are_joints() -> None:
     assert dict(row.clearance_in) == {3: 0.001, 5: 0.002}
 
 
-@pytest.mark.parametrize("headings", [("max", "found"), ("old", "new"), ("", "limit")])
+@pytest.mark.parametrize(
+    "headings", [("max", "found"), ("old", "new"), ("", "limit"), ("LH", "RH")]
+)
 def test_what_may_be_a_reading_is_not_taken_for_a_limit(headings: tuple[str, str]) -> None:
     lines = [["Tail", "N1"], ["Side", "LH"], ["Convention", "RADIAL"], ["Item", *headings]]
     lines += [[f"J{n} (in)", 0.001, 0.001] for n in (3, 5)]
@@ -184,14 +186,6 @@ def test_sides_in_the_headings_of_a_table_with_sides_are_refused() -> None:
     head = ["tail", "side", "convention", "J3 LH (in)", "J3 RH (in)"]
     found = read_many([workbook([head, ["N1", "LH", "RADIAL", 0.001, 0.029]])], OPTIONS)
     assert {problem.code for problem in found.problems} == {"header_doubtful"}
-
-
-def test_sides_in_the_headings_of_a_form_that_says_its_side_are_refused() -> None:
-    lines = [["Tail", "N1"], ["Side", "LH"], ["Convention", "RADIAL"], ["Item", "LH", "RH"]]
-    lines += [[f"J{n} (in)", 0.001, 0.029] for n in (3, 5)]
-    found = read_many([workbook(lines)], OPTIONS)
-    assert {problem.code for problem in found.problems} == {"header_doubtful"}
-    assert not found.inspections
 
 
 def test_a_plunger_whose_visit_is_not_said_is_refused() -> None:
