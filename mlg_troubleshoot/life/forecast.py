@@ -17,7 +17,7 @@ from functools import partial
 from hashlib import sha256
 from itertools import islice
 from math import inf
-from operator import attrgetter, itemgetter
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -75,6 +75,7 @@ class Stretch:
 def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]:
     """Readings of each joint between its restorations, in the order of time."""
     found = {joint: [Stretch(0.0, [])] for joint in joints}
+    eras = _placed_in_time(life) if life.repairs else []
     landings = 0.0
     for place, event in enumerate(life.events):
         if place in life.overhauls:
@@ -85,7 +86,7 @@ def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]
                 if joint in found:
                     found[joint][-1].readings.append((event.landings, *reading))
         else:
-            at = _landings_of(event, life)
+            at = _landings_of(event, eras)
             for joint in found.keys() & event.joints:
                 begun = found[joint][-1].begun if at is None else at
                 found[joint].append(Stretch(begun, []))
@@ -128,27 +129,28 @@ def unit_of(key: GearKey, joint: int) -> str:
     return f"{key[0]} {key[1]} #{joint}"
 
 
-def placed_in_time(life: GearLife) -> list[list[tuple[int, float]]]:
-    """Day and landings of the inspections that state both, those between two overhauls together."""
+def _placed_in_time(life: GearLife) -> list[Array]:
+    """Day and landings of the inspections that state both, those between two overhauls together,
+    shape (n, 2). [d, landings]
+    """
     found: list[list[tuple[int, float]]] = [[]]
     for place, event in enumerate(life.events):
         if place in life.overhauls:
             found.append([])
         if event.joints is None and event.day and event.landings is not None:
             found[-1].append((date.fromisoformat(event.day).toordinal(), event.landings))
-    return found
+    return [np.array(era, float) for era in found if era]
 
 
-def _landings_of(repair: Moment, life: GearLife) -> float | None:
+def _landings_of(repair: Moment, eras: Sequence[Array]) -> float | None:
     """Landings at a repair: as recorded, else between the inspections about it, by their days."""
     if repair.landings is not None:
         return float(repair.landings)
-    eras = [era for era in placed_in_time(life) if era]
     if not eras or not repair.day:
         return None
     day = date.fromisoformat(repair.day).toordinal()
-    own = max((era for era in eras if era[0][0] <= day), key=itemgetter(0), default=eras[0])
-    days, landings = zip(*own, strict=True)
+    begun = [era for era in eras if era[0, 0] <= day]
+    days, landings = (begun or eras[:1])[-1].T
     return float(np.interp(day, days, landings))
 
 
@@ -298,7 +300,7 @@ def _due_date(life: GearLife, ahead: Forecast) -> str | None:
     latest = last.at.toordinal()
     days = 0.0
     if not ahead.due_now:
-        eras = [np.array(era) for era in placed_in_time(life) if era]
+        eras = _placed_in_time(life)
         passed, flown = np.sum([np.zeros(2), *(era[-1] - era[0] for era in eras)], axis=0).tolist()
         if flown <= 0.0 or passed <= 0.0:
             return None

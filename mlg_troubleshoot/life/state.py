@@ -11,11 +11,13 @@ When the inspections and repairs of one gear took place, by their dates and thei
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from bisect import bisect, bisect_left
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime, timedelta
 from itertools import groupby, pairwise
 from math import hypot, inf
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -118,16 +120,15 @@ def other_visits_count(found: Iterable[GearState | None]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Event:
-    """A fact with its visit; `value`: a clearance, or the largest displacement. [in]"""
+    """A fact with its visit; `value`: a clearance, or the largest displacement. [in]
+
+    left: when the joint of a reading was restored at its own visit, before it was read.
+    """
 
     visit: GearVisit
     at: date | None
     value: float = 0.0
-    joints: frozenset[int] = frozenset()
-
-    @property
-    def moment(self) -> tuple[object, ...]:
-        return self.at, self.joints
+    left: tuple[date | None, ...] = ()
 
     def fact(self, kind: FactKind, joint: int | None = None, value_in: float | None = None) -> Fact:
         return Fact(kind, joint, value_in, self.at, self.visit.inspection.record_id)
@@ -142,15 +143,8 @@ def _is_later(one: _Event | GearVisit, other: _Event | GearVisit) -> bool:
 
 
 def _newest(events: Sequence[_Event]) -> list[_Event]:
-    # Of what a table states with its day alone nothing is later than the last day.
-    last = max((e.at for e in events if e.at.__class__ is date), default=None)
-    others = [e for e in events if e.visit.typed or e.at.__class__ is not date]
-    return [
-        e
-        for e in events
-        if not surely_later(last, e.at)
-        if not any(_is_later(other, e) for other in others)
-    ]
+    typed = [e for e in events if e.visit.typed]
+    return [e for e in _last(events) if not any(_is_later(other, e) for other in typed)]
 
 
 def states(visits: Sequence[GearVisit], gear: Gear) -> list[GearState]:
@@ -158,19 +152,26 @@ def states(visits: Sequence[GearVisit], gear: Gear) -> list[GearState]:
     if len(visits) == 1:
         return [_alone(visits[0], gear)]
     found: dict[int, GearState] = {}
-    known = _Known(gear)
-    order = sorted(range(len(visits)), key=lambda n: visits[n].at or date.min)
-    undated = [n for n in order if visits[n].at is None]
-    for n in undated:
-        known.add(visits[n])
-    for _day, same in groupby(order[len(undated) :], key=lambda n: visits[n].at):
-        known.forget_replaced()
-        together = list(same)
-        for n in together:
-            known.add(visits[n])
-        found |= {n: known.at(visits[n]) for n in together}
+    known = _Known(gear, visits)
+    undated: list[int] = []
+    for day, same in _by_day(visits):
+        together = [visits[n] for n in same]
+        # Rows of one table that are in no order stand there themselves.
+        known.add(day, together, [v for v in together if v.place < inf])
+        if day is None:
+            undated = same
+        else:
+            found |= {n: known.at(visits[n]) for n in same}
+            known.find(v for v in together if v.place == inf)
     found |= {n: known.at(visits[n]) for n in undated}
     return [found[n] for n in range(len(visits))]
+
+
+def _by_day(visits: Sequence[GearVisit]) -> Iterator[tuple[date | None, list[int]]]:
+    """Places of the visits of each day, first of those that state none."""
+    order = sorted(range(len(visits)), key=lambda n: visits[n].at or date.min)
+    for day, same in groupby(order, key=lambda n: visits[n].at):
+        yield day, list(same)
 
 
 def state_now(visits: Sequence[GearVisit], gear: Gear) -> GearState | None:
@@ -182,9 +183,10 @@ def state_now(visits: Sequence[GearVisit], gear: Gear) -> GearState | None:
     found = [v for v in found if not v.inspection.says_nothing] or found
     if not found:
         return None
-    known = _Known(gear)
-    for visit in visits:
-        known.add(visit)
+    known = _Known(gear, visits)
+    for day, same in _by_day(visits):
+        together = [visits[n] for n in same]
+        known.add(day, together, together)
     return known.at(found[-1], now=True)
 
 
@@ -218,16 +220,6 @@ def _is_beyond(readings_in: Iterable[float], row: Inspection, gear: Gear) -> boo
     return any(abs(each) > margin + ROUNDING_IN for each in readings_in)
 
 
-def _put(events: list[_Event], new: _Event) -> None:
-    """Add an event; of rows of a table at one moment, which are in no order, the worst one."""
-    if new.visit.place == inf and not new.visit.typed:
-        for n, other in enumerate(events):
-            if other.visit.place == inf and new.moment == other.moment:
-                events[n] = max(other, new, key=lambda event: event.value)
-                return
-    events.append(new)
-
-
 def _plunger_of(visit: GearVisit) -> _Event:
     row = visit.inspection
     return _Event(visit, _when(visit, row.plunger_date), max(map(abs, row.readings_in)))
@@ -238,8 +230,7 @@ def _outcome_of(visit: GearVisit) -> _Event:
 
 
 def _repair_of(visit: GearVisit) -> _Event:
-    row = visit.inspection
-    return _Event(visit, row.repair_date, joints=frozenset(row.restored_joints))
+    return _Event(visit, visit.inspection.repair_date)
 
 
 def _when(visit: GearVisit, stated: date | None) -> date | None:
@@ -251,75 +242,149 @@ def _when(visit: GearVisit, stated: date | None) -> date | None:
     return stated or (None if updated else visit.at)
 
 
-@dataclass(slots=True)
+# Stand in place of a joint for any repair, and for one of the rigging.
+_ANY, _RIGGING = 0, -1
+
+
 class _Known:
-    """What may still count of one gear, as its visits are added in the order of their days."""
+    """What may still count of one gear, as its visits are added in the order of their days.
 
-    gear: Gear
-    readings: dict[int, list[_Event]] = field(default_factory=dict)
-    plunger: list[_Event] = field(default_factory=list)
-    failed: list[_Event] = field(default_factory=list)
-    retracted: list[_Event] = field(default_factory=list)
-    repairs: list[_Event] = field(default_factory=list)
-    checked: list[_Event] = field(default_factory=list)
+    readings, repairs: of each joint. settled: the last repair after which the gear retracted.
+    """
 
-    def add(self, visit: GearVisit) -> None:
-        row = visit.inspection
-        for joint, value in row.clearance_in.items():
-            _put(self.readings.setdefault(joint, []), _Event(visit, visit.at, value))
-        if row.readings_in:
-            _put(self.plunger, _plunger_of(visit))
-        if row.outcome is not None:
-            tried = self.failed if row.outcome is Outcome.FAILED else self.retracted
-            _put(tried, _outcome_of(visit))
-        if row.is_repaired:
-            _put(self.repairs, _repair_of(visit))
-        if row.rigging_checked is RiggingCheck.YES:
-            _put(self.checked, _Event(visit, visit.at))
+    def __init__(self, gear: Gear, visits: Iterable[GearVisit] = ()) -> None:
+        self.gear = gear
+        self.readings: dict[int, list[_Event]] = {}
+        self.plunger: list[_Event] = []
+        self.failed: list[_Event] = []
+        self.retracted: list[_Event] = []
+        self.repairs: dict[int, list[_Event]] = {}
+        self.settled: list[_Event] = []
+        self.checked: list[_Event] = []
+        self._typed = sorted(visit.place for visit in visits if visit.typed)
 
-    def forget_replaced(self) -> None:
-        """Let go what is replaced by what is later by its date, at every visit that follows."""
-        self.readings = {joint: _last(events) for joint, events in self.readings.items()}
-        self.plunger = _last(self.plunger)
-        self.failed = _first_and_last(
-            [e for e in self.failed if not _is_settled(e, self.repairs, self.retracted)]
+    def add(
+        self, day: date | None, visits: Iterable[GearVisit], found: Iterable[GearVisit]
+    ) -> None:
+        """Add the repairs of all visits of a day, and what was found at some; let go what they
+        replace at every visit that follows.
+        """
+        self.failed = [e for e in self.failed if not self.is_settled(e)]
+        for visit in visits:
+            self.repair(visit)
+        self.find(found)
+
+        def is_sure(event: _Event) -> bool:
+            # Of what was typed on one day the order of entry decides.
+            return not event.visit.typed or surely_later(day, event.visit.at)
+
+        def last(events: Iterable[_Event]) -> list[_Event]:
+            return _last(self._worst(day, events), is_sure)
+
+        self.retracted = last(self.retracted)
+        self.settled = _last(
+            [*self.settled, *_followed(self.repairs.get(_ANY, ()), self.retracted, is_sure)]
         )
-        self.checked = _last(self.checked)
-        self.retracted = _last(self.retracted)
-        self.repairs = _last(self.repairs, lambda new, old: new.joints >= old.joints)
+        failed = [*self._worst(day, self.failed)]
+        ends = _last(failed, is_sure), _last(failed, is_sure, first=True)
+        # The first failure says since when the rigging counts as looked at, the last one what has
+        # to be repaired.
+        at_ends = {id(e) for each in ends for e in each}
+        self.failed = [e for e in failed if id(e) in at_ends]
+        self.readings = {joint: last(events) for joint, events in self.readings.items()}
+        self.repairs = {joint: last(events) for joint, events in self.repairs.items()}
+        self.plunger = last(self.plunger)
+        self.checked = last(self.checked)
+
+    def repair(self, visit: GearVisit) -> None:
+        row = visit.inspection
+        if not row.is_repaired:
+            return
+        is_rigging = row.rigging_checked is RiggingCheck.CORRECTED
+        for what in (_ANY, *row.restored_joints, *[_RIGGING] * is_rigging):
+            self.repairs.setdefault(what, []).append(_repair_of(visit))
+
+    def find(self, visits: Iterable[GearVisit]) -> None:
+        """Add what was found at some visits."""
+        for visit in visits:
+            row = visit.inspection
+            for joint, value in row.clearance_in.items():
+                left = (row.repair_date,) if joint in row.restored_joints else ()
+                read = _Event(visit, visit.at, value, left)
+                self.readings.setdefault(joint, []).append(read)
+            if row.readings_in:
+                self.plunger.append(_plunger_of(visit))
+            if row.outcome is not None:
+                tried = self.failed if row.outcome is Outcome.FAILED else self.retracted
+                tried.append(_outcome_of(visit))
+            if row.rigging_checked is RiggingCheck.YES:
+                self.checked.append(_Event(visit, visit.at))
+
+    def _worst(self, day: date | None, events: Iterable[_Event]) -> Collection[_Event]:
+        """Of events of which nothing says that one is later than another, the worst one."""
+        found: dict[object, _Event] = {}
+        for event in events:
+            visit = event.visit
+            is_kept = visit.place < inf
+            same: object = (
+                id(visit)
+                if visit.typed
+                else (
+                    event.at,
+                    event.left,
+                    visit.at and visit.at == day,
+                    is_kept and bisect(self._typed, visit.place),
+                    is_kept,
+                )
+            )
+            if same not in found or event.value > found[same].value:
+                found[same] = event
+        return found.values()
+
+    def is_settled(self, event: _Event) -> bool:
+        """Whether a gear was repaired after something was found, and retracted after that."""
+        return any(_is_later(repair, event) for repair in self.settled)
 
     def at(self, visit: GearVisit, *, now: bool = False) -> GearState:
         return _AsOf(self, visit, now=now).state()
 
 
+def _always(_event: _Event) -> bool:
+    return True
+
+
 def _last(
-    events: Sequence[_Event], replaces: Callable[[_Event, _Event], bool] = lambda _new, _old: True
+    events: Collection[_Event],
+    is_sure: Callable[[_Event], bool] = _always,
+    *,
+    first: bool = False,
 ) -> list[_Event]:
-    return [
-        e
-        for e in events
-        if not any(surely_later(other.at, e.at) and replaces(other, e) for other in events)
-    ]
+    """Events than which no other one that is sure is surely later; `first`: earlier."""
+    if len(events) < 2:
+        return [*events]
+
+    def replaces(one: _Event, other: _Event) -> bool:
+        return surely_later(other.at, one.at) if first else surely_later(one.at, other.at)
+
+    ends: list[_Event] = []
+    for event in events:
+        if event.at is None or not is_sure(event) or any(replaces(end, event) for end in ends):
+            continue
+        ends = [end for end in ends if not replaces(event, end)]
+        # One of each moment says as much as all of them.
+        if all(end.at != event.at for end in ends):
+            ends.append(event)
+    return [e for e in events if not any(replaces(end, e) for end in ends)]
 
 
-def _first_and_last(failed: Sequence[_Event]) -> list[_Event]:
-    """Of failures that stand, those that are not surely between two others: the first one says
-    since when the rigging counts as looked at, the last one what has to be repaired.
-    """
-    return [
-        e
-        for e in failed
-        if not any(surely_later(e.at, other.at) for other in failed)
-        or not any(surely_later(other.at, e.at) for other in failed)
-    ]
-
-
-def _is_settled(event: _Event, repairs: Iterable[_Event], retracted: Sequence[_Event]) -> bool:
-    """Whether a gear was repaired after something was found, and retracted after that."""
-    return any(
-        _is_later(repair, event) and any(_is_later(tried, repair) for tried in retracted)
-        for repair in repairs
-    )
+def _followed(
+    repairs: Iterable[_Event],
+    retracted: Collection[_Event],
+    is_sure: Callable[[_Event], bool] = _always,
+) -> list[_Event]:
+    """Repairs after which the gear retracted."""
+    tried = [e for e in retracted if is_sure(e)]
+    return [r for r in repairs if is_sure(r) and any(_is_later(t, r) for t in tried)]
 
 
 class _AsOf:
@@ -327,12 +392,26 @@ class _AsOf:
 
     def __init__(self, known: _Known, visit: GearVisit, *, now: bool) -> None:
         self._known = known
+        self._own = _Known(known.gear)
+        self._own.repair(visit)
+        self._own.find([visit])
         self._gear = known.gear
         self._visit = visit
         self._row = visit.inspection
         self._now = now
-        self._repairs = [e for e in known.repairs if now or not _is_later(e.visit, self._visit)]
-        self._retracted = self._counting(known.retracted)
+        self._repairs = {
+            joint: [
+                *(
+                    e
+                    for e in known.repairs.get(joint, ())
+                    if not self._is_own(e) and (now or not _is_later(e.visit, visit))
+                ),
+                *self._own.repairs.get(joint, ()),
+            ]
+            for joint in known.repairs.keys() | self._own.repairs.keys()
+        }
+        self._retracted = self._counting(known.retracted, self._own.retracted)
+        self._settled = _followed(self._of(), self._retracted)
         self._older: list[Fact] = []
         self._said: list[str] = []
 
@@ -358,39 +437,46 @@ class _AsOf:
         inspection = replace(row, warnings=(*row.warnings, *said), **changed)
         return GearState(self._visit, inspection, tuple(self._older))
 
-    def _counting(self, events: Iterable[_Event]) -> list[_Event]:
-        """What is surely older than the visit, and what is kept and may be: rows of one table that
-        are in no order stand there themselves.
-        """
+    def _counting(self, events: Iterable[_Event], own: Iterable[_Event]) -> list[_Event]:
+        """What is surely older than the visit, and what is kept and may be; its own comes last."""
         return [
             e
             for e in events
+            if not self._is_own(e)
             if self._now
-            or self._is_own(e)
             or _is_later(self._visit, e.visit)
             or (e.visit.place < inf and not _is_later(e.visit, self._visit))
-        ]
+        ] + [*own]
 
     def _is_own(self, event: _Event) -> bool:
         return event.visit is self._visit
 
-    def _later(self, event: _Event, joint: int | None = None) -> list[_Event]:
+    def _later(self, event: _Event, joint: int = _ANY) -> list[_Event]:
         """Repairs, of one joint or any, that are surely later."""
-        return [r for r in self._of(joint) if _is_later(r, event)]
+        return [r for r in self._of(joint, event) if _is_later(r, event)]
 
-    def _of(self, joint: int | None) -> list[_Event]:
-        return [r for r in self._repairs if joint is None or joint in r.joints]
+    def _of(self, joint: int = _ANY, read: _Event | None = None) -> list[_Event]:
+        """Repairs, of one joint or any; not those after which it was `read`: a row tells of a joint
+        how it was left, and the next one may state the same repair.
+        """
+        repairs = self._repairs.get(joint, [])
+        if joint == _ANY or read is None or not read.left:
+            return repairs
+        return [
+            r
+            for r in repairs
+            if r.visit is not read.visit
+            if r.visit.typed or r.at is None or r.at not in read.left
+        ]
 
-    def _counts_for(self, event: _Event, joint: int | None = None) -> bool:
+    def _counts_for(self, event: _Event, joint: int = _ANY) -> bool:
         """Whether something may count in favour of the gear: it is surely older than the visit,
         and no repair of another visit may have replaced it.
         """
         if self._is_own(event) and not self._now:
             return True
         is_before = self._now or _is_later(self._visit, event.visit)
-        # A row tells of a joint how it was left.
-        repairs = (r for r in self._of(joint) if joint is None or r.visit is not event.visit)
-        return is_before and all(_is_later(event, r) for r in repairs)
+        return is_before and all(_is_later(event, r) for r in self._of(joint, event))
 
     def _readings(self) -> dict[str, Any]:
         """Clearances of other visits that stand, and of this one those that do."""
@@ -404,8 +490,8 @@ class _AsOf:
             limit = self._gear.joint(joint)
             standing = [
                 e
-                for e in _newest(self._counting(events))
-                if not any(r.visit is not e.visit for r in self._later(e, joint))
+                for e in _newest(self._counting(events, self._own.readings.get(joint, ())))
+                if not self._later(e, joint)
                 and (limit.is_over_limit(e.value) or self._counts_for(e, joint))
             ]
             worst = max(standing, key=lambda e: e.value, default=None)
@@ -451,7 +537,7 @@ class _AsOf:
         own = _plunger_of(self._visit) if row.readings_in else None
         if own is not None and not self._now:
             return own
-        newest = _newest(self._counting(self._known.plunger))
+        newest = _newest(self._counting(self._known.plunger, self._own.plunger))
         replaced = [e for e in newest if self._later(e)]
         standing = [
             e for e in newest if e not in replaced and (self._is_beyond(e) or self._counts_for(e))
@@ -477,9 +563,9 @@ class _AsOf:
         """
         together = [
             e
-            for e in self._counting(self._known.plunger)
+            for e in self._counting(self._known.plunger, self._own.plunger)
             if event.visit.typed and e.visit.typed and e.at == event.at and _is_later(event, e)
-            if not any(_is_later(r, e) and not _is_later(r, event) for r in self._repairs)
+            if not any(_is_later(r, e) and not _is_later(r, event) for r in self._of())
         ]
         together.append(event)
         read = [(e, each) for e in together for each in e.visit.inspection.readings_in]
@@ -487,23 +573,30 @@ class _AsOf:
             self._older += [e.fact(FactKind.PLUNGER, None, each) for e, each in read]
         return tuple(each for _event, each in read)
 
+    def _failures(self) -> list[_Event]:
+        """Failures that are not settled."""
+        counting = self._counting(self._known.failed, self._own.failed)
+        return [e for e in counting if not self._is_settled(e)]
+
     def _is_rigging_checked(self) -> bool:
         """Whether the rigging was looked at since the failure that stands."""
-        failed = [e for e in self._counting(self._known.failed) if not self._is_settled(e)]
-        checked = self._counting(self._known.checked)
+        failed = self._failures()
+        checked = self._counting(self._known.checked, self._own.checked)
         return bool(failed) and any(not _is_later(failed[0], e) for e in checked)
 
     def _is_beyond(self, event: _Event) -> bool:
         return _is_beyond(event.visit.inspection.readings_in, self._row, self._gear)
 
     def _is_settled(self, event: _Event) -> bool:
-        return _is_settled(event, self._repairs, self._retracted)
+        # What is typed without a day may be older than what is settled at the visits of the days.
+        known = self._known.settled if self._now or self._visit.at else ()
+        return any(_is_later(repair, event) for repair in (*known, *self._settled))
 
     def _outcome(self) -> _Event | None:
         """The outcome that stands: a failure that is not settled, else the newest retraction."""
         row = self._row
         own = _outcome_of(self._visit) if row.outcome is not None else None
-        still = [e for e in self._counting(self._known.failed) if not self._is_settled(e)]
+        still = self._failures()
         if own is not None and row.outcome is Outcome.FAILED and not self._is_settled(own):
             return own
         if still:
@@ -527,29 +620,34 @@ class _AsOf:
 
         The days are made for that comparison: the decision compares them and shows none.
         """
-        row = self._row
         found = {"plunger_date": plunger, "outcome_date": outcome}
         dated = {name: event for name, event in found.items() if event is not None}
-        own = [_repair_of(self._visit)] if row.is_repaired else []
-        since = [
-            r
-            for r in self._repairs
-            if not self._is_own(r) and (self._now or not own)
-            if any(_is_later(r, e) for e in dated.values())
-            or self._is_closed_by(outcome, r)
-            or not _is_later(own[0] if own else self._visit, r)
-        ]
-        repairs = [*own, *since]
-        if not repairs or not (since or any(not self._is_own(e) for e in dated.values())):
+        own = self._own.repairs.get(_ANY, [])
+
+        def is_since(repair: _Event) -> bool:
+            if self._is_own(repair) or (own and not self._now):
+                return False
+            return (
+                any(_is_later(repair, e) for e in dated.values())
+                or self._is_closed_by(outcome, repair)
+                or not _is_later(own[0] if own else self._visit, repair)
+            )
+
+        since = {what: [*filter(is_since, done)] for what, done in self._repairs.items()}
+        others = {id(r.visit): r for done in since.values() for r in done}
+        if not (own or others):
             return {}
-        days = (_day_of(r.at) for r in repairs if r.at is not None)
+        if not (others or any(not self._is_own(e) for e in dated.values())):
+            return {}
+        days = [_day_of(r.at) for r in (*own, *others.values()) if r.at is not None]
         day = max(days, default=self._visit.at or _SOME_DAY)
-        joints = frozenset[int]().union(*(r.joints for r in repairs))
-        changed: dict[str, Any] = {"restored_joints": tuple(sorted(joints)), "repair_date": day}
-        if any(r.visit.inspection.rigging_checked is RiggingCheck.CORRECTED for r in repairs):
+        done = {what for what, later in since.items() if later} | self._own.repairs.keys()
+        joints = tuple(sorted(done - {_ANY, _RIGGING}))
+        changed: dict[str, Any] = {"restored_joints": joints, "repair_date": day}
+        if _RIGGING in done:
             changed["rigging_checked"] = RiggingCheck.CORRECTED
-        self._say_repairs([r for r in since if not _is_later(self._visit, r)])
-        return changed | {name: _place(e, self._repairs, day) for name, e in dated.items()}
+        self._say_repairs([r for r in others.values() if not _is_later(self._visit, r)])
+        return changed | {name: _place(e, self._of(), day) for name, e in dated.items()}
 
     def _is_closed_by(self, outcome: _Event | None, repair: _Event) -> bool:
         """Whether this visit is the first at which a gear that had failed retracted after its
@@ -557,7 +655,8 @@ class _AsOf:
         """
         first = [e for e in self._retracted if _is_later(e, repair)][:1]
         is_own = outcome is not None and first == [outcome] and self._is_own(outcome)
-        return is_own and any(_is_later(repair, failed) for failed in self._known.failed)
+        failed = (*self._known.failed, *self._own.failed)
+        return is_own and any(_is_later(repair, e) for e in failed)
 
     def _say_repairs(self, repairs: Sequence[_Event]) -> None:
         """Name repairs that may be later than this visit."""
@@ -666,12 +765,24 @@ def overhauls(moments: Sequence[Moment]) -> dict[int, frozenset[int]]:
         return found
     placed = _placed(moments)
     landings = np.array([moments[i].landings for i in placed], float)
-    begun = 0
-    for n, end in pairwise([*lasting_falls(landings).tolist(), len(placed)]):
-        restored = _restored(moments, placed[begun:n], placed[n:end])
+    repairs = [(m.day, m.joints) for m in moments if m.joints]
+    recorded = sorted(repairs, key=itemgetter(0))
+    days = [day for day, _joints in recorded]
+    falls = [0, *lasting_falls(landings).tolist(), len(placed)]
+    last: dict[int, tuple[float, float]] = {}
+    for (start, n), end in zip(pairwise(falls), falls[2:], strict=False):
+        for i in placed[start:n]:
+            last |= moments[i].read
+        first: dict[int, tuple[float, float]] = {}
+        for i in reversed(placed[n:end]):
+            first |= moments[i].read
+        begins = bisect_left(days, moments[placed[n - 1]].day)
+        ends = bisect(days, moments[placed[n]].day)
+        done = frozenset[int]().union(*(joints for _day, joints in recorded[begins:ends]))
+        restored = _restored(done, last, first)
         if len(restored) >= _SEVERAL:
             found[placed[n]] = restored
-            begun = n
+            last = {}
     return found
 
 
@@ -688,18 +799,15 @@ def _falls(moments: Sequence[Moment]) -> list[tuple[int, int]]:
 
 
 def _restored(
-    moments: Sequence[Moment], before: Sequence[int], after: Sequence[int]
+    recorded: frozenset[int],
+    last: Mapping[int, tuple[float, float]],
+    first: Mapping[int, tuple[float, float]],
 ) -> frozenset[int]:
-    """Joints that were restored between two stretches of a life; none if another one reads
-    wider.
+    """Joints that were restored between the last readings before and the first ones after, by
+    records and as they read; none if another one reads wider.
     """
-    days = moments[before[-1]].day, moments[after[0]].day
-    recorded = (m.joints for m in moments if m.joints and days[0] <= m.day <= days[1])
-    restored = frozenset[int]().union(*recorded)
-    last = {joint: reading for i in before for joint, reading in moments[i].read.items()}
-    first = {joint: reading for i in after[::-1] for joint, reading in moments[i].read.items()}
-    tighter = set(restored)
-    for joint in (last.keys() & first.keys()) - restored:
+    tighter = set(recorded)
+    for joint in (last.keys() & first.keys()) - recorded:
         (was, was_u), (reads, u) = last[joint], first[joint]
         clearly = _CLEARLY * hypot(was_u, u)
         if reads > was + clearly:

@@ -1,10 +1,11 @@
-"""Fleets of more gears than the wear of joints is learnt from."""
+"""Fleets of more gears than the wear of joints is learnt from, and gears of many visits."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import date
+from datetime import date, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,10 @@ import pytest
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import lives, lives_of
-from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, teachers_first
+from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, stretches, teachers_first
+from mlg_troubleshoot.life.logbook import log_of
+from mlg_troubleshoot.life.state import GearVisit, state_now, states
+from mlg_troubleshoot.records import ReadOptions, read_many
 from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
@@ -165,3 +169,77 @@ def test_unpacked_contents_are_judged_by_the_gate_of_their_own_store(store: Stor
     strict = Store(store.place, judge=lambda _record, _body: "it is wrong")
     with pytest.raises(StoreError, match="it is wrong"):
         lives_of(strict, [(TAILS[0], "LH")])
+
+
+# Rows of one gear: the columns of a table, and what stands in them.
+SHAPES = {
+    "days": ("inspection_date,clearance_3_in", "{day},{c}"),
+    "one day": ("inspection_date,clearance_3_in", "2024-05-01,{c}"),
+    "no day": ("plunger_displacement_in,clearance_3_in", "{plunger},{c}"),
+    "failures": ("inspection_date,outcome", "{day},FAILED"),
+    "repairs of days": (
+        "inspection_date,restored_joints,repair_date,gear_landings,clearance_3_in",
+        "{day},{joint},{day},{landings},{c}",
+    ),
+    "repairs of any day": (
+        "inspection_date,outcome,restored_joints,repair_date,plunger_displacement_in,clearance_3_in",
+        "{any_day},{outcome},{joint},{day},{plunger},{c}",
+    ),
+    "repairs without a day": ("restored_joints,outcome,clearance_3_in", "{joint},{outcome},{c}"),
+    "a repair in each row": (
+        "inspection_date,outcome,restored_joints,repair_date,clearance_3_in",
+        "{any_day},{outcome},3,2024-05-01,{c}",
+    ),
+    "landings of any day": ("inspection_date,gear_landings,clearance_3_in", "{day},{landings},{c}"),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_gear_of_four_times_as_many_visits_takes_four_times_the_work(
+    shape: str, tmp_path: Path
+) -> None:
+    gear = load_gear()
+    header, row = SHAPES[shape]
+
+    def calls_of(visits: int) -> int:
+        """Calls of a check of a table, of keeping it and of showing the gear."""
+        rng = np.random.default_rng(5)
+        file = tmp_path / f"{visits}.csv"
+        lines = [f"record_id,tail_no,side,clearance_convention,{header}"]
+        for n in range(visits):
+            cells = row.format(
+                day=date(2000, 1, 1) + timedelta(days=n),
+                any_day=date(2000, 1, 1) + timedelta(days=int(rng.integers(visits))),
+                joint=rng.integers(1, 11),
+                outcome=rng.choice(["FAILED", "RETRACTED", ""]),
+                plunger=f"{rng.uniform(0.0, 0.05):.4f}",
+                landings=rng.integers(20_000),
+                c=f"{rng.uniform(0.001, 0.009):.5f}",
+            )
+            lines.append(f"R{n},N1,LH,RADIAL,{cells}")
+        file.write_text("\n".join(lines), encoding="utf-8")
+        rows = read_many([file], ReadOptions.of(gear)).inspections
+        assert len(rows) == visits
+        count = 0
+
+        def count_call(_frame: object, event: str, _of: object) -> None:
+            nonlocal count
+            count += event == "call"
+
+        store = Store(tmp_path / f"{visits}.sqlite")
+        before = sys.getprofile()
+        sys.setprofile(count_call)
+        try:
+            states([GearVisit(row) for row in rows], gear)
+            keep(map(Told.by, rows), store)
+            (life,) = lives(store).values()
+            states(life.visits, gear)
+            state_now(life.visits, gear)
+            log_of(life, gear)
+            stretches(life, gear.joint_numbers)
+        finally:
+            sys.setprofile(before)
+        return count
+
+    few, many = calls_of(60), calls_of(240)
+    assert many < 5.0 * few

@@ -11,7 +11,7 @@ import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import GearLife, life_of
-from mlg_troubleshoot.life.forecast import placed_in_time, stretches
+from mlg_troubleshoot.life.forecast import _placed_in_time, stretches
 from mlg_troubleshoot.life.state import GearVisit, Moment, contradictions, overhauls
 from mlg_troubleshoot.store import Store
 from tests.cli.conftest import mlg, row
@@ -159,7 +159,7 @@ def test_a_joint_that_was_left_goes_on_wearing(kept: GearLife) -> None:
 
 
 def test_days_and_landings_are_those_between_overhauls(kept: GearLife) -> None:
-    eras = [[landings for _day, landings in era] for era in placed_in_time(kept)]
+    eras = [[landings for _day, landings in era] for era in _placed_in_time(kept)]
     assert eras == [[1400, 2200], [300, 1100]]
 
 
