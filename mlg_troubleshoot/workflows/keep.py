@@ -7,7 +7,7 @@ come from anybody.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import datetime
@@ -126,14 +126,18 @@ class Told:
     @property
     def known_by(self) -> Iterator[Hashable]:
         """What another record of the same inspection has as well."""
-        record = self.record
+        name, day = self.record.record_id, self.record.day
         yield self.content
-        yield "found", self.without_day
-        yield "id", record.record_id
-        yield "id", record.record_id, record.day
-        # What a table without ids said of a gear on a day.
-        if is_made_for_row(record.record_id):
-            yield "day", record.day
+        yield self.content, "" if is_made_for_row(name) else name
+        yield "found", self.without_day, name
+        yield "id", name
+        yield "id", name, day
+
+    @property
+    def cells(self) -> list[Hashable]:
+        """What a table without ids says of the joints of a gear on a day."""
+        read = self.record.body["inspection"].get("clearance_in", {})
+        return [(self.record.day, *cell) for cell in read.items()]
 
 
 def told_by(judgements: Iterable[Judgement]) -> list[Told]:
@@ -150,11 +154,15 @@ class _KnownContents:
 
     def __init__(self, life: GearLife | None) -> None:
         self._by: defaultdict[Hashable, list[Told]] = defaultdict(list)
+        self._by_cell: defaultdict[Hashable, list[tuple[Told, int]]] = defaultdict(list)
         self._void: dict[tuple[object, ...], set[bytes]] = {}
         standing = {}
         for visit in life.inspections if life else ():
             told = standing[visit.kept.record_id] = Told.of(visit.kept)
             self.add(told)
+            cells = told.cells if is_made_for_row(visit.kept.record_id) else []
+            for cell in cells:
+                self._by_cell[cell].append((told, len(cells)))
         for entry in life.entries if life else ():
             record, name = entry.record, entry.record.record_id
             if record.kind is not RecordKind.INSPECTION:
@@ -170,29 +178,40 @@ class _KnownContents:
         for key in told.known_by:
             self._by[key].append(told)
 
-    def same(self, told: Told) -> Told | None:
-        return next((o for o in self._by.get(told.content, ()) if _may_be_one(o, told)), None)
+    def same(self, told: Told, content: bytes | None = None) -> Told | None:
+        """What stands with the same content, unless the ids state that it is another inspection."""
+        what = content or told.content
+        name = told.record.record_id
+        keys = (what,) if is_made_for_row(name) else ((what, name), (what, ""))
+        return next((o for key in keys for o in self._by.get(key, ())), None)
 
     def otherwise(self, told: Told, stand: Collection[str]) -> Told | None:
         """What stands for the same inspection with other content: under its id on its day or
         without one, or the same findings under its id on another day or without one; where no
         table has ids, what is mostly the same on that day and in no row of this table (`stand`).
         """
-        found, of_id, of_day, *unnamed = [self._by.get(k, []) for k in [*told.known_by][1:]]
+        name, day = told.record.record_id, told.record.day
+        of_day, of_id, moved = (
+            self._by.get(key, [])
+            for key in (("id", name, day), ("id", name), ("found", told.without_day, name))
+        )
         undated = [o for o in of_id[-1:] if not o.record.day]
-        moved = (
-            o
-            for o in found
-            if o.record.record_id == told.record.record_id
-            or (not o.record.day and _may_be_one(o, told))
-        )
-        mostly = (
-            o
-            for others in unnamed
-            for o in others
-            if o.record.key and o.record.key not in stand and _is_mostly(o, told)
-        )
-        return next(chain(of_day[-1:], undated, moved, mostly), None)
+        # The hash of what states no day is that without one.
+        without_day = self.same(told, told.without_day)
+        known = next(chain(of_day[-1:], undated, moved), without_day)
+        return known or (self._mostly(told, stand) if is_made_for_row(name) else None)
+
+    def _mostly(self, told: Told, stand: Collection[str]) -> Told | None:
+        """What says most of the same readings of that day."""
+        cells = told.cells
+        alike: Counter[str] = Counter()
+        for cell in cells:
+            for other, most in self._by_cell.get(cell, ()):
+                key = other.record.key
+                alike[key] += 1
+                if 2 * alike[key] >= max(most, len(cells)) and key not in stand:
+                    return other
+        return None
 
     def new(self, told: Told) -> Record | None:
         """A record to add; None if it was voided, which it stays. Under the id of a void one it is
@@ -202,18 +221,6 @@ class _KnownContents:
         if told.content in void:
             return None
         return replace(told.record, identity=()) if void else told.record
-
-
-def _is_mostly(one: Told, other: Told) -> bool:
-    """Whether most of what two records say of one gear and day is the same."""
-    said = [{*told.record.body["inspection"]["clearance_in"].items()} for told in (one, other)]
-    return 2 * len(said[0] & said[1]) >= max(map(len, said)) > 0
-
-
-def _may_be_one(one: Told, other: Told) -> bool:
-    """Whether the ids of two records do not state that they are two inspections."""
-    ids = one.record.record_id, other.record.record_id
-    return ids[0] == ids[1] or any(map(is_made_for_row, ids))
 
 
 def keep(

@@ -201,11 +201,10 @@ def test_a_gear_of_four_times_as_many_visits_takes_four_times_the_work(
     gear = load_gear()
     header, row = SHAPES[shape]
 
-    def calls_of(visits: int) -> int:
-        """Calls of a check of a table, of keeping it and of showing the gear."""
-        rng = np.random.default_rng(5)
-        file = tmp_path / f"{visits}.csv"
-        lines = [f"record_id,tail_no,side,clearance_convention,{header}"]
+    def read(visits: int, seed: int) -> Sequence[Inspection]:
+        rng = np.random.default_rng(seed)
+        file = tmp_path / "gear.csv"
+        lines = [f"tail_no,side,clearance_convention,{header}"]
         for n in range(visits):
             cells = row.format(
                 day=date(2000, 1, 1) + timedelta(days=n),
@@ -216,10 +215,15 @@ def test_a_gear_of_four_times_as_many_visits_takes_four_times_the_work(
                 landings=rng.integers(20_000),
                 c=f"{rng.uniform(0.001, 0.009):.5f}",
             )
-            lines.append(f"R{n},N1,LH,RADIAL,{cells}")
+            lines.append(f"N1,LH,RADIAL,{cells}")
         file.write_text("\n".join(lines), encoding="utf-8")
         rows = read_many([file], ReadOptions.of(gear)).inspections
         assert len(rows) == visits
+        return rows
+
+    def calls_of(visits: int) -> int:
+        """Calls of a check of a table, of keeping it and another one, and of showing the gear."""
+        rows, others = read(visits, 5), read(visits, 6)
         count = 0
 
         def count_call(_frame: object, event: str, _of: object) -> None:
@@ -232,6 +236,7 @@ def test_a_gear_of_four_times_as_many_visits_takes_four_times_the_work(
         try:
             states([GearVisit(row) for row in rows], gear)
             keep(map(Told.by, rows), store)
+            keep(map(Told.by, others), store, amend=False)
             (life,) = lives(store).values()
             states(life.visits, gear)
             state_now(life.visits, gear)
