@@ -39,14 +39,7 @@ def diagnose(
         str, typer.Option(metavar="NAME", help="Who approves that it may relax verdicts.")
     ] = "",
     why: Annotated[str, typer.Option(metavar="TEXT", help="Why it is approved.")] = "",
-    causes: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="FILE.py|FILE.toml",
-            help="Your own causes (runs this file: give only one that you trust), or prior"
-            " probabilities and sizes of effects in your fleet.",
-        ),
-    ] = None,
+    causes: options.Causes = None,
     tables: options.MeasuredTables,
     shown: options.Shown,
 ) -> None:
@@ -95,9 +88,11 @@ def diagnose(
         show_notes(result.unread if shown.quiet else result.notes)
         show_problems(result.problems)
         _show(result, shown.unit())
-    if write_extension is not None and result.extension is None:
+    if write_extension is None:
+        pass
+    elif result.extension is None:
         output.say(_unwritten(result.diagnosis))
-    elif write_extension is not None and result.extension is not None:
+    else:
         keep_extension(
             result.extension, write_extension, approved_by=approve.strip(), reason=why.strip()
         )

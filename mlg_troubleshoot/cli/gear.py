@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import typer
 
 from mlg_troubleshoot.cli import options, output
@@ -25,9 +23,7 @@ def show(
     if as_json:
         output.write_json(load_gear(gear))
     else:
-        known = load_gear(gear)
-        kinds = Counter(str(number.kind) for number in known.numbers).most_common()
-        output.show_page("gear", output.console(), gear=known, kinds=kinds)
+        output.show_page("gear", output.console(), gear=load_gear(gear))
 
 
 def verify(context: typer.Context, as_json: options.Json = False) -> None:

@@ -116,8 +116,9 @@ Causes = Annotated[
     list[Path] | None,
     typer.Option(
         "--causes",
-        metavar="FILE.py",
-        help="Your own causes. Runs this file: give only one that you trust.",
+        metavar="FILE.py|FILE.toml",
+        help="Your own causes (runs this file: give only one that you trust); for a diagnosis also"
+        " prior probabilities and sizes of effects in your fleet.",
     ),
 ]
 Report = Annotated[

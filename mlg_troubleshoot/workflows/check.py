@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
+from mlg_troubleshoot.decision.assessment import Action, Assessment, Judgement, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.decision.judge_rows import (
     AT_ONCE,
@@ -185,6 +185,13 @@ class BlockOutput:
     make: Callable[[Sequence[Judgement]], Any]
     take: Callable[[Any], object]
     sets: bool = False
+
+
+def reading_order(row: Inspection, gear: Gear) -> tuple[int, ...]:
+    """The joints to read next, as the plan of an unfinished inspection has them."""
+    (judged,) = assess([row], gear, load_index_table(gear), sets=False)
+    steps = (step for step in judged.plan.steps if step.action is Action.MEASURE)
+    return next((step.joints for step in steps), ())
 
 
 def json_around(result: CheckResult) -> tuple[str, str]:

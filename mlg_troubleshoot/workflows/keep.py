@@ -22,11 +22,16 @@ from msgspec import Meta
 from mlg_troubleshoot.datafile import Table, refusal
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement
 from mlg_troubleshoot.decision.columns import (
+    BY_NAME,
+    CLEARANCE,
     COLUMNS,
     CONVENTION,
     DATE,
     IDENTITY,
     LANDINGS,
+    MARGIN,
+    MARGIN_U,
+    PLUNGER_DISPLACEMENT,
     RECORD_ID,
     SIDE,
     TAIL_NO,
@@ -67,6 +72,9 @@ from mlg_troubleshoot.store import (
 )
 from mlg_troubleshoot.units import LengthUnit
 
+_STANDS = (MARGIN, MARGIN_U, BY_NAME["cannot_reach"], BY_NAME["no_spare"])
+_PLUNGERS = tuple(map(PLUNGER_DISPLACEMENT.header, range(1, PLUNGER_DISPLACEMENT.copies + 1)))
+_COPIES = {PLUNGER_DISPLACEMENT.name: _PLUNGERS}
 # Inspections that one sentence names at most.
 _MOST_NAMED = 6
 
@@ -421,6 +429,57 @@ def amend(store: Store, gear: Gear, wrong: Record, changes: Mapping[str, str]) -
         raise UsageError(f"{wrong.record_id} says that already", "Give another value.")
     store.add([record])
     return record
+
+
+def correct(
+    store: Store, gear: Gear, records: Sequence[Record], changes: Mapping[str, str]
+) -> list[UsageError]:
+    """Correct columns in the visit that was recorded last, those without a text in the last one
+    that states them; why others were not is returned.
+    """
+    of: defaultdict[Record, dict[str, str]] = defaultdict(dict)
+    for name, text in changes.items():
+        states = [each for each in records if text or name in _stated(each)]
+        of[(states or records)[-1]].update(dict.fromkeys(_COPIES.get(name, (name,)), text))
+    refused = []
+    for record, texts in of.items():
+        try:
+            amend(store, gear, record, texts)
+        except UsageError as error:
+            refused.append(error)
+    return refused
+
+
+def _stated(record: Record) -> set[str]:
+    """The columns in which a visit says something."""
+    row = inspection_from(record)
+    joints = map(CLEARANCE.header, row.clearance_in)
+    return {*joints, *(c.name for c in COLUMNS if not c.needs_joint and row.value(c.filled))}
+
+
+def put_back(store: Store, before: Iterable[Record], now: Iterable[Record]) -> None:
+    """Let visits say again what they said before they were corrected."""
+    newest = {each.record_id: each.key for each in now}
+    store.add(
+        inspection_record(inspection_from(old), RecordKind.CORRECTION, supersedes=wrong)
+        for old in before
+        if (wrong := newest[old.record_id]) != old.key
+    )
+
+
+def continued(
+    known: Inspection, row: Inspection, typed: Collection[str], again: Collection[int]
+) -> Inspection:
+    """A visit with what stands of the gear and was not typed anew: its margin, what the day does
+    not allow; and which of the joints that were to be measured `again` were.
+    """
+    stands = [column.filled for column in _STANDS if column.name not in typed]
+    if row.inspection_date == known.inspection_date and LANDINGS.name not in typed:
+        stands.append(LANDINGS.filled)
+    more = {name: getattr(known, name) for name in stands}
+    # What the reader of a row alone misses in it stands in other visits.
+    measured_again = tuple(sorted(row.clearance_in.keys() & again))
+    return replace(row, measured_again=measured_again, warnings=(), **more)
 
 
 # Made at run time from the joints of a gear: no checker of types reads them.

@@ -53,7 +53,7 @@ def test_joints_are_asked_for_in_the_order_of_next_and_show_their_limit_as_read(
     joints = [prompt for prompt in terminal.prompts if prompt.startswith("#")]
     assert joints[0].startswith("#3 short link inner bearing, limit 15.0 thou")
     assert joints[1].startswith("#5")
-    assert "✓ #3 8.0 thou total play = 4.0 thou radial" in terminal.screen
+    assert "✓ #3 8 thou total play = 4.0 thou radial" in terminal.screen
     assert "Over the limit of 15.0 thou (assumed): look up the manual's." in terminal.screen
 
 
@@ -74,8 +74,7 @@ def test_readings_keep_the_unit_that_they_were_typed_in(sit: Sit, life: Life) ->
 def test_a_unit_of_one_inspection_is_said_and_not_offered_next(sit: Sit) -> None:
     assert "before:" not in sit(*failed("done"), "").screen
     screen = sit("N2 LH", "mm radial", "r", "", "done", "", "", "").screen
-    assert "Readings are in mm, radial (before: thou, total play)." in screen
-    assert "For this inspection; Enter goes on offering thou, total play." in screen
+    assert "Readings are in mm, radial (for this inspection, before: thou, total play)." in screen
     assert "Readings are in thou, total play." in sit("N2 LH", "").screen
     with pytest.raises(StoppedError, match="Readings are thou, total play"):
         sit("N3 LH")
@@ -272,13 +271,13 @@ def test_a_joint_that_waits_is_asked_for_after_the_others(sit: Sit, typed, asked
     terminal = sit(*gear("f", "46", *typed, "done"), "")
     joints = [prompt.split()[0] for prompt in terminal.prompts if prompt.startswith("#")]
     assert joints == asked
-    assert "✓ #3 25.0 thou total play = 12.5 thou radial, was 14 thou" in terminal.screen
+    assert "✓ #3 25 thou total play = 12.5 thou radial, was 14 thou" in terminal.screen
 
 
 def test_a_joint_prompt_says_what_enter_does_and_what_ends_the_joints(sit: Sit) -> None:
     terminal = sit(*gear("f", "46", "#1 none", "14", "#3 none", "done"), "")
     assert all("(Enter: not read; done)" in p for p in terminal.prompts if p.startswith("#"))
-    for said in ("– #1 not read\n", "– #3 not read, was 14 thou"):
+    for said in ("✓ #1 none\n", "✓ #3 none, was 14 thou"):
         assert said in terminal.screen
 
 

@@ -392,10 +392,8 @@ def test_a_corrected_tail_or_side_is_that_of_all_that_was_typed_here(
     begun(*failed("8", "done"))
     sit("N1 LH", *typed, "")
     assert (len(life(*gear).inspections), len(life().inspections)) == (2, 1)
-    left = life().inspections[0].kept.digest[:10]
-    said = capsys.readouterr().err
-    assert f" entries from N1 LH to {gear[1]} {gear[0]}." in said
-    assert f"not moved: {left}. Move one: mlg history move HASH {gear[1]} {gear[0]}" in said
+    said = f" entries from N1 LH to {gear[1]} {gear[0]}."
+    assert said in capsys.readouterr().err
 
 
 def test_an_undo_takes_a_corrected_side_back(sit, begun, life, capsys):

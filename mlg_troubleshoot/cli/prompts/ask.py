@@ -24,7 +24,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     label_of,
     split_words,
 )
-from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit, reading_order
+from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,
@@ -41,7 +41,8 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, with_unit
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, Sentence, said_in
+from mlg_troubleshoot.workflows.check import reading_order
 
 _FOLLOW_HELP = "new: a new inspection of this gear. gear: another gear. open: opens the report."
 _UNUSUAL = "unusual"
@@ -191,14 +192,12 @@ class Asker:
         if begun or self.known:
             self.saved.discard(self.entry.id)
         if begun:
-            self.entry = max(begun, key=lambda each: len(each.cells))
+            self.entry = begun[0]
             self.entry.cells = {**gear, **self.entry.cells}
             at = f"{self.entry.started:%Y-%m-%d %H:%M}"
             self._say(f"Continued: {self.entry.identity}, begun {at}. new = begin anew.", "green")
         elif self.known:
-            row, offered = self.known.row, self.offered(self.known)
-            if {row.unit_entered, row.convention} != {offered[name] for name in READ_IN}:
-                self._say(f"   Readings are in {_heading(offered)}.")
+            self._say(f"   Readings are in {_heading(self.offered(self.known))}.")
             return self.known
         return self._ask_all()
 
@@ -260,15 +259,15 @@ class Asker:
         return next(iter(open_ones), _UNUSUAL if self._unusual() else "")
 
     def _joints(self) -> list[str]:
-        """Joints in the order of NEXT, then the critical ones, then as in the gear file."""
+        """Joints in the order of NEXT, then as in the gear file."""
         names = [CLEARANCE.header(n) for n in self.gear.joint_numbers]
         known = self.entry.cells.keys()
         if {*names} <= known or not {*FIRST} <= known:
             return names
-        rest = sorted(self.gear.joints, key=lambda joint: not joint.critical)
         if self._order[0] != self.entry.cells:
-            self._order = dict(self.entry.cells), reading_order(self.gear, self.entry)
-        order = (*self._order[1], *(joint.number for joint in rest))
+            row = self.entry.inspection(self.gear)
+            self._order = dict(self.entry.cells), reading_order(row, self.gear)
+        order = (*self._order[1], *self.gear.joint_numbers)
         return [CLEARANCE.header(n) for n in dict.fromkeys(order)]
 
     def _turn(self, name: str) -> None:
@@ -317,30 +316,23 @@ class Asker:
         is_word = typed.lower() != _NO_WORD.get(name)
         if name == TAIL_NO.name:
             is_word = typed[1:2].isalpha()
-        earlier = ""
         if name == _UNUSUAL and PLUNGER in dict(split_words(typed)):
             # It is typed again, not once more.
-            earlier = self.entry.cells.pop(PLUNGER, "")
-        is_taken = is_word and self._take(typed)
-        if earlier:
-            self.entry.cells.setdefault(PLUNGER, earlier)
-        if not is_taken:
+            self._give(PLUNGER, "none")
+        if not (is_word and self._take(typed)):
             self._answer_question(name, typed or self._enters(name))
 
     def _answer_question(self, name: str, text: str) -> None:
-        if joint_of(name):
-            self._answer_joint(name, text)
-        elif name in _OPTIONAL and not text:
-            self.entry.give(name, "")
+        if not text and (joint_of(name) or name in _OPTIONAL):
+            # A reading that was typed before stands.
+            self.entry.give(name, self.entry.cells.get(name, ""))
+            self._named = [each for each in self._named if each != name]
         elif not text:
             raise UsageError("Enter alone is not an answer", "Type the answer, or u to go back.")
         elif name == TAIL_NO.name:
             self._answer_tail(text)
         elif name in READ_IN:
-            self._answer_unit(text)
-            offered = {n: t for n, t in self.saved.offered().items() if n in READ_IN}
-            if any(self.entry.cells.get(n, t) != t for n, t in offered.items()):
-                self._say(f"   For this inspection; Enter goes on offering {_heading(offered)}.")
+            self._answer_unit(text, "for this inspection, before")
         elif name == _UNUSUAL:
             if text.lower() not in _YES:
                 raise UsageError(f"{text!r} is not understood", "Type y, #3 13 or p 41.")
@@ -355,7 +347,7 @@ class Asker:
         if side:
             self._give(SIDE.name, last)
 
-    def _answer_unit(self, typed: str) -> None:
+    def _answer_unit(self, typed: str, before: str) -> None:
         """Take a unit, a convention or both; what is not typed is that of the last entry."""
         cells = self.entry.cells
         last = {**self.saved.offered(), **cells}
@@ -380,27 +372,7 @@ class Asker:
             self.entry.give(name, text)
         said = "; what was typed before keeps its unit" * bool(read)
         replaced = any(last.get(name, text) != text for name, text in found.items())
-        before = f" (before: {was})" * replaced
-        self._say(f"   Readings are in {_heading(found)}{before}{said}.")
-
-    def _answer_joint(self, name: str, typed: str) -> None:
-        """Take a clearance; one that can hardly be is confirmed."""
-        number = joint_of(name) or 0
-        before = self.entry.cells.get(name, "")
-        was = f", was {before}" * bool(before and typed)
-        typed = typed or before
-        if typed.lower() in ("", "none"):
-            self._named = [each for each in self._named if each != name]
-            self.entry.give(name, "")
-            self._say(f"– #{number} not read{was}", "dim")
-            return
-        read, said = self.entry.judge(self.gear, name, with_unit(typed, self.entry.unit))
-        if said and not self._confirmed(name, f"#{number}: {said}", typed):
-            return
-        self._named = [each for each in self._named if each != name]
-        entered = read.entered.get(number)
-        self.entry.give(name, str(entered) if entered else "")
-        self._echo(number, read, was)
+        self._say(f"   Readings are in {_heading(found)}{f' ({before}: {was})' * replaced}{said}.")
 
     def _confirmed(self, name: str, said: str, text: str) -> bool:
         """Say what is unusual, and whether it is right; else what was typed instead was taken."""
@@ -428,9 +400,10 @@ class Asker:
         """Take a line of words, each by itself; false if it is not one."""
         words = split_words(line)
         if units := [text for name, text in words if name in READ_IN]:
-            self._answer_unit(" ".join(units))
+            self._answer_unit(" ".join(units), "before")
             cells = self.entry.cells
-            self.saved.usual |= {name: cells[name] for name, _ in words if name in READ_IN}
+            stated = {name: cells[name] for name, _ in words if name in READ_IN}
+            self.saved.offered().update(stated)
         lengths = [name for name, _ in words if column_of(name).is_length]
         if words and not {*READ_IN} <= self.entry.cells.keys() and (lengths or self.entry.waiting):
             self.entry.waiting.append(line)
@@ -452,37 +425,59 @@ class Asker:
         self.entry.require_untyped(name)
         self._named.append(name)
         if text:
-            self._answer_joint(name, text)
+            self._give(name, text)
 
     def _give(self, name: str, text: str) -> None:
-        """Give a column, and say what was taken."""
+        """Give a column, and say what was taken; a reading that can hardly be is confirmed."""
         taken = self.entry.accepted_with_day(self.gear, name, text)
-        said = self._doubted(taken[PLUNGER]) if taken.get(PLUNGER) else ""
-        if said and not self._confirmed(PLUNGER, said, text):
+        said = self._doubted(name, taken[name])
+        if said and not self._confirmed(name, said, text):
             return
+        self._named = [each for each in self._named if each != name]
         given = []
         for column, kept in taken.items():
             before = self.entry.cells.get(column)
-            was = f", was {before}" if before and not kept else ""
-            given.append(f"{label_of(column)} {kept or 'none'}{was}")
             self.entry.give(column, kept)
+            was = f", was {before}" if before and (joint_of(name) or not kept) else ""
+            given.append(f"{label_of(column)} {kept or 'none'}{self._radially(column)}{was}")
         self._say(f"✓ {', '.join(given)}", "green")
+        number = joint_of(name)
+        if number and taken[name]:
+            joint = self.gear.joint(number)
+            if joint.is_over_limit(self._judged(name).clearance_in[number]):
+                self._say(
+                    f"  Over the limit of {self._limit(number)} ({joint.limit.kind.value}): look up"
+                    " the manual's.",
+                    "bold red",
+                )
 
-    def _doubted(self, text: str) -> str:
-        """What is said of a plunger reading beyond what all joints at their limits could cause, or
-        in another unit.
+    def _radially(self, name: str) -> str:
+        """What a clearance of another convention is radially; empty if it is radial."""
+        number, kind = joint_of(name), self.entry.convention
+        if not (number and self.entry.cells[name]) or kind is ClearanceConvention.RADIAL:
+            return ""
+        radial = self._length(self._judged(name).clearance_in[number])
+        return f" {_plain(kind)} = {radial} radial"
+
+    def _doubted(self, name: str, text: str) -> str:
+        """What is said of a clearance that can hardly be, of a plunger reading beyond what all
+        joints at their limits could cause or in another unit.
         """
-        read, _ = self.entry.judge(self.gear, PLUNGER, text)
+        if not (text and _is_length(name)):
+            return ""
+        reads = [self.entry.judge(self.gear, name, each) for each in text.split("; ")]
+        if joint_of(name):
+            return said_in(Sentence.joined(reads[0].warnings), self.entry.unit)
         most_in = float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
-        if max(map(abs, read.readings_in)) <= most_in:
-            return read.unit_question
+        if max(abs(each) for read in reads for each in read.readings_in) <= most_in:
+            return reads[-1].unit_question
         return (
             f"Plunger {text}: all joints at their limits could move it"
             f" {self._length(most_in)} at most."
         )
 
     def _judged(self, name: str) -> Inspection:
-        return self.entry.judge(self.gear, name, self.entry.cells[name])[0]
+        return self.entry.judge(self.gear, name, self.entry.cells[name])
 
     # What is shown.
 
@@ -502,7 +497,7 @@ class Asker:
     def _joint_question(self, number: int) -> tuple[str, str]:
         joint = self.gear.joint(number)
         kind = self.entry.convention
-        limit = self._length(joint.limit.value * kind.per_radial)
+        limit = self._limit(number)
         last = self.known.last.get(number) if self.known else None
         prompt = f"#{number} {joint.name}, limit {limit}" + f", last {last}" * (last is not None)
         typed = self.entry.cells.get(CLEARANCE.header(number))
@@ -551,21 +546,6 @@ class Asker:
         given = self.entry.cells.get(RESTORED_JOINTS.name)
         return self._judged(RESTORED_JOINTS.name).restored_joints if given else ()
 
-    def _echo(self, number: int, read: Inspection, was: str) -> None:
-        joint = self.gear.joint(number)
-        radial_in = read.clearance_in[number]
-        factor = self.entry.convention.per_radial
-        shown = f"✓ #{number} {self._length(radial_in * factor)}"
-        if factor != 1.0:
-            shown += f" {_plain(self.entry.convention)} = {self._length(radial_in)} radial"
-        self._say(shown + was, "green")
-        if joint.is_over_limit(radial_in):
-            self._say(
-                f"  Over the limit of {self._length(joint.limit.value * factor)}"
-                f" ({joint.limit.kind.value}): look up the manual's.",
-                "bold red",
-            )
-
     def _typed(self, prompt: str, help_text: str) -> str:
         """Ask, and return what is typed; the words for help, undo and stop are the same
         everywhere.
@@ -604,6 +584,10 @@ class Asker:
 
     def _length(self, length_in: float) -> str:
         return f"{self.entry.unit.shown(length_in)} {self.entry.unit}"
+
+    def _limit(self, number: int) -> str:
+        limit_in = self.gear.joint(number).limit.value
+        return self._length(limit_in * self.entry.convention.per_radial)
 
     @contextmanager
     def _interrupted(self) -> Iterator[None]:

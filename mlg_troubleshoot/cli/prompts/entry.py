@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import secrets
-from dataclasses import replace
 from datetime import date, datetime, timedelta
 
 import msgspec
@@ -42,13 +41,11 @@ from mlg_troubleshoot.records.gate import judge_row
 from mlg_troubleshoot.units import (
     ClearanceConvention,
     LengthUnit,
-    Sentence,
     parse_length,
     with_unit,
 )
 
 PLUNGER = PLUNGER_DISPLACEMENT.name
-PLUNGERS = tuple(map(PLUNGER_DISPLACEMENT.header, range(1, PLUNGER_DISPLACEMENT.copies + 1)))
 REPAIR_DATE = "repair_date"
 # What gear is entered, and what its readings are.
 IDENTITY = (TAIL_NO.name, SIDE.name)
@@ -189,23 +186,17 @@ class Entry(msgspec.Struct, kw_only=True):
                 said.append(f"{label_of(name)} {text or 'none'}{again}")
         return ", ".join(said)
 
-    def judge(self, gear: Gear, name: str, text: str) -> tuple[Inspection, str]:
-        """Let the gate of tables judge an answer: what it reads, and what it wants confirmed."""
-        is_joint = joint_of(name) is not None
+    def judge(self, gear: Gear, name: str, text: str) -> Inspection:
+        """Let the gate of tables judge an answer; of the plunger one reading."""
         options = ReadOptions.of(gear, unit=self.unit, convention=self.convention, asks=True)
-        rows = []
-        for each in text.split(";") if name == PLUNGER else [text]:
-            read, problems = judge_length(name, each.strip(), options)
-            if problems or not isinstance(read, Inspection):
-                expected = _ANSWERS if name == OUTCOME.name else problems[0].expected
-                raise UsageError(
-                    f"{label_of(name)} {each.strip()!r} is not accepted: expected {expected}",
-                    " ".join(at_prompt(problem.remedy) for problem in problems),
-                )
-            rows.append(read)
-        readings_in = tuple(x for row in rows for x in row.readings_in)
-        said = str(Sentence.joined(rows[0].warnings)) if is_joint else ""
-        return replace(rows[0], readings_in=readings_in), said
+        read, problems = judge_length(name, text, options)
+        if problems or not isinstance(read, Inspection):
+            expected = _ANSWERS if name == OUTCOME.name else problems[0].expected
+            raise UsageError(
+                f"{label_of(name)} {text!r} is not accepted: expected {expected}",
+                " ".join(at_prompt(problem.remedy) for problem in problems),
+            )
+        return read
 
     def row(self) -> dict[str, object]:
         """The answers as the cells of one row; each length stands under its own unit."""
@@ -305,7 +296,8 @@ class Entry(msgspec.Struct, kw_only=True):
                 self.judge(gear, name, typed)
             return typed.upper() if name == TAIL_NO.name else typed
         lengths = [with_unit(each.strip(), self.unit) for each in typed.split(";")]
-        self.judge(gear, name, "; ".join(lengths))
+        for each in lengths:
+            self.judge(gear, name, each)
         if name == PLUNGER:
             lengths = [self.cells.get(name, ""), *lengths]
         return "; ".join(filter(None, lengths))

@@ -12,30 +12,25 @@ from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.prompts.ask import Asker
 from mlg_troubleshoot.cli.prompts.entry import (
     HEADING,
-    PLUNGER,
-    PLUNGERS,
     Entry,
-    column_of,
-    joint_of,
     label_of,
 )
 from mlg_troubleshoot.cli.prompts.visit import (
     SavedEntries,
     Terminal,
     Visit,
-    continued,
     find_visit,
 )
+from mlg_troubleshoot.decision.assessment import Action
 from mlg_troubleshoot.decision.columns import UNIT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.judge_rows import listed
-from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
+from mlg_troubleshoot.errors import OutputError, TroubleshootError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.state import GearKey, GearState, key_of
-from mlg_troubleshoot.store import RecordKind, inspection_from, inspection_record
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
-from mlg_troubleshoot.workflows.keep import add_typed, amend, move, voids
+from mlg_troubleshoot.workflows.keep import add_typed, continued, correct, move, put_back, voids
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.cli.check_run import Run
@@ -107,13 +102,11 @@ class Sitting:
         if known is not None and entry.todo is not None and key != key_of(known.row):
             own = [each for each in known.records if each.record_id in self._own]
             moved = self._move(known, own or known.records[-1:] * (not entry.has_findings), key)
-            left = [each.digest[:10] for each in known.records if each not in own]
-            if own and left:
-                say = f"Not typed at this sitting and not moved: {', '.join(left)}. Move one:"
-                output.say(f"{say} mlg history move HASH {entry.identity} --why TEXT")
         before = tuple(moved or known.records) if known else ()
         if known is not None and not entry.has_findings:
-            self._amend(entry, before)
+            changes = {name: entry.cells[name] for name in entry.typed if name not in HEADING}
+            for error in correct(self._place, self._gear, before, changes):
+                output.say(f"Not changed: {error.message}. {error.remedy}")
         else:
             moved = []
             self._add(entry)
@@ -131,7 +124,8 @@ class Sitting:
         known = self._visit(*entry.gear_key)
         rows = entry.visits(self._gear)
         if known is not None:
-            rows = [continued(known, row, entry) for row in rows]
+            again = known.step.joints if known.step.action is Action.MEASURE_AGAIN else ()
+            rows = [continued(known.row, row, entry.typed, again) for row in rows]
         try:
             added, warnings = add_typed(self._place, rows, entry.started)
         except TroubleshootError:
@@ -153,35 +147,15 @@ class Sitting:
             output.say(f"Moved {of} from {' '.join(key_of(visit.row))} to {' '.join(key)}.")
         return moved
 
-    def _amend(self, entry: Entry, records: Sequence[Record]) -> None:
-        """Correct what does not belong to one finding in the visit that was recorded last; what was
-        not found after all, in the last one that states it.
-        """
-        changes: dict[Record, dict[str, str]] = {}
-        for name in (name for name in entry.typed if name not in HEADING):
-            text = entry.cells[name]
-            states = [each for each in records if text or _is_stated(each, name)]
-            columns = PLUNGERS if name == PLUNGER else (name,)
-            changes.setdefault((states or records)[-1], {}).update(dict.fromkeys(columns, text))
-        for record, texts in changes.items():
-            try:
-                amend(self._place, self._gear, record, texts)
-            except UsageError as error:
-                output.say(f"Not changed: {error.message}. {error.remedy}")
-
     def _undo(self, visit: Visit) -> Visit:
         """Take the last visit back, or a correction or a move of visits to this gear."""
         if not visit.undoes:
             output.say("Nothing is left to undo.")
             return visit
         key, ids = visit.moved or (key_of(visit.row), ())
-        newest = {each.record_id: each.key for each in visit.records}
-        for each in visit.before:
-            if (wrong := newest[each.record_id]) != each.key:
-                row = inspection_from(each)
-                self._place.add([inspection_record(row, RecordKind.CORRECTION, supersedes=wrong)])
+        put_back(self._place, visit.before, visit.records)
         if ids:
-            here = self._visit(visit.row.tail_no, visit.row.side) or visit
+            here = self._visit(*key_of(visit.row)) or visit
             self._move(here, [each for each in here.records if each.record_id in ids], key)
         elif not visit.before:
             self._place.add([voids(visit.records[-1], "taken back at the prompts")])
@@ -222,9 +196,3 @@ class Sitting:
         if other is not None and not listed(other.result.judgements)[0].is_fine:
             brief = other.result.judgements[0].in_brief
             output.say(f"Open on {other.row.tail_no} {side}: {brief}.")
-
-
-def _is_stated(record: Record, name: str) -> bool:
-    """Whether a visit says something in a column."""
-    row, joint = inspection_from(record), joint_of(name)
-    return joint in row.clearance_in if joint else bool(row.value(column_of(name).filled))

@@ -21,17 +21,12 @@ from mlg_troubleshoot.cli.output import text as data_text
 from mlg_troubleshoot.cli.prompts.entry import LAST, PLUNGER, READ_IN, Entry
 from mlg_troubleshoot.decision.assessment import Action, Step
 from mlg_troubleshoot.decision.columns import (
-    BY_NAME,
     CLEARANCE,
-    LANDINGS,
-    MARGIN,
-    MARGIN_U,
     OUTCOME,
     RESTORED_JOINTS,
     RIGGING_CHECKED,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import as_spelt, lives_of
@@ -39,7 +34,7 @@ from mlg_troubleshoot.life.logbook import shortened, visit_lines
 from mlg_troubleshoot.life.state import GearKey, GearState, state_now
 from mlg_troubleshoot.store import Draft, Drafts, Record, Store, login
 from mlg_troubleshoot.units import LengthUnit, said_in
-from mlg_troubleshoot.workflows.check import CheckResult, load_index_table
+from mlg_troubleshoot.workflows.check import CheckResult
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
 _ASKS = {
@@ -49,7 +44,6 @@ _ASKS = {
     Action.RETRACT: OUTCOME.name,
 }
 _TO_READ = (Action.MEASURE, Action.MEASURE_AGAIN)
-_STANDS = (MARGIN, MARGIN_U, BY_NAME["cannot_reach"], BY_NAME["no_spare"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,27 +103,6 @@ def find_visit(
     return Visit(tuple(each.kept for each in visits), row, judge(state), last, undoes)
 
 
-def continued(known: Visit, row: Inspection, entry: Entry) -> Inspection:
-    """A visit with what stands of the gear and was not typed anew: its margin, what the day does
-    not allow; and which joints NEXT wanted measured again.
-    """
-    stands = [column.filled for column in _STANDS if column.name not in entry.typed]
-    if row.inspection_date == known.row.inspection_date and LANDINGS.name not in entry.typed:
-        stands.append(LANDINGS.filled)
-    is_again = known.step.action is Action.MEASURE_AGAIN
-    again = row.clearance_in.keys() & known.step.joints if is_again else ()
-    more = {name: getattr(known.row, name) for name in stands}
-    # What the reader of a row alone misses in it stands in other visits.
-    return replace(row, measured_again=tuple(sorted(again)), warnings=(), **more)
-
-
-def reading_order(gear: Gear, entry: Entry) -> tuple[int, ...]:
-    """The joints to read next, as the plan of an unfinished entry has them."""
-    (judged,) = assess([entry.inspection(gear)], gear, load_index_table(gear), sets=False)
-    step = next((s for s in judged.plan.steps if s.action is Action.MEASURE), None)
-    return () if step is None else step.joints
-
-
 # How long an answer waits for another writer before the next question comes. [s]
 _PATIENCE_S = 3
 # Characters of an entry that cannot be read: enough for all its answers. [1]
@@ -144,9 +117,7 @@ class SavedEntries:
         self.owner = login()
         self._run = secrets.token_hex(4)
         self._writers = {self._run}
-        # Unit and convention that were stated for all that follows.
-        self.usual: dict[str, str] = {}
-        # What the last complete entry offers, read once until another is complete.
+        # What the last complete entry offers and was stated since, until another is complete.
         self._last: dict[str, str] | None = None
 
     def save(self, entry: Entry, *, complete: bool = False) -> str:
@@ -184,7 +155,6 @@ class SavedEntries:
         """
         found = []
         damaged = []
-        self._last = None
         try:
             for draft in self._all():
                 if draft.complete:
@@ -204,7 +174,9 @@ class SavedEntries:
         return found, damaged
 
     def offered(self) -> dict[str, str]:
-        """The user's unit and convention, name and gauge of the last entry."""
+        """The user's unit and convention, name and gauge of the last entry; what is stated for all
+        that follows is put in.
+        """
         if self._last is None:
             try:
                 entries = [_entry_of(draft) for draft in self._all() if draft.complete]
@@ -212,7 +184,7 @@ class SavedEntries:
                 entries = []
             cells = next((entry.cells for entry in entries if entry), {})
             self._last = {name: cells[name] for name in (*READ_IN, *LAST) if cells.get(name)}
-        return self._last | self.usual
+        return self._last
 
     def _all(self) -> list[Draft]:
         return self.drafts.newest_first(self.owner)

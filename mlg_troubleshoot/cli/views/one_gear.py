@@ -109,12 +109,10 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
     """All joints, repairs, the uncertainty budget; the report has the indices."""
     _show_joints(a, screen)
     restored = {number for each in a.repair_sets or () for number in each.joints}
-    pairs = (" = ".join(map("#{}".format, group)) for group in gear.link_groups if len(group) > 1)
     show_page(
         "detail",
         screen,
         a=a,
         gear=gear,
-        alike=", ".join(pairs),
         parts=sorted({gear.joint(number).new_part.value for number in restored}),
     )
