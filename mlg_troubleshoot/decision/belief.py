@@ -363,9 +363,13 @@ class Inference:
         """Drawn failures of each gear, the same ones whoever else is judged: where the plunger
         stands, then what each joint moved, one after another, as in a hidden Markov chain.
         """
-        causes = np.repeat([0, 1], [STATES, _OTHERS])
+        chances = self.chances.copy()
+        chances[chances[:, 2] < _NEGLIGIBLE, 2] = 0.0
+        counts = [STATES, _OTHERS, _OTHERS * bool(chances[:, 2].any())]
+        causes = np.repeat([0, 1], counts[::2])
         gears, joints, half = len(self._wear), len(self.gear.joints), _CELLS // 2
-        even, (turns, of_level, of_joint) = _even(joints + 3, len(causes)), _random(joints)
+        even = _even(joints + 3, STATES + _OTHERS)[:, : len(causes)]
+        turns, of_level, of_joint = _random(joints)
         each = np.arange(gears)[:, None]
         gear, pins, levels = self._contexts
         weights = np.zeros_like(self._weights)
@@ -400,12 +404,12 @@ class Inference:
         fresh = turns[pins[context[:, :STATES]], np.arange(STATES)]
         amplification = responses(self.gear)[0].amplification
         freed = moved[:, :STATES] - amplification * self.gear.new_parts_in * fresh
-        counts = [STATES, _OTHERS, _OTHERS]
+        each_weighs = chances / [STATES, _OTHERS, _OTHERS]
         blamed = self.worn * amplification / amplification.max()
         worn = np.concatenate([worn[:, :STATES], rigging, worn[:, STATES:]], axis=1)
         return [
             States(
-                np.repeat(np.diag(self.chances[k] / counts), counts, axis=1),
+                np.repeat(np.diag(each_weighs[k]), counts, axis=1),
                 worn[k],
                 freed[k],
                 stands[k, :STATES],
