@@ -489,6 +489,8 @@ _DECLARATIONS = (UNIT, CONVENTION)
 _READ = (CLEARANCE, PLUNGER_DISPLACEMENT)
 # What is of one visit, below the headings of several.
 _MEASURED = (*_READ, OUTCOME)
+# Columns that may hold the labels of a form. [1]
+_LABELLED = 4
 _NUMBER = re.compile(r"[^\w]*\d")
 _SAID = re.compile(r"\s*([^:]{1,40}):\s*(\S.*)")
 
@@ -528,12 +530,12 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     for row, cells in lines:
         texts = {i: cell for i, cell in enumerate(cells) if isinstance(cell, str)}
         for i, text in texts.items():
-            column = _column(text, options)
+            column = _column(text, options) if i < _LABELLED else None
             said = None if column else _said(text, options)
             if said is not None:
                 told[row] = _column(said[0], options)
             # Behind a text the last cell is a value.
-            elif column is not None and i < 4 and (i == min(texts) or any(cells[i + 1 :])):
+            elif column is not None and (i == min(texts) or any(cells[i + 1 :])):
                 labels.setdefault(row, (i, column))
     kinds = {row: column for row, (_, column) in labels.items()}
     columns = [*kinds.values(), *filter(None, told.values())]
@@ -585,7 +587,7 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         for entry in _entries(row, cells, labels.get(row), headings, row >= begin, options)
     ]
     # What two forms next to each other both say is said once; what was measured, of each.
-    own = [(e.row, e.at) if _column(e.text, options) in _MEASURED else e[2:] for e in read]
+    own = [e[:3] if _column(e.text, options) in _MEASURED else e[2:] for e in read]
     entries = [*dict(zip(own, read, strict=True)).values()]
     named = [each.row for each in entries if _column(each.text, options) is RECORD_ID]
     filled = [_column(each.text, options) for each in entries if each.cell is not None]
@@ -610,7 +612,7 @@ def _with_joints(
             for i, c in enumerate(cells)
         ]
         lines.append((row, named))
-        for i, cell in enumerate(cells):
+        for i, cell in enumerate(cells[:_LABELLED]):
             behind = cells[i + 1 :]
             is_joint = _column(cell, options) is JOINT
             if is_joint and not any(show(c).isdecimal() or _is_fraction(c) for c in behind):
@@ -641,6 +643,7 @@ def _entries(
         known = _column(cell, options)
         said = None if known else _said(text, options)
         is_label = i > at and i < filled[-1] and (known or (at < 0 and not _is_number(cell)))
+        is_label = is_label and not (is_waiting and _tells_failure(text))
         if said is not None:
             yield _Entry(row, i, *said)
         elif len(filled) == 1 and _tells_failure(text):

@@ -226,6 +226,7 @@ def test_what_stands_once_beside_columns_that_are_not_read_counts(line, label, a
         (7, [None, "Plunger displacement (in)", None, None, 0.06]),
         (8, ["The gear did not retract"]),
         (8, [None, None, "plunger 1.5 mm"]),
+        (8, [None, "Outcome", "Plunger: 0.06"]),
     ],
 )
 def test_what_stands_anywhere_in_a_form_is_read_or_asked_about(at, line):
