@@ -156,6 +156,8 @@ _CLEARANCE_WORDS = _words("clearance clearances clr")
 _JOINT_WORDS = _words("joint jt j no nr number #")
 _FLOAT_WORDS = _words("axial float end endfloat")
 _FILLERS = _words("of at the for in")
+# So many joints that a header may mean are named. [1]
+_MOST_MEANT = 3
 # A joint's column with one of these words holds something other than a measurement.
 _OTHER_MATTER = _words(
     "remark remarks comment comments note notes photo photos picture date by initials sign"
@@ -293,11 +295,12 @@ def suspect(header: str, joints: Joints) -> tuple[str | None, bool]:
     sure = is_sure and not said & _OTHER_MATTER
     if not (sure or is_plunger or numbers or said & joints.vocabulary or not text):
         return (None if said & _OTHER_MATTER else ""), False
-    fitting = [*numbers] or joints.called(said)
-    joint = fitting[0] if len(fitting) == 1 else joints.numbers[0]
-    return (PLUNGER_DISPLACEMENT if is_plunger else CLEARANCE).header(
-        None if is_plunger else joint
-    ), sure
+    column = PLUNGER_DISPLACEMENT if is_plunger else CLEARANCE
+    fitting = sorted(numbers) or joints.called(said)
+    named_joints = fitting if 0 < len(fitting) <= _MOST_MEANT else joints.numbers[:1]
+    unit = next(iter(units.known), None) if len(units.known) == 1 else None
+    meant = [column.header(None if is_plunger else joint, unit) for joint in named_joints]
+    return " or ".join(dict.fromkeys(meant)), sure
 
 
 @lru_cache(4096)
@@ -337,7 +340,8 @@ def _numbered(words: list[str], units: _Units, joints: Joints) -> Recognition | 
     if everything & _OTHER_MATTER and not (is_clearance or is_float):
         return UNKNOWN
     column = AXIAL_FLOAT if is_float else CLEARANCE
-    meant = column.header(number)
+    unit = next(iter(units.known), None) if len(units.known) == 1 else None
+    meant = column.header(number, unit)
     if number not in joints.numbers:
         columns = [column.header(each) for each in joints.numbers]
         close = difflib.get_close_matches(meant, columns, 2, 0.0)

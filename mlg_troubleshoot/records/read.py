@@ -45,7 +45,9 @@ from mlg_troubleshoot.records.tables import (
     find_header,
     header_score,
     read_table,
+    tells_failure,
 )
+from mlg_troubleshoot.records.values import says_reading
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.records.frames import Frame
@@ -103,6 +105,14 @@ class _Candidate:
     def is_instructions(self) -> bool:
         texts = (cell for _, cells in self.peeked[:1] for cell in cells if cell is not None)
         return show(next(texts, None)).strip().lower().startswith(_INSTRUCTIONS)
+
+    @property
+    def holds_finding(self) -> bool:
+        """Whether a sheet without a header tells of a failure, or of a reading in words."""
+        if self.header or self.is_instructions:
+            return False
+        texts = (cell for _, cells in self.rows for cell in cells if isinstance(cell, str))
+        return any(tells_failure(text) or says_reading(text) for text in texts)
 
 
 def read_many(
@@ -345,7 +355,7 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
             " of them.",
         )
     if chosen:
-        left = [c for c in every if c.is_filled and c not in chosen]
+        left = [c for c in every if c not in chosen and (c.is_filled or c.holds_finding)]
         found.unread_sheets += [f"sheet {c.sheet.name!r}" for c in left]
         if len(every) - len(hidden) > 1 and options.sheet is None:
             found.notes.append(f"read from sheet{'s' * (len(chosen) > 1)} {_names(chosen)}")

@@ -702,6 +702,8 @@ def is_made_for_row(record_id: str) -> bool:
 _END = re.compile(r"(?:(?P<below><=?|≤|no[ -]?go)|(?:>=?|≥|go))\s*(?=[\d.,])", re.IGNORECASE)
 # That sign, or its word, in a cell of its own.
 _ABOVE = re.compile(r"[>≥]=?|(?:more|greater|larger) than|above|over")
+# What is short of mid-position is negative, however it was written.
+_UNDER = re.compile(r"under[ _-]?travel", re.IGNORECASE)
 _NO_END = "Measure with a gauge that reaches further, or leave it blank if it was not measured."
 
 
@@ -841,6 +843,8 @@ class RowReader:
         # The dates of the column, and those of rows that wait for the others.
         self._days: set[Cell] = set()
         self._waiting: dict[RowSource, tuple[CellFaultError, Cell, CellPlace]] = {}
+        # Those that do not say how they were read.
+        self._declared: set[RowSource] = set()
 
     def _add(self, placed: Iterable[PlacedField]) -> None:
         """Take columns whose cells travel to the report, each under its own name, and are searched
@@ -877,6 +881,9 @@ class RowReader:
         asked += self.ask_about(self._cells, found)
         asked += [each for each in row.questions if each not in asked]
         source = RowSource(self._table.file, self._table.sheet, row.number)
+        how = self._at.get(CONVENTION)
+        if how is None or self._cells[how] is None:
+            self._declared.add(source)
         for index, fault in sorted(self._faults, key=itemgetter(0)):
             if fault.days and index == self._at.get(DATE):
                 self._waiting[source] = fault, self._cells[index], self._place(index)
@@ -944,6 +951,8 @@ class RowReader:
                 self._fault(index, fault)
                 continue
             number = of.number or 0
+            if of.column is PLUNGER_DISPLACEMENT and _UNDER.search(self._placed[index].header):
+                length = -abs(length)
             if entered.bound:
                 warning, end = self._at_an_end(number, length, entered)
                 found.warnings.append(warning)
@@ -1089,6 +1098,8 @@ class RowReader:
             if is_unread and (is_said or is_length):
                 target = nearest or CLEARANCE.name
                 meant = f'a reading, pass --map "{header}={target}" (a length with its unit)'
+                if _UNDER.search(header):
+                    meant += ", which is then negative"
             elif self._may_say_outcome(placed, cell, outcome):
                 meant = f'what the gear did, pass --map "{header}={OUTCOME.name}"'
             elif said and found.convention and said.per_radial != found.convention.per_radial:
@@ -1318,6 +1329,25 @@ class RowReader:
                 fault, *_ = self._waiting[row.source]
                 rows[place] = replace(row, inspection_date=fault.days[order])
         return f"dates are read as {order.words}: no other order fits all dates of the column"
+
+    def settle_conventions(self, rows: list[Inspection | InvalidRow], texts: Iterable[str]) -> None:
+        """Ask about the rows that are read as declared, where the texts of the sheet name another
+        convention.
+        """
+        named = {text: said for text in texts if (said := convention_word(text))}
+        for place, row in enumerate(rows):
+            if not isinstance(row, Inspection) or row.source not in self._declared or not named:
+                continue
+            taken = row.convention.per_radial if row.convention else None
+            if any(said.per_radial == taken for said in named.values()):
+                continue
+            text = quote(next(iter(named)), 60)
+            question = (
+                f"the sheet says {text!r}, but the row is read as {row.convention}, as declared:"
+                " one of the two is wrong. Correct it."
+            )
+            asked = filter(None, (question, row.unit_question))
+            rows[place] = replace(row, unit_question=Sentence.joined(asked))
 
     def _unit_questions(self, found: _Found) -> list[str]:
         """Refuse readings that cannot be of the stated unit; return what must be asked before the

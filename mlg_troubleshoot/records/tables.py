@@ -77,6 +77,7 @@ from mlg_troubleshoot.records.rows import (
 from mlg_troubleshoot.records.values import (
     CellFaultError,
     convention_word,
+    find_day,
     in_words,
     may_be_outcome,
     says_failed,
@@ -365,6 +366,9 @@ class Columns:
         for key in (*measured, *(key for key in groups if key not in measured)):
             group = groups[key]
             visits = visits_of([heading for *_, heading in group])
+            if len({(p.header, heading.is_reading) for p, _, heading in group}) < 2:
+                # One heading twice is one column twice, not two that are in doubt.
+                visits = visits or [heading.visit for *_, heading in group if heading.is_reading]
             has_side = self.at(SIDE) and any(visit and visit.side for visit in visits)
             is_apart = key in measured or several.keys() - {ONE_VISIT} >= {*visits}
             if has_side or not is_apart or all(p.field is not None for p, *_ in group):
@@ -452,13 +456,16 @@ class Columns:
                 placed.field = None
             else:
                 first.refused = True
+                letters = placed.place.letters
+                # Letters that two lines of a form share name neither.
+                is_own = letters != first.place.letters
+                use = f", or pass --map {letters}=carry to use the other" if is_own else ""
                 self._tell(
                     "header_duplicate",
                     placed,
                     f"one column for {field.name}; {first.place.cell} {first.header!r} is one"
                     " already",
-                    f"Remove one of the two, or pass --map {placed.place.letters}=carry to"
-                    " use the other.",
+                    f"Remove one of the two{use}.",
                 )
 
     def _look_for_missing(self) -> None:
@@ -553,7 +560,7 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     numbers = {
         i
         for row, cells in lines
-        if kinds.get(row) in _READ
+        if kinds.get(row) is CLEARANCE
         for i, cell in enumerate(cells)
         if (_is_number(cell) if i > labels[row][0] else _is_fraction(cell))
     }
@@ -571,7 +578,7 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         row: cells
         for row, cells in lines
         if kinds.get(row) in (SIDE, DATE)
-        if sum(cells[i] is not None for i in numbers if labels[row][0] < i < len(cells)) > 1
+        if _are_heads([cells[i] for i in numbers if labels[row][0] < i < len(cells)])
     }
     headings = {i: _heading(i, [heads[row] for row in sorted(heads)]) for i in sorted(numbers)}
     for i, text in headings.items():
@@ -584,7 +591,9 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
         entry
         for row, cells in lines
         if row not in heads
-        for entry in _entries(row, cells, labels.get(row), headings, row >= begin, options)
+        for entry in _entries(
+            row, cells, labels.get(row), headings, options, above=corner, begin=begin
+        )
     ]
     # What two forms next to each other both say is said once; what was measured, of each.
     own = [e[:3] if _column(e.text, options) in _MEASURED else e[2:] for e in read]
@@ -600,6 +609,12 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     )
 
 
+def _are_heads(cells: Cells) -> bool:
+    """Whether sides or days stand above several columns."""
+    filled = [cell for cell in cells if cell is not None]
+    return len(filled) > 1 and all(Side.spelt(show(c)) or find_day(show(c)) for c in filled)
+
+
 def _with_joints(
     rows: Sequence[NumberedRow], options: ReadOptions
 ) -> tuple[list[NumberedRow], int]:
@@ -607,10 +622,11 @@ def _with_joints(
     corner, at = 0, -1
     lines: list[NumberedRow] = []
     for row, cells in rows:
-        named = [
-            f"joint {show(c)}" if i == at and show(c).strip().isdecimal() else c
-            for i, c in enumerate(cells)
-        ]
+        named = [*cells]
+        text = show(cells[at]).strip() if 0 <= at < len(cells) else ""
+        known = _column(f"joint {text}", options) if _NUMBER.match(text) else None
+        if known is CLEARANCE or text.isdecimal():
+            named[at] = f"joint {text}"
         lines.append((row, named))
         for i, cell in enumerate(cells[:_LABELLED]):
             behind = cells[i + 1 :]
@@ -625,15 +641,21 @@ def _entries(
     cells: Cells,
     first: tuple[int, Column] | None,
     headings: Mapping[int, str],
-    is_below: bool,
     options: ReadOptions,
+    *,
+    above: int,
+    begin: int,
 ) -> Iterator[_Entry]:
-    """A line of a form: labels, each with what stands behind it; and what else may matter."""
+    """A line of a form: labels, each with what stands behind it; and what else may matter.
+
+    above: the row that the table of joints begins in, if it says so; what stands above it is of
+    all columns. begin: the row that the readings begin below.
+    """
     at, column = first or (-1, None)
     label = _text(cells[at]) if first else ""
     filled = [i for i, cell in enumerate(cells) if cell is not None]
-    is_paired = len({cells[i] for i in filled if i in headings and i > at}) > 1
-    is_read = column in _READ and bool(headings)
+    is_below = row >= begin
+    is_paired = row >= above and _are_of_columns(at, column, cells, headings, options)
     is_waiting = False
     # A blank below found is a joint that was not measured.
     blanks = headings if column is CLEARANCE and is_below else ()
@@ -642,29 +664,72 @@ def _entries(
         text = cell if isinstance(cell, str) else ""
         known = _column(cell, options)
         said = None if known else _said(text, options)
-        is_label = i > at and i < filled[-1] and (known or (at < 0 and not _is_number(cell)))
-        is_label = is_label and not (is_waiting and _tells_failure(text))
+        # What the gear did is no label, nor the joint's name next to its number.
+        is_name = i == at + 1 and text == label
+        is_again = is_name or (known is OUTCOME and known is column)
+        is_again = is_again or (is_waiting and tells_failure(text))
+        is_pair = (at < 0 and not _is_plain(text)) or not (is_below or is_waiting)
+        is_label = at < i < filled[-1] and not (is_paired or is_again) and (known or is_pair)
         if said is not None:
             yield _Entry(row, i, *said)
-        elif len(filled) == 1 and _tells_failure(text):
+        elif len(filled) == 1 and tells_failure(text):
             yield _Entry(row, i, text, text)
             return
         elif i == at or (text and is_label):
             if is_waiting:
                 yield _Entry(row, at + 1, label, None)
             at, label, column, is_waiting = i, _text(cell), known, True
-        else:
-            is_own = is_paired or (is_below and column in _MEASURED)
-            is_value = i in headings if is_read else is_waiting or (i in headings and is_own)
+        elif not is_name:
+            is_own = i in headings and (is_paired or (is_below and column in _MEASURED))
+            is_line = is_below and i in headings and _NUMBER.match(label) is not None
+            is_value = is_waiting or is_own
+            if column is CLEARANCE and headings:
+                is_value = i in headings
+            if column is TAIL_NO and i > at and i in headings:
+                # Two tails of one line are not settled by what stands first.
+                is_value = is_value or _is_tail(cell)
             is_said = says_reading(text) or (cell is not None and any(spoken(cell)))
+            is_said = is_said or (column in _READ and _is_number(cell))
             if not (is_value or _matters(cell) or is_said):
                 continue
             header = label if is_value or column is None else ""
-            heading = headings.get(i, "") if is_value and is_own and column else ""
-            yield _Entry(row, i, f"{header} {heading}".strip(), cell)
+            is_headed = is_value and ((is_own and column) or is_line)
+            words = headings.get(i, "").split() if is_headed else []
+            if column is not None and not column.is_length:
+                words = [word for word in words if word.strip("()[]") not in UNIT_SPELLINGS]
+            yield _Entry(row, i, " ".join(filter(None, [header, *words])), cell)
             is_waiting = False
     if is_waiting and column:
         yield _Entry(row, at + 1, label, None)
+
+
+def _are_of_columns(
+    at: int,
+    column: Column | None,
+    cells: Cells,
+    headings: Mapping[int, str],
+    options: ReadOptions,
+) -> bool:
+    """Whether a line says of each column of readings something of its own, and nothing else."""
+    # The label may stand again in front of each.
+    own = (None, cells[at])
+    behind = {i: cells[i] for i in range(at + 1, len(cells)) if cells[i] not in own}
+    return (
+        len({*behind.values()}) > 1
+        and headings.keys() >= behind.keys()
+        and {_column(cell, options) for cell in behind.values()} <= {None, column}
+        and (column is not TAIL_NO or all(map(_is_tail, behind.values())))
+    )
+
+
+def _is_tail(cell: Cell) -> bool:
+    """Whether a cell may be a tail, not the label of what stands behind it."""
+    return re.search(r"[\d-]", show(cell)) is not None
+
+
+def _is_plain(text: str) -> bool:
+    """Whether a text is empty, or a number and its unit."""
+    return not text or not math.isnan(written_number(text, decimal_comma=True)[0])
 
 
 def _said(text: str, options: ReadOptions) -> tuple[str, str] | None:
@@ -704,7 +769,7 @@ def _is_fraction(cell: Cell) -> bool:
 def _matters(cell: Cell) -> bool:
     """Whether a cell may be a reading, or what the gear did, whatever stands next to it."""
     return cell is not None and (
-        _is_fraction(cell) or may_be_outcome(cell, asked=False) or _tells_failure(show(cell))
+        _is_fraction(cell) or may_be_outcome(cell, asked=False) or tells_failure(show(cell))
     )
 
 
@@ -894,11 +959,11 @@ def _read_one(
     out = Collected()
     below: Header | None = None
     form = header if isinstance(header, Form) else None
-    side = None
     first = list(islice(rows, _LOOKED_AT))
-    said = placed = ""
+    filled = first if form is None else [(header.row + 1, form.as_row.cells)]
+    options, side, said = _sides(sheet.name, header, filled, options, file)
+    placed = ""
     if form is None:
-        options, side, said = _sides(sheet.name, header, first, options, file)
         placed = f"the header is in row {' and '.join(map(str, header.rows_used))}"
         if sheet.delimiter is None:
             wide = max((len(cells) for number, cells in first if number > header.row), default=0)
@@ -929,32 +994,17 @@ def _read_one(
             table.take(number, cells)
     if form is not None:
         out.rows += map(table.reader.read, table.by_visits(form.as_row))
-    about = "; ".join(table.finish())
+        titles += [cell for _, cells in rows for cell in cells if isinstance(cell, str)]
+    about = "; ".join(table.finish(titles))
     read, carried, left = columns.notes()
     read = "; ".join(filter(None, (placed * (header.row > 1), read, said)))
-    against = _against_title(titles, options.convention)
-    out.notes += filter(None, (against, read, carried, about))
+    out.notes += filter(None, (read, carried, about))
     out.notes += left
     out.unread += left
     kind = "long" if columns.is_long else "wide" if form is None else "form"
     kind = "visits" if len(columns.visits) > 1 else kind
     out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, width, columns.placed))
     return out, below, rows
-
-
-def _against_title(titles: Sequence[str], declared: ClearanceConvention | None) -> str:
-    """Say that a title above the header names another convention than the one declared."""
-    if declared is None:
-        return ""
-    for title in titles:
-        words = tidy(title).replace("_", " ")
-        named = [c for c in ClearanceConvention if c.value.lower().replace("_", " ") in words]
-        if named and all(c.per_radial != declared.per_radial for c in named):
-            return (
-                f"above the header stands {quote(title, 60)!r}, but rows that state no convention"
-                f" are read as {declared}, as declared: one of the two is wrong"
-            )
-    return ""
 
 
 def _sides(
@@ -1003,12 +1053,13 @@ _NO_INSPECTION = re.compile(
       |no\ further)(?![^\s:.,'\u2019_/(\-])""",
     re.VERBOSE | re.IGNORECASE,
 )
+_NOTE = re.compile(r"\D+\s\D+\s\D+")
 _RULE = re.compile(r"[-=_*.\s]{3,}")
 # Both outcomes next to each other: a legend.
 _LEGEND = re.compile(r"\bretracted(?: \w{1,3})? failed\b|\bfailed(?: (?!not )\w{1,3})? retracted\b")
 
 
-def _tells_failure(text: str) -> bool:
+def tells_failure(text: str) -> bool:
     """Whether a line outside the table says that a gear failed."""
     return says_failed(text) and _LEGEND.search(in_words(text)) is None
 
@@ -1076,7 +1127,7 @@ class _Table:
         others = [cell for cell in cells if not isinstance(cell, str) or not fields[cell]]
         is_of_gear = any(map(Side.spelt, texts)) and any(map(_is_fraction, cells))
         is_number = is_told and any(map(_is_number, others))
-        is_said = any(_tells_failure(text) or says_reading(text) for text in texts)
+        is_said = any(tells_failure(text) or says_reading(text) for text in texts)
         if is_number or is_of_gear or is_said:
             why = FileRefusedError(
                 "row_above",
@@ -1202,7 +1253,9 @@ class _Table:
         if not any(filled.isdisjoint(kind) for kind in telling) and not _RULE.fullmatch(first):
             return ""
         texts = {i: cell for i in filled if isinstance(cell := cells[i], str)}
-        if len(texts) == len(filled) and all(map(_RULE.fullmatch, texts.values())):
+        # Words in the first cell alone are a note.
+        is_note = {*texts} == filled == {0} and _NOTE.fullmatch(first) is not None
+        if is_note or (len(texts) == len(filled) and all(map(_RULE.fullmatch, texts.values()))):
             return first
         named = {min(filled): RECORD_ID}
         if not filled.isdisjoint(self._evidence):
@@ -1233,7 +1286,7 @@ class _Table:
             texts = [*filter(None, map(show, cells))]
             if says_reading(" ".join(texts)):
                 alarms.append("a joint and a number in words")
-            if not worst.get(Outcome.FAILED) and any(map(_tells_failure, texts)):
+            if not worst.get(Outcome.FAILED) and any(map(tells_failure, texts)):
                 alarms.append("a failure in words")
             if alarms:
                 what = f"{quote(name, 40)!r}, set aside although it holds {', '.join(alarms)}"
@@ -1268,9 +1321,9 @@ class _Table:
         if known.outcome is Outcome.FAILED:
             yield Outcome.FAILED, 1.0
 
-    def finish(self) -> list[str]:
+    def finish(self, titles: Sequence[str]) -> list[str]:
         """Read what could be read only with all rows at hand, and say what stood between the
-        inspections and how some cells were read.
+        inspections and how some cells were read; titles: the texts that are of all rows.
         """
         found = self._out.rows
         if self._folder is not None:
@@ -1279,6 +1332,8 @@ class _Table:
         dates = self.reader.settle_dates(found)
         if self._aside:
             self._judge_aside()
+        below = [cell for *_, cells in self._aside for cell in cells if isinstance(cell, str)]
+        self.reader.settle_conventions(found, [*titles, *below])
         sheet = self._sheet
         words = self.reader.not_measured
         named = [f"row {number} {quote(name, 40)!r}" for number, name, _ in self._aside]

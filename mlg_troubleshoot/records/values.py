@@ -193,7 +193,8 @@ _BLANK_WORDS = (
 )
 NOT_MEASURED = frozenset(_BLANK_WORDS.split("|"))
 # What they write for a tail that they do not know; NA and NONE may be tails.
-_NO_NAME = frozenset(("n/a", "n.a.", "unknown", "not known", "tbd", "tba"))
+_NO_NAME_WORDS = "n/a|n.a.|unknown|not known|tbd|tba|ditto|do.|do|idem|id.|same|as above"
+_NO_NAME = frozenset(_NO_NAME_WORDS.split("|"))
 
 
 def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
@@ -436,12 +437,13 @@ def _yes_no(cell: Filled) -> bool | None:
 
 
 _OUTCOME_WORDS = {
-    **_each("retracted|retracts|ok|okay|pass|passed|good|normal", Outcome.RETRACTED),
+    **_each("retracted|retracts|ok|okay|pass|passed|good|normal|satisfactory", Outcome.RETRACTED),
     **_each(
         "failed|fail|fails|failure|failed to retract|did not retract|not retracted|ng|nok|not ok"
         "|nicht ok|nio|nicht in ordnung|u s|unserviceable|defekt|ausfall|did not lock"
-        "|did not lock up|no good|reject|rejected|stuck|jammed|hung|hung up|unretracted"
-        "|no retraction|kaputt|nicht eingefahren|échec|échoué|fallo|falló|fallito|mislukt",
+        "|did not lock up|no good|unsatisfactory|reject|rejected|stuck|jammed|hung|hung up"
+        "|failed retraction|unretracted|no retraction|kaputt|nicht eingefahren|échec|échoué"
+        "|fallo|falló|fallito|mislukt",
         Outcome.FAILED,
     ),
 }
@@ -510,12 +512,14 @@ def written_number(cell: Filled, *, decimal_comma: bool) -> tuple[float, LengthU
         return math.nan, None
 
 
+_CONVENTION_SAID = re.compile(r"\b(?:(radial)|(diametral|diametric)(?:al)?|(total play))(?:ly)?\b")
+
+
 def convention_word(text: str) -> ClearanceConvention | None:
-    """The convention that a text names, wherever it stands."""
-    try:
-        return ClearanceConvention.parse(plain_text(text))
-    except UsageError:
-        return None
+    """The convention that a text names, wherever it stands; None where it names several."""
+    said = {match.lastindex or 0 for match in _CONVENTION_SAID.finditer(in_words(text))}
+    is_clear = said == {1} or (said and 1 not in said)
+    return [*ClearanceConvention][min(said) - 1] if is_clear else None
 
 
 # Questions about the gear, by words of a header.
@@ -530,7 +534,11 @@ def _read_outcome(cell: Filled, header: str) -> Outcome:
     `Failed?`).
     """
     if isinstance(cell, str):
-        found = None if "?" in cell else _OUTCOME_WORDS.get(in_words(cell))
+        words = "?" if "?" in cell else in_words(cell)
+        found = _OUTCOME_WORDS.get(words)
+        # A sentence that says both is not taken for either.
+        if found is None and says_failed(words) and not re.search(r"(?<!not )retracted", words):
+            found = Outcome.FAILED
         if found is not None:
             return found
     question = in_words(header)

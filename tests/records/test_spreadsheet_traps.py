@@ -236,14 +236,6 @@ def test_12_an_unknown_header_of_two_rows_is_an_error_and_its_second_row_no_insp
     assert not result.rows
 
 
-@pytest.mark.parametrize(("declared", "notes"), [("TOTAL_PLAY", 1), ("RADIAL", 0)])
-def test_14_a_title_that_names_another_convention_is_said(read, xlsx, declared, notes):
-    header = [*HEADER[:3], *HEADER[4:]]
-    rows = [["Clearances, radial"], header, [*GOOD[:3], *GOOD[4:]]]
-    result = read(xlsx(rows), "t.xlsx", convention=declared)
-    assert sum("'Clearances, radial'" in note for note in result.notes) == notes
-
-
 def test_12_a_row_of_units_below_the_header_is_read(read, xlsx):
     rows = [
         ["record_id", "tail_no", "side", "clearance_convention", "Joint 3", "Joint 5"],
