@@ -162,7 +162,9 @@ def states(visits: Sequence[GearVisit], gear: Gear) -> list[GearState]:
             undated = same
         else:
             found |= {n: known.at(visits[n]) for n in same}
-            known.find(v for v in together if v.place == inf)
+            others = [v for v in together if v.place == inf]
+            known.read(others)
+            known.find(others)
     found |= {n: known.at(visits[n]) for n in undated}
     return [found[n] for n in range(len(visits))]
 
@@ -264,7 +266,7 @@ class _Known:
         self._typed = sorted(visit.place for visit in visits if visit.typed)
 
     def add(
-        self, day: date | None, visits: Iterable[GearVisit], found: Iterable[GearVisit]
+        self, day: date | None, visits: Iterable[GearVisit], found: Sequence[GearVisit]
     ) -> None:
         """Add the repairs of all visits of a day, and what was found at some; let go what they
         replace at every visit that follows.
@@ -272,26 +274,39 @@ class _Known:
         self.failed = [e for e in self.failed if not self.is_settled(e)]
         for visit in visits:
             self.repair(visit)
+        self.read(found)
         self.find(found)
 
         def is_sure(event: _Event) -> bool:
             # Of what was typed on one day the order of entry decides.
             return not event.visit.typed or surely_later(day, event.visit.at)
 
-        def last(events: Iterable[_Event]) -> list[_Event]:
-            return _last(self._worst(day, events), is_sure)
+        def last(events: list[_Event]) -> list[_Event]:
+            return events if len(events) < 2 else _last(self._worst(day, events), is_sure)
 
         self.retracted = last(self.retracted)
         self.settled = _last(
             [*self.settled, *_followed(self.repairs.get(_ANY, ()), self.retracted, is_sure)]
         )
-        failed = [*self._worst(day, self.failed)]
-        ends = _last(failed, is_sure), _last(failed, is_sure, first=True)
-        # The first failure says since when the rigging counts as looked at, the last one what has
-        # to be repaired.
-        at_ends = {id(e) for each in ends for e in each}
-        self.failed = [e for e in failed if id(e) in at_ends]
-        self.readings = {joint: last(events) for joint, events in self.readings.items()}
+        if len(self.failed) > 1:
+            failed = self._worst(day, self.failed)
+            ends = _last(failed, is_sure), _last(failed, is_sure, first=True)
+            # The first failure says since when the rigging counts as looked at, the last one what
+            # has to be repaired.
+            at_ends = {id(e) for each in ends for e in each}
+            self.failed = [e for e in failed if id(e) in at_ends]
+        # A later repair at the row of a reading does not hide one of another row.
+        self.readings = {
+            joint: [
+                read
+                for read in last(events)
+                if not any(
+                    is_sure(r) and _is_later(r, read)
+                    for r in _of_others(self.repairs.get(joint, ()), read)
+                )
+            ]
+            for joint, events in self.readings.items()
+        }
         self.repairs = {joint: last(events) for joint, events in self.repairs.items()}
         self.plunger = last(self.plunger)
         self.checked = last(self.checked)
@@ -304,14 +319,19 @@ class _Known:
         for what in (_ANY, *row.restored_joints, *[_RIGGING] * is_rigging):
             self.repairs.setdefault(what, []).append(_repair_of(visit))
 
-    def find(self, visits: Iterable[GearVisit]) -> None:
-        """Add what was found at some visits."""
+    def read(self, visits: Iterable[GearVisit]) -> None:
+        """Add the readings of joints at some visits."""
         for visit in visits:
             row = visit.inspection
             for joint, value in row.clearance_in.items():
                 left = (row.repair_date,) if joint in row.restored_joints else ()
                 read = _Event(visit, visit.at, value, left)
                 self.readings.setdefault(joint, []).append(read)
+
+    def find(self, visits: Iterable[GearVisit]) -> None:
+        """Add what else was found at some visits."""
+        for visit in visits:
+            row = visit.inspection
             if row.readings_in:
                 self.plunger.append(_plunger_of(visit))
             if row.outcome is not None:
@@ -349,6 +369,18 @@ class _Known:
         return _AsOf(self, visit, now=now).state()
 
 
+def _of_others(repairs: Iterable[_Event], read: _Event) -> list[_Event]:
+    """Repairs of a joint but that after which it was read: a row tells of a joint how it was left,
+    and the next one may state the same repair.
+    """
+    return [
+        r
+        for r in repairs
+        if r.visit is not read.visit
+        if r.visit.typed or r.at is None or r.at not in read.left
+    ]
+
+
 def _always(_event: _Event) -> bool:
     return True
 
@@ -360,21 +392,16 @@ def _last(
     first: bool = False,
 ) -> list[_Event]:
     """Events than which no other one that is sure is surely later; `first`: earlier."""
-    if len(events) < 2:
-        return [*events]
+    later = _surely_earlier if first else surely_later
+    ends: list[date] = []
+    for moment in {e.at for e in events if e.at is not None and is_sure(e)}:
+        if not any(later(end, moment) for end in ends):
+            ends = [moment, *(end for end in ends if not later(moment, end))]
+    return [e for e in events if not any(later(end, e.at) for end in ends)]
 
-    def replaces(one: _Event, other: _Event) -> bool:
-        return surely_later(other.at, one.at) if first else surely_later(one.at, other.at)
 
-    ends: list[_Event] = []
-    for event in events:
-        if event.at is None or not is_sure(event) or any(replaces(end, event) for end in ends):
-            continue
-        ends = [end for end in ends if not replaces(event, end)]
-        # One of each moment says as much as all of them.
-        if all(end.at != event.at for end in ends):
-            ends.append(event)
-    return [e for e in events if not any(replaces(end, e) for end in ends)]
+def _surely_earlier(one: date | None, other: date | None) -> bool:
+    return surely_later(other, one)
 
 
 def _followed(
@@ -456,18 +483,9 @@ class _AsOf:
         return [r for r in self._of(joint, event) if _is_later(r, event)]
 
     def _of(self, joint: int = _ANY, read: _Event | None = None) -> list[_Event]:
-        """Repairs, of one joint or any; not those after which it was `read`: a row tells of a joint
-        how it was left, and the next one may state the same repair.
-        """
+        """Repairs, of one joint or any; not those after which it was `read`."""
         repairs = self._repairs.get(joint, [])
-        if joint == _ANY or read is None or not read.left:
-            return repairs
-        return [
-            r
-            for r in repairs
-            if r.visit is not read.visit
-            if r.visit.typed or r.at is None or r.at not in read.left
-        ]
+        return repairs if joint == _ANY or read is None else _of_others(repairs, read)
 
     def _counts_for(self, event: _Event, joint: int = _ANY) -> bool:
         """Whether something may count in favour of the gear: it is surely older than the visit,
@@ -490,7 +508,7 @@ class _AsOf:
             limit = self._gear.joint(joint)
             standing = [
                 e
-                for e in _newest(self._counting(events, self._own.readings.get(joint, ())))
+                for e in _newest(self._counting(events, filter(self._is_own, events)))
                 if not self._later(e, joint)
                 and (limit.is_over_limit(e.value) or self._counts_for(e, joint))
             ]
