@@ -210,7 +210,7 @@ class _KnownContents:
         return known or (self._mostly(told, stand) if is_made_for_row(name) else None)
 
     def _mostly(self, told: Told, stand: Collection[str]) -> Told | None:
-        """What says most of the same readings of that day."""
+        """What has half or more of the same readings on that day."""
         cells = told.cells
         alike: Counter[str] = Counter()
         for cell in cells:
