@@ -167,8 +167,8 @@ def commands_table() -> str:
 USERS = {
     "administrator": {"seldom": "--store; history verify --report", "weekly": "--expect; --quiet"},
     "analyst": {
-        "seldom": "--approve; --causes; --design; --seed; --size; --workers"
-        "; --write-table; diagnose --why",
+        "seldom": "--approve; --causes; --design; --figure; --seed; --size; --workers"
+        "; --write-table; diagnose --why; study --csv",
         "weekly": "--extension; --json; --write-extension",
     },
     "fleet engineer": {

@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -44,6 +45,10 @@ class StudyFlags:
         int | None,
         typer.Option(min=1, help="Cores for the total order of lhs; all if not given."),
     ] = None
+    csv: Annotated[Path | None, typer.Option(metavar="OUT.csv", help="One line per joint.")] = None
+    figure: Annotated[
+        Path | None, typer.Option(metavar="OUT.svg", help="A picture of the indices of all joints.")
+    ] = None
     write_table: Annotated[
         bool,
         typer.Option(
@@ -66,7 +71,8 @@ def study(flags: StudyFlags) -> None:
     table = gear.indices_file if flags.write_table else None
     # The table may be written again, unless it is the gear file that is named so.
     kept = {*gear.files} - ({gear.indices_file} - {gear.path})
-    claim(None, kept, [("--write-table", table)], force=flags.force)
+    outputs = [("--csv", flags.csv), ("--figure", flags.figure), ("--write-table", table)]
+    claim(None, kept, outputs, force=flags.force)
     design = options.one_of(StudyDesign, flags.design.lower(), "--design")
     n1, n2, iterations = _size(flags.size)
     with ExitStack() as processes, stages(quiet=False) as progress:
@@ -85,6 +91,10 @@ def study(flags: StudyFlags) -> None:
     else:
         rows = [*zip(gear.joints, findings.table.joints, strict=True)]
         output.show_page("study", output.console(), f=findings, rows=rows)
+    if flags.csv is not None:
+        task.write_study_csv(findings, flags.csv)
+    if flags.figure is not None:
+        findings.plot().save(flags.figure)
     if table is not None:
         task.write_study_table(findings)
         output.say(f"Table written: {table}")

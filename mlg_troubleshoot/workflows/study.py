@@ -6,13 +6,14 @@ What computes is imported where it is needed: a check must not wait for scipy.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import write_index_table
+from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.parallel import StageProgress
 
 if TYPE_CHECKING:
@@ -60,3 +61,15 @@ def write_study_table(findings: StudyFindings) -> None:
     """Write the table of indices that goes with the gear; another one is refused."""
     refuse_other_tables(findings.options)
     write_index_table(findings.table, findings.gear.indices_file)
+
+
+def write_study_csv(findings: StudyFindings, path: Path) -> None:
+    """Write one line per joint; of an interval both ends."""
+    lines = []
+    for joint in findings.to_dict()["joints"]:
+        line: dict[str, Any] = {}
+        for name, value in joint.items():
+            ends = {f"{name}_low": 0, f"{name}_high": 1} if isinstance(value, list) else {}
+            line |= {end: value[place] for end, place in ends.items()} or {name: value}
+        lines.append(line)
+    write_csv(path, [*lines[0]], [[*line.values()] for line in lines])

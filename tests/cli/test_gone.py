@@ -6,7 +6,9 @@ import csv
 import fnmatch
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 from typer.main import get_command
@@ -67,16 +69,28 @@ def test_a_command_has_no_more_options_than_its_budget(name: str) -> None:
     assert len([*options_of(found.get_command(None, name))]) <= BUDGET[name]
 
 
-def test_it_has_eight_options() -> None:
-    assert len(get_command(app).params) == 8
+def test_it_has_ten_options() -> None:
+    assert len(get_command(app).params) == 10
 
 
-def test_screen_and_json_give_the_same_indices(monkeypatch) -> None:
+def test_the_figure_is_an_svg_with_every_joint(tmp_path: Path) -> None:
+    file = tmp_path / "study.svg"
+    assert mlg("study", "--figure", file).code == 0
+    texts = [each.text for each in ET.parse(file).iter() if each.tag.endswith("text")]
+    assert {f"#{joint}" for joint in range(1, 11)} <= set(texts)
+
+
+def test_screen_json_and_csv_give_the_same_indices(tmp_path, monkeypatch):
     # To compile takes longer than so small a study.
     monkeypatch.setattr("mlg_troubleshoot.paper.study.numba_is_installed", lambda: False)
+    file = tmp_path / "study.csv"
     small = ("study", "--design", "lhs", "--size", "10,50,2", "--workers", "1")
-    shown = mlg(*small).out
-    for joint in mlg(*small, "--json").json["joints"]:
+    found = mlg(*small, "--json").json["joints"]
+    shown = mlg(*small, "--csv", file).out
+    with file.open(encoding="utf-8-sig", newline="") as text:
+        rows = list(csv.DictReader(text))
+    for joint, row in zip(found, rows, strict=True):
+        assert float(row["first_order"]) == pytest.approx(joint["first_order"], rel=1e-5)
         assert f"{joint['first_order']:.4f}".replace("-", MINUS) in shown
 
 

@@ -12,6 +12,8 @@ from pathlib import Path
 from tests.fuzz.case import Case
 from tests.fuzz.desk import STORE, Desk
 
+SMALL = ["study", "--design", "lhs", "--size", "2,20,1"]
+
 
 @dataclass(frozen=True)
 class Output:
@@ -68,6 +70,7 @@ OUTPUTS = (
     Output(["fleet", "--no-forecast", "-q", "--report"], (), "", folder=True, takes_a_store=True),
     Output(["template"], (), ""),
     Output(["diagnose", "far.csv", "-q", "--write-extension"], ("far.csv",), rare=True),
+    Output([*SMALL, "--csv"], (), "", rare=True),
 )
 FOREIGN = (
     *("mine.txt", "other.sqlite", "in.xlsx", "in.csv", "far.csv", "old-marked.xlsx"),
