@@ -215,7 +215,7 @@ TAIL_NO = Column(
     expected="a tail number (text)",
     spellings=(
         "aircraft|aircraft no|aircraft number|aircraft reg|reg|reg no|registration no|tail"
-        "|tail number|tail nr|tail #|a c reg|a c registration|a c tail no|aircraft tail"
+        "|tail number|tail nr|tail #|a c|a c reg|a c registration|a c tail no|aircraft tail"
         "|aircraft tail no|aircraft registration|registration"
     ),
     words="tail",

@@ -154,7 +154,7 @@ def _phrases(text: str) -> re.Pattern[str]:
     return re.compile(rf"\b(?:{text})\b")
 
 
-_LEFT = _phrases("as[ -]?left|after(?: (?:repair|work|overhaul|restoration))?|nachher")
+_LEFT = _phrases("as[ -]?left|after(?: (?:repair|work|rework|overhaul|restoration))?|nachher")
 _READING = _phrases(
     "(?:as[ -])?found(?: today| now)?|actual|today|now|current(?:ly)?|(?:as )?measured"
     "|measurements?|readings?|before(?: (?:repair|work))?|ist|istwert|gefunden|gemessen|heute"

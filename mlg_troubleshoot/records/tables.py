@@ -29,6 +29,7 @@ from mlg_troubleshoot.decision.columns import (
     TAIL_NO,
     UNIT,
     Column,
+    Holds,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
 from mlg_troubleshoot.errors import Problem
@@ -451,8 +452,8 @@ class Columns:
                 (seen[key],) = plain
                 other = placed if plain[0] is first else first
                 other.field = None
-            elif field.column.carried:
-                # A second column of remarks is a column of its own.
+            elif field.column.holds is Holds.TEXT and not field.column.bears_verdict:
+                # A second column of remarks, or of who signed, is a column of its own.
                 placed.field = None
             else:
                 first.refused = True

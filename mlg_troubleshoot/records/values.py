@@ -13,7 +13,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, TypeVar
 
-from mlg_troubleshoot.decision.columns import OUTCOME, Column, Holds
+from mlg_troubleshoot.decision.columns import CONVENTION, OUTCOME, Column, Holds
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.records.cells import (
@@ -411,6 +411,8 @@ def _read_choice(column: Column, cell: Filled) -> StrEnum:
     name = re.sub(r"[\s\-]+", "_", text).casefold()
     alike = {word.casefold(): choice for word, choice in choices.items()}
     found = alike.get(name) or (column.spelt(text) if column.spelt is not None else None)
+    if column is CONVENTION:
+        found = found or convention_word(text)
     if found is not None:
         return found
     if isinstance(cell, OddCell):
@@ -470,7 +472,10 @@ def says_failed(text: str) -> bool:
 
 # Words of a reading that somebody wrote outside its column; a day is not one.
 _JOINT_SAID = re.compile(r"\b(?:joints?|jt|plunger|clearance|gelenk)\b|#\s*\d", re.IGNORECASE)
-_FRACTION = re.compile(r"(?<![\d.,/\-])\d{0,3}[.,]\d+(?![\d.,/\-])|\d\s*(?:thou|mm)\b")
+_FRACTION = re.compile(
+    r"(?<!unit: )(?<!units: )(?<![\d.,/\-])\d{0,3}[.,]\d+(?![\d.,/\-])|\d\s*(?:thou|mm)\b",
+    re.IGNORECASE,
+)
 
 
 def says_reading(text: str) -> bool:

@@ -56,6 +56,14 @@ def test_a_pair_above_the_table_is_of_every_visit(head, column, pairs, visits):
     assert found.problems == ()
 
 
+def test_who_signed_and_a_convention_in_words_leave_a_form_readable():
+    lines = ["A/C,N801HK", "Side,LH", "Convention,Total play (dial indicator)", "Joint,Found (in)"]
+    found = read([*lines, *JOINTS, "Measured by,J. Smith,Inspected by,A. Lee"])
+    (row,) = found.inspections
+    assert (row.tail_no, row.clearance_in[1]) == ("N801HK", 0.0006)
+    assert found.problems == ()
+
+
 def test_two_tails_of_one_line_above_the_table_are_not_settled():
     found = read(form("Aircraft,N801HK,N802HK", head="Joint,LH (in),RH (in)", joints=["1,0.1,0.1"]))
     assert not found.inspections
@@ -87,6 +95,7 @@ def test_letters_that_two_lines_share_are_not_proposed():
 @pytest.mark.parametrize(
     "lines",
     [
+        ["All joints: radial. Unit: 0.001 in", WIDE, "N1,LH,2026-03-14,0.0012,0.0011,0.013"],
         ["Clearance type: radial", WIDE, "N1,LH,2026-03-14,0.0012,0.0011,0.013"],
         [WIDE, "N1,LH,2026-03-14,0.0012,0.0011,0.013", "Note: readings are radial offsets,,,,,"],
         [f"{WIDE},Remarks", "N1,LH,2026-03-14,0.0012,0.0011,0.013,radial offset of the pin"],
