@@ -93,19 +93,19 @@ def by_prompt(gear: Gear, value: str, margin: str, convention: Convention) -> Fo
     head = {"tail_no": "N1", "side": "LH", "unit": "in", "clearance_convention": convention.value}
     entry = Entry.new(gear, head)
     refused = []
-    warned = ""
+    warned = False
     for name, text in (("clearance_3", value), ("margin", margin)):
         try:
-            _, said = entry.judge(gear, name, text)
+            said = entry.judge(gear, name, text).warnings
         except UsageError as error:
             refused.append(words(error))
             continue
-        warned = warned or said
+        warned = warned or (name == "clearance_3" and bool(said))
         entry.give(name, f"{text} in" if text[-1:].isdigit() or text[-1:] == "." else text)
     if refused:
         return Found(refused=" ".join(refused))
     row = entry.inspection(gear)
-    assert bool(warned) == bool(row.warnings)
+    assert warned == bool(row.warnings)
     return Found(row.clearance_in[3], row.margin_in, row.warnings)
 
 
