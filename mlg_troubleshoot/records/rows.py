@@ -999,6 +999,11 @@ class RowReader:
             found.values[SIDE] = side
         if row.visit.day:
             found.values[DATE] = self._day_of(row.visit.day)
+        if row.visit.is_left:
+            found.warnings.append(
+                "as left is of the day of as found: until a later reading says more, the worse of"
+                " both counts"
+            )
 
     def _read_day_of_visit(self, text: str) -> date | None:
         """The day of a visit, as the heading of its readings says it."""

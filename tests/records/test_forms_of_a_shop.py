@@ -75,6 +75,7 @@ def test_what_was_found_and_what_was_left_keep_their_outcomes():
     found = read(form(*top, head="Joint,As found (in),As left (in)", joints=lines))
     said = [(row.outcome, row.readings_in) for row in found.inspections]
     assert said == [("FAILED", (0.046,)), ("RETRACTED", (0.006,))]
+    assert ["worse of both" in " ".join(row.warnings) for row in found.inspections] == [False, True]
 
 
 @pytest.mark.parametrize("line", ["3 (recheck),26", "3a,26", "10 / 9,13"])
