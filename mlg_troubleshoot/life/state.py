@@ -162,9 +162,7 @@ def states(visits: Sequence[GearVisit], gear: Gear) -> list[GearState]:
             undated = same
         else:
             found |= {n: known.at(visits[n]) for n in same}
-            others = [v for v in together if v.place == inf]
-            known.read(others)
-            known.find(others)
+            known.note((), [v for v in together if v.place == inf])
     found |= {n: known.at(visits[n]) for n in undated}
     return [found[n] for n in range(len(visits))]
 
@@ -186,6 +184,10 @@ def state_now(visits: Sequence[GearVisit], gear: Gear) -> GearState | None:
     if not found:
         return None
     known = _Known(gear, visits)
+    if any(visit.typed for visit in visits):
+        # Where the order of entry decides as well, a later day alone replaces nothing.
+        known.note(visits, visits)
+        return known.at(found[-1], now=True)
     for day, same in _by_day(visits):
         together = [visits[n] for n in same]
         known.add(day, together, together)
@@ -272,10 +274,7 @@ class _Known:
         replace at every visit that follows.
         """
         self.failed = [e for e in self.failed if not self.is_settled(e)]
-        for visit in visits:
-            self.repair(visit)
-        self.read(found)
-        self.find(found)
+        self.note(visits, found)
 
         def is_sure(event: _Event) -> bool:
             # Of what was typed on one day the order of entry decides.
@@ -295,21 +294,22 @@ class _Known:
             # has to be repaired.
             at_ends = {id(e) for each in ends for e in each}
             self.failed = [e for e in failed if id(e) in at_ends]
-        # A later repair at the row of a reading does not hide one of another row.
-        self.readings = {
-            joint: [
-                read
-                for read in last(events)
-                if not any(
-                    is_sure(r) and _is_later(r, read)
-                    for r in _of_others(self.repairs.get(joint, ()), read)
-                )
-            ]
-            for joint, events in self.readings.items()
-        }
-        self.repairs = {joint: last(events) for joint, events in self.repairs.items()}
+        self.readings = {joint: last(events) for joint, events in self.readings.items()}
+        for joint, events in self.repairs.items():
+            both = {id(e): e for each in (events, events[::-1]) for e in self._worst(day, each)}
+            newest = _last(both.values(), is_sure)
+            others = both.keys() - {id(e) for e in newest}
+            # Of a reading at the row of the newest repair the one before it decides.
+            self.repairs[joint] = newest + _last([both[n] for n in others], is_sure)
         self.plunger = last(self.plunger)
         self.checked = last(self.checked)
+
+    def note(self, visits: Iterable[GearVisit], found: Sequence[GearVisit]) -> None:
+        """Add the repairs of all visits, and what was found at some."""
+        for visit in visits:
+            self.repair(visit)
+        self.read(found)
+        self.find(found)
 
     def repair(self, visit: GearVisit) -> None:
         row = visit.inspection
@@ -367,18 +367,6 @@ class _Known:
 
     def at(self, visit: GearVisit, *, now: bool = False) -> GearState:
         return _AsOf(self, visit, now=now).state()
-
-
-def _of_others(repairs: Iterable[_Event], read: _Event) -> list[_Event]:
-    """Repairs of a joint but that after which it was read: a row tells of a joint how it was left,
-    and the next one may state the same repair.
-    """
-    return [
-        r
-        for r in repairs
-        if r.visit is not read.visit
-        if r.visit.typed or r.at is None or r.at not in read.left
-    ]
 
 
 def _always(_event: _Event) -> bool:
@@ -483,9 +471,13 @@ class _AsOf:
         return [r for r in self._of(joint, event) if _is_later(r, event)]
 
     def _of(self, joint: int = _ANY, read: _Event | None = None) -> list[_Event]:
-        """Repairs, of one joint or any; not those after which it was `read`."""
+        """Repairs, of one joint or any; not that after which it was `read`: a row tells of a joint
+        how it was left.
+        """
         repairs = self._repairs.get(joint, [])
-        return repairs if joint == _ANY or read is None else _of_others(repairs, read)
+        if joint == _ANY or read is None:
+            return repairs
+        return [r for r in repairs if r.visit is not read.visit]
 
     def _counts_for(self, event: _Event, joint: int = _ANY) -> bool:
         """Whether something may count in favour of the gear: it is surely older than the visit,
