@@ -77,7 +77,7 @@ def fleet(
     for line in found.lines:
         if line.suggestion and not shown.quiet:
             output.say(f"Note: {line.suggestion}")
-    entered_in = shown.unit(*(line.unit for line in everything.lines))
+    entered_in = history.unit_of(everything, records.kept, shown)
     if shown.as_json:
         output.write_json(found)
     elif found.lines:

@@ -81,8 +81,7 @@ def show(
         if shown.as_json:
             output.write_json(everything)
         elif everything.lines:
-            unit = shown.unit(*(line.unit for line in everything.lines))
-            show_gears(everything, unit, ahead=False)
+            show_gears(everything, unit_of(everything, place, shown), ahead=False)
         else:
             output.console().print(no_records(place.place))
         return
@@ -93,8 +92,7 @@ def show(
         raise UsageError(
             f"{tail} has two gears here, and JSON shows one", f"Run: mlg history {tail} LH --json"
         )
-    rows = [kept.inspection for kept in found.lives[0].inspections]
-    unit = shown.unit(*[row.unit_entered for row in rows if row.entered][-1:])
+    unit = unit_of(found, place, shown)
     for life, line in zip(found.lives, found.lines, strict=True):
         if shown.as_json:
             output.write_json(LifeAhead(life, line.ahead, known))
@@ -121,6 +119,15 @@ def write_pages(
         replace_files=shown.force,
     )
     output.say_written(written, quiet=shown.quiet)
+
+
+def unit_of(found: Lives, store: Store, shown: options.Shown) -> LengthUnit:
+    """The unit of most gears, or that of the user's last entry where no clearance says it."""
+    from mlg_troubleshoot.cli.prompts.visit import SavedEntries
+
+    usual = SavedEntries(store.place).offered().get("unit")
+    own = [LengthUnit(usual)] if usual else []
+    return shown.unit(*(line.unit for line in found.lines), *own)
 
 
 def no_records(place: str) -> str:

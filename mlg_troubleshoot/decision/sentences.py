@@ -76,11 +76,11 @@ def joints_are(joints: Sequence[int], one: str = "is", more: str = "are") -> str
     return f"{joint_list(joints)} {one if len(joints) == 1 else more}"
 
 
-def _chance(a: Assessment) -> str:
-    # No chance of a few thousand sets of directions is smaller than can be counted.
-    chance = a.probability_exceed_random_directions or 0.0
-    beyond = (a.predicted_displacement_in or 0.0) > a.margin_in
-    return "< 0.1 %" if beyond and not chance else percent(chance)
+def chance_said(chance: float | None) -> str:
+    """Write a chance with random directions: none of a few thousand sets is not never, and joints
+    may be unread.
+    """
+    return percent(chance) if chance else "< 0.1 %"
 
 
 def headline(a: Assessment, measured_in: float) -> Sentence:
@@ -106,7 +106,8 @@ def headline(a: Assessment, measured_in: float) -> Sentence:
         where = "as loaded" if a.as_loaded else "even in the worst directions"
         return Sentence.of("{}, {}: {} of {}.", head, where, worst, margin)
     what = "as loaded" if a.as_loaded else "worst case"
-    return Sentence.of("{}: {} {} of {}, chance {}.", head, what, worst, margin, _chance(a))
+    chance = chance_said(a.probability_exceed_random_directions)
+    return Sentence.of("{}: {} {} of {}, chance {}.", head, what, worst, margin, chance)
 
 
 def _worst(a: Assessment) -> Sentence:
@@ -115,7 +116,7 @@ def _worst(a: Assessment) -> Sentence:
         "Worst directions could reach {}{}, chance {}.",
         Length(a.predicted_displacement_in or 0.0),
         alone,
-        _chance(a),
+        chance_said(a.probability_exceed_random_directions),
     )
 
 

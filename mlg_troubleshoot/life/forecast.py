@@ -487,6 +487,7 @@ class FleetLine:
         lines = log_of(life, gear, () if asked.joint is None else (asked.joint,))
         failed = [e.date or "no date" for e in lines if e.counts and e.kind == "FAILED"]
         row = None if life.latest is None else life.latest.inspection
+        newest_first = (each.inspection.unit_entered for each in reversed(life.inspections))
         return cls(
             *life.key,
             len(life.inspections),
@@ -507,7 +508,7 @@ class FleetLine:
                 for e in lines
                 if e.counts and e.kind == "reading" and e.joints == (asked.joint,)
             ),
-            None if life.state is None else life.state.inspection.unit_entered,
+            next(filter(None, newest_first), None),
         )
 
     def by_when(self, gear: Gear) -> str:

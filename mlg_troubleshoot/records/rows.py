@@ -967,7 +967,7 @@ class RowReader:
                     facts = str(entered), Length.brief(length), Length.brief(usual)
                     said = "joint {}: {} is {} radial, above {}: check the reading.{}"
                     check = Sentence.of(said, number, *facts, f" {slip}" if slip else "")
-                    found.warnings.append(check)
+                    found.warnings.append(check.said_in(entered.unit))
             elif of.column is PLUNGER_DISPLACEMENT:
                 found.plunger.append((length, entered.unit))
 

@@ -58,7 +58,7 @@ def test_each_verdict_has_its_words_and_its_colour(judge, read, more, headline, 
 def test_a_gear_that_its_reading_clears_states_the_chance_by_which_it_is_cleared(judge: Judge):
     found = judge({3: 0.006, 5: 0.004}, readings_in=(0.01,))
     assert found.title == "WITHIN MARGIN, MEASURED"
-    assert found.headline.endswith("in from the joints that were read, chance 0 %.")
+    assert found.headline.endswith("in from the joints that were read, chance < 0.1 %.")
     assert found.probability_exceed_random_directions == 0.0
 
 

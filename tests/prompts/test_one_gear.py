@@ -94,6 +94,22 @@ def test_a_unit_that_is_stated_by_its_word_is_offered_next(sit: Sit, typed) -> N
     assert "Readings are mm, total play (Enter: yes" in screen
 
 
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        (("r", "", "name F. Kern", "done", ""), "J. Smith"),
+        (("date yesterday", "r", "", "done", "F. Kern", ""), "J. Smith"),
+        (("r", "", "done", "F. Kern", ""), "F. Kern"),
+    ],
+)
+def test_the_name_of_a_colleague_is_of_one_gear_and_not_offered_next(sit, life, typed, offered):
+    sit(*failed("done"), "")
+    sit("N2 LH", "", *typed, "#3 8", "")
+    visits = [visit.inspection.technician_id for visit in life(tail="N2").inspections]
+    assert visits == ["F. Kern", "F. Kern"]
+    assert f"Measured by (Enter: {offered})" in sit("N3 LH", "", "r", "", "done", "", "").screen
+
+
 def test_enter_alone_does_not_confirm_an_unusual_reading(sit: Sit, life: Life) -> None:
     sit(*gear("f", "", "90", "", "9", "done"), "")
     assert life().inspections[-1].inspection.clearance_in == {3: 0.0045}
@@ -182,11 +198,13 @@ def test_a_fraction_is_refused_with_its_value(sit: Sit) -> None:
     assert "1/64 in = 15.6 thou" in sit(*gear("f", "1/64", "46", "1/64", "8", "done"), "").screen
 
 
-def test_a_reading_that_can_hardly_be_is_confirmed_or_typed_again(sit: Sit, life: Life) -> None:
+def test_a_reading_that_can_hardly_be_is_confirmed_or_typed_again(sit, life, capsys) -> None:
     screen = sit(*gear("f", "46", "85", "8.5", "<2", "y", "done"), "").screen
     assert "Is the decimal point misplaced (factor 10)? It would be 8.5 thou" in screen
     found = life().inspections[-1].inspection
     assert sorted(map(str, found.entered.values())) == ["8.5 thou", "<2 thou"]
+    sit("N2 LH", "", "f", "46", "#2 90", "y", "done", "", "", "")
+    assert "joint 2: 90 thou is 45 thou radial, above 15 thou: " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -349,6 +349,13 @@ def test_a_unit_changed_at_a_result_is_that_of_all_that_is_shown_and_typed_next(
     assert found[2].readings_in == pytest.approx((1.1 / 25.4,))
 
 
+def test_records_without_a_clearance_are_shown_in_the_unit_that_is_typed(sit, store) -> None:
+    assert "u = undo plunger +41 thou" in sit(*gear("f", "46", "done"), "p 41", "").screen
+    for command in ("history", "fleet"):
+        assert "measured +46.0 of 30.0 thou" in mlg(command, "--store", store).out
+    assert "plunger +46 thou" in mlg("history", "N1", "--store", store).out
+
+
 def test_what_only_a_table_said_of_a_gear_stands(sit: Sit, now: Now, tmp_path: Path) -> None:
     table = tmp_path / "one.csv"
     table.write_text(

@@ -256,6 +256,8 @@ def test_a_gear_measured_within_its_margin_is_said_neither_to_fail_nor_to_lack_a
     assert "None needed" in text.split("Repair sets")[1]
     assert "No set of joints" not in text
     assert "has another cause" not in text
+    assert "The verdict was measured. OUTSIDE: a plunger reading that stands is" in text
+    assert "Here:" not in text
 
 
 def test_unread_joints_are_named_where_they_keep_a_repair_from_being_sure(judge, make):

@@ -113,7 +113,7 @@ class Asker:
     # Joints that were named before their turn; the last one is asked for.
     _named: list[str] = field(default_factory=list)
     _unfinished: list[Entry] = field(default_factory=list)
-    # Unit, convention and day that were typed for the gear.
+    # Unit, convention, day and name that were typed for the gear.
     _stated: dict[str, str] = field(default_factory=dict)
     _messages: set[str] = field(default_factory=set)
     # The order of the joints with what was typed when it was planned.
@@ -143,7 +143,8 @@ class Asker:
         day = self._stated.get(DATE.name)
         keys = ["y = I did NEXT" + f" on {day}" * bool(day)] * bool(visit.todo)
         keys += ["d = details", "report"]
-        keys += [f"u = undo {visit.undoes}"] * bool(visit.undoes)
+        unit = LengthUnit(self.offered(visit)[UNIT.name])
+        keys += [f"u = undo {said_in(visit.undoes, unit)}"] * bool(visit.undoes)
         self._say("   ".join([*keys, "new", "gear", "?"]), "dim")
         while True:
             try:
@@ -172,6 +173,7 @@ class Asker:
             if word not in ("new", "y") and {*self.entry.typed} <= {*_STATED} and not self._named:
                 self._state()
             elif self.entry.typed and not (self.entry.has_findings or self._named):
+                self._state()
                 return self.entry
             else:
                 with self._interrupted():
@@ -205,6 +207,7 @@ class Asker:
         """An entry that adds to the records of a gear, or a new inspection of it."""
         cells = {TAIL_NO.name: visit.row.tail_no, SIDE.name: visit.row.side.value}
         if word == "new":
+            self._stated.pop(LAST[0], None)
             return Entry.new(self.gear, cells | self._stated)
         cells |= self.offered(visit)
         return Entry.new(self.gear, cells, [*visit.todo] if word == "y" else [])
@@ -217,9 +220,11 @@ class Asker:
         return last | self.saved.offered() | self._stated
 
     def _state(self) -> None:
-        """Let unit, convention and day of the entry stand for what is typed next for its gear."""
+        """Let unit, convention, day and name of the entry stand for what is typed next for its
+        gear.
+        """
         cells = self.entry.cells
-        self._stated |= {name: cells[name] for name in _STATED if name in cells}
+        self._stated |= {name: cells[name] for name in (*_STATED, LAST[0]) if name in cells}
 
     def _ask_all(self) -> Entry:
         """Ask what is open, then confirm what is unusual; the entry is complete."""
@@ -339,6 +344,9 @@ class Asker:
             self.entry.give(SMALL_READINGS_TRUE.name, "yes")
         else:
             self._give(name, text)
+            # A word, or a name of another day, is of this inspection.
+            if name == LAST[0] and DATE.name not in self.entry.cells:
+                self.saved.offered()[name] = self.entry.cells[name]
 
     def _answer_tail(self, typed: str) -> None:
         first, _, last = typed.rpartition(" ")

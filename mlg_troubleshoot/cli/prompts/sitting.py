@@ -28,7 +28,7 @@ from mlg_troubleshoot.decision.judge_rows import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.state import GearKey, GearState, key_of
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.units import LengthUnit, said_in
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.keep import add_typed, continued, correct, move, put_back, voids
 
@@ -159,7 +159,7 @@ class Sitting:
             self._move(here, [each for each in here.records if each.record_id in ids], key)
         elif not visit.before:
             self._place.add([voids(visit.records[-1], "taken back at the prompts")])
-        output.say(f"Undone: {visit.undoes}.")
+        output.say(f"Undone: {said_in(visit.undoes, self._unit(visit))}.")
         return self._published(*key)
 
     def _published(self, tail: str, side: Side | str) -> Visit:

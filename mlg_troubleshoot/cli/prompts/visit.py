@@ -33,7 +33,7 @@ from mlg_troubleshoot.life.folding import as_spelt, lives_of
 from mlg_troubleshoot.life.logbook import shortened, visit_lines
 from mlg_troubleshoot.life.state import GearKey, GearState, state_now
 from mlg_troubleshoot.store import Draft, Drafts, Record, Store, login
-from mlg_troubleshoot.units import LengthUnit, said_in
+from mlg_troubleshoot.units import Sentence
 from mlg_troubleshoot.workflows.check import CheckResult
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
@@ -98,8 +98,7 @@ def find_visit(
     undoes = ""
     if len(life.visits) > 1 and visits[-1].inspection.source.file is None:
         lines = shortened(visit_lines(visits[-1].inspection, gear))
-        unit = row.unit_entered or LengthUnit.INCH
-        undoes = ", ".join(said_in(line.text, unit) for line in lines)
+        undoes = Sentence.joined((line.text for line in lines), ", ")
     return Visit(tuple(each.kept for each in visits), row, judge(state), last, undoes)
 
 
@@ -135,9 +134,10 @@ class SavedEntries:
 
     def finish(self, entry: Entry) -> None:
         """Close an entry whose result was kept; the last one says what Enter offers next time. A
-        unit or convention of this entry alone is not offered.
+        unit, convention or name of this entry alone is not offered.
         """
-        usual = {name: text for name, text in self.offered().items() if name in READ_IN}
+        usual = {LAST[0]: "", **self.offered()}
+        usual.pop(LAST[1], None)
         self.save(msgspec.structs.replace(entry, cells=entry.cells | usual), complete=True)
         for draft in [each for each in self._all() if each.complete][1:]:
             self.discard(draft.id)
@@ -174,7 +174,7 @@ class SavedEntries:
         return found, damaged
 
     def offered(self) -> dict[str, str]:
-        """The user's unit and convention, name and gauge of the last entry; what is stated for all
+        """The user's unit, convention and name, gauge of the last entry; what is stated for all
         that follows is put in.
         """
         if self._last is None:

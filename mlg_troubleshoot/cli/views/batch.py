@@ -16,7 +16,7 @@ from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.output import DataConsole, print_table, word
 from mlg_troubleshoot.decision.assessment import Verdict, VerdictTone
 from mlg_troubleshoot.decision.judge_rows import Listed, latest_of_each_gear, worst_first
-from mlg_troubleshoot.decision.sentences import percent
+from mlg_troubleshoot.decision.sentences import chance_said
 from mlg_troubleshoot.errors import Problem, ProblemGroup, grouped
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -79,7 +79,7 @@ def _cells(line: Listed, screen: DataConsole) -> list[Cell]:
         word(line.record_id),
         "open" if is_open else screen.length(line.worst_in),
         screen.length(line.margin_in),
-        "-" if line.chance is None else percent(line.chance),
+        "-" if line.chance is None else chance_said(line.chance),
         line.in_brief,
     ]
 
