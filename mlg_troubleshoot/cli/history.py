@@ -123,7 +123,7 @@ def write_pages(
 
 def unit_of(found: Lives, store: Store, shown: options.Shown) -> LengthUnit:
     """The unit of most gears, or that of the user's last entry where no clearance says it."""
-    from mlg_troubleshoot.cli.prompts.visit import SavedEntries
+    from mlg_troubleshoot.cli.prompts.saved import SavedEntries
 
     usual = SavedEntries(store.place).offered().get("unit")
     own = [LengthUnit(usual)] if usual else []
@@ -168,7 +168,7 @@ def show_gears(
     ]
     console.print("The most urgent gear first.")
     _show_warnings(console, (said for line in found.lines for said in line.warnings))
-    spare = ("landings", "last seen", "failed", worst_in, "verdict", "next action")
+    spare = ("landings", "last seen", "failed", worst_in, "verdict")
     output.print_table(console, headings, rows, spare, "--json lists all of them", folded=why)
     if joint is not None:
         _show_trend(console, lines, joint)

@@ -15,7 +15,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from itertools import groupby
 from pathlib import Path
 from shutil import get_terminal_size
@@ -42,8 +42,8 @@ _PLAIN = "mlg.plain"
 _GLUE = "\ue000"
 # Between the cells of a table in a template.
 _CELL = "│"
-# Room that the last column of a table gets before other columns are left out for it, and rows that
-# are printed where all of them are listed elsewhere.
+# Room that a column that is folded gets before other columns are left out for it, and rows that are
+# printed where all of them are listed elsewhere.
 _LEAST = 27
 _LINES = 60
 # A sign and what stands for it, one for one, so that drawings and tables keep their columns.
@@ -189,7 +189,7 @@ def print_table(
     right.
 
     With `spare` a column that says nothing is left out, and on a narrow screen those of `spare`,
-    the first first; then only the last column, or the one that is named, is folded. Of many rows
+    the first first; then only the last column, and the one that is named, are folded. Of many rows
     the first are printed, and where the `others` are listed.
     """
     shown = rows[:_LINES] if others else rows
@@ -198,7 +198,7 @@ def print_table(
         for row in shown
     ]
     kept = {heading.removesuffix(">"): place for place, heading in enumerate(headings)}
-    last = folded or [*kept][-1]
+    folds = {folded, [*kept][-1]}
     wide = {
         name: max(*map(cell_len, name.split("\n")), 1, *(row[place].cell_len for row in cells))
         for name, place in kept.items()
@@ -207,7 +207,7 @@ def print_table(
         for name, place in [*kept.items()]:
             if all(row[place].plain == "-" for row in cells):
                 del kept[name]
-        foldable = max(wide[last] - _LEAST, 0)
+        foldable = sum(max(wide[name] - _LEAST, 0) for name in folds if name)
         for name in spare:
             if sum(wide[each] + 1 for each in kept) - 1 - foldable > screen.width:
                 kept.pop(name, None)
@@ -218,7 +218,7 @@ def print_table(
             name,
             justify="left" if headings[place] == name else "right",
             overflow="fold",
-            no_wrap=spare is not None and name != last,
+            no_wrap=spare is not None and name not in folds,
         )
     for row in cells:
         table.add_row(*(row[place] for place in kept.values()))
@@ -309,20 +309,15 @@ Advance = Callable[[str, int, int | None], None]
 
 @contextmanager
 def stages(*, quiet: bool) -> Iterator[Advance]:
-    """Show how far each stage of a run is."""
-    if quiet or is_plain() or not sys.stderr.isatty():
-        yield lambda _name, _done, _total: None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID
+    """Show on a terminal how far each stage of a run is."""
+    is_shown = sys.stderr.isatty() and not (quiet or is_plain())
+    screen = Console(stderr=True)
 
-    tasks: dict[str, TaskID] = {}
-    columns = "{task.description}", BarColumn(), MofNCompleteColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with screen.status("") if is_shown else nullcontext() as status:
 
         def advance(name: str, done: int, total: int | None) -> None:
-            if name not in tasks:
-                tasks[name] = bar.add_task(name, total=total)
-            bar.update(tasks[name], completed=done, total=total)
+            if status is not None:
+                status.update(f"{name} {done}" + f" of {total}" * bool(total))
 
         yield advance
 

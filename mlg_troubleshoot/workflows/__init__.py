@@ -7,5 +7,6 @@ __all__ = [
     "history",
     "keep",
     "study",
+    "visit",
     "witness",
 ]

@@ -8,7 +8,7 @@ import os
 import sys
 import zipfile
 
-from mlg_troubleshoot.cli.prompts.visit import SavedEntries
+from mlg_troubleshoot.cli.prompts.saved import SavedEntries
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.store import Draft, Drafts, Store
 from tests.fuzz.case import Case

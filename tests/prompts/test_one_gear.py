@@ -118,9 +118,10 @@ def test_enter_alone_does_not_confirm_an_unusual_reading(sit: Sit, life: Life) -
 def test_a_word_that_is_no_outcome_is_refused_with_what_is_expected_and_asked_again(
     sit: Sit,
 ) -> None:
-    screen = sit(*gear("total", "f", "", "done"), "").screen
+    screen = sit(*gear("total", "f", "", "3 27", "done"), "").screen
     refused = "'total' is not accepted: expected r (retracted), f (failed) or n (not tried). Did it"
     assert refused in " ".join(screen.split())
+    assert "Or as #3 13, unit mm." in screen
 
 
 @pytest.mark.parametrize("typed", ["plunger 41; 22", "p 0.041 in p 22", "p 41"])

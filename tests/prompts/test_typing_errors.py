@@ -16,7 +16,7 @@ import pytest
 
 from mlg_troubleshoot.cli.prompts.ask import Asker
 from mlg_troubleshoot.cli.prompts.entry import Entry
-from mlg_troubleshoot.cli.prompts.visit import SavedEntries
+from mlg_troubleshoot.cli.prompts.saved import SavedEntries
 from mlg_troubleshoot.gear.gear_file import load_gear
 from tests.prompts.scripted import ScriptedTerminal
 

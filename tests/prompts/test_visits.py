@@ -90,7 +90,7 @@ def test_enter_is_no_second_reading(sit: Sit, begun: Begun, now: Now) -> None:
     assert (found.measured_again, found.clearance_in[2]) == ((), 0.0078)
 
 
-def test_five_visits_lead_to_done_with_few_keys(sit, now, capsys):
+def test_five_visits_lead_to_done_with_few_keys(sit, now, store, capsys):
     keys = sit(*LIMIT, "").keys
     readings = sum(len(each) + 1 for each in ("46", "8", "11", "26", "6", "14"))
     for typed in (("y", "", "", "4", "4"), ("y", "12"), ("y", "r")):
@@ -104,6 +104,8 @@ def test_five_visits_lead_to_done_with_few_keys(sit, now, capsys):
     screen = sit("N1 LH", "y", "").screen
     assert "y = I did NEXT" not in screen
     assert "✗ Nothing is typed for NEXT. report writes what is to be signed." in screen
+    # On 80 columns too.
+    assert "thou Sign the repair off" in mlg("fleet", "--store", store).out
 
 
 def test_a_failure_after_the_repair_on_its_day_counts(sit, begun, life, capsys):

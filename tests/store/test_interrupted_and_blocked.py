@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sql
 
-from mlg_troubleshoot.cli.prompts.visit import SavedEntries
+from mlg_troubleshoot.cli.prompts.saved import SavedEntries
 from mlg_troubleshoot.records import rows
 from mlg_troubleshoot.store import Draft, Drafts, Store, StoreError
 from mlg_troubleshoot.store.database import _ADVISORY_LOCK

@@ -24,7 +24,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     label_of,
     split_words,
 )
-from mlg_troubleshoot.cli.prompts.visit import SavedEntries, Terminal, Visit
+from mlg_troubleshoot.cli.prompts.saved import SavedEntries, Terminal
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,
@@ -43,6 +43,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, Sentence, said_in
 from mlg_troubleshoot.workflows.check import reading_order
+from mlg_troubleshoot.workflows.visit import Visit
 
 _FOLLOW_HELP = "new: a new inspection of this gear. gear: another gear. open: opens the report."
 _UNUSUAL = "unusual"

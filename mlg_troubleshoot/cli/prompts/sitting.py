@@ -15,12 +15,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     Entry,
     label_of,
 )
-from mlg_troubleshoot.cli.prompts.visit import (
-    SavedEntries,
-    Terminal,
-    Visit,
-    find_visit,
-)
+from mlg_troubleshoot.cli.prompts.saved import SavedEntries, Terminal
 from mlg_troubleshoot.decision.assessment import Action
 from mlg_troubleshoot.decision.columns import UNIT
 from mlg_troubleshoot.decision.inspection import Side
@@ -31,6 +26,7 @@ from mlg_troubleshoot.life.state import GearKey, GearState, key_of
 from mlg_troubleshoot.units import LengthUnit, said_in
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.keep import add_typed, continued, correct, move, put_back, voids
+from mlg_troubleshoot.workflows.visit import Visit, find_visit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.cli.check_run import Run

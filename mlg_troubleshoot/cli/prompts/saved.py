@@ -1,6 +1,4 @@
-"""What is kept of a gear when somebody comes back to it.
-
-Entries of the prompts in the store: every answer is saved at once, and offered again until its
+"""Entries of the prompts in the store: every answer is saved at once, and offered again until its
 result was kept.
 
 The terminal: asks on standard input, writes everything to standard error.
@@ -10,97 +8,16 @@ from __future__ import annotations
 
 import secrets
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 
 from mlg_troubleshoot.cli.output import console, word
 from mlg_troubleshoot.cli.output import text as data_text
-from mlg_troubleshoot.cli.prompts.entry import LAST, PLUNGER, READ_IN, Entry
-from mlg_troubleshoot.decision.assessment import Action, Step
-from mlg_troubleshoot.decision.columns import (
-    CLEARANCE,
-    OUTCOME,
-    RESTORED_JOINTS,
-    RIGGING_CHECKED,
-)
-from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.cli.prompts.entry import LAST, READ_IN, Entry
 from mlg_troubleshoot.errors import OutputError
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.life.folding import as_spelt, lives_of
-from mlg_troubleshoot.life.logbook import shortened, visit_lines
-from mlg_troubleshoot.life.state import GearKey, GearState, state_now
-from mlg_troubleshoot.store import Draft, Drafts, Record, Store, login
-from mlg_troubleshoot.units import Sentence
-from mlg_troubleshoot.workflows.check import CheckResult
-
-# The one question that a step asks, by its column; joints to read are asked one by one.
-_ASKS = {
-    Action.READ_PLUNGER: PLUNGER,
-    Action.CHECK_RIGGING: RIGGING_CHECKED.name,
-    Action.RESTORE: RESTORED_JOINTS.name,
-    Action.RETRACT: OUTCOME.name,
-}
-_TO_READ = (Action.MEASURE, Action.MEASURE_AGAIN)
-
-
-@dataclass(frozen=True, slots=True)
-class Visit:
-    """What stands of a gear, and what is said of it today.
-
-    row: what stands. records: its visits in the order of their entry. last: the last reading of
-    each joint with its day. undoes: what an undo takes back, which is the last visit; empty if
-    nothing. moved: or the gear that visits were moved from, with their ids. before: or what stood
-    before a correction.
-    """
-
-    records: tuple[Record, ...]
-    row: Inspection
-    result: CheckResult
-    last: Mapping[int, str]
-    undoes: str = ""
-    moved: tuple[GearKey, frozenset[str]] | None = None
-    before: tuple[Record, ...] = ()
-
-    @property
-    def step(self) -> Step:
-        return self.result.judgements[0].next_action
-
-    @property
-    def todo(self) -> tuple[str, ...]:
-        """The columns that NEXT asks for."""
-        if self.step.action in _TO_READ:
-            return tuple(map(CLEARANCE.header, self.step.joints))
-        asked = _ASKS.get(self.step.action)
-        return () if asked is None else (asked,)
-
-
-def find_visit(
-    store: Store, gear: Gear, tail: str, side: Side, judge: Callable[[GearState], CheckResult]
-) -> Visit | None:
-    """What is kept of a gear, under whichever spelling of its tail number."""
-    if store.is_new:
-        return None
-    key = (as_spelt([tail], store)[tail], side.value)
-    life = lives_of(store, [key]).get(key)
-    state = None if life is None else state_now(life.visits, gear)
-    if life is None or state is None or not life.inspections:
-        return None
-    visits = sorted(life.inspections, key=lambda each: each.place)
-    last = {
-        joint: f"{entered} on {visit.at}" if visit.at else str(entered)
-        for visit in life.visits
-        for joint, entered in visit.inspection.entered.items()
-    }
-    row = state.inspection
-    undoes = ""
-    if len(life.visits) > 1 and visits[-1].inspection.source.file is None:
-        lines = shortened(visit_lines(visits[-1].inspection, gear))
-        undoes = Sentence.joined((line.text for line in lines), ", ")
-    return Visit(tuple(each.kept for each in visits), row, judge(state), last, undoes)
-
+from mlg_troubleshoot.store import Draft, Drafts, Store, login
 
 # How long an answer waits for another writer before the next question comes. [s]
 _PATIENCE_S = 3
