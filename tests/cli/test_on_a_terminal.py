@@ -123,7 +123,7 @@ def test_a_plain_terminal_has_the_same_words_without_colour_and_boxes(start, pla
 def test_a_large_batch_shows_its_progress_unless_it_is_to_be_quiet(start, tmp_path):
     write_csv(tmp_path / "batch.csv", 400, blank=0.05)
     child = start("check", tmp_path / "batch.csv")
-    child.expect(r"Judging .* of 400")
+    child.expect(r"Judging .*/400")
     child.expect_exact("400 inspections:")
     assert finish(child) == 1
     child = start("check", tmp_path / "batch.csv", "--quiet")
