@@ -15,7 +15,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from itertools import groupby
 from pathlib import Path
 from shutil import get_terminal_size
@@ -309,15 +309,20 @@ Advance = Callable[[str, int, int | None], None]
 
 @contextmanager
 def stages(*, quiet: bool) -> Iterator[Advance]:
-    """Show on a terminal how far each stage of a run is."""
-    is_shown = sys.stderr.isatty() and not (quiet or is_plain())
-    screen = Console(stderr=True)
+    """Show how far each stage of a run is."""
+    if quiet or is_plain() or not sys.stderr.isatty():
+        yield lambda _name, _done, _total: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID
 
-    with screen.status("") if is_shown else nullcontext() as status:
+    tasks: dict[str, TaskID] = {}
+    columns = "{task.description}", BarColumn(), MofNCompleteColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
 
         def advance(name: str, done: int, total: int | None) -> None:
-            if status is not None:
-                status.update(f"{name} {done}" + f" of {total}" * bool(total))
+            if name not in tasks:
+                tasks[name] = bar.add_task(name, total=total)
+            bar.update(tasks[name], completed=done, total=total)
 
         yield advance
 

@@ -541,8 +541,8 @@ def _read_outcome(cell: Filled, header: str) -> Outcome:
     if isinstance(cell, str):
         words = "?" if "?" in cell else in_words(cell)
         found = _OUTCOME_WORDS.get(words)
-        # A sentence that says both is not taken for either.
-        if found is None and says_failed(words) and not re.search(r"(?<!not )retracted", words):
+        # A sentence that says both, or a number, is not taken for either.
+        if found is None and says_failed(words) and not re.search(r"(?<!not )retracted|\d", words):
             found = Outcome.FAILED
         if found is not None:
             return found

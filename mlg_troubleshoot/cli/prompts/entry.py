@@ -190,8 +190,7 @@ class Entry(msgspec.Struct, kw_only=True):
         """Let the gate of tables judge an answer; of the plunger one reading."""
         options = ReadOptions.of(gear, unit=self.unit, convention=self.convention, asks=True)
         read, problems = judge_length(name, text, options)
-        is_other = name == OUTCOME.name and text not in OUTCOMES.values()
-        if problems or is_other or not isinstance(read, Inspection):
+        if problems or not isinstance(read, Inspection):
             expected = _ANSWERS if name == OUTCOME.name else problems[0].expected
             hint = f"Or as {label_of(name)} 13, unit mm." if joint_of(name) else ""
             raise UsageError(
