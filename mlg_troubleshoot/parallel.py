@@ -43,14 +43,11 @@ def map_blocks(
     call = partial(_call, pickle.dumps(function))
     futures = (executor.submit(call, block) for block in blocks)
     waiting = deque(islice(futures, _AHEAD))
-    try:
-        while waiting:
-            result = waiting.popleft().result()
-            waiting.extend(islice(futures, 1))
-            yield result
-    finally:
-        for future in waiting:
-            future.cancel()
+    # A cancelled future would end the thread that tells of processes that are gone.
+    while waiting:
+        result = waiting.popleft().result()
+        waiting.extend(islice(futures, 1))
+        yield result
 
 
 def _call(function: bytes, block: Any) -> Any:

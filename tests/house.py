@@ -59,7 +59,7 @@ WAYS = {
 # Code tokens that each room may weigh at most. A budget only falls: whoever makes a room lighter
 # writes it down again.
 BUDGETS: dict[str, int] = {
-    "(top)": 8614,
+    "(top)": 8600,
     "cli": 25727,
     "decision": 28463,
     "diagnosis": 33392,

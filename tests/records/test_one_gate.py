@@ -98,7 +98,8 @@ def by_prompt(gear: Gear, value: str, margin: str, convention: Convention) -> Fo
         try:
             said = entry.judge(gear, name, text).warnings
         except UsageError as error:
-            refused.append(words(error))
+            # A prompt says besides how another joint or unit is named.
+            refused.append(words(error).removesuffix(" Or as #3 13, unit mm."))
             continue
         warned = warned or (name == "clearance_3" and bool(said))
         entry.give(name, f"{text} in" if text[-1:].isdigit() or text[-1:] == "." else text)
