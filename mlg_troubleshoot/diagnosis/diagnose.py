@@ -768,9 +768,9 @@ def _comparable(measured_in: Array, predicted_in: Array, contribution_in: Array)
 def _explained_by_clearances(
     measured_in: Array, predicted_in: Array, contribution_in: Array, no_sign_slip: bool
 ) -> bool:
-    """Tell whether factors of −1 to 1, joint by joint, explain readings beyond chance that no one
-    scale of the prediction does, nor one with a joint that was written in millimetres; where no
-    sign is wrong, that a constant does not.
+    """Say whether factors of −1 to 1 for each joint explain the readings better than chance, than
+    one scale of the prediction and than a joint that was written in millimetres; where no sign is
+    wrong, also better than a constant.
     """
     from scipy.optimize import lsq_linear
 

@@ -30,7 +30,7 @@ class Beliefs:
     shape_size : float
         How large an effect is that no list has, where it acts, over the scatter of a row. [1]
     sizes : tuple of float
-        Sizes over the plausible one of a cause that are equally likely, shared by all that acts.
+        Equally likely ratios of the size of an effect to its plausible size, shared by all causes.
         [1]
     form : float
         Error of a cause's form, as a share of its effect. [1]

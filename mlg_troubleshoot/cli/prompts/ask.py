@@ -318,7 +318,7 @@ class Asker:
             return
         if name in _OPTIONAL and typed.lower() == "done":
             typed = ""
-        # A letter that begins a tail number, or may answer the question otherwise, is no word.
+        # What begins a tail number, or may answer the question otherwise, does not count as a word.
         is_word = typed.lower() != _NO_WORD.get(name)
         if name == TAIL_NO.name:
             is_word = typed[1:2].isalpha()
