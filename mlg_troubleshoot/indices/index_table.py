@@ -8,17 +8,15 @@ whose link it displaces (*current clearance*, ``csc θ``), is handed on by the n
 clearance*, ``cos φ csc θ``) and by levers and slots (*rigid body*, ``sin φ · L2/L1``).
 
 The stage of a clearance runs from its joint to the first joint of a higher number that moves:
-A_i,i+1 of Eq. 9. The two ends of one link act alike (Fig. 10), so both have the stage of the
-upstream end. Differs from the paper: a fixed pivot that has a clearance is not a case of Eq. 10;
-its stage is the exact derivative, and so is that of every joint to the output where a guide moves.
-In a slider the guide stands for an infinitely long second link,
-so that its csc θ is the secant of the angle between link and axis.
+A_i,i+1 of Eq. 9; where a guide moves, to the output. The two ends of one link act alike (Fig. 10),
+so both have the stage of the upstream end. Differs from the paper: a fixed pivot that has a
+clearance is not a case of Eq. 10, and has its derivative all the same.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -28,7 +26,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from mlg_troubleshoot.arrays import STEP, Array, Wholes, frozen
+from mlg_troubleshoot.arrays import STEP, Array, Wholes, central_slopes, central_steps, frozen
 from mlg_troubleshoot.datafile import (
     LARGEST,
     MOST_ENTRIES,
@@ -42,13 +40,8 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import LinkageModel
 from mlg_troubleshoot.geometry.mechanism import (
-    Crank,
-    Dyad,
     Guided,
-    Lever,
     Mechanism,
-    Slider,
-    Slot,
     Step,
     needs,
 )
@@ -211,10 +204,6 @@ def _read_once(path: Path, _changed_ns: int, _size: int) -> IndexTable:
     return read_json(path, IndexTable, "").content
 
 
-def _text(values: Mapping[str, Any]) -> str:
-    return json.dumps(values, indent=1, allow_nan=False) + "\n"
-
-
 def write_index_table(table: IndexTable, path: Path) -> None:
     """Write a table of indices, whole or not at all: over such a table only, through no link."""
     if path.is_symlink():
@@ -222,7 +211,7 @@ def write_index_table(table: IndexTable, path: Path) -> None:
     if path.exists():
         read_json(path, IndexTable, "")
     try:
-        text = _text(msgspec.to_builtins(table))
+        text = json.dumps(msgspec.to_builtins(table), indent=1, allow_nan=False) + "\n"
     except ValueError:
         raise GearFileError(
             f"{path.name}: {table.failed} samples do not close at these limits: some indices are"
@@ -297,205 +286,87 @@ def amplification(
 ) -> Amplification:
     """Compute the amplification indices of a linkage over its release stroke.
 
+    The three cases of Eq. 10 are derivatives: what a joint moves per clearance (*current*), or per
+    movement of the joint before it (*previous*, *rigid body*). Both are taken as such, by central
+    differences.
+
     model: another linkage of the same gear, else the reference.
     """
     linkage = gear.model if model is None else model
-    chain = _Chain(linkage, {joint.number: joint.point for joint in gear.joints}, n_strokes)
+    mechanism = linkage.mechanism
+    kernel = linkage.kernel
+    numbers = {joint.point: joint.number for joint in gear.joints}
+    stroke = frozen(np.linspace(*linkage.stroke, n_strokes))
+    both = stroke + STEP * np.array([[1.0], [-1.0]])
+    speed = {
+        joint: _lengths(central_slopes(_stacked(place, both.shape))[0])
+        for joint, place in kernel.positions(both, kernel.no_clearance()).items()
+    }
+    factor = _per_length(mechanism)
+    has_guides = any(isinstance(step, Guided) for step in mechanism.steps)
     stage = []
     onward = []
     of_maxima = []
     for number in gear.joint_numbers:
-        own, later = chain.stage_and_later(number)
-        stage.append(own)
+        first = next(group[0] for group in mechanism.alike if number in group)
+        path = _path(mechanism, first)
+        after = (i for i, step in enumerate(path) if numbers.get(step.joint, 0) > first)
+        end = len(path) - 1 if has_guides else next(after, len(path) - 1)
+        links: list[Any] = kernel.no_clearance()
+        at = 2 * linkage.joint_numbers.index(first)
+        links[at : at + 2] = central_steps(2).T[:, :, None]
+        shape = 4, n_strokes
+        if has_guides:
+            place = _stacked([kernel.output(stroke, links) / factor], shape)
+        else:
+            place = _stacked(kernel.positions(stroke, links)[path[end].joint], shape)
+        # The largest over all directions of the clearance.
+        stage.append(np.linalg.norm(central_slopes(place), 2, axis=(0, 2)))
+        later = [speed[step.joint] / speed[needs(step)[0]] for step in path[end + 1 :]]
         onward.append(np.prod([np.ones(n_strokes), *later], axis=0))
-        of_maxima.append(float(np.prod([factor.max() for factor in later])))
+        of_maxima.append(float(np.prod([each.max() for each in later])))
     return Amplification(
         gear.joint_numbers,
-        chain.stroke,
+        stroke,
         frozen(stage),
         frozen(onward),
         frozen(of_maxima),
-        abs(linkage.rate) * chain.output_factor(),
+        abs(linkage.rate) * factor,
         frozen(linkage.plunger_amplification()),
     )
 
 
-def csc(first: Array, second: Array) -> Array:
-    """Cosecant of the angle between two links, at least 1, shape (...). [1]"""
-    lengths = _lengths(first) * _lengths(second)
-    cosine = np.sum(first * second, axis=-1) / lengths
-    sine: Array = np.sqrt(1.0 - cosine**2)
-    return 1.0 / sine
+def _path(mechanism: Mechanism, number: int) -> list[Step]:
+    """The steps from the one whose link or pivot a clearance displaces to the output, each driven
+    by the one before.
+    """
+    entry = next(
+        step
+        for step in mechanism.steps
+        if number
+        in (*step.virtual_links, *(mechanism.point(name).virtual_link for name in needs(step)))
+    )
+    back: list[Step] = []
+    step = mechanism.step(mechanism.output.joint)
+    while step is not None and step != entry:
+        back.append(step)
+        step = mechanism.step(needs(step)[0])
+    return [entry] if step is None else [entry, *reversed(back)]
 
 
-class _Chain:
-    """Positions of all joints in space over the release, and the cases of Eq. 10 between them."""
+def _per_length(mechanism: Mechanism) -> float:
+    """What the output moves per movement of its joint: 1 for a position. [1 or rad/in]"""
+    output = mechanism.output
+    if output.kind == "position":
+        return 1.0
+    ends = map(mechanism.reference_in_space, (output.joint, output.pivot))
+    return float(1.0 / _lengths(np.subtract(*ends)))
 
-    def __init__(self, model: LinkageModel, points: dict[int, str], n_strokes: int) -> None:
-        self.model = model
-        self.mechanism: Mechanism = model.mechanism
-        self.points = points
-        self.numbers = {point: number for number, point in points.items()}
-        self.stroke = frozen(np.linspace(*model.stroke, n_strokes))
-        flat = model.kernel.positions(self.stroke, model.kernel.no_clearance())
-        self.place: dict[str, Array] = {}
-        for point in self.mechanism.points:
-            if point.name in flat:
-                origin, axes = self.mechanism.frame(point.plane)
-                x, y = (np.broadcast_to(part, (n_strokes,))[:, None] for part in flat[point.name])
-                self.place[point.name] = origin + x * axes[0] + y * axes[1]
 
-    def stage_and_later(self, number: int) -> tuple[Array, list[Array]]:
-        """Index of the stage of a joint, and the index of every later stage, each over the
-        release.
-        """
-        first = next(group[0] for group in self.mechanism.alike if number in group)
-        if any(isinstance(step, Guided) for step in self.mechanism.steps):
-            return self._of_output(number), []
-        entry = self._entry(first)
-        path = self._path(entry)
-        later = (i for i, step in enumerate(path) if self.numbers.get(step.joint, 0) > first)
-        end = next(later, len(path) - 1)
-        if self.mechanism.point(self.points[first]).fixed:
-            own = self._derivative(first, path[end].joint)
-        else:
-            own = self._current(entry) * np.prod(
-                [self._previous(step) for step in path[1 : end + 1]], axis=0
-            )
-        return own, [self._previous(step) for step in path[end + 1 :]]
-
-    def output_factor(self) -> float:
-        output = self.mechanism.output
-        if output.kind == "position":
-            return 1.0
-        arms = self.place[output.joint] - self.place[output.pivot]
-        arm = arms[-1]
-        return float(1.0 / np.linalg.norm(arm))
-
-    def _entry(self, number: int) -> Step:
-        """Return the step whose link or pivot the clearance displaces."""
-        return next(
-            step
-            for step in self.mechanism.steps
-            if number
-            in (
-                *step.virtual_links,
-                *(self.mechanism.point(name).virtual_link for name in needs(step)),
-            )
-        )
-
-    def _path(self, entry: Step) -> list[Step]:
-        """Return the steps from one step to the output, each driven by the one before."""
-        path = [entry]
-        joint = self.mechanism.output.joint
-        back: list[Step] = []
-        while joint != entry.joint:
-            step = self.mechanism.step(joint)
-            if step is None:
-                return path
-            back.append(step)
-            joint = needs(step)[0]
-        return path + back[::-1]
-
-    def _tangent(self, step: Step) -> Array:
-        """Unit vector along which a step's joint moves when only the mechanism's input changes."""
-        axes = self._axes(step)
-        place = self.place[step.joint]
-        if isinstance(step, Slider):
-            direction = np.cos(step.axis) * axes[0] + np.sin(step.axis) * axes[1]
-            return np.broadcast_to(direction, place.shape)
-        from_centre = place - self.place[needs(step)[-1]]
-        return _unit(np.cross(axes[2], from_centre))
-
-    def _axes(self, step: Step) -> Array:
-        return self.mechanism.frame(self.mechanism.point(step.joint).plane)[1]
-
-    def _link(self, step: Dyad | Slider) -> Array:
-        return self.place[step.joint] - self.place[step.upstream]
-
-    def _current(self, step: Step) -> Array:
-        """Current clearance: csc θ; on a slot's pin, which is a rigid body, L2/L1 (Eq. 10 with sin
-        φ = 1).
-        """
-        match step:
-            case Dyad() | Slider():
-                axes = self._axes(step)
-                in_plane = self._link(step) @ axes[:2].T
-                tangent = self._tangent(step) @ axes[:2].T
-                # The joint moves across its second link: the sine of θ is the cosine between link
-                # and path.
-                normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
-                return csc(in_plane, normal)
-            case Slot():
-                return self._arms(step, step.pin)
-            case Crank() | Lever() | Guided():
-                return np.ones(len(self.stroke))
-
-    def _previous(self, step: Step) -> Array:
-        """Previous clearance, cos φ csc θ, or rigid body, sin φ · L2/L1 (Eq. 10)."""
-        match step:
-            case Dyad() | Slider():
-                link = _unit(self._link(step))
-                handed = self.mechanism.step(step.upstream)
-                if handed is None:
-                    return np.ones(len(self.stroke))
-                cosine = np.sum(link * self._tangent(handed), axis=-1)
-                sine = np.sum(link * self._tangent(step), axis=-1)
-                index: Array = np.abs(cosine / sine)
-                return index
-            case Slot():
-                handed = self.mechanism.step(step.pin)
-                arm = _unit(self.place[step.pin] - self.place[step.pivot])
-                if handed is None:
-                    return self._arms(step, step.pin)
-                across: Array = np.cross(arm, self._tangent(handed))
-                return _lengths(across) * self._arms(step, step.pin)
-            case Lever():
-                return self._arms(step, step.follows)
-            case Crank() | Guided():
-                return np.ones(len(self.stroke))
-
-    def _arms(self, step: Lever | Slot, other: str) -> Array:
-        pivot = self.place[step.pivot]
-        driven = _lengths(self.place[step.joint] - pivot)
-        driving = _lengths(self.place[other] - pivot)
-        return driven / driving
-
-    def _derivative(self, number: int, joint: str) -> Array:
-        """Largest movement of a joint per unit of one clearance over all directions."""
-
-        def place(links: list[float]) -> Array:
-            positions = self.model.kernel.positions(self.stroke, links)
-            return np.stack(positions[joint], axis=-1)
-
-        return self._largest(number, place)
-
-    def _of_output(self, number: int) -> Array:
-        """The same of the output, as a movement of its joint."""
-        kernel = self.model.kernel
-        moved = self._largest(number, lambda links: kernel.output(self.stroke, links)[:, None])
-        return moved / self.output_factor()
-
-    def _largest(self, number: int, place: Callable[[list[float]], Array]) -> Array:
-        at = 2 * self.model.joint_numbers.index(number)
-
-        def moved_by(axis: int, step: float) -> Array:
-            links = self.model.kernel.no_clearance()
-            links[at + axis] = step
-            return place(links)
-
-        def slope(axis: int) -> Array:
-            return (moved_by(axis, STEP) - moved_by(axis, -STEP)) / (2 * STEP)
-
-        jacobian = np.stack([slope(0), slope(1)], axis=-1)
-        largest: Array = np.linalg.norm(jacobian, 2, axis=(-2, -1))
-        return largest
+def _stacked(parts: Sequence[Array], shape: tuple[int, ...]) -> Array:
+    return np.stack([np.broadcast_to(part, shape) for part in parts], axis=-1)
 
 
 def _lengths(vectors: Array) -> Array:
     lengths: Array = np.linalg.norm(vectors, axis=-1)
     return lengths
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / _lengths(vectors)[..., None]

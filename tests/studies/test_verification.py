@@ -9,7 +9,7 @@ import pytest
 
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.index_table import Amplification, amplification, csc
+from mlg_troubleshoot.indices.index_table import Amplification, amplification
 from mlg_troubleshoot.paper.verification import Computed, load_targets, targets_file, verify
 from mlg_troubleshoot.workflows.check import load_index_table
 
@@ -101,8 +101,10 @@ def test_the_stage_of_a_current_clearance_is_the_cosecant_of_the_angle_between_t
     gear, growth
 ):
     place = {p.name: np.array([p.x, p.y]) for p in gear.reference.mechanism.points}
-    expected = csc(place["5"] - place["3"], place["4"] - place["5"])
-    assert growth.local_stage[2] == pytest.approx(float(expected), rel=1e-9)
+    first = place["5"] - place["3"]
+    second = place["4"] - place["5"]
+    cosine = first @ second / np.linalg.norm(first) / np.linalg.norm(second)
+    assert growth.local_stage[2] == pytest.approx(1.0 / np.sqrt(1.0 - cosine**2), rel=1e-9)
 
 
 def test_the_stage_of_the_locking_pin_is_the_ratio_of_the_release_levers_arms(gear, growth):
