@@ -103,13 +103,15 @@ def test_the_annotated_workbook_marks_bad_cells_and_joints_over_their_limit_besi
     mixed, tmp_path
 ):
     out = tmp_path / "out.xlsx"
-    mlg("check", mixed, "--annotate", out)
+    assert "lacks" not in mlg("check", mixed, "--annotate", out).err
     sheet = openpyxl.load_workbook(out).worksheets[0]
     assert [cell.coordinate for row in sheet.iter_rows() for cell in row if cell.comment] == [
         "C4",
         "G4",
         "N5",
     ]
+    assert "over the limit of joint 10, 0.0075 in radial" in sheet["N5"].comment.text
+    assert sheet["N5"].fill != sheet["M5"].fill
     column = next(cell.column for cell in sheet[1] if cell.value == "verdict")
     assert [sheet.cell(row, column).value for row in range(2, 6)] == [
         *("WITHIN_MARGIN", "OUTSIDE_MARGIN"),
@@ -120,8 +122,10 @@ def test_the_annotated_workbook_marks_bad_cells_and_joints_over_their_limit_besi
 def test_what_the_annotated_workbook_lacks_is_said(mixed, tmp_path):
     with zipfile.ZipFile(mixed, "a") as archive:
         archive.writestr("xl/ctrlProps/ctrlProp1.xml", "<formControlPr/>")
+        archive.writestr("xl/media/image1.png", b"picture")
     run = mlg("check", mixed, "--annotate", tmp_path / "out.xlsx")
-    assert "the annotated copy lacks 1 of the form controls of the workbook" in run.err
+    for what in ("form controls", "pictures"):
+        assert f"the annotated copy lacks 1 of the {what} of the workbook" in run.err
 
 
 def test_a_workbook_that_was_refused_is_not_annotated_and_leaves_with_nothing_judged(tmp_path):

@@ -4,7 +4,6 @@ row.
 
 from __future__ import annotations
 
-import openpyxl
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
@@ -98,26 +97,6 @@ def test_a_column_that_contradicts_the_convention_or_the_unit_is_asked_about(
 @pytest.mark.parametrize(("header", "word"), [("u/m", "inches"), ("Reading", "Radial")])
 def test_a_column_that_agrees_with_unit_or_convention_is_only_carried(tmp_path, gear, header, word):
     assert one(tmp_path, gear, **{header: word}).carried[header] == word
-
-
-@pytest.mark.parametrize("sheet", [None, "*"])
-def test_a_sheet_that_is_not_read_is_named(tmp_path, gear, sheet):
-    book = openpyxl.Workbook()
-    columns = {
-        "record_id": "R1",
-        "tail_no": "N1",
-        "side": "LH",
-        "clearance_convention": "RADIAL",
-        **HEALTHY,
-    }
-    book.active.append(list(columns))
-    book.active.append(list(columns.values()))
-    book.create_sheet("RH").append(["words of somebody"])
-    book.create_sheet("hidden").sheet_state = "hidden"
-    book.save(tmp_path / "t.xlsx")
-    notes = " ".join(read_many([tmp_path / "t.xlsx"], ReadOptions.of(gear, sheet=sheet)).notes)
-    assert "hidden sheets were not read: 'hidden'" in notes
-    assert "no header of inspections, not read: sheet 'RH'" in notes
 
 
 @pytest.mark.parametrize("word", ["?", "-", "n/a", "N/A", "unknown", "TBD"])

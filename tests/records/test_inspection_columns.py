@@ -45,12 +45,6 @@ def test_a_reading_across_the_joint_is_halved(read, table, convention):
     assert row.clearance_in == {3: 0.013, 5: 0.007}
 
 
-def test_millimetres_and_thou_columns_give_the_inches(read, table):
-    header = (*HEADER[:4], "clearance_3_mm", "clearance_5_thou")
-    row = inspection(read(table(header, [(*GOOD[:4], 0.3302, 7)])))
-    assert row.clearance_in == {3: pytest.approx(0.013), 5: pytest.approx(0.007)}
-
-
 def test_the_reading_is_kept_as_entered_with_its_unit(read, table):
     header = (*HEADER[:4], "clearance_3_mm", "clearance_5_in")
     row = inspection(read(table(header, [(*GOOD[:4], "0.330", ".0070")])))
@@ -229,22 +223,7 @@ def test_a_bad_optional_cell_is_reported_and_reads_as_absent(read, table, name, 
     )
     problem = only(result)
     assert (problem.column, problem.cell, problem.row) == (name, "G2", 2)
-    plain = inspection(read(table()))
-    row = result.rows[0]
-    assert isinstance(row, Inspection)
-    assert row.clearance_in == plain.clearance_in
-    assert (row.gauge_u_in, row.margin_in, row.readings_in, dict(row.axial_float_in)) == (
-        0.0005,
-        None,
-        (),
-        {},
-    )
-    assert (row.outcome, row.approach, row.inspection_date, row.gear_landings) == (
-        None,
-        None,
-        None,
-        None,
-    )
+    assert result.rows == read(table()).rows
 
 
 @pytest.mark.parametrize(("name", "value"), BAD_DECISIVE)

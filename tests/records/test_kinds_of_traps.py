@@ -18,7 +18,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions, ReadResult, read_many
 from mlg_troubleshoot.records.cells import NumberFormat, OddCell, OddKind
-from tests.records.reading import Named
+from tests.records.reading import Named, only
 
 HEADER = ["record_id", "tail_no", "side", "clearance_convention", "clearance_3_in"]
 HEADER += ["inspection_date", "gear_landings", "remarks"]
@@ -179,11 +179,6 @@ def formatted(read, xlsx):
         return read(xlsx((header, row), change), "t.xlsx", **(options or {"unit": "thou"}))
 
     return run
-
-
-def only(result):
-    (problem,) = result.problems
-    return problem
 
 
 MILLIMETRES = [
