@@ -1,7 +1,5 @@
 """What a study looks at: clearances in, plunger displacement out.
 
-What every estimator returns.
-
 Indices by an exact tensor of Gauss points: the reference that faster routes are held against.
 
 With m Gauss points a variable, every conditional mean of Eqs. 1 and 2 is exact for polynomials of
@@ -12,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -75,40 +72,26 @@ def worst_directions(model: LinkageModel, limits_in: Array) -> HeldDirections:
     return HeldDirections(model, directions, 1.0 if is_over else -1.0)
 
 
-Estimate = tuple[Array, Array]
-
-
 @dataclass(frozen=True, slots=True)
 class Indices:
     """First- and total-order indices with 95 % intervals, as fractions of the variance.
 
-    first_order, total_order, shape (n,): indices of Eqs. 1 and 2. [1] first_order_interval,
-    total_order_interval, shape (n, 2): their 95 % intervals. [1] mean, variance: moments of the
-    response. [its unit, its unit squared] evaluations, failed: evaluations of the response, and
-    those that gave no number: one makes the indices NaN. note: what the user should know about the
-    route taken; empty if nothing.
+    orders, half, shape (2, n): indices of Eqs. 1 and 2, and the half widths of their 95 %
+    intervals. [1]
+    mean, variance: moments of the response. [its unit, its unit squared]
+    evaluations, failed: evaluations of the response, and those that gave no number: one makes the
+    indices NaN.
+    note: what the user should know about the route taken; empty if nothing.
     """
 
     design: str
-    seed: int
-    first_order: Array
-    first_order_interval: Array
-    total_order: Array
-    total_order_interval: Array
+    orders: Array
+    half: Array
     mean: float
     variance: float
     evaluations: int
     failed: int
     note: str = ""
-
-    @classmethod
-    def around(
-        cls, design: str, seed: int, first: Estimate, total: Estimate, *rest: Any
-    ) -> Indices:
-        """Indices from values with the half widths of their intervals, both of shape (n,). [1]"""
-        first_interval = _interval(*first)
-        total_interval = _interval(*total)
-        return cls(design, seed, first[0], first_interval, total[0], total_interval, *rest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,11 +122,6 @@ def group_indices(
     return tuple(found)
 
 
-def _interval(values: Array, half: Array) -> Array:
-    """Lower and upper ends around each value, shape (n, 2). [1]"""
-    return np.stack([values - half, values + half], axis=1)
-
-
 def student_half(scatter: Array, count: int) -> Array:
     """Half width of the 95 % interval of a mean of independent values.
 
@@ -155,13 +133,6 @@ def student_half(scatter: Array, count: int) -> Array:
         return np.full_like(scatter, np.nan)
     half: Array = float(stdtrit(count - 1, 0.975)) * scatter / np.sqrt(count)
     return half
-
-
-def failed_note(failed: int, evaluations: int) -> str:
-    return (
-        f"{failed} of {evaluations} samples do not close, so the variance over the whole range is"
-        " not defined: use smaller limits."
-    )
 
 
 # Gauss points per variable: the next ones change no index of a shipped gear by 2e-5. [1]

@@ -28,7 +28,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import lru_cache, partial
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -52,8 +51,6 @@ from mlg_troubleshoot.indices.variance import (
     HeldDirections,
     Indices,
     Response,
-    TensorIndices,
-    failed_note,
     group_indices,
     order_for,
     student_half,
@@ -151,45 +148,33 @@ def first_order_design(n: int, n1: int, n2: int, ccd: Array | None, rng: Generat
     return Replicated(points, places)
 
 
-@dataclass(frozen=True, slots=True)
-class PaperDesign:
-    """A replicated design of section 4.3.
-
-    n1: repetitions at each level.
-    n2: latin hypercube levels.
-    n_ccd: composite points.
-    """
-
-    name: str
-    n1: int
-    n2: int
-    n_ccd: int
-
-
-PAPER_DESIGNS: dict[str, PaperDesign] = {
-    "lhs": PaperDesign("lhs", 100, 1000, 0),
-    "lhs+ccd": PaperDesign("lhs+ccd", 100, 862, 138),
-    "ccd": PaperDesign("ccd", 100, 0, 138),
-}
+# Repetitions at each level and iterations of the paper's designs, and the Latin hypercube levels of
+# each: beside them the last two have the composite points (section 4.3).
+REPETITIONS = 100
 ITERATIONS = 10
+LEVELS = {"lhs": 1000, "lhs+ccd": 862, "ccd": 0}
 
 
 @dataclass(frozen=True, slots=True)
-class ReplicatedIndices:
-    """First-order indices of a replicated design, averaged over iterations.
+class Averaged:
+    """Indices averaged over iterations.
 
-    plain, corrected, shape (n,): mean index over the iterations, as the paper has it and freed of
-    its bias. [1] scatter, shape (n,): standard deviation of one iteration's index. [1] evaluations,
-    failed: solutions of the linkage, and those that did not close: one makes its iteration NaN.
+    mean, shape (n,): mean of the iterations. [1]
+    scatter, shape (n,): standard deviation of one iteration's index; NaN with fewer than two. [1]
+    evaluations, failed: solutions of the linkage, and those that did not close: one makes its
+    iteration NaN.
     """
 
-    design: PaperDesign
-    seed: int
-    plain: Array
-    corrected: Array
+    mean: Array
     scatter: Array
     evaluations: int
     failed: int
+
+    @classmethod
+    def over(cls, each: Array, evaluations: int, failed: int) -> Averaged:
+        """Average the indices of each iteration, shape (iterations, n)."""
+        scatter = each.std(axis=0, ddof=1) if len(each) > 1 else np.full(each.shape[1], np.nan)
+        return cls(each.mean(axis=0), scatter, evaluations, failed)
 
 
 def bias_corrected(plain: Array, n1: int) -> Array:
@@ -203,42 +188,37 @@ def bias_corrected(plain: Array, n1: int) -> Array:
 def replicated_first_order(
     response: Response,
     n: int,
-    design: PaperDesign,
+    n1: int,
+    n2: int,
     seed: int,
     iterations: int = ITERATIONS,
+    ccd: Array | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> ReplicatedIndices:
-    """Estimate first-order indices (Eq. 1) with a replicated design.
+) -> Averaged:
+    """Estimate plain first-order indices (Eq. 1) with a replicated design.
 
-    response: unit cube, shape (n_points, n), to values, shape (n_points,). progress: called with
-    the iterations done and their number.
+    response: unit cube, shape (n_points, n), to values, shape (n_points,).
+    n1, n2: repetitions and Latin hypercube levels.
+    ccd, shape (n_ccd, n): composite points. [1]
+    progress: called with the iterations done and their number.
     Raises `UsageError` if the design has fewer than two repetitions or no points.
     """
-    if design.n1 < 2 or design.n2 + design.n_ccd < 2 or iterations < 1:
+    composite = 0 if ccd is None else len(ccd)
+    if n1 < 2 or n2 + composite < 2 or iterations < 1:
         raise UsageError(
-            f"{iterations} iterations of a replicated design of {design.n1} × ({design.n2} +"
-            f" {design.n_ccd}) points",
+            f"{iterations} iterations of a replicated design of {n1} × ({n2} + {composite}) points",
             "It has at least two repetitions, two points in each, and one iteration.",
         )
-    ccd = central_composite(n) if design.n_ccd else None
     found: list[Array] = []
-    evaluations = failed = 0
+    failed = 0
     for stream in np.random.SeedSequence(seed).spawn(iterations):
-        rng = np.random.default_rng(stream)
-        rows = first_order_design(n, design.n1, design.n2, ccd, rng)
-        values = response(rows.points.reshape(-1, n))
-        values = values.reshape(design.n1, -1)
-        evaluations += values.size
+        rows = first_order_design(n, n1, n2, ccd, np.random.default_rng(stream))
+        values = response(rows.points.reshape(-1, n)).reshape(n1, -1)
         failed += count_failed(values)
         found.append(_group_shares(values, rows.places))
         if progress is not None:
             progress(len(found), iterations)
-    plain = np.array(found)
-    mean = plain.mean(axis=0)
-    scatter = plain.std(axis=0, ddof=1) if iterations > 1 else np.full(n, np.nan)
-    return ReplicatedIndices(
-        design, seed, mean, bias_corrected(mean, design.n1), scatter, evaluations, failed
-    )
+    return Averaged.over(np.array(found), iterations * n1 * (n2 + composite), failed)
 
 
 def _group_shares(values: Array, places: Wholes) -> Array:
@@ -257,29 +237,6 @@ def _group_shares(values: Array, places: Wholes) -> Array:
 LEVELS_PER_BLOCK = 50
 
 
-class StudyBlock(NamedTuple):
-    """A range of levels of one iteration: the first and the one after the last."""
-
-    iteration: int
-    start: int
-    stop: int
-
-
-class BlockSums(NamedTuple):
-    """What a block contributes.
-
-    within, shape (n,): sum over the base samples of the variance when one joint varies. [in²]
-    total, squares: sum and sum of squares of the base samples. [in, in²]
-    """
-
-    within: Array
-    total: float
-    squares: float
-    samples: int
-    evaluations: int
-    failed: int
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class TotalOrderStudy:
     """Everything that a block depends on; it travels to other processes.
@@ -290,67 +247,43 @@ class TotalOrderStudy:
     response: HeldDirections
     limits_in: Array
     seed: int
-    n1: int = 100
-    n2: int = 1000
-    iterations: int = 10
-
-    def __post_init__(self) -> None:
-        if self.n1 < 2 or self.n2 < 1 or self.iterations < 1:
-            raise UsageError(
-                f"a total-order study of {self.n1} repetitions, {self.n2} levels, {self.iterations}"
-                " iterations",
-                "It has at least 2 repetitions, 1 level and 1 iteration.",
-            )
-
-    @property
-    def n(self) -> int:
-        return len(self.limits_in)
+    n1: int = REPETITIONS
+    n2: int = LEVELS["lhs"]
+    iterations: int = ITERATIONS
 
     @property
     def evaluations(self) -> int:
         """Solutions of the linkage in the whole study: every joint's, and the base samples."""
-        return self.iterations * self.n1 * self.n2 * (self.n1 * self.n + 1)
+        return self.iterations * self.n1 * self.n2 * (self.n1 * len(self.limits_in) + 1)
 
     @property
-    def blocks(self) -> tuple[StudyBlock, ...]:
+    def blocks(self) -> list[tuple[int, range]]:
+        """Iteration and levels of each block."""
         starts = range(0, self.n2, LEVELS_PER_BLOCK)
-        return tuple(
-            StudyBlock(i, start, min(start + LEVELS_PER_BLOCK, self.n2))
+        return [
+            (i, range(start, min(start + LEVELS_PER_BLOCK, self.n2)))
             for i in range(self.iterations)
             for start in starts
-        )
+        ]
 
 
-@dataclass(frozen=True, slots=True)
-class TotalOrder:
-    """Total-order indices.
+def compute_block(study: TotalOrderStudy, block: tuple[int, range]) -> Array:
+    """Add up what a block contributes, shape (n + 3,).
 
-    total_order, shape (n,): mean of the iterations. [1]
-    scatter, shape (n,): standard deviation of one iteration's index; NaN with fewer than two. [1]
+    Returns: sum over the base samples of the variance when one joint varies, of each joint [in²];
+    sum and sum of squares of the base samples [in, in²]; solutions that do not close.
     """
-
-    total_order: Array
-    scatter: Array
-    evaluations: int
-    failed: int
-
-
-def compute_block(study: TotalOrderStudy, block: StudyBlock) -> BlockSums:
     response = replace(study.response, compiled=numba_is_installed())
-    n = study.n
+    n = len(study.limits_in)
     n1 = study.n1
-    n2 = study.n2
-    levels = _levels(n, n1, n2, study.seed, block.iteration)
-    within = np.zeros(n)
-    total = squares = 0.0
-    failed = 0
+    iteration, block_levels = block
+    levels = _levels(n, n1, study.n2, study.seed, iteration)
+    sums = np.zeros(n + 3)
     wide = np.empty((n, n1, n1))
-    for level in range(block.start, block.stop):
-        clearance = middle_of_level(levels[:, level, :], n2) * study.limits_in
+    for level in block_levels:
+        clearance = middle_of_level(levels[:, level, :], study.n2) * study.limits_in
         base = response(clearance)
-        total += float(base.sum())
-        squares += float((base * base).sum())
-        failed += count_failed(base)
+        sums[n:] += base.sum(), (base * base).sum(), count_failed(base)
         columns = clearance.T
         wide[:] = columns[:, :, None]
         for i in range(n):
@@ -359,12 +292,10 @@ def compute_block(study: TotalOrderStudy, block: StudyBlock) -> BlockSums:
             wide[i] = columns[i][:, None]
             spread = values - values.mean(axis=1, keepdims=True)
             variance = float(np.einsum("ij,ij->", spread, spread)) / (n1 - 1)
-            within[i] += variance
+            sums[i] += variance
             if not np.isfinite(variance):
-                failed += count_failed(values)
-    count = (block.stop - block.start) * n1
-    evaluations = count * (n1 * n + 1)
-    return BlockSums(within, total, squares, count, evaluations, failed)
+                sums[-1] += count_failed(values)
+    return sums
 
 
 @lru_cache(maxsize=2)
@@ -377,28 +308,19 @@ def total_order(
     study: TotalOrderStudy,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> TotalOrder:
+) -> Averaged:
     """Estimate total-order indices (Eq. 2) with a study of this size, here or by an executor."""
     blocks = study.blocks
-    sums: list[BlockSums] = []
+    sums: list[Array] = []
     for block in map_blocks(partial(compute_block, study), blocks, executor):
         sums.append(block)
         if progress is not None:
             progress(len(sums), len(blocks))
-    size = len(blocks) // study.iterations
-    each = np.array([_index(sums[at : at + size]) for at in range(0, len(sums), size)])
-    scatter = each.std(axis=0, ddof=1) if len(each) > 1 else np.full(study.n, np.nan)
-    evaluations = sum(block.evaluations for block in sums)
-    failed = sum(block.failed for block in sums)
-    return TotalOrder(each.mean(axis=0), scatter, evaluations, failed)
-
-
-def _index(sums: Sequence[BlockSums]) -> Array:
-    """Total-order indices of one iteration, shape (n,). [1]"""
-    within = np.sum([block.within for block in sums], axis=0)
-    total, squares, samples = np.sum([block[1:4] for block in sums], axis=0)
-    index: Array = within / samples / (squares / samples - (total / samples) ** 2)
-    return index
+    iterations = np.array(sums).reshape(study.iterations, -1, len(sums[0])).sum(axis=1)
+    within, (total, squares, failed) = np.split(iterations.T, [-3])
+    samples = study.n1 * study.n2
+    each = within / samples / (squares / samples - (total / samples) ** 2)
+    return Averaged.over(each.T, study.evaluations, int(failed.sum()))
 
 
 class StudyDesign(StrEnum):
@@ -480,15 +402,6 @@ class StudyFindings(Result):
     growth: Amplification
 
 
-@dataclass(slots=True)
-class _Run:
-    """What the design found on one linkage."""
-
-    indices: Indices
-    plain: Array | None = None
-    groups: tuple[GroupIndices, ...] = ()
-
-
 def run_study(
     gear: Gear, options: StudyOptions, progress: StageProgress = lambda _stage, _done, _total: None
 ) -> StudyFindings:
@@ -501,108 +414,99 @@ def run_study(
             f"limits {limits.tolist()} in of {len(gear.joints)} joints",
             "Give one positive length per joint.",
         )
+    plain = None
+    groups: tuple[GroupIndices, ...] = ()
     if options.design is StudyDesign.TENSOR:
-        run = _on_linkage(gear, limits, options, 0)
+        indices, groups = _on_linkage(gear, limits, 0)
     else:
-        run = _paper(gear, limits, options, progress)
-    found = [run.indices]
+        indices, plain = _paper(gear, limits, options, progress)
+    found = [indices]
     for k in range(1, len(gear.ensemble)):
-        found.append(_on_linkage(gear, limits, options, k).indices)
+        found.append(_on_linkage(gear, limits, k)[0])
         progress("ensemble", k, len(gear.ensemble) - 1)
     growth = amplification(gear)
     table = _table(gear, limits, options, found, growth)
-    return StudyFindings(gear, options, table, run.indices, run.plain, run.groups, growth)
+    return StudyFindings(gear, options, table, indices, plain, groups, growth)
 
 
-def _on_linkage(gear: Gear, limits: Array, options: StudyOptions, k: int) -> _Run:
-    """Indices of linkage k of the ensemble; the first is the reference."""
+def _on_linkage(gear: Gear, limits: Array, k: int) -> tuple[Indices, tuple[GroupIndices, ...]]:
+    """Indices of linkage k of the ensemble, and of its links; the first is the reference, whose
+    intervals are the difference to two Gauss points per joint.
+    """
     response = worst_directions(gear.ensemble_models[k], limits)
     corners = tensor_indices(response, limits, nodes=CORNERS)
+    none = np.full((2, len(limits)), np.nan)
     if corners.failed:
         # Gauss points lie inside the range, and a linkage opens at its corners first.
         design = f"{corners.evaluations} corners of the range"
-        none = np.full(len(limits), np.nan), np.full(len(limits), np.nan)
         counts = corners.evaluations, corners.failed
-        note = failed_note(corners.failed, corners.evaluations)
-        return _Run(Indices.around(design, options.seed, none, none, np.nan, np.nan, *counts, note))
+        return Indices(design, none, none, np.nan, np.nan, *counts, _failed_note(*counts)), ()
     order = order_for(len(limits))
     tensor = tensor_indices(response, limits, order=order)
-    coarse = None if k or order < 3 else tensor_indices(response, limits, order=2)
-    return _Run(_of_tensor(tensor, coarse, options.seed), groups=group_indices(gear, tensor.closed))
-
-
-def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -> Indices:
-    first = tensor.first_order
-    total = tensor.total_order
+    orders = np.array([tensor.first_order, tensor.total_order])
+    half = np.zeros_like(orders)
     evaluations = tensor.evaluations
     note = ""
-    half = np.zeros((2, len(first)))
-    if coarse is not None:
-        half = np.abs([first - coarse.first_order, total - coarse.total_order])
+    if k == 0 and order > 2:
+        coarse = tensor_indices(response, limits, order=2)
+        half = np.abs(orders - [coarse.first_order, coarse.total_order])
         evaluations += coarse.evaluations
         note = "intervals are the difference to two Gauss points per joint"
     design = f"tensor of {len(tensor.weights)} Gauss points per joint"
-    estimates = ((first, half[0]), (total, half[1]))
-    return Indices.around(
-        design, seed, *estimates, tensor.mean, tensor.variance, evaluations, tensor.failed, note
-    )
+    moments = tensor.mean, tensor.variance
+    indices = Indices(design, orders, half, *moments, evaluations, tensor.failed, note)
+    return indices, group_indices(gear, tensor.closed)
 
 
-def _paper(gear: Gear, limits: Array, options: StudyOptions, progress: StageProgress) -> _Run:
-    """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
+def _paper(
+    gear: Gear, limits: Array, options: StudyOptions, progress: StageProgress
+) -> tuple[Indices, Array]:
+    """Run the paper's design for the first order and, for ``lhs``, its study of the total order;
+    return the plain first order as well.
+    """
     response = worst_directions(gear.model, limits)
     n = len(limits)
-    design = _sized(PAPER_DESIGNS[str(options.design)], n, options)
+    n1 = REPETITIONS if options.n1 is None else options.n1
     iterations = ITERATIONS if options.iterations is None else options.iterations
-    found = replicated_first_order(
+    n2 = LEVELS[options.design]
+    if n2 and options.n2 is not None:
+        n2 = options.n2
+    ccd = None if options.design is StudyDesign.LHS else central_composite(n)
+    first = replicated_first_order(
         lambda unit: response(unit * limits),
         n,
-        design,
+        n1,
+        n2,
         options.seed,
         iterations,
+        ccd,
         partial(progress, "first order"),
     )
-    total = spread = np.full(n, np.nan)
-    evaluations = found.evaluations
-    failed = found.failed
-    note = f"first order corrected for the bias (1 - S)/{design.n1}"
-    if options.design is StudyDesign.LHS:
-        study = TotalOrderStudy(response, limits, options.seed, design.n1, design.n2, iterations)
-        totals = total_order(study, options.executor, partial(progress, "total order"))
-        total = totals.total_order
-        spread = student_half(totals.scatter, iterations)
-        evaluations += totals.evaluations
-        failed += totals.failed
-        if totals.failed:
-            note += f"; {failed_note(totals.failed, totals.evaluations)}"
-    name = (
-        f"{design.name}: n1 = {design.n1}, n2 = {design.n2}, nCCD = {design.n_ccd}, mean of"
-        f" {iterations} iterations"
-    )
-    half = student_half(found.scatter, iterations)
-    indices = Indices.around(
-        name,
-        options.seed,
-        (found.corrected, half),
-        (total, spread),
+    total = Averaged(np.full(n, np.nan), np.full(n, np.nan), 0, 0)
+    note = f"first order corrected for the bias (1 - S)/{n1}"
+    if ccd is None:
+        study = TotalOrderStudy(response, limits, options.seed, n1, n2, iterations)
+        total = total_order(study, options.executor, partial(progress, "total order"))
+        if total.failed:
+            note += f"; {_failed_note(total.evaluations, total.failed)}"
+    indices = Indices(
+        f"{options.design}: n1 = {n1}, n2 = {n2}, nCCD = {0 if ccd is None else len(ccd)}, mean of"
+        f" {iterations} iterations",
+        np.array([bias_corrected(first.mean, n1), total.mean]),
+        student_half(np.array([first.scatter, total.scatter]), iterations),
         np.nan,
         np.nan,
-        evaluations,
-        failed,
+        first.evaluations + total.evaluations,
+        first.failed + total.failed,
         note,
     )
-    return _Run(indices, plain=found.plain)
+    return indices, first.mean
 
 
-def _sized(paper: PaperDesign, n: int, options: StudyOptions) -> PaperDesign:
-    """Return a paper design in the size asked for, with the composite points of this number of
-    variables.
-    """
-    return replace(
-        paper,
-        n1=paper.n1 if options.n1 is None else options.n1,
-        n2=paper.n2 if options.n2 is None or not paper.n2 else options.n2,
-        n_ccd=len(central_composite(n)) if paper.n_ccd else 0,
+def _failed_note(evaluations: int, failed: int) -> str:
+    return (
+        f"{failed} of {evaluations} samples do not close, so the variance over the whole range is"
+        " not defined: use smaller limits."
     )
 
 
@@ -615,24 +519,27 @@ def _table(
 ) -> IndexTable:
     """The table of the reference, the first that was found, with the spread over all."""
     reference = found[0]
-    orders = np.array([[each.first_order, each.total_order] for each in found])
+    orders = np.array([each.orders for each in found])
     places = ranks(orders[0, 0])
     spans = rank_ranges(orders[:, 0])
-    ends = np.array([orders.min(axis=0), orders.max(axis=0)])
+    # Lower and upper ends of first and total order, of each joint.
+    spread = np.array([orders.min(axis=0), orders.max(axis=0)]).T.tolist()
+    intervals = np.array([reference.orders - reference.half, reference.orders + reference.half])
+    ends = intervals.T.tolist()
     joints = tuple(
         JointIndices(
             joint=joint.number,
             limit_in=float(limits[i]),
-            first_order=float(reference.first_order[i]),
-            first_order_interval=_pair(reference.first_order_interval[i]),
-            total_order=float(reference.total_order[i]),
-            total_order_interval=_pair(reference.total_order_interval[i]),
+            first_order=float(reference.orders[0, i]),
+            first_order_interval=tuple(ends[i][0]),
+            total_order=float(reference.orders[1, i]),
+            total_order_interval=tuple(ends[i][1]),
             plunger_amplification=float(growth.exact[i]),
             max_amplification_index=float(growth.max_stage[i]),
             rank=int(places[i]),
             rank_range=spans[i],
-            first_order_spread=_pair(ends[:, 0, i]),
-            total_order_spread=_pair(ends[:, 1, i]),
+            first_order_spread=tuple(spread[i][0]),
+            total_order_spread=tuple(spread[i][1]),
         )
         for i, joint in enumerate(gear.joints)
     )
@@ -645,7 +552,3 @@ def _table(
         failed=sum(each.failed for each in found),
         joints=joints,
     )
-
-
-def _pair(ends: Array) -> tuple[float, float]:
-    return float(ends[0]), float(ends[1])

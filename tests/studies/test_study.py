@@ -69,7 +69,7 @@ def test_a_design_with_composite_points_gives_no_total_order(gear: Gear) -> None
 def test_limits_at_which_the_linkage_does_not_close_are_shown_and_not_hidden(gear: Gear) -> None:
     found = run_study(gear, StudyOptions(limits_in=np.full(10, 0.06)))
     assert found.table.failed > 0
-    assert np.all(np.isnan(found.indices.first_order))
+    assert np.all(np.isnan(found.indices.orders))
     assert "do not close" in found.indices.note
 
 
