@@ -60,11 +60,6 @@ def test_a_bad_cell_makes_its_row_invalid_and_says_why_and_good_rows_survive(
     assert said in json.dumps(problem, ensure_ascii=False)
 
 
-def test_a_problem_names_file_cell_column_and_value(table: Table) -> None:
-    found = mlg("check", table(row(clearance_3_in="worn")))
-    assert "table.csv, cell G2, column 'clearance_3_in': found 'worn'" in found.err
-
-
 def test_a_problem_is_one_line_of_a_file_however_long_it_is(table: Table) -> None:
     found = mlg("check", table(row(clearance_3_in="worn" * 40)))
     assert sum("worn" in line for line in found.err.splitlines()) == 1

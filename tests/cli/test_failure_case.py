@@ -9,8 +9,6 @@ import pytest
 
 from tests.cli.conftest import DATA, FAILURE, HAND, Run, Table, mlg, ranked, row
 
-BLANK = {f"clearance_{n}_in": "" for n in range(1, 11)}
-
 
 def test_it_is_outside_as_the_paper_says(failure: Run, failure_json: Run) -> None:
     found = failure_json.one
@@ -56,34 +54,6 @@ def test_on_the_command_line_every_unit_and_convention_gives_the_same(readings, 
 
 
 @pytest.mark.parametrize(
-    ("changes", "unit"),
-    [
-        (
-            {
-                "clearance_convention": "TOTAL_PLAY",
-                "clearance_3_in": "0.026",
-                "clearance_5_in": "0.014",
-            },
-            "in",
-        ),
-        ({"clearance_3_in": "0.3302", "clearance_5_in": "0.1778"}, "mm"),
-        ({"clearance_3_in": "13", "clearance_5_in": "7"}, "thou"),
-    ],
-    ids=["total play", "millimetres", "thou"],
-)
-def test_in_a_table_every_unit_and_convention_gives_the_same(changes, unit, table, failure_json):
-    cells = {
-        column.replace("_in", f"_{unit}"): value
-        for column, value in row(**(BLANK | changes)).items()
-    }
-    cells["outcome"] = "FAILED"
-    found = mlg("check", table(cells), "--json").one
-    assert found["verdict"] == "OUTSIDE_MARGIN"
-    expected = failure_json.one["predicted_displacement_in"]
-    assert found["predicted_displacement_in"] == pytest.approx(expected, abs=1e-12)
-
-
-@pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (("--convention", "RADIAL", "--set", "3=0.013"), "The unit is missing"),
@@ -93,21 +63,6 @@ def test_in_a_table_every_unit_and_convention_gives_the_same(changes, unit, tabl
 def test_by_hand_it_is_refused_without_unit_or_convention(arguments, said):
     found = mlg(*HAND, *arguments)
     assert (found.code, found.out, said in found.err) == (2, "", True)
-
-
-@pytest.mark.parametrize(
-    ("cells", "declared"),
-    [
-        ({column.removesuffix("_in"): value for column, value in row().items()}, ("--unit", "in")),
-        (row(clearance_convention=None), ("--convention", "RADIAL")),
-    ],
-    ids=["unit", "convention"],
-)
-def test_a_table_without_unit_or_convention_is_refused_until_it_is_declared(cells, declared, table):
-    path = table(cells)
-    found = mlg("check", path, "--json")
-    assert (found.code, found.one["verdict"]) == (3, "INVALID")
-    assert mlg("check", path, *declared, "--json").one["verdict"] == "WITHIN_MARGIN"
 
 
 def test_the_factor_2_of_the_convention_changes_the_verdict(table: Table) -> None:

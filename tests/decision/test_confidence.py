@@ -31,12 +31,14 @@ def test_curvature_moves_the_probability_by_less_than_one_percent(judge, gear, c
     assert share == pytest.approx(found.probability_within_margin, abs=0.012)
 
 
-def test_advice_does_not_change_the_verdict_or_its_probability(judge: Judge) -> None:
-    plain, advised = judge(every_joint(0.002)), judge(every_joint(0.002), advice=True)
-    assert (plain.verdict, plain.probability_within_margin) == (
-        advised.verdict,
-        advised.probability_within_margin,
-    )
+def test_advice_changes_neither_the_verdict_nor_its_probability_nor_next(judge: Judge) -> None:
+    for read in (every_joint(0.002), {3: 0.001, 5: 0.001}):
+        plain, advised = judge(read), judge(read, advice=True)
+        assert (plain.verdict, plain.probability_within_margin, plain.next_action) == (
+            advised.verdict,
+            advised.probability_within_margin,
+            advised.next_action,
+        )
 
 
 GAUGE_U_IN, PLUNGER_U_IN, MARGIN_IN = 0.0005, 0.002, 0.03

@@ -129,7 +129,9 @@ def test_only_joints_over_their_limits_are_restored_without_a_complaint(judge: J
     ],
 )
 def test_a_joint_is_measured_again_only_near_its_limit_and_once(judge, third, more, first):
-    assert judge(every_joint(0.003, j3=third), **RETRACTED, **more).next_action.action is first
+    found = judge(every_joint(0.003, j3=third), **RETRACTED, **more).next_action
+    assert found.action is first
+    assert ("with another gauge" in found.text) is (first is Action.MEASURE_AGAIN)
 
 
 def test_the_joints_that_were_not_read_are_one_sentence_of_done(judge: Judge) -> None:

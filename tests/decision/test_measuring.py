@@ -144,8 +144,3 @@ def test_slopes_are_those_of_the_sense_that_governs(gear: Gear, sense: float) ->
     sizes = [np.maximum(over, -under) for over, under in (after, before)]
     numeric = (sizes[0] - sizes[1]) / 2e-5
     assert response.slopes(start) == pytest.approx(numeric, rel=1e-6)
-
-
-def test_with_advice_the_next_action_is_the_same(judge: Judge) -> None:
-    measured = {3: 0.001, 5: 0.001}
-    assert judge(measured, advice=True).next_action == judge(measured).next_action

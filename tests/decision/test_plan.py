@@ -122,12 +122,6 @@ def test_a_plunger_beyond_its_margin_is_a_complaint_only_of_a_gear_that_failed(
     assert (found.next_action.action, found.end) == (first, end)
 
 
-def test_a_joint_at_its_limit_is_not_restored_even_if_read_in_millimetres(judge: Judge) -> None:
-    at_limit = judge(every_joint(0.0005, j7=0.1905 / 25.4))
-    assert Action.RESTORE not in [step.action for step in at_limit.plan.steps]
-    assert at_limit.end is End.WITHIN
-
-
 def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone(judge):
     read = every_joint(0.005, j3=0.0079)
     del read[4]

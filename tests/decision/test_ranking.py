@@ -16,10 +16,6 @@ def order(judge: Judge, clearance: dict[int, float]) -> list[int]:
     return [finding.joint for finding in judge(clearance).ranked]
 
 
-def test_the_two_worn_joints_of_the_published_failure_stand_on_top(judge: Judge) -> None:
-    assert order(judge, {3: 0.013, 5: 0.007})[:2] == [3, 5]
-
-
 def test_the_contribution_is_amplification_times_clearance(judge: Judge) -> None:
     for finding in judge(every_joint(0.002, j3=0.006)).joints:
         assert finding.contribution_in == pytest.approx(

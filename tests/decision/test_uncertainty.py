@@ -77,11 +77,6 @@ def test_each_measured_joint_has_a_part_of_its_own(gear: Gear, judge: Judge) -> 
     )
 
 
-def test_only_measured_joints_carry_reading_uncertainty(gear: Gear, judge: Judge) -> None:
-    one = of_readings(budget(judge({3: 0.0})))
-    assert one == pytest.approx(0.0005 * gear.model.plunger_amplification()[2], rel=1e-3)
-
-
 def test_a_joint_with_an_uncertainty_of_its_own_carries_that_instead(gear: Gear) -> None:
     plain, own = inspected(WORN), inspected(WORN, gauge_u_by_joint_in={3: 0.002, 5: 0.0001})
     each = Cases.of(gear, [plain, own]).predict_bounds()[0].u_readings_in

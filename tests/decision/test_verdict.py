@@ -105,11 +105,6 @@ def test_this_gears_own_margin_takes_the_place_of_the_published_one(judge: Judge
     assert (found.margin_in, found.verdict) == (0.08, Verdict.WITHIN_MARGIN)
 
 
-def test_the_chance_with_random_directions_stands_beside_the_bound(judge: Judge) -> None:
-    alone = judge(dict.fromkeys(range(1, 11), 0.0) | FAILURE)
-    assert alone.probability_exceed_random_directions == pytest.approx(0.25, abs=0.01)
-
-
 def test_an_invalid_row_is_rejected_with_what_to_correct(gear: Gear, table: IndexTable) -> None:
     row = InvalidRow("R1", "258401", Side.LH, ("clearance_3_in", "side"))
     (found,) = assess([row], gear, table)

@@ -24,10 +24,9 @@ from mlg_troubleshoot.diagnosis import (
 )
 from mlg_troubleshoot.diagnosis.diagnose import NamedCause
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
-from mlg_troubleshoot.errors import GearFileError, OutputError, TroubleshootError
+from mlg_troubleshoot.errors import GearFileError, TroubleshootError
 from mlg_troubleshoot.gear.gear import Gear, adjusted_worst_case
 from mlg_troubleshoot.units import ClearanceConvention
-from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult, check_inspection
 
 BY_NAME = {cause.name: cause for cause in CATALOGUE}
 HOSTILE = 'N"1\\2 [[terms]] \n# ü № "'
@@ -220,12 +219,6 @@ def test_a_file_that_no_diagnosis_wrote_so_says_it(changed, gear, tmp_path):
     assert load_extension([file], gear).describe().endswith(f"; no diagnosis wrote {file}")
 
 
-def test_an_extension_that_cannot_be_written_says_so(gear: Gear, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(OutputError, match="cannot be written"):
-        write_extension(extension(gear, RATE), tmp_path / "file" / "e.toml")
-
-
 def test_files_stack_and_their_offsets_add_up(gear: Gear, tmp_path: Path) -> None:
     write_extension(extension(gear, GAUGE), tmp_path / "one.toml")
     write_extension(extension(gear, RIGGED), tmp_path / "two.toml")
@@ -258,20 +251,6 @@ def test_a_change_since_a_date_acts_in_a_table_that_starts_on_another_day(day, m
 def test_another_tail_and_a_row_without_the_column_are_not_touched(gear: Gear) -> None:
     assert offset_of(gear, (RIGGED,), tail_no="N2") == 0.0
     assert offset_of(gear, (STRETCH,), hydraulic_pressure_psi=None) == 0.0
-
-
-def checked(gear: Gear, *terms: Term) -> CheckResult:
-    options = CheckOptions(extension=extension(gear, *terms) if terms else None)
-    return check_inspection(inspection(), options)
-
-
-def test_a_check_predicts_with_the_extension(gear: Gear) -> None:
-    plain, extended = (checked(gear, *terms).judgements[0] for terms in ((), (GAUGE,)))
-    assert extended.over_travel_in - plain.over_travel_in == pytest.approx(0.004, abs=1e-9)
-
-
-def test_the_model_s_uncertainty_becomes_the_scatter_that_was_left(gear: Gear) -> None:
-    assert checked(gear, GAUGE).judgements[0].budget.model_in == pytest.approx(0.0031)
 
 
 def test_an_extension_describes_itself_in_words(gear: Gear) -> None:

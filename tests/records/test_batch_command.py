@@ -81,7 +81,8 @@ def test_joints_over_their_limit_are_counted_over_the_batch(mixed):
 def test_each_problem_is_told_with_place_value_and_remedy(mixed):
     said = mlg("check", mixed).err
     assert "2 problems in the input:" in said
-    for words in ("cell C4", "'both'", "Enter LH or RH", "cell G4", "'n/a?'"):
+    place = "mixed.xlsx, sheet 'Inspections', cell C4, column 'side': found 'both'"
+    for words in (place, "Enter LH or RH", "cell G4", "'n/a?'"):
         assert words in said
 
 

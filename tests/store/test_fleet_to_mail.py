@@ -41,8 +41,9 @@ def names(found: list[dict[str, object]]) -> list[str]:
     return [f"{gear['tail_no']} {gear['side']}" for gear in found]
 
 
-def test_an_empty_store_says_how_to_keep_inspections(tmp_path: Path) -> None:
-    found = mlg("fleet", "--store", tmp_path / "none.sqlite")
+@pytest.mark.parametrize("command", ["fleet", "history"])
+def test_an_empty_store_says_how_to_keep_inspections(tmp_path: Path, command: str) -> None:
+    found = mlg(command, "--store", tmp_path / "none.sqlite")
     assert found.out.startswith("No records in ")
     assert " ".join(found.out.split()).endswith("Keep inspections with: mlg check FILE --keep")
 

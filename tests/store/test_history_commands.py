@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from datetime import date, timedelta
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, S
 from mlg_troubleshoot.gear import gear_file
 from mlg_troubleshoot.life.folding import life_of
 from mlg_troubleshoot.reporting.html import environment
-from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_record, packed
+from mlg_troubleshoot.store import Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.cli.conftest import Run, mlg, row
 
@@ -50,36 +49,13 @@ def keep(folder: Path, *rows: Mapping[str, str], more: tuple[str, ...] = ()) -> 
 
 
 def seeded(*visits: tuple[int, float]) -> None:
-    """Keep visits of N123 LH as a check would, without one: what was found is joint 3 first."""
-    found: list[Record] = []
+    """Keep visits of N123 LH as a check would, without one."""
+    found = []
     for n, worn_in in visits:
         day = date(2024, 1, 10) + timedelta(days=90 * n)
-        seen = Inspection(
-            f"N123-LH-{n}",
-            "N123",
-            Side.LH,
-            RADIAL,
-            {3: worn_in},
-            inspection_date=day,
-            gear_landings=400.0 * n,
-        )
-        verdict, worst_in = "OUTSIDE_MARGIN" if worn_in > 0.006 else "WITHIN_MARGIN", 5.0 * worn_in
-        result = {
-            "verdict": verdict,
-            "joints": [{"joint": 3, "rank": 1}],
-            "predicted_displacement_in": worst_in,
-        }
-        body = {
-            "result": {**result, "margin_in": 0.03},
-            "program_version": "0",
-            "geometry_sha256": "0",
-            "extension": None,
-        }
-        found.append(inspection_record(seen))
-        found.append(
-            replace(found[-1], kind=RecordKind.ASSESSMENT, packed=packed(body), identity=(f"{n}",))
-        )
-    Store().add(found)
+        when = {"inspection_date": day, "gear_landings": 400.0 * n}
+        found.append(Inspection(f"N123-LH-{n}", "N123", Side.LH, RADIAL, {3: worn_in}, **when))
+    Store().add([inspection_record(seen) for seen in found])
 
 
 def life(*more: str) -> dict[str, object]:
@@ -207,13 +183,6 @@ def test_what_cannot_be_amended_is_refused(tmp_path, place, values, said):
     assert said in " ".join(run.err.split())
 
 
-def test_a_void_inspection_does_not_count(tmp_path: Path, place: Path) -> None:
-    seeded((1, 0.001), (2, 0.009))
-    assert mlg("history", "void", "N123-LH-2", "--why", "another aircraft").code == 0
-    assert joint_3(life())["readings"] == [[400.0, 0.001]]
-    assert mlg("history", "void", "N123-LH-2", "--why", "again").code == 2
-
-
 def test_no_worst_case_is_stated_of_a_visit_on_which_no_joint_was_read(tmp_path, place):
     seen = visit(1, 0.0, outcome="FAILED", plunger_displacement_in="0.041")
     keep(tmp_path, {n: "" if re.match(r"clearance_\d", n) else text for n, text in seen.items()})
@@ -263,10 +232,10 @@ def test_an_export_is_imported_with_its_chain(tmp_path: Path, place: Path) -> No
     kinds = [
         json.loads(line)["kind"] for line in (tmp_path / "chain.jsonl").read_text().splitlines()
     ]
-    assert kinds == ["inspection", "assessment", "inspection", "assessment", "repair"]
+    assert kinds == ["inspection", "inspection", "repair"]
     other = ("--store", tmp_path / "other.sqlite")
     assert mlg("history", "import", tmp_path / "chain.jsonl", *other).code == 0
-    assert mlg("history", "verify", *other).out.startswith("5 records fit the chain.\n")
+    assert mlg("history", "verify", *other).out.startswith("3 records fit the chain.\n")
 
 
 @pytest.mark.parametrize("line", ["[" * 5000 + "]" * 5000, "9" * 5000, "[]", "{", "\x00"])
@@ -293,12 +262,6 @@ def test_what_cannot_be_meant_is_refused_as_usage(tmp_path, place, command):
     run = mlg(*command)
     assert run.code == 2
     assert "What to do:" in run.err
-
-
-def test_an_empty_store_says_how_to_keep(place: Path) -> None:
-    run = mlg("history")
-    assert run.code == 0
-    assert "--keep" in run.out
 
 
 def test_a_fleet_without_landings_has_no_forecast_and_says_null(tmp_path, place):

@@ -230,24 +230,6 @@ def test_a_table_of_blank_rows_alone_is_no_conclusion(tmp_path: Path) -> None:
     assert kept(tmp_path, [line("2026-02-01", **blank)]).code == 3
 
 
-def test_a_plunger_beyond_the_margin_from_before_a_repair_is_shown(tmp_path: Path) -> None:
-    found = kept(
-        tmp_path,
-        [
-            line(
-                "2026-03-01",
-                plunger_displacement_in="0.041",
-                plunger_date="2026-01-01",
-                restored_joints="3",
-                repair_date="2026-02-01",
-                outcome="RETRACTED",
-            )
-        ],
-    )
-    assert found.code == 0
-    assert any("+0.0410 in" in said for said in found.one["warnings"])
-
-
 def test_every_joint_of_a_full_reading_is_its_own(tmp_path: Path) -> None:
     found = kept(tmp_path, [line("2026-01-01")], [line("2026-02-01")])
     assert {fact["record"] for fact in found.one["standing"]} == {"R2026-02-01"}
