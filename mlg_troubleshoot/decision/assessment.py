@@ -188,6 +188,14 @@ class Verdict(StrEnum):
         }[self.value]
 
 
+def title_of(verdict: Verdict, basis: Basis) -> str:
+    """The verdict in capitals, as it heads every channel."""
+    if basis is Basis.PREDICTED:
+        return verdict.words
+    outside = verdict is Verdict.OUTSIDE_MARGIN
+    return "OUTSIDE MARGIN, MEASURED" if outside else "WITHIN MARGIN, MEASURED"
+
+
 class VerdictTone(StrEnum):
     """How loud a verdict is: RED is for what must be done now."""
 
@@ -496,13 +504,7 @@ class Assessment(_Planned, Result):
     @property
     def title(self) -> str:
         """The verdict in capitals, as it heads every channel."""
-        if self.basis is Basis.MEASURED:
-            return (
-                "OUTSIDE MARGIN, MEASURED"
-                if self.is_measured_outside
-                else "WITHIN MARGIN, MEASURED"
-            )
-        return self.verdict.words
+        return title_of(self.verdict, self.basis)
 
     @property
     def is_measured_outside(self) -> bool:

@@ -6,7 +6,7 @@ What is looked at first: of the joints of a gear, of the gears of a batch.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import date
 from functools import partial
@@ -284,6 +284,20 @@ def assess(
         )
         for row in rows
     )
+
+
+def verdicts(
+    rows: Sequence[Inspection], gear: Gear, table: IndexTable, *, fleet: Fleet | None = None
+) -> Iterator[tuple[Verdict, Basis, float | None, float]]:
+    """The verdict of each inspection, what it rests on, its worst case (None where the linkage does
+    not close) and its margin: without a plan. [in]
+    """
+    for start in range(0, len(rows), AT_ONCE):
+        cases = Cases.of(gear, rows[start : start + AT_ONCE], fleet=fleet)
+        with threadpool_limits(1, "blas"):
+            judged = _judged(cases, table)
+        worst = map(_number_or_none, judged.lower.displacement_in.tolist())
+        yield from zip(judged.verdicts, judged.bases, worst, cases.margin_in.tolist(), strict=True)
 
 
 # What a judgement without an extension does not depend on.

@@ -13,7 +13,7 @@ from datetime import date, datetime
 from functools import cached_property
 from operator import itemgetter
 
-from mlg_troubleshoot.decision.assessment import Action, Assessment, Basis, Verdict
+from mlg_troubleshoot.decision.assessment import Action, Assessment, Basis, Verdict, title_of
 from mlg_troubleshoot.decision.inspection import (
     Fleet,
     Inspection,
@@ -21,7 +21,7 @@ from mlg_troubleshoot.decision.inspection import (
     Side,
     plain_tail,
 )
-from mlg_troubleshoot.decision.judge_rows import Listed, assess
+from mlg_troubleshoot.decision.judge_rows import Listed, assess, verdicts
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -58,15 +58,15 @@ _TICK_S = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class TodaysVerdict:
-    """What a check says of a gear today; the defaults of one that cannot be judged.
+    """What a check says of a gear today; the defaults of one that cannot be judged, or of a verdict
+    without a plan.
 
-    title: the verdict in words. worst_joint: the joint to look at first. next_action: in brief.
-    minutes, restore: of the plan. is_fine: whether nothing needs attention.
+    worst_joint: the joint to look at first. next_action: in brief. minutes, restore: of the plan.
+    is_fine: whether nothing needs attention.
     """
 
     verdict: Verdict | None = None
     basis: Basis | None = None
-    title: str = ""
     predicted_displacement_in: float | None = None
     margin_in: float | None = None
     worst_joint: int | None = None
@@ -74,6 +74,10 @@ class TodaysVerdict:
     minutes: float = 0.0
     restore: tuple[int, ...] = ()
     is_fine: bool = True
+
+    @property
+    def title(self) -> str:
+        return title_of(self.verdict, self.basis) if self.verdict and self.basis else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -417,58 +421,46 @@ def judge_lives(
     fleet: Fleet | None = None,
     every: bool = False,
 ) -> list[GearLife]:
-    """Judge what stands of each gear today by what its `fleet` teaches and, with `every`, what
-    stood at each inspection.
+    """Judge what stands of each gear today by what its `fleet` teaches and, with `every`, say the
+    verdict of what stood at each visit.
     """
     asked = list(lives)
     numbers = set(gear.joint_numbers)
-    found: dict[tuple[int, str], GearState] = {}
-    for place, life in enumerate(asked):
-        known = [v for v in life.visits if v.inspection.clearance_in.keys() <= numbers]
-        if (now := state_now(known, gear)) is not None:
-            found[place, _NOW] = now
-        if not every:
-            continue
-        inspected = {visit.kept.digest for visit in life.inspections}
-        found |= {
-            (place, digest): state
-            for state in states(known, gear)
-            if (digest := state.visit.kept.digest) in inspected
-        }
-    said = dict(zip(found, _judged([*found.values()], gear, table, fleet), strict=True))
+    visits = [
+        [v for v in life.visits if v.inspection.clearance_in.keys() <= numbers] for life in asked
+    ]
+    now = [state_now(own, gear) for own in visits]
+    before = [states(own, gear) if every else [] for own in visits]
+    rows = [state.inspection for own in before for state in own]
+    was = verdicts(rows, gear, table, fleet=fleet)
+    standing = [state for state in now if state is not None]
+    says = _judged(standing, gear, table, fleet)
     return [
         replace(
             life,
-            judged={digest: each for (n, digest), each in said.items() if n == place and digest},
-            state=found.get((place, _NOW)),
-            now=said.get((place, _NOW), TodaysVerdict()),
+            judged={state.visit.kept.digest: TodaysVerdict(*next(was)) for state in own},
+            state=state,
+            now=TodaysVerdict() if state is None else next(says),
         )
-        for place, life in enumerate(asked)
+        for life, own, state in zip(asked, before, now, strict=True)
     ]
-
-
-# Stands in place of the hash of an inspection.
-_NOW = ""
 
 
 def _judged(
     states: Sequence[GearState], gear: Gear, table: IndexTable, fleet: Fleet | None
-) -> list[TodaysVerdict]:
+) -> Iterator[TodaysVerdict]:
     rows = [state.inspection for state in states]
     each = assess(rows, gear, table, sets=False, fleet=fleet)
-    return [
-        TodaysVerdict(
-            found.verdict,
-            found.basis,
-            found.title,
-            found.predicted_displacement_in,
-            found.margin_in,
-            found.ranked[0].joint,
-            found.in_brief,
-            sum(step.minutes for step in found.plan.steps),
-            tuple(n for s in found.plan.steps if s.action is Action.RESTORE for n in s.joints),
-            Listed.of(replace(found, older=state.older)).is_fine,
-        )
-        for state, found in zip(states, each, strict=True)
-        if isinstance(found, Assessment)
-    ]
+    for state, found in zip(states, each, strict=True):
+        if isinstance(found, Assessment):
+            yield TodaysVerdict(
+                found.verdict,
+                found.basis,
+                found.predicted_displacement_in,
+                found.margin_in,
+                found.ranked[0].joint,
+                found.in_brief,
+                sum(step.minutes for step in found.plan.steps),
+                tuple(n for s in found.plan.steps if s.action is Action.RESTORE for n in s.joints),
+                Listed.of(replace(found, older=state.older)).is_fine,
+            )

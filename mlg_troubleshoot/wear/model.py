@@ -19,7 +19,7 @@ reading is x + N(0, r²). Both are filtered exactly (Kalman).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -36,6 +36,9 @@ _DECIMALS = 9
 # Readings lie on a grid if it has at least this many readings to a step of their range, and not by
 # chance. [1]
 _MOST_STEPS = 2000
+# Newest readings of a unit that it is followed by, and units read twice or more that are learnt
+# from, at most: more would narrow nothing. [1]
+_FOLLOWED = 160
 # Share of the parts whose values fall from which on wear is taken to fall. [1]
 _FALLING = 0.75
 
@@ -170,8 +173,8 @@ def scale_of(paths: Sequence[WearPath]) -> Scale:
 
 
 def lay_out(groups: Sequence[Sequence[WearPath]], scale: Scale) -> Steps:
-    """Lay the paths of each unit behind each other; shorter units are padded in front, so that all
-    end together.
+    """Lay the newest readings of each unit behind each other; shorter units are padded in front, so
+    that all end together.
     """
     lengths = [sum(max(path.n_readings, 1) for path in group) for group in groups]
     shape = (max(lengths, default=0), len(groups))
@@ -194,7 +197,9 @@ def lay_out(groups: Sequence[Sequence[WearPath]], scale: Scale) -> Steps:
             if path.reading_u is not None:
                 steps.known_r2[rows, column] = (path.reading_u / scale.value) ** 2
             row += max(count, 1)
-    return steps
+    newest = Steps(*(getattr(steps, each.name)[-_FOLLOWED:] for each in fields(Steps)))
+    newest.begins[:1] |= np.array(lengths) > _FOLLOWED
+    return newest
 
 
 _LOG_2PI = float(np.log(2 * np.pi))
@@ -419,8 +424,7 @@ class WearModel(Result):
         Simulated paths of each unit. [1]
     """
 
-    # Units read twice or more that are learnt from at most: more would not narrow it. [1]
-    learns_from: ClassVar[int] = 160
+    learns_from: ClassVar[int] = _FOLLOWED
 
     paths: Mapping[str, tuple[WearPath, ...]]
     kinds: Mapping[str, float]
