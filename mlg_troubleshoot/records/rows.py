@@ -171,15 +171,25 @@ _REFERENCE = _phrases(
     rf"|permissible)(?: {_MOST})?"
 )
 _SIDE = re.compile(r"\b(?:[lr]/?h|left|right|port|stbd|starboard)\b|^[lr]$")
+# A side, or what was left.
+_OPEN = re.compile(r"\bleft\b(?! (?:hand|side|gear|leg))")
 
 
-def take_apart(text: str) -> Heading:
-    """What a heading says of the numbers below it; two words that contradict say nothing."""
+def take_apart(text: str, beside: str = "") -> Heading:
+    """What a heading says of the numbers below it; two words that contradict say nothing.
+
+    beside: the headings next to it: left is a side where one says right, and else what was left
+    where one says found.
+    """
     rest = re.sub(r"\s*_+\s*", " ", tidy(text))
     day = find_day(rest)
     rest = rest.replace(day.casefold(), " ") if day else rest
     is_left = _LEFT.search(rest) is not None
     rest = _LEFT.sub(" ", rest)
+    is_open = _OPEN.search(rest) is not None and "right" not in beside
+    if is_open:
+        rest = _OPEN.sub(" ", rest)
+        is_left = _READING.search(beside) is not None or _SIDE.search(rest) is not None
     # "Reading" is part of "last reading".
     is_reference = _REFERENCE.search(rest) is not None
     rest = _REFERENCE.sub(" ", rest)
@@ -189,7 +199,7 @@ def take_apart(text: str) -> Heading:
     rest = re.sub(
         r"[\s(\[,;:/-]+$|^[\s)\],;:/-]+|\(\s*\)", "", " ".join(_SIDE.sub(" ", rest).split())
     )
-    if len(sides) > 1 or is_reference + is_reading + is_left > 1:
+    if len(sides) > 1 or is_reference + is_reading + is_left > 1 or is_open > is_left:
         return Heading(rest=rest)
     kind = not is_reference if is_reference or is_reading or is_left else None
     return Heading(kind, Occasion(next(iter(sides), None), day, is_left), rest)
@@ -991,6 +1001,10 @@ class RowReader:
             else:
                 found.values[column] = value
         side = row.visit.side or self._options.side
+        if SIDE in self._at and found.values.get(SIDE, side) is not side and row.visit.side:
+            expected = f"{side}, as the headers of its readings say"
+            remedy = "Correct the side, or the headers."
+            self._fault(self._at[SIDE], CellFaultError("side_contradicts", expected, remedy))
         if self._makes_ids:
             found.values[RECORD_ID] = self._made_id(side)
         elif self._suffix and RECORD_ID in found.values:

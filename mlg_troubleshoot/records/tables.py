@@ -206,7 +206,7 @@ def _with_rows_below(header: Header, rows: Sequence[NumberedRow], options: ReadO
             field = recognise(text, options.joints).field if word else None
             if field is not None and field.column in IDENTITY:
                 words = []
-        headings = [take_apart(text) for text in words if text]
+        headings = [take_apart(text, tidy(" ".join(words))) for text in words if text]
         if headings and all(each.is_said and each.is_bare for each in headings):
             joined = []
             above_it = ""
@@ -346,12 +346,13 @@ class Columns:
         """
         joints = self._options.joints
         in_long = bool(self.at(JOINT))
+        beside = " ".join(tidy(p.header) for p in self.placed)
         groups: dict[tuple[Column, int | None], list[tuple[PlacedField, Field, Heading]]] = {}
         for p, unit in zip_longest(self.placed, units):
             named = p.field
             heading = Heading(is_reading=True)
             if named is None and not p.is_settled:
-                heading = take_apart(p.header)
+                heading = take_apart(p.header, beside)
                 rest = f"clearance {heading.rest}" if in_long and heading.is_bare else heading.rest
                 named = recognise(rest, joints).field
                 if named is not None and named.column.is_length:
@@ -370,7 +371,7 @@ class Columns:
             if len({(p.header, heading.is_reading) for p, _, heading in group}) < 2:
                 # One heading twice is one column twice, not two that are in doubt.
                 visits = visits or [heading.visit for *_, heading in group if heading.is_reading]
-            has_side = self.at(SIDE) and any(visit and visit.side for visit in visits)
+            has_side = self.at(SIDE) and len({visit.side for visit in visits if visit}) > 1
             is_apart = key in measured or several.keys() - {ONE_VISIT} >= {*visits}
             if has_side or not is_apart or all(p.field is not None for p, *_ in group):
                 continue

@@ -252,3 +252,33 @@ def test_two_forms_next_to_each_other_are_two_inspections() -> None:
         ("N1", "LH", 0.001),
         ("N2", "RH", 0.029),
     ]
+
+
+AS_FOUND, AS_LEFT = ("LH", {3: 0.001}), ("LH", {3: 0.002})
+
+
+@pytest.mark.parametrize(
+    ("side", "headers", "visits"),
+    [
+        ("LH", ("J3 found (in)", "J3 left (in)"), [AS_FOUND, AS_LEFT]),
+        ("LH", ("J3 left (in)", "J3 before (in)"), [AS_FOUND, AS_LEFT]),
+        (None, ("J3 found LH (in)", "J3 left LH (in)"), [AS_FOUND, AS_LEFT]),
+        (None, ("J3 left (in)", "J3 right (in)"), [AS_FOUND, ("RH", {3: 0.002})]),
+        (None, ("J3 L/H (in)",), [AS_FOUND]),
+        ("LH", ("J3 LH (in)",), [AS_FOUND]),
+        ("LH", ("J3 port (in)",), [AS_FOUND]),
+        ("LH", ("J3 left (in)",), []),
+        (None, ("J3 left (in)",), []),
+        ("RH", ("J3 LH (in)",), []),
+        ("LH", ("J3 left (in)", "J3 right (in)"), []),
+    ],
+)
+def test_left_is_a_side_or_what_was_left_as_the_headings_next_to_it_say(
+    side: str | None, headers: tuple[str, ...], visits: list[object]
+) -> None:
+    said = ["Side"] if side else []
+    rows = [["Tail", "Convention", *said, *headers], ["N1", "RADIAL", *[side] * len(said)]]
+    rows[1] += [0.001, 0.002][: len(headers)]
+    found = read_many([workbook(rows)], OPTIONS)
+    assert found_in(found) == visits
+    assert bool(found.problems) is not bool(visits)
