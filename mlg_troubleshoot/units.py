@@ -88,22 +88,6 @@ UNIT_SPELLINGS: dict[str, LengthUnit] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Slip:
-    """A slip of entry by a factor, and what makes a value that many times too small."""
-
-    factor: float
-    too_small: str
-
-
-# The one table of slips: suggested wherever they would explain a value, never applied.
-SLIPS: dict[str, Slip] = {
-    "unit": Slip(MM_PER_IN, "inches read as millimetres"),
-    "point": Slip(10.0, "a misplaced decimal point"),
-    "convention": Slip(2.0, "a radial clearance read as diametral or total play"),
-}
-
-
 class ClearanceConvention(StrEnum):
     """What a clearance reading is a reading of. It must be stated: the factor 2 flips
     verdicts.
@@ -138,6 +122,25 @@ class ClearanceConvention(StrEnum):
                 "Give RADIAL (centre offset), DIAMETRAL (bore minus pin) or TOTAL_PLAY (dial"
                 " reading).",
             ) from None
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """A slip of entry by a factor, and what makes a value that many times too small."""
+
+    factor: float
+    too_small: str
+
+
+# The one table of slips: suggested wherever they would explain a value, never applied.
+SLIPS: dict[str, Slip] = {
+    "unit": Slip(MM_PER_IN, "inches read as millimetres"),
+    "point": Slip(10.0, "a misplaced decimal point"),
+    "convention": Slip(
+        ClearanceConvention.TOTAL_PLAY.per_radial,
+        "a radial clearance read as diametral or total play",
+    ),
+}
 
 
 def with_unit(text: str, unit: LengthUnit) -> str:

@@ -52,7 +52,7 @@ from mlg_troubleshoot.decision.prediction import (
 from mlg_troubleshoot.decision.priors import BEYOND, PRIORS, THRESHOLDS, WELL_WITHIN
 from mlg_troubleshoot.decision.sentences import joints_are
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE
-from mlg_troubleshoot.gear.gear import BETTER_GAUGES_IN, Gear
+from mlg_troubleshoot.gear.gear import BETTER_GAUGE_U_IN, Gear
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -632,7 +632,7 @@ class _PlanBuilder:
         """Take the readings in doubt again, once in a plan."""
         doubted = self._joints(self.doubted)
         if doubted and not self.taken_again:
-            self._measure(doubted, BETTER_GAUGES_IN[-1])
+            self._measure(doubted, BETTER_GAUGE_U_IN)
             self.taken_again = True
 
     def _restore_over_limit(self) -> _PlanBuilder:

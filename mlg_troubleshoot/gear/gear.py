@@ -2,9 +2,6 @@
 well.
 
 Changes inside the geometric model, row by row: what an extension of the model amounts to.
-
-How well gauges read, as standard uncertainties: what a reading has that states none, and what
-better gauges reach.
 """
 
 from __future__ import annotations
@@ -13,12 +10,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, central_slopes, central_steps, frozen
-from mlg_troubleshoot.datafile import Table, Whole
+from mlg_troubleshoot.datafile import Table, Whole, read_toml
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.linkage import (
     IN_CACHE,
@@ -33,6 +31,13 @@ from mlg_troubleshoot.results import JsonOutput
 
 # 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
 ROUNDING_IN = 1e-9
+
+DATA = Path(str(files("mlg_troubleshoot.gear"))) / "data"
+# What is assumed where nothing is stated, by its name; units and sources stand in the file.
+ASSUMED = read_toml(DATA / "assumed.toml", dict[str, float]).content
+DEFAULT_GAUGE_U_IN = ASSUMED["gauge_u"]
+DEFAULT_PLUNGER_U_IN = ASSUMED["plunger_u"]
+BETTER_GAUGE_U_IN = ASSUMED["better_gauge_u"]
 
 
 class SourceKind(StrEnum):
@@ -466,12 +471,3 @@ def adjusted_slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCas
         slopes[rows] = central_slopes(model.displacement(links, numbers)).T
     rate = 1.0 if adjustment.rate_factor is None else adjustment.rate_factor[:, None]
     return rate * slopes
-
-
-# A clearance reading that states none, taken by hand: assumed. [in]
-DEFAULT_GAUGE_U_IN = 0.0005
-# A plunger reading that states none: hand-held gauges read it to 0.0015 to 0.002 in, assumed to be
-# the larger. [in]
-DEFAULT_PLUNGER_U_IN = 0.002
-# What better gauges can reach: bore gauges and micrometers. [in]
-BETTER_GAUGES_IN = (0.0004, 0.0003)

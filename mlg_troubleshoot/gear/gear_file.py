@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import hashlib
 from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,8 @@ from mlg_troubleshoot.errors import GearFileError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.assembly import Assembly, guides_of
 from mlg_troubleshoot.gear.gear import (
+    ASSUMED,
+    DATA,
     Area,
     Discrepancies,
     Gear,
@@ -38,33 +39,24 @@ from mlg_troubleshoot.gear.linkage import Calibration
 from mlg_troubleshoot.geometry.mechanism import Mechanism
 from mlg_troubleshoot.geometry.program import write_program
 
-_DATA = Path(str(files("mlg_troubleshoot.gear"))) / "data"
 _OLD = 'docs/how-to/own-gear.md, "Gear files of 0.2.0", shows the old and the new way to write it.'
-# What a workshop need not state and what is assumed for it, by the names of a gear: the key, the
-# number and its unit.
+# What a workshop need not state, by the names of a gear: the key and its unit.
 _WORKSHOP = {
-    "plunger_reading": ("read_plunger_min", 12.0, "min"),
-    "rigging_check": ("check_rigging_min", 30.0, "min"),
-    "retraction": ("trial_retraction_min", 15.0, "min"),
-    "second_repair_chance": ("second_repair_chance", 0.02, "1"),
-    "horizon": ("horizon_landings", 20_000.0, "landings"),
-    "accepted_chance": ("accepted_chance", 0.05, "1"),
+    "plunger_reading": ("read_plunger_min", "min"),
+    "rigging_check": ("check_rigging_min", "min"),
+    "retraction": ("trial_retraction_min", "min"),
+    "second_repair_chance": ("second_repair_chance", "1"),
+    "horizon": ("horizon_landings", "landings"),
+    "accepted_chance": ("accepted_chance", "1"),
 }
-# What is assumed of a joint: a new part without clearance, and the time to measure and restore it.
-_ACCESS_MIN = 10.0
-_RESTORE_MIN = 120.0
-_BEARING_SPAN_IN = 1.0
-# A reading above twice the largest limit is asked again, one above five times is refused. [1]
-_CONFIRM_ABOVE = 2
-_HARD_LIMIT = 5
 
 
 def shipped_gears() -> tuple[str, ...]:
     """Return the names of the gears that ship with the program, the default one first, for
     :func:`load_gear`.
     """
-    names = {p.stem for p in _DATA.glob("*.toml")}
-    gears = (n for n in names if not n.endswith(("-ensemble", "-targets")))
+    names = {p.stem for p in DATA.glob("*.toml")}
+    gears = (n for n in names if not n.endswith(("-ensemble", "-targets", "assumed")))
     return tuple(sorted(gears, key=lambda name: (name != DEFAULT_GEAR, name)))
 
 
@@ -106,7 +98,7 @@ def load_gear(name_or_path: str | Path | Gear = DEFAULT_GEAR) -> Gear:
 
 @lru_cache(maxsize=8)
 def _shipped(name: str) -> Gear:
-    return _read(_DATA / f"{name}.toml")
+    return _read(DATA / f"{name}.toml")
 
 
 def read_gear_file(path: Path) -> DataFile[GearFile]:
@@ -150,15 +142,12 @@ def _read(path: Path) -> Gear:
             for number in range(1, len(form.joints) + 1)
         ),
         areas=tuple(areas),
-        **{
-            name: numbers.of(form.workshop, key, unit, assumed)
-            for name, (key, assumed, unit) in _WORKSHOP.items()
-        },
+        **{name: numbers.of(form.workshop, key, unit) for name, (key, unit) in _WORKSHOP.items()},
         calibration=calibration,
         margin=numbers.of(form, "margin", "in"),
-        bearing_span=numbers.of(form, "bearing_span", "in", _BEARING_SPAN_IN),
-        hard_limit=numbers.of(form, "hard_limit", "in", _HARD_LIMIT * largest),
-        confirm_above=numbers.of(form, "confirm_above", "in", _CONFIRM_ABOVE * largest),
+        bearing_span=numbers.of(form, "bearing_span", "in"),
+        hard_limit=numbers.of(form, "hard_limit", "in", largest),
+        confirm_above=numbers.of(form, "confirm_above", "in", largest),
         down_lock_range=down_lock_range,
         how=_how(form.how, numbers),
         discrepancies=_discrepancies(file, reference.mechanism),
@@ -226,11 +215,11 @@ class _Numbers:
         own = table.source or self.form.source
         return self.form.sources[table.source_of.get(key, own)]
 
-    def of(self, table: SourcedTable, key: str, unit: str, assumed: float = 0.0) -> Sourced:
-        """Add the number of a table, or what is assumed for it."""
+    def of(self, table: SourcedTable, key: str, unit: str, size: float = 1.0) -> Sourced:
+        """Add the number of a table, or what is assumed for it, a multiple of a size."""
         value = getattr(table, key)
         if value is None:
-            return self.assumed(assumed, unit)
+            return self.assumed(ASSUMED[key] * size, unit)
         return self.add(value, unit, self.source(table, key))
 
 
@@ -313,8 +302,8 @@ def _joint(
         location=joint.location or f"pin of {links}",
         limit=numbers.of(joint, "limit", "in"),
         new_part=numbers.of(joint, "new_part", "in"),
-        access=numbers.of(joint, "access_min", "min", _ACCESS_MIN),
-        restore=numbers.of(joint, "restore_min", "min", _RESTORE_MIN),
+        access=numbers.of(joint, "access_min", "min"),
+        restore=numbers.of(joint, "restore_min", "min"),
         area=area,
         critical=joint.critical,
         acts_like=tuple(n for n in alike if n != number),

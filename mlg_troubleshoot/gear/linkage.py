@@ -162,7 +162,6 @@ def links_from(clearance_in: Array, directions: Array) -> list[Array]:
 
 # Directions around a joint among which the worst one is bracketed. [rad]
 _ANGLES = np.pi * np.arange(8) / 4
-_ROOT_HALF = np.sqrt(0.5)
 # A joint without clearance still has a direction in which it would act: found with this length.
 _PROBE_IN = STEP
 _ROWS = 512
@@ -237,32 +236,24 @@ def worst_of_sense(
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
     n, joints = clearance.shape
     moved = np.empty(n)
-    angles = np.empty((n, joints))
+    # Gears run along the last axis: every operation then works on long rows of memory.
+    angles = np.empty((joints, n))
     senses = np.broadcast_to(sense, n)
     for start in range(0, n, _ROWS):
-        rows = slice(start, min(start + _ROWS, n))
+        rows = slice(start, start + _ROWS)
         part = {name: np.asarray(value)[rows] for name, value in (changed or {}).items()}
-        moved[rows], angles[rows] = _sequential(model, clearance[rows], senses[rows], part)
-    return moved, angles
-
-
-def _sequential(
-    model: LinkageModel, clearance: Array, sense: Array, changed: Mapping[str, Array]
-) -> tuple[Array, Array]:
-    n, joints = clearance.shape
-    # Gears run along the last axis: every operation then works on long rows of memory.
-    links: list[Any] = [0.0] * (2 * joints)
-    chosen = np.empty((joints, n))
-    for j in reversed(range(joints)):
-        length = np.ascontiguousarray(clearance[:, j])
-        probe = np.where(length > 0.0, length, _PROBE_IN)
-        links[2 * j] = np.cos(_ANGLES)[:, None] * probe
-        links[2 * j + 1] = np.sin(_ANGLES)[:, None] * probe
-        angle = _argmax_on_circle(sense * model.displacement(links, changed))
-        chosen[j] = angle
-        links[2 * j] = length * np.cos(angle)
-        links[2 * j + 1] = length * np.sin(angle)
-    return np.broadcast_to(model.displacement(links, changed), (n,)), chosen.T
+        links: list[Any] = [0.0] * (2 * joints)
+        for j in reversed(range(joints)):
+            length = np.ascontiguousarray(clearance[rows, j])
+            probe = np.where(length > 0.0, length, _PROBE_IN)
+            links[2 * j] = np.cos(_ANGLES)[:, None] * probe
+            links[2 * j + 1] = np.sin(_ANGLES)[:, None] * probe
+            angle = _argmax_on_circle(senses[rows] * model.displacement(links, part))
+            angles[j, rows] = angle
+            links[2 * j] = length * np.cos(angle)
+            links[2 * j + 1] = length * np.sin(angle)
+        moved[rows] = model.displacement(links, part)
+    return moved, angles.T
 
 
 def _argmax_on_circle(sampled: Array) -> Array:
@@ -272,7 +263,14 @@ def _argmax_on_circle(sampled: Array) -> Array:
     Returns, shape (n,): angles. [rad]
     """
     angle: Array = _ANGLES[np.argmax(sampled, axis=0)]
-    real, imaginary = _harmonics(np.nan_to_num(sampled))
+    # The first three terms of the discrete Fourier transform of eight samples.
+    known = np.nan_to_num(sampled)
+    even = known[:4] + known[4:]
+    odd = known[:4] - known[4:]
+    near = (odd[1] - odd[3]) * np.cos(_ANGLES[1])
+    far = (odd[1] + odd[3]) * np.cos(_ANGLES[1])
+    real = odd[0] + near, even[0] - even[2], odd[0] - near
+    imaginary = -odd[2] - far, even[3] - even[1], odd[2] - far
     for _ in range(4):
         c = np.cos(angle)
         s = np.sin(angle)
@@ -287,21 +285,6 @@ def _argmax_on_circle(sampled: Array) -> Array:
         divisor = np.where(concave, curvature, 1.0)
         angle = angle - np.where(concave, slope / divisor, 0.0)
     return angle
-
-
-def _harmonics(sampled: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    """Real and imaginary parts of the first three terms of the discrete Fourier transform of eight
-    samples.
-    """
-    even = sampled[:4] + sampled[4:]
-    odd = sampled[:4] - sampled[4:]
-    near = (odd[1] - odd[3]) * _ROOT_HALF
-    far = (odd[1] + odd[3]) * _ROOT_HALF
-    return (odd[0] + near, even[0] - even[2], odd[0] - near), (
-        -odd[2] - far,
-        even[3] - even[1],
-        odd[2] - far,
-    )
 
 
 def random_directions(n_joints: int, n: int) -> Array:

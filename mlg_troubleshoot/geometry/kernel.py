@@ -41,6 +41,7 @@ class Kernel:
         self._program = program
         self.parameter_names = tuple(program.parameters)
         self.parameters = frozen(list(program.parameters.values()))
+        self._nominal = self.parameters.tolist()
         self._output = _function(program, (program.output,))
         self._loop: Callable[..., None] | None = None
 
@@ -51,7 +52,7 @@ class Kernel:
 
     def numbers(self) -> dict[str, float]:
         """The numbers of the mechanism by name. [in, rad or 1]"""
-        return dict(zip(self.parameter_names, self.parameters.tolist(), strict=True))
+        return dict(zip(self.parameter_names, self._nominal, strict=True))
 
     def output(
         self,
@@ -67,18 +68,9 @@ class Kernel:
           rad or 1]
         Returns: output; NaN where the mechanism does not close. [in or rad]
         """
-        return self._solved(self._output, position, links, parameters)[0]
-
-    def _solved(
-        self,
-        formulas: Callable[..., tuple[Any, ...]],
-        position: Array | float,
-        links: Sequence[Array | float],
-        parameters: Sequence[Any] | None,
-    ) -> list[Array]:
-        numbers = self.parameters.tolist() if parameters is None else parameters
         with np.errstate(invalid="ignore", divide="ignore"):
-            return [np.asarray(value) for value in formulas(position, links, numbers)]
+            (found,) = self._output(position, links, parameters or self._nominal)
+        return np.asarray(found)
 
     def positions(
         self,
@@ -89,7 +81,9 @@ class Kernel:
         """x and y of every point in its own plane, of one with a virtual link at its downstream
         link. [in]
         """
-        values = iter(self._solved(self._places, position, links, parameters))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found = self._places(position, links, parameters or self._nominal)
+        values = map(np.asarray, found)
         # x and y of each point follow each other.
         named = zip(self._program.joints, values, values, strict=True)
         return {joint: (x, y) for joint, x, y in named}

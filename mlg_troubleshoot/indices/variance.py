@@ -138,7 +138,7 @@ def student_half(scatter: Array, count: int) -> Array:
 # Gauss points per variable: the next ones change no index of a shipped gear by 2e-5. [1]
 _ORDER = 3
 # Nodes and weights of a two-point rule: the response at no clearance and at the limit. [1]
-CORNERS = (np.array([0, 1], float), np.array([0.5, 0.5]))
+CORNERS = (np.arange(2, dtype=float), np.full(2, 0.5))
 # Points of a tensor at most, and those evaluated at once. [1]
 _MOST_POINTS = 2_000_000
 _ROWS = 1 << 16
