@@ -85,18 +85,6 @@ def test_every_check_fits_its_schema(arguments: tuple[object, ...], stdin: bytes
     assert complain("check", mlg(*arguments, "--json", stdin=stdin).json) == []
 
 
-def test_a_linkage_that_does_not_close_has_no_displacement_and_a_warning() -> None:
-    found = mlg(
-        *HAND, "--convention", "RADIAL", *(f"--set={n}=0.05in" for n in range(1, 11)), "--json"
-    ).one
-    assert (found["verdict"], found["predicted_displacement_in"], found["over_travel_in"]) == (
-        "OUTSIDE_MARGIN",
-        None,
-        None,
-    )
-    assert any("does not close" in warning for warning in found["warnings"])
-
-
 FLEETS: dict[str, dict[str, Any]] = {
     "one cause": {"kind": "single", "strength": 25.0, "cause": "gauge_bias"},
     "nothing wrong": {"kind": "null", "null": "iid"},
@@ -138,14 +126,6 @@ def test_causes_that_rows_cannot_tell_apart_share_the_probability_of_their_class
     first, second = (each["probability"] for each in found[:2])
     assert found[0]["class_probability"] == pytest.approx(found[1]["class_probability"])
     assert found[0]["class_probability"] > max(first, second) + 0.2
-
-
-@pytest.mark.parametrize(("outcome", "said"), [("failed to retract", "FAILED"), ("", None)])
-def test_the_json_of_a_check_has_what_the_gear_did(outcome: str, said: str | None) -> None:
-    row = (
-        f"tail_no,side,clearance_3_in,clearance_convention,outcome\nN1,LH,0.003,RADIAL,{outcome}\n"
-    )
-    assert mlg("check", "-", "--json", stdin=row.encode()).one["outcome"] == said
 
 
 @pytest.mark.parametrize(

@@ -53,11 +53,6 @@ def test_one_value_in_five_joints_or_more_is_asked_about(judge, clearances, aske
     assert said(judge(clearances).warnings, said_so) is asked
 
 
-def test_a_joint_at_its_limit_is_not_above_it_even_if_read_in_millimetres(judge: Judge) -> None:
-    found = judge(every_joint(0.0, j7=0.1905 / 25.4))
-    assert not any(joint.over_limit for joint in found.joints)
-
-
 @pytest.mark.parametrize("unit", [LengthUnit.INCH, LengthUnit.THOU, LengthUnit.MILLIMETRE])
 def test_a_plunger_at_its_margin_is_not_beyond_it_in_any_unit(judge, unit):
     typed = {"in": 0.03, "thou": 30.0, "mm": 0.762}[unit.value]
