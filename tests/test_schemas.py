@@ -23,7 +23,6 @@ from tests.store.places import table
 
 FOUR_BAR = Path(__file__).parent / "geometry" / "data" / "four-bar.toml"
 Change = Callable[[Any], object]
-ROOT = Path(__file__).parents[1]
 BAD_ROWS = (
     b"record_id,tail_no,side,clearance_convention,clearance_1_in\n"
     b"A,N1,,RADIAL,0.001\nB,N1,LH,RADIAL,worn\nC,N1,LH,RADIAL,0.001\n,,,,\nD,,XX,,-1\n"

@@ -27,8 +27,6 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import links_from, random_directions, worst_case
 from tests.decision.conftest import Judge, belief_of, every_joint, inspected
 
-MARGIN_IN = 0.03
-
 
 def levels_of(gear: Gear, clearance_in: dict[int, float]) -> Array:
     return given_readings(Cases.of(gear, [inspected(clearance_in)]))[0][0]

@@ -15,7 +15,6 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.linkage import worst_case
 from tests.decision.conftest import every_joint, inspected
 
-FAILURE = {3: 0.013, 5: 0.007}
 # The failure with the other joints in good condition.
 FULL_FAILURE = every_joint(0.001, j3=0.013, j5=0.007)
 MARGIN_IN = 0.03

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.diagnosis import CATALOGUE, Scene, diagnose
+from mlg_troubleshoot.diagnosis import Scene, diagnose
 from mlg_troubleshoot.diagnosis.explain import build_bank
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.gear.gear import Gear
@@ -21,7 +21,6 @@ from tests.hidden_effect.simulator import blemished_fleet, write_rows
 
 from .conftest import Array, fleet
 
-BY_NAME = {cause.name: cause for cause in CATALOGUE}
 MODIFIED = {"N101": 150, "N104": 420, "N105": 240, "N108": 510}
 
 

@@ -26,11 +26,6 @@ GIVEN = (
 JOINTS = ("Joint {n} (in)", "J{n} (in)", "clearance_{n}_in", "Clearance #{n} (in)")
 CORNERS = ("Item", "Location", "Pos.", "No.", "Bearing", "Joint", "Jt", "")
 UNKNOWN = ("Trial1", "A", "1st", "x", "")
-NAMES = (
-    *("actuator rod end", "locking pin", "short link inner bearing", "locking lever pivot"),
-    *("short link outer bearing", "extension lever end", "bellcrank", "long link end"),
-    *("trunnion", "drag brace"),
-)
 SMALL = dict.fromkeys(range(1, 11), 0.001)
 WORN = {**SMALL, 3: 0.029, 5: 0.021}
 

@@ -159,13 +159,6 @@ def test_the_rest_of_a_chain_is_added_to_its_beginning(store: Store, tmp_path: P
     assert beginning.restore(store.export(), "chain").new == 6
 
 
-def test_a_store_of_a_newer_schema_is_refused(store: Store, place: Path) -> None:
-    with closing(sqlite3.connect(place)) as raw, raw:
-        raw.execute("INSERT INTO mlg_meta VALUES (99)")
-    with pytest.raises(StoreError, match="schema version 99"):
-        Store(place).gears()
-
-
 @pytest.mark.parametrize(
     "version", sorted(OLD.glob("version-*.sqlite")), ids=lambda path: path.stem
 )

@@ -56,21 +56,10 @@ def test_a_table_that_says_what_a_record_was_amended_to_is_known(keep: Keep) -> 
     assert "0 inspections kept" in keep(B={CLEARANCE: "0.002"}).err
 
 
-def test_the_refusal_of_a_changed_row_says_how_the_table_is_settled(keep: Keep) -> None:
-    keep()
-    refused = keep(B={CLEARANCE: "0.002"}).err
-    assert "kept already with other content: B (N1 LH 2026-02-01)" in refused
-    assert "Settle the table as a whole" in " ".join(refused.split())
-
-
-def test_a_row_whose_bad_date_was_corrected_is_not_kept_a_second_time(keep: Keep) -> None:
-    keep(B={DAY: "2026-02-31"})
-    assert "kept already with other content: B (N1 LH no date)" in keep().err
-
-
-def test_nor_one_whose_date_was_another(keep: Keep) -> None:
-    keep(B={DAY: "2025-02-01"})
-    assert "kept already with other content: B (N1 LH 2025-02-01)" in keep().err
+@pytest.mark.parametrize(("day", "said"), [("2026-02-31", "no date"), ("2025-02-01",) * 2])
+def test_a_row_whose_date_was_corrected_is_not_kept_a_second_time(keep, day, said):
+    keep(B={DAY: day})
+    assert f"kept already with other content: B (N1 LH {said})" in keep().err
 
 
 @pytest.mark.parametrize("times", [1, 2])
@@ -107,6 +96,8 @@ def third_joint(folder: Path) -> dict[str, float]:
 def test_the_cells_that_were_changed_are_named(keep: Keep) -> None:
     keep(A={"outcome": ""})
     refused = keep(A={"outcome": ""}, B={CLEARANCE: "0.0031"}, C={"outcome": "FAILED"}).err
+    assert "kept already with other content: B (N1 LH 2026-02-01)" in refused
+    assert "Settle the table as a whole" in " ".join(refused.split())
     assert "B (N1 LH 2026-02-01): #3 was 0.001, the table says 0.0031" in refused
     assert "C (N1 LH 2026-03-01): outcome was blank, the table says FAILED" in refused
     assert "--amend takes what it says, --keep-old leaves what is kept" in " ".join(refused.split())

@@ -37,10 +37,6 @@ def gears(store: Path, *more: str) -> list[dict[str, object]]:
     return list(json.loads(found.out)["gears"])
 
 
-def names(found: list[dict[str, object]]) -> list[str]:
-    return [f"{gear['tail_no']} {gear['side']}" for gear in found]
-
-
 @pytest.mark.parametrize("command", ["fleet", "history"])
 def test_an_empty_store_says_how_to_keep_inspections(tmp_path: Path, command: str) -> None:
     found = mlg(command, "--store", tmp_path / "none.sqlite")

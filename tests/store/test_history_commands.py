@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 from collections.abc import Callable, Mapping
@@ -223,19 +222,6 @@ def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(tmp_path, pla
     mlg("fleet", "--no-forecast", "--report", tmp_path)
     page = pypdf.PdfReader(tmp_path / "fleet.pdf").pages[0]
     assert sorted(map(float, page.mediabox[2:])) == [612.0, 792.0]
-
-
-def test_an_export_is_imported_with_its_chain(tmp_path: Path, place: Path) -> None:
-    seeded((1, 0.001), (2, 0.002))
-    repair("2024-08-01", 810)
-    assert mlg("history", "export", tmp_path / "chain.jsonl").code == 0
-    kinds = [
-        json.loads(line)["kind"] for line in (tmp_path / "chain.jsonl").read_text().splitlines()
-    ]
-    assert kinds == ["inspection", "inspection", "repair"]
-    other = ("--store", tmp_path / "other.sqlite")
-    assert mlg("history", "import", tmp_path / "chain.jsonl", *other).code == 0
-    assert mlg("history", "verify", *other).out.startswith("3 records fit the chain.\n")
 
 
 @pytest.mark.parametrize("line", ["[" * 5000 + "]" * 5000, "9" * 5000, "[]", "{", "\x00"])

@@ -31,7 +31,6 @@ from tests.cli.conftest import Run, mlg, row
 from . import places
 
 SOUND = inspection_record(places.inspection(1))
-NUMBER = {"verdict": "WITHIN_MARGIN", "joints": [{"joint": 3, "rank": 1}]}
 
 
 def with_field(**fields: object) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from mlg_troubleshoot.life.forecast import TEACHERS, fit_fleet, stretches, teach
 from mlg_troubleshoot.life.logbook import log_of
 from mlg_troubleshoot.life.state import GearVisit, state_now, states
 from mlg_troubleshoot.records import ReadOptions, read_many
-from mlg_troubleshoot.store import RecordKind, Store, StoreError, inspection_record
+from mlg_troubleshoot.store import Store, StoreError, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from mlg_troubleshoot.workflows.history import Lives, show_fleet, show_lives
@@ -118,14 +118,6 @@ def test_a_store_kept_in_many_blocks_is_the_one_kept_at_once(tmp_path, monkeypat
     monkeypatch.setattr("mlg_troubleshoot.store.database._AT_ONCE", 5)
     assert keep(told, in_blocks) == kept
     assert [r.content for r in in_blocks.all()] == [r.content for r in at_once.all()]
-
-
-def test_rows_that_stand_twice_in_a_call_are_kept_once(tmp_path: Path) -> None:
-    batch = Path(__file__).parents[2] / "inspection_data" / "fleet_batch.csv"
-    store = Store(tmp_path / "store.sqlite")
-    kept = keep(told_by(check_files([batch, batch], CheckOptions()).judgements), store)
-    stored = [record for record in store.all() if record.kind is RecordKind.INSPECTION]
-    assert len(stored) == kept.new == kept.known == len(store.all())
 
 
 def test_keeping_says_how_far_it_is_also_where_rows_state_repairs(tmp_path: Path) -> None:

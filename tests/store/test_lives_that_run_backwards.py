@@ -5,7 +5,7 @@ say of them.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
 from pathlib import Path
@@ -34,7 +34,6 @@ from tests.cli.conftest import Run, mlg, row
 
 from .places import table
 
-View = Callable[[], Mapping[str, Any]]
 # Landings and the readings of #3 and #5 at the yearly inspections of one gear. [1, in, in]
 YEARS = (
     (14, 0.0011, 0.0010),

@@ -15,12 +15,6 @@ from .places import table
 
 SOUND = {f"clearance_{n}_in": "0.0011" for n in range(1, 11)}
 FAR, WORN = "0.06", "0.0121"
-# What comes next on a gear with which nothing is the matter.
-FINE = (
-    "Nothing is required",
-    "Sign the repair off in the aircraft's records",
-    "Go on with fault isolation: within its margin",
-)
 REPAIRED = {"restored_joints": "6", "repair_date": "2026-01-05"}
 
 

@@ -155,12 +155,6 @@ def test_the_same_reading_written_in_another_unit_is_the_same_inspection(tmp_pat
     assert ", 1 known already" in kept(tmp_path, "other.csv", in_thou)
 
 
-def test_what_is_mostly_the_same_on_one_day_in_files_without_ids_is_one_inspection(tmp_path, place):
-    kept(tmp_path, "one.csv", NAMELESS[0])
-    other = places.table(tmp_path, {**NAMELESS[0], "clearance_3_in": "0.002"}, name="other.csv")
-    assert "the table says 0.002" in mlg("check", other, "--keep").err
-
-
 def test_bodies_of_records_are_those_of_earlier_versions(tmp_path: Path) -> None:
     (tmp_path / "old.sqlite").write_bytes(
         (Path(__file__).parent / "data" / "version-1.sqlite").read_bytes()

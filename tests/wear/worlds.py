@@ -11,35 +11,15 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 KINDS = ("wiener", "integrated", "gamma", "power")
-# Worlds that no kind of the model is: a curve that grows on itself, one that settles, a line read
-# with much error.
-FOREIGN = ("exponential", "saturating", "noisy line", "two phases")
 
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """One stretch of a part's life between restorations: true wear on a fine grid, and what was
-    read of it.
-    """
+    """What was read of one stretch of a part's life between restorations."""
 
     unit: str
-    grid: Array
-    true: Array
     usage: Array
     read: Array
-
-    def crossing(self, limit: float) -> float:
-        """Usage at which the true wear first reaches a limit, infinite if it does not within the
-        grid.
-        """
-        over = np.flatnonzero(self.true >= limit)
-        if not len(over):
-            return float("inf")
-        k = int(over[0])
-        if k == 0:
-            return 0.0
-        part = (limit - self.true[k - 1]) / (self.true[k] - self.true[k - 1])
-        return float(self.grid[k - 1] + part * (self.grid[k] - self.grid[k - 1]))
 
 
 def _wear(kind: str, pace: float, grid: Array, rng: np.random.Generator) -> Array:
@@ -56,16 +36,8 @@ def _wear(kind: str, pace: float, grid: Array, rng: np.random.Generator) -> Arra
             [[0.0], np.cumsum(np.sqrt(step) * rng.standard_normal(len(step)))[:-1]]
         )
         rise = drift * step
-    elif kind == "gamma":
-        rise = rng.gamma(step * 40.0, pace / 40.0)
-    elif kind == "exponential":
-        rise = np.diff((np.exp(0.7 * pace * grid) - 1.0) / 0.9)
-    elif kind == "saturating":
-        rise = np.diff(1.8 * pace * (1.0 - np.exp(-grid / 1.5)))
-    elif kind == "noisy line":
-        rise = pace * step
     else:
-        rise = pace * np.where(grid[1:] < 0.5, 1.8, 0.7) * step
+        rise = rng.gamma(step * 40.0, pace / 40.0)
     return np.concatenate([[0.0], np.cumsum(rise)])
 
 
@@ -92,8 +64,6 @@ def fleet(
             true = start + 0.05 * rng.standard_normal() + _wear(kind, pace, grid, rng)
             usage = np.sort(rng.uniform(0.02, 1.5, visits))
             read = np.interp(usage, grid, true) + noise * rng.standard_normal(visits)
-            lives.append(
-                Life(f"part {number}", grid, true, usage, np.round(read / resolution) * resolution)
-            )
+            lives.append(Life(f"part {number}", usage, np.round(read / resolution) * resolution))
         parts_lives.append(lives)
     return parts_lives
