@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Posterior
@@ -71,11 +69,6 @@ def test_the_sense_of_the_displacement_tells_little(gear: Gear) -> None:
     assert chance(explained(gear, sound, 0.02), 2) == pytest.approx(
         chance(explained(gear, sound, -0.02), 2), abs=0.1
     )
-
-
-def test_the_seed_decides_the_draws(gear: Gear) -> None:
-    first, again = (explained(gear, {}, 0.02) for _ in range(2))
-    assert first == replace(again)
 
 
 def test_the_chance_of_the_rigging_is_the_one_that_the_plan_follows(gear: Gear) -> None:

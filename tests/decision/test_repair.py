@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision import planner as repair
-from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, minutes_of
+from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.prediction import Cases, Prediction, predict
 from mlg_troubleshoot.gear.gear import Gear
@@ -87,13 +87,6 @@ def test_a_joint_over_its_limit_is_in_every_repair_set_even_where_it_moves_the_p
     )
     assert found
     assert all(7 in s.joints for s in found)
-
-
-def test_opening_an_area_counts_once(gear: Gear) -> None:
-    # Sidestay 15 min, #3 and #5 8 min each; link assembly 20 min, #6 6 min.
-    for joints, minutes in (([3], 23), ([3, 5], 31), ([3, 5, 6], 57)):
-        places = np.isin(gear.joint_numbers, joints)
-        assert minutes_of(gear, places, np.zeros(10, bool))[0] == minutes
 
 
 def test_a_restored_joint_has_the_clearance_of_a_new_part(gear: Gear) -> None:

@@ -175,26 +175,6 @@ def test_a_day_without_a_year_is_the_last_such_day(sit: Sit, life: Life) -> None
     assert life().inspections[-1].inspection.inspection_date == day
 
 
-WRONG = {
-    1: ("x", "", "cm", "1 thou"),
-    2: ("x", "", "rad x"),
-    3: ("x", "", "5", "y"),
-    4: ("0,041", "3/64", "x", "900", "46 47", "f 3", "n 5 5"),
-    5: ("x", "6,5", "-5", "1/64", "9 mm", "200", "3 cm", "#99 5", "landings 3,412", "margin x"),
-    6: ("date 99 Nov", "date 03/04/2026", "temperature 99", "side x", "p", "8 8"),
-}
-
-
-@pytest.mark.parametrize("question", WRONG)
-def test_a_wrong_answer_is_refused_and_its_question_is_asked_again(sit, life, question):
-    right = [*HEAD, "f", "46", "8", "done", *END, ""]
-    wrong = WRONG[question]
-    asked = sit(*right[:question], *wrong, *right[question:]).prompts
-    assert len(set(asked[question : question + len(wrong) + 1])) == 1
-    found = life().inspections[-1].inspection
-    assert (found.clearance_in, found.readings_in) == ({3: 0.004}, (0.046,))
-
-
 def test_a_fraction_is_refused_with_its_value(sit: Sit) -> None:
     assert "1/64 in = 15.6 thou" in sit(*gear("f", "1/64", "46", "1/64", "8", "done"), "").screen
 

@@ -28,26 +28,34 @@ RIGHT = {
 WRONG = {
     "Tail": ("", "?!", "-", "n/a"),
     "Side": ("", "x", "both", "1", "LHS RH"),
-    "Unit": ("", "x", "cm", "in mm x", "play"),
-    "A cl": ("", "x", "thou", "r", "46"),
+    "Unit": ("", "x", "cm", "in mm x", "play", "1 thou"),
+    "A cl": ("", "x", "thou", "r", "46", "rad x"),
     "Did ": ("", "x", "46", "yes", "f 4", "done"),
-    "Plun": ("x", "0,041", "3/64", "900", "46 47", "4.6.", "1e9", "-"),
-    "#": ("x", "6,5", "-5", "1/64", "9 mm", "200", "3 cm", "#11 5", "1e5", "5 5", "p", "margin 0"),
+    "Plun": ("x", "0,041", "3/64", "900", "46 47", "4.6.", "1e9", "-", "f 3", "n 5 5"),
+    "#": (
+        *("x", "6,5", "-5", "1/64", "9 mm", "200", "3 cm", "#11 5", "1e5", "5 5", "p", "margin 0"),
+        *("#99 5", "landings 3,412", "margin x", "date 99 Nov", "date 03/04/2026", "side x"),
+        "temperature 99",
+    ),
 }
 
 
 class Typist(ScriptedTerminal):
-    """Answers each question, sometimes wrongly first."""
+    """Answers each question, sometimes wrongly first; the first one types every error once."""
 
     def __init__(self, seed: int) -> None:
         super().__init__(())
         self.chance = random.Random(seed)
+        self.left = {} if seed else {begin: [*words] for begin, words in WRONG.items()}
         self.asked: list[tuple[str, str]] = []
 
     def ask(self, prompt: str) -> str:
         word = next((text for begin, text in RIGHT.items() if prompt.startswith(begin)), "")
-        if (wrong := _wrong_at(prompt)) and self.chance.random() < 0.4:
-            word = self.chance.choice(wrong)
+        begin = next((begin for begin in WRONG if prompt.startswith(begin)), "")
+        if self.left.get(begin):
+            word = self.left[begin].pop()
+        elif begin and self.chance.random() < 0.4:
+            word = self.chance.choice(WRONG[begin])
         self.asked.append((prompt.partition(" (")[0], word))
         assert len(self.asked) < 400
         return word
@@ -76,7 +84,7 @@ def run_script(seed: int, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(4), pytest.param(range(4, 300), marks=pytest.mark.slow)], ids=len
+    "seeds", [range(3), pytest.param(range(3, 300), marks=pytest.mark.slow)], ids=len
 )
 def test_no_typing_error_is_taken_or_leads_elsewhere(seeds: Iterable[int], tmp_path: Path) -> None:
     for seed in seeds:

@@ -379,14 +379,6 @@ def test_readings_of_another_convention_are_shown_in_that_of_today(sit, begun, l
     assert str(life().inspections[-1].inspection.entered[5]) == "4 thou"
 
 
-@pytest.mark.parametrize(("line", "gear"), [("side RH", ("RH", "N1")), ("tail N2", ("LH", "N2"))])
-def test_a_corrected_tail_or_side_moves_the_inspection(sit, begun, life, line, gear):
-    begun(*failed("8", "done"))
-    sit("N1 LH", line, "")
-    assert len(life(*gear).inspections) == 1
-    assert life().inspections == ()
-
-
 @pytest.mark.parametrize(
     ("typed", "gear"),
     [

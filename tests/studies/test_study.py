@@ -190,19 +190,6 @@ def test_a_statement_of_section_4_3_has_its_outcome_on_all_ten_linkages(statemen
     assert len(found[0].linkages) == 10
 
 
-def test_scipy_agrees(on_cube: Response, exact: TensorIndices) -> None:
-    from scipy.stats import sobol_indices, uniform
-
-    found = sobol_indices(
-        func=lambda x: on_cube(np.ascontiguousarray(x.T)),
-        n=2**12,
-        dists=[uniform()] * 10,
-        rng=np.random.default_rng(0),
-    )
-    assert found.first_order == pytest.approx(exact.first_order, abs=1e-3)
-    assert found.total_order == pytest.approx(exact.total_order, abs=1e-3)
-
-
 @pytest.mark.filterwarnings("ignore")
 def test_salib_agrees(on_cube: Response, exact: TensorIndices) -> None:
     pytest.importorskip("SALib")
