@@ -24,7 +24,6 @@ from mlg_troubleshoot.diagnosis import Candidate, Diagnosis, NamedCause
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.reporting.figures import (
     ACCENT,
-    INK,
     PALE,
     PAPER,
     SOFT,
@@ -429,15 +428,14 @@ def residual_plot(
         across = Axis.around(against.label, x.tolist(), 0.03)
     plot = Plot(canvas, across, axis, top=24)
     plot.draw_axes(names=names)
-    canvas.text(plot.area[0], 12, title, size=11, bold=True)
-    _, zero = plot.at(plot.x.low, 0.0)
-    canvas.line(plot.area[0], zero, plot.area[2], zero, colour=SOFT, width=1.0)
+    canvas.text(plot.area[0] + 12j, title, bold=True)
+    canvas.line(plot.at(plot.x.low, 0.0), plot.at(plot.x.high, 0.0), colour=SOFT)
     marked = np.zeros(len(y), bool) if against.marked is None else against.marked
     known = np.isfinite(x) & np.isfinite(y)
     # What is marked stands on top.
     for row in sorted(np.flatnonzero(known).tolist(), key=lambda row: bool(marked[row])):
         at = plot.at(float(x[row]), float(y[row]))
-        _point(canvas, *at, after=after, marked=bool(marked[row]))
+        _point(canvas, at, after=after, marked=bool(marked[row]))
     rows = known & marked if against.marked is not None else known
     if names:
         parts = [np.flatnonzero(known & (against.values == k)) for k in range(len(names))]
@@ -452,43 +450,31 @@ def residual_plot(
         if len(part) >= 2:
             _mean_mark(plot, centre, y[part])
     if against.marked is not None:
-        canvas.marker("triangle", plot.area[2] - 6, 8, 4.0)
-        canvas.text(plot.area[2] - 14, 12, against.marked_label, size=10, anchor="end")
+        canvas.marker("triangle", plot.area[2] - 6 + 8j, 4.0)
+        canvas.text(plot.area[2] - 14 + 12j, against.marked_label, size=10, anchor="end")
     return canvas.svg()
 
 
-def _point(canvas: Canvas, x: float, y: float, *, after: bool, marked: bool = False) -> None:
+def _point(canvas: Canvas, at: complex, *, after: bool, marked: bool = False) -> None:
     if marked:
-        canvas.marker("triangle", x, y, 4.0)
+        canvas.marker("triangle", at, 4.0)
     elif after:
-        canvas.marker("circle", x, y, 1.9, colour=ACCENT)
+        canvas.marker("circle", at, 1.9, ACCENT)
     else:
-        canvas.add(
-            "circle",
-            cx=x,
-            cy=y,
-            r=2.3,
-            fill="none",
-            stroke=SOFT,
-            stroke_width=0.8,
-        )
+        canvas.circle(at, 2.3, colour=SOFT, width=0.8)
 
 
 def _mean_mark(plot: Plot, x: float, values: Array) -> None:
     mean = float(np.mean(values))
     error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
-    px, py = plot.at(x, mean)
-    _, low = plot.at(x, mean - 2.0 * error)
-    _, high = plot.at(x, mean + 2.0 * error)
-    plot.canvas.line(px, low, px, high, width=1.6)
-    for end in (low, high):
-        plot.canvas.line(px - 3, end, px + 3, end, width=1.6)
-    _square(plot.canvas, px, py)
+    low, high = (plot.at(x, mean + 2.0 * end) for end in (-error, error))
+    plot.canvas.polyline([low - 3, low + 3, low, high, high - 3, high + 3], width=1.6)
+    _square(plot.canvas, plot.at(x, mean))
 
 
-def _square(canvas: Canvas, x: float, y: float) -> None:
+def _square(canvas: Canvas, at: complex) -> None:
     """The mark of a mean."""
-    canvas.rectangle(x - 3, y - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
+    canvas.rectangle(at - (3 + 3j), 6 + 6j, PAPER, width=1.4)
 
 
 def lanes(title: str, across: Axis, names: Sequence[str], high: float = 20.0) -> Plot:
@@ -501,11 +487,12 @@ def lanes(title: str, across: Axis, names: Sequence[str], high: float = 20.0) ->
     plot = Plot(canvas, across, Axis("", float(len(names)), 0.0), **margins)
     plot.draw_axes(lanes=True)
     left, top, right, _ = plot.area
-    canvas.text(left, top - 9, title, bold=True)
+    canvas.text(complex(left, top - 9), title, bold=True)
     for place, name in enumerate(names, 1):
-        base = top + high * place
-        canvas.text(left - 6, base - high / 2 + 3.5, short(name, 9), size=9.5, anchor="end")
-        canvas.line(left, base, right, base, colour=PALE)
+        base = complex(left, top + high * place)
+        middle = base + (-6 + 3.5j) - 1j * high / 2
+        canvas.text(middle, short(name, 9), size=9.5, anchor="end")
+        canvas.line(base, base + right - left, colour=PALE)
     return plot
 
 
@@ -531,8 +518,8 @@ def tail_strips(residuals: Residuals) -> list[Markup]:
         for place, tail in enumerate(shown):
             own = values[tails == tail].tolist()
             for value in own:
-                _point(plot.canvas, *plot.at(value, place + 0.5), after=after)
-            _square(plot.canvas, *plot.at(float(np.mean(own)), place + 0.5))
+                _point(plot.canvas, plot.at(value, place + 0.5), after=after)
+            _square(plot.canvas, plot.at(float(np.mean(own)), place + 0.5))
         figures.append(plot.canvas.svg())
     return figures
 
@@ -550,16 +537,16 @@ def measured_against_predicted(rows: FittedRows) -> Markup:
     plot.draw_axes(x_ticks=8)
     low = plot.x.low
     high = plot.x.high
-    canvas.line(*plot.at(low, low), *plot.at(high, high), colour=SOFT, dash="6 3")
+    canvas.line(plot.at(low, low), plot.at(high, high), colour=SOFT, dash="6 3")
     shown = [
         ("before", rows.predicted, False),
         *([(rows.fit, rows.fitted, True)] if rows.fit else []),
     ]
     for k, (label, x_values, is_after) in enumerate(shown):
         for x, y in zip(x_values, rows.measured, strict=True):
-            _point(canvas, *plot.at(float(x), float(y)), after=is_after)
+            _point(canvas, plot.at(float(x), float(y)), after=is_after)
         if rows.fit:
-            x = plot.area[0] + 6 + 62 * k
-            _point(canvas, x, 10, after=is_after)
-            canvas.text(x + 7, 13.5, label, size=10)
+            key = plot.area[0] + 6 + 62 * k + 10j
+            _point(canvas, key, after=is_after)
+            canvas.text(key + (7 + 3.5j), label, size=10)
     return canvas.svg()

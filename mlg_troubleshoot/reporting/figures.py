@@ -11,7 +11,7 @@ these.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import groupby
@@ -123,7 +123,12 @@ _TICK_SIZE = 9.5
 
 Anchor = Literal["start", "middle", "end"]
 Marker = Literal["circle", "square", "diamond", "triangle", "ring"]
-Place = tuple[float, float]
+# Points and directions of a drawing are complex numbers: x to the right, y downward. [canvas units]
+_CORNERS: dict[str, tuple[complex, ...]] = {
+    "square": (-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j),
+    "diamond": (-1j, 1, 1j, -1),
+    "triangle": (-1j, 1 + 0.8j, -1 + 0.8j),
+}
 
 
 def _stroke(
@@ -132,7 +137,7 @@ def _stroke(
     """How a line is drawn: black, 1 unit wide and whole unless it says otherwise."""
     return {
         "stroke": colour,
-        "stroke_width": width,
+        "stroke_width": width if colour else None,
         "stroke_dasharray": dash,
         "stroke_linecap": cap,
     }
@@ -170,54 +175,37 @@ class Canvas:
         body = f">{escape(visible(content))!s}</{element}>" if content else "/>"
         self._parts.append(f"<{element}{''.join(written)}{body}")
 
-    def line(self, x1: float, y1: float, x2: float, y2: float, **stroke: Any) -> None:
+    def line(self, start: complex, end: complex, **stroke: Any) -> None:
+        x1, y1, x2, y2 = start.real, start.imag, end.real, end.imag
         self.add("line", x1=x1, y1=y1, x2=x2, y2=y2, **_stroke(**stroke))
 
-    def rectangle(
-        self,
-        x: float,
-        y: float,
-        across: float,
-        down: float,
-        *,
-        fill: str = "none",
-        **edge: Any,
-    ) -> None:
-        outline = _stroke(**edge) if edge else {}
-        width = max(across, 0.0)
-        height = max(down, 0.0)
+    def circle(self, at: complex, radius: float, fill: str = "none", **stroke: Any) -> None:
+        self.add("circle", cx=at.real, cy=at.imag, r=radius, fill=fill, **_stroke(**stroke))
+
+    def rectangle(self, corner: complex, size: complex, fill: str = "none", **stroke: Any) -> None:
         self.add(
             "rect",
-            x=x,
-            y=y,
-            width=width,
-            height=height,
+            x=corner.real,
+            y=corner.imag,
+            width=size.real,
+            height=size.imag,
             fill=fill,
-            **outline,
+            **_stroke(**stroke),
         )
 
-    def polyline(
-        self,
-        points: Sequence[Place],
-        *,
-        fill: str = "none",
-        closed: bool = False,
-        **stroke: Any,
-    ) -> None:
-        through = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-        drawn = _stroke(**{"width": 1.5, **stroke})
+    def polyline(self, points: Iterable[complex], fill: str = "none", **stroke: Any) -> None:
+        """Draw a line through points; with a fill a closed one."""
         self.add(
-            "polygon" if closed else "polyline",
-            points=through,
+            "polyline" if fill == "none" else "polygon",
+            points=" ".join(f"{each.real:.1f},{each.imag:.1f}" for each in points),
             fill=fill,
-            **drawn,
+            **_stroke(**{"width": 1.5, **stroke}),
             stroke_linejoin="round",
         )
 
     def text(
         self,
-        x: float,
-        y: float,
+        at: complex,
         text: str,
         *,
         size: float = TEXT_SIZE,
@@ -225,48 +213,27 @@ class Canvas:
         colour: str = INK,
         anchor: Anchor = "start",
     ) -> None:
-        """Write a text with its baseline at y. [canvas units]"""
+        """Write a text, its baseline at a point."""
         self.add(
             "text",
             text,
-            x=x,
-            y=y,
+            x=at.real,
+            y=at.imag,
             font_size=size,
             font_weight="bold" if bold else None,
             fill=colour,
             text_anchor=None if anchor == "start" else anchor,
         )
 
-    def marker(
-        self, shape: Marker, x: float, y: float, size: float = 5.0, *, colour: str = INK
-    ) -> None:
+    def marker(self, shape: Marker, at: complex, size: float = 5.0, colour: str = INK) -> None:
         """Draw a marker centred on a point; `size` is half its width. [canvas units]"""
-        left = x - size
-        right = x + size
-        top = y - size
-        bottom = y + size
-        match shape:
-            case "circle":
-                self.add("circle", cx=x, cy=y, r=size, fill=colour)
-            case "ring":
-                self.add(
-                    "circle",
-                    cx=x,
-                    cy=y,
-                    r=size,
-                    fill=PAPER,
-                    stroke=colour,
-                    stroke_width=1.6,
-                )
-            case "square":
-                self.rectangle(left, top, 2 * size, 2 * size, fill=colour)
-            case "diamond":
-                corners = [(x, top), (right, y), (x, bottom), (left, y)]
-                self.polyline(corners, fill=colour, colour=colour, width=1.0, closed=True)
-            case "triangle":
-                base = y + 0.8 * size
-                corners = [(x, top), (right, base), (left, base)]
-                self.polyline(corners, fill=colour, colour=colour, width=1.0, closed=True)
+        if shape == "ring":
+            self.circle(at, size, PAPER, colour=colour, width=1.6)
+        elif shape == "circle":
+            self.circle(at, size, colour, colour=None)
+        else:
+            corners = [at + size * corner for corner in _CORNERS[shape]]
+            self.polyline(corners, colour, colour=colour, width=1.0)
 
     def svg(self, css_class: str = "figure") -> Markup:
         title = visible(self.title)
@@ -314,19 +281,10 @@ class Axis:
         room = (high - low) * margin or abs(high) * 0.1 or 1.0
         return cls(label, low - room, high + room)
 
-
-@dataclass(frozen=True, slots=True)
-class Series:
-    """A line in a plot; a NaN in it is a gap. Its colour never stands alone: dashes and label say
-    the same.
-    """
-
-    label: str
-    x: tuple[float, ...]
-    y: tuple[float, ...]
-    dash: str | None = None
-    colour: str = INK
-    width: float = 1.8
+    def ticks(self, about: int = 5) -> list[tuple[float, str]]:
+        """Round numbers within it, each as it is written."""
+        values = nice_ticks(self.low, self.high, about)
+        return [(value, number(value, decimals_of(values))) for value in values]
 
 
 class Plot:
@@ -347,16 +305,14 @@ class Plot:
         self.y = y
         if left is None:
             # The label of the vertical axis ends 16 units from the edge; its numbers follow it.
-            ticks = nice_ticks(y.low, y.high)
-            widths = [text_width(number(v, decimals_of(ticks)), _TICK_SIZE) for v in ticks]
-            left = max(52.0, 24.0 + max(widths))
+            left = max(52.0, 24.0 + max(text_width(text, _TICK_SIZE) for _, text in y.ticks()))
         self.area = (left, top, canvas.width - right, canvas.height - bottom)
 
-    def at(self, x: float, y: float) -> tuple[float, float]:
+    def at(self, x: float, y: float) -> complex:
         x0, y0, x1, y1 = self.area
         across = (x - self.x.low) / (self.x.high - self.x.low)
         up = (y - self.y.low) / (self.y.high - self.y.low)
-        return x0 + across * (x1 - x0), y1 - up * (y1 - y0)
+        return complex(x0 + across * (x1 - x0), y1 - up * (y1 - y0))
 
     def draw_axes(
         self, x_ticks: int = 6, names: Sequence[str] = (), *, lanes: bool = False
@@ -364,52 +320,39 @@ class Plot:
         """Draw grid, ticks, frame and labels; names take the place of numbers on the horizontal
         axis. Of lanes, which their names distinguish, the grid is vertical, stronger at zero.
         """
+        canvas = self.canvas
         x0, y0, x1, y1 = self.area
+        numbers: dict[str, Any] = {"size": _TICK_SIZE, "colour": SOFT}
         if not lanes:
-            self._draw_vertical_axis()
-        ticks = nice_ticks(self.x.low, self.x.high, x_ticks)
+            for value, text in self.y.ticks():
+                start = self.at(self.x.low, value)
+                canvas.line(start, complex(x1, start.imag), colour=PALE)
+                canvas.text(start + (-5 + 3.5j), text, anchor="end", **numbers)
+            canvas.line(complex(x0, y0), complex(x0, y1), colour=SOFT)
+            canvas.add(
+                "text",
+                self.y.label,
+                transform=f"translate(11 {(y0 + y1) / 2:.1f}) rotate(-90)",
+                text_anchor="middle",
+                font_size=10.0,
+                fill=INK,
+            )
         room = max(2, int((x1 - x0) / max(len(names), 1) / 6.5))
-        marks = [(float(k), short(name, room)) for k, name in enumerate(names)]
-        for value, text in marks or [(value, number(value, decimals_of(ticks))) for value in ticks]:
-            x, _ = self.at(value, self.y.low)
+        named = [(float(k), short(name, room)) for k, name in enumerate(names)]
+        for value, text in named or self.x.ticks(x_ticks):
+            foot = self.at(value, self.y.low)
             if lanes:
                 colour, width = (SOFT, 1.0) if value == 0.0 else (RULE, 0.5)
-                self.canvas.line(x, y0, x, y1, colour=colour, width=width)
+                canvas.line(complex(foot.real, y0), foot, colour=colour, width=width)
             else:
-                self.canvas.line(x, y1, x, y1 + 4, colour=SOFT)
-            self.canvas.text(x, y1 + 14, text, size=_TICK_SIZE, anchor="middle", colour=SOFT)
-        self.canvas.line(x0, y1, x1, y1, colour=SOFT)
-        self.canvas.text((x0 + x1) / 2, y1 + 28, self.x.label, size=10, anchor="middle")
+                canvas.line(foot, foot + 4j, colour=SOFT)
+            canvas.text(foot + 14j, text, anchor="middle", **numbers)
+        canvas.line(complex(x0, y1), complex(x1, y1), colour=SOFT)
+        canvas.text(complex((x0 + x1) / 2, y1 + 28), self.x.label, size=10, anchor="middle")
 
-    def _draw_vertical_axis(self) -> None:
-        x0, y0, x1, y1 = self.area
-        ticks = nice_ticks(self.y.low, self.y.high)
-        for value in ticks:
-            _, y = self.at(self.x.low, value)
-            self.canvas.line(x0, y, x1, y, colour=PALE)
-            self.canvas.text(
-                x0 - 5,
-                y + 3.5,
-                number(value, decimals_of(ticks)),
-                size=_TICK_SIZE,
-                anchor="end",
-                colour=SOFT,
-            )
-        self.canvas.line(x0, y0, x0, y1, colour=SOFT)
-        self.canvas.add(
-            "text",
-            self.y.label,
-            transform=f"translate(11 {(y0 + y1) / 2:.1f}) rotate(-90)",
-            text_anchor="middle",
-            font_size=10.0,
-            fill=INK,
-        )
-
-    def draw(self, series: Series) -> None:
-        places = zip(series.x, series.y, strict=True)
+    def draw(self, x: Iterable[float], y: Iterable[float], **stroke: Any) -> None:
+        """Draw a line through points; a NaN is a gap."""
+        places = zip(x, y, strict=True)
         for known, run in groupby(places, lambda at: all(map(math.isfinite, at))):
             if known:
-                corners = [self.at(x, y) for x, y in run]
-                self.canvas.polyline(
-                    corners, colour=series.colour, width=series.width, dash=series.dash
-                )
+                self.canvas.polyline([self.at(*each) for each in run], **{"width": 1.8, **stroke})

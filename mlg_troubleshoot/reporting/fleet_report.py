@@ -33,7 +33,6 @@ from mlg_troubleshoot.reporting.figures import (
     Canvas,
     Lengths,
     Plot,
-    Series,
 )
 from mlg_troubleshoot.reporting.html import Document, ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
@@ -77,7 +76,7 @@ def wear_figure(life: GearLife, ahead: Forecast, gear: Gear, lengths: Lengths) -
         expected = [np.interp(passed, landings_of_bands(gear), edge) for edge in edges]
         forecast = np.array([last + passed, *expected])
         _panel(canvas, place, gear.joint(number), landings, between, forecast, lengths)
-    canvas.text(52, canvas.height - 4, _LEGEND, size=9.5)
+    canvas.text(complex(52, canvas.height - 4), _LEGEND, size=9.5)
     return canvas.svg()
 
 
@@ -100,29 +99,25 @@ def _panel(
     y = _PANEL_HIGH * (place // 2)
     plot = Plot(canvas, landings, Axis("", 0.0, 1.15 * max(limit, most)))
     plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
-    canvas.text(x + 52, y + 13, f"{joint.label}, {lengths.unit}", bold=True)
+    canvas.text(complex(x + 52, y + 13), f"{joint.label}, {lengths.unit}", bold=True)
     at, *expected = forecast
     if expected:
         low, middle, high = np.minimum(np.array(expected) * shown(1.0), plot.y.high)
         around = [*zip(at, low, strict=True), *zip(at[::-1], high[::-1], strict=True)]
-        edges = [plot.at(float(a), float(v)) for a, v in around]
-        canvas.polyline(edges, fill=PALE, colour=None, closed=True)
-        plot.draw(Series("", tuple(at), tuple(middle), "2 2", ACCENT))
+        canvas.polyline([plot.at(*each) for each in around], PALE, colour=None)
+        plot.draw(at, middle, dash="2 2", colour=ACCENT)
     plot.draw_axes(5)
-    plot.draw(Series("", (landings.low, landings.high), (limit, limit), "5 3", _RED))
+    plot.draw((landings.low, landings.high), (limit, limit), dash="5 3", colour=_RED)
     new, *others = between
     for begun in sorted({each.begun for each in others} - {new.begun}):
         base = plot.at(begun, 0.0)
-        top_y = plot.at(begun, plot.y.high)
-        canvas.line(*base, *top_y, colour=SOFT, dash="1 3")
-        canvas.marker("triangle", *base, 4.5)
+        canvas.line(base, plot.at(begun, plot.y.high), colour=SOFT, dash="1 3")
+        canvas.marker("triangle", base, 4.5)
     for each in between:
         placed = [(at, shown(value)) for at, value, _u in each.placed]
-        usage = tuple(at for at, _ in placed)
-        values = tuple(value for _, value in placed)
-        plot.draw(Series("", usage, values))
+        plot.draw(*zip(*placed, strict=True))
         for at, value in placed:
-            canvas.marker("square" if value > limit else "circle", *plot.at(at, value), 3.2)
+            canvas.marker("square" if value > limit else "circle", plot.at(at, value), 3.2)
 
 
 def fleet_document(

@@ -72,8 +72,6 @@ _LARGEST_EXAGGERATION = 100
 _ABOVE = 44
 _BELOW = 40
 
-# Points and directions of a drawing are complex numbers: x to the right, y downward. [canvas units]
-
 
 def schematic(gear: Gear, assessment: Assessment, width: float = _WIDTH) -> Schematic:
     """Draw the linkage at mid-position, its joints numbered in place and their clearances
@@ -103,7 +101,7 @@ def joint_key(gear: Gear, clearance_in: Mapping[int, float], lengths: Lengths) -
     for row, (joint, state, line) in enumerate(lines):
         y = 12 + 21 * row
         _mark(canvas, complex(12, y), str(joint.number), state)
-        canvas.text(28, y + 4, line, bold=state == "over")
+        canvas.text(complex(28, y + 4), line, bold=state == "over")
     return canvas.svg("figure")
 
 
@@ -201,13 +199,13 @@ class _PlaneDrawing:
             for name, point in self.points.items()
         }
 
-        canvas.text(2, 11, name, size=10.5, bold=True, colour=SOFT)
+        canvas.text(2 + 11j, name, size=10.5, bold=True, colour=SOFT)
         self._parts(canvas, at)
         for point, place in at.items():
             if self.mechanism.point(point).fixed and point not in self.cut:
-                _polygon(canvas, place, place + (12 + 19j), place + (-12 + 19j), fill=PAPER)
+                canvas.polyline([place, place + (12 + 19j), place + (-12 + 19j)], PAPER)
             if all(joint.point != point for joint in joints):
-                canvas.marker("circle", place.real, place.imag, 3.0)
+                canvas.marker("circle", place, 3.0)
         markers = _without_overlap({j.number: at[j.point] for j in joints})
         # Those of another plane first: nothing of theirs may cover this one's.
         for joint in sorted(joints, key=self._stands_here):
@@ -220,8 +218,8 @@ class _PlaneDrawing:
                 start = place + _MARKER * _unit(along)
                 _arrow(canvas, start, start + along)
             if here and marker != place:
-                _line(canvas, place, marker, colour=SOFT, width=1.2)
-                canvas.marker("circle", place.real, place.imag, 2.5)
+                canvas.line(place, marker, colour=SOFT, width=1.2)
+                canvas.marker("circle", place, 2.5)
             _mark(canvas, marker, str(number), states[number], faded=not here)
         return name, canvas.svg("figure panel"), width
 
@@ -237,27 +235,21 @@ class _PlaneDrawing:
             place = at[step.joint]
             if isinstance(step, (Lever, Slot)):
                 plates.append({step.joint, *needs(step)})
-                _polygon(
-                    canvas,
-                    place,
-                    *map(at.__getitem__, needs(step)),
-                    fill=PALE,
-                    colour=RULE,
-                    width=3,
-                )
+                ends = [at[name] for name in needs(step)]
+                canvas.polyline([place, *ends], PALE, colour=RULE, width=3)
                 continue
             for name in needs(step):
                 # Two points of a plate need no bar.
                 if not any({step.joint, name} <= plate for plate in plates):
-                    _line(canvas, place, at[name], width=6, cap="round")
-                    _line(canvas, place, at[name], width=3, cap="round", colour=PAPER)
+                    canvas.line(place, at[name], width=6, cap="round")
+                    canvas.line(place, at[name], width=3, cap="round", colour=PAPER)
         named = dict.fromkeys(self.cut, "actuator") | {self.mechanism.output.joint: "output"}
         for point, name in named.items():
             if point in at:
                 left = at[point].real < canvas.width / 2
-                x = at[point].real + (-14 if left else 14)
+                beside = at[point] + (-14 if left else 14) + 4j
                 end: Anchor = "end" if left else "start"
-                canvas.text(x, at[point].imag + 4, name, size=9, colour=SOFT, anchor=end)
+                canvas.text(beside, name, size=9, colour=SOFT, anchor=end)
 
 
 def _without_overlap(markers: Mapping[int, complex]) -> dict[int, complex]:
@@ -283,14 +275,6 @@ def _unit(run: complex) -> complex:
     return run / (abs(run) or 1.0)
 
 
-def _line(canvas: Canvas, start: complex, end: complex, **stroke: Any) -> None:
-    canvas.line(start.real, start.imag, end.real, end.imag, **stroke)
-
-
-def _polygon(canvas: Canvas, *corners: complex, fill: str, **stroke: Any) -> None:
-    canvas.polyline([(p.real, p.imag) for p in corners], fill=fill, closed=True, **stroke)
-
-
 def joint_state(joint: JointSpec, clearance_in: float | None) -> JointState:
     if clearance_in is None:
         return "missing"
@@ -302,20 +286,12 @@ def _mark(canvas: Canvas, at: complex, text: str, state: str, faded: bool = Fals
     pale = missing or faded
     colour = SOFT if pale else INK
     if state == "over":
-        canvas.marker("square", at.real, at.imag, _MARKER, colour=colour)
+        canvas.marker("square", at, _MARKER, colour)
     else:
-        canvas.add(
-            "circle",
-            cx=at.real,
-            cy=at.imag,
-            r=_MARKER,
-            fill=PAPER,
-            stroke=colour,
-            stroke_width=1.3 if pale else 2.2,
-            stroke_dasharray="3 2.2" if missing else None,
-        )
+        dash = "3 2.2" if missing else None
+        canvas.circle(at, _MARKER, PAPER, colour=colour, width=1.3 if pale else 2.2, dash=dash)
     ink = PAPER if state == "over" else colour
-    canvas.text(at.real, at.imag + 4, text, bold=not missing, colour=ink, anchor="middle")
+    canvas.text(at + 4j, text, bold=not missing, colour=ink, anchor="middle")
 
 
 def joint_mark(text: str, state: JointState) -> Markup:
@@ -328,16 +304,9 @@ def joint_mark(text: str, state: JointState) -> Markup:
 def _arrow(canvas: Canvas, start: complex, end: complex) -> None:
     along = _unit(end - start)
     base = end - min(8.0, abs(end - start)) * along
-    _line(canvas, start, end, colour=PAPER, width=5.5)
-    _line(canvas, start, base, width=2.4)
-    _polygon(
-        canvas,
-        end,
-        base + 4.2j * along,
-        base - 4.2j * along,
-        fill=INK,
-        width=0.5,
-    )
+    canvas.line(start, end, colour=PAPER, width=5.5)
+    canvas.line(start, base, width=2.4)
+    canvas.polyline([end, base + 4.2j * along, base - 4.2j * along], INK, width=0.5)
 
 
 def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
@@ -375,15 +344,14 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
     shown = lengths.unit.from_inches
     for place, (name, ends, marker) in enumerate(lanes):
         y = place + 0.5
-        start = ends[0] if len(ends) > 1 else 0.0
-        width = 4.0 if name == what else 1.5
-        plot.canvas.line(*plot.at(shown(start), y), *plot.at(shown(ends[-1]), y), width=width)
+        points = [plot.at(shown(end), y) for end in ends]
+        start = points[0] if len(points) > 1 else plot.at(0.0, y)
+        plot.canvas.line(start, points[-1], width=4.0 if name == what else 1.5)
         if name == what:
-            left, middle = plot.at(shown(sense * worst - u2), y)
-            right, _ = plot.at(shown(sense * worst + u2), y)
-            plot.canvas.rectangle(left, middle - 6, right - left, 12, colour=INK)
-        for end in ends:
-            plot.canvas.marker(marker, *plot.at(shown(end), y), 5.0)
+            left, right = (plot.at(shown(sense * worst + end), y) for end in (-u2, u2))
+            plot.canvas.rectangle(left - 6j, right - left + 12j)
+        for point in points:
+            plot.canvas.marker(marker, point)
     return plot.canvas.svg()
 
 
@@ -409,41 +377,21 @@ def _gauge(
         bottom=32,
     )
     left, top, right, bottom = plot.area
-    ends = [plot.at(lengths.unit.from_inches(end), 0.0)[0] for end in (-margin_in, margin_in)]
-    canvas.rectangle(ends[0], top, ends[1] - ends[0], bottom - top, fill=PALE)
+    ends = [plot.at(lengths.unit.from_inches(end), 0.0) for end in (-margin_in, margin_in)]
+    canvas.rectangle(ends[0], ends[1] - ends[0] + 1j * (bottom - top), PALE, colour=None)
     plot.draw_axes(lanes=True)
-    canvas.text(left, 10, "◀ short of mid-position", size=10, colour=SOFT)
-    canvas.text(
-        (left + right) / 2,
-        10,
-        "allowed",
-        size=10,
-        anchor="middle",
-        colour=SOFT,
-    )
-    canvas.text(
-        right,
-        10,
-        "beyond mid-position ▶",
-        size=10,
-        colour=SOFT,
-        anchor="end",
-    )
-    canvas.text(canvas.width, 10, lengths.unit, size=10, colour=SOFT, anchor="end")
-    for x, end in zip(ends, (-margin_in, margin_in), strict=True):
-        canvas.line(x, top - 8, x, bottom + 4, width=2.6)
+    small: dict[str, Any] = {"size": 10, "colour": SOFT}
+    canvas.text(left + 10j, "◀ short of mid-position", **small)
+    canvas.text((left + right) / 2 + 10j, "allowed", anchor="middle", **small)
+    canvas.text(right + 10j, "beyond mid-position ▶", anchor="end", **small)
+    canvas.text(canvas.width + 10j, lengths.unit, anchor="end", **small)
+    for at, end in zip(ends, (-margin_in, margin_in), strict=True):
+        canvas.line(at - 8j, at + 1j * (bottom - top + 4), width=2.6)
         words = lengths.bare(end, True)
-        canvas.text(
-            x,
-            top - 11,
-            words,
-            size=10.5,
-            bold=True,
-            anchor="middle",
-        )
+        canvas.text(at - 11j, words, size=10.5, bold=True, anchor="middle")
     for place, (name, value) in enumerate(lanes.items()):
-        y = plot.at(0.0, place + 0.5)[1] + 4
+        base = 1j * (plot.at(0.0, place + 0.5).imag + 4)
         bold = name[0].isupper()
-        canvas.text(0, y, name, size=10.5, bold=bold)
-        canvas.text(canvas.width, y, value, size=10.5, bold=bold, anchor="end")
+        canvas.text(base, name, size=10.5, bold=bold)
+        canvas.text(canvas.width + base, value, size=10.5, bold=bold, anchor="end")
     return plot

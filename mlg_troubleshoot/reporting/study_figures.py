@@ -26,7 +26,7 @@ def indices_figure(table: IndexTable) -> Markup:
     for place, value, low, high, marker in drawn:
         y = place + (0.3 if marker == "circle" else 0.7)
         if math.isfinite(low + high):
-            plot.canvas.line(*plot.at(low, y), *plot.at(high, y))
+            plot.canvas.line(plot.at(low, y), plot.at(high, y))
         if math.isfinite(value):
-            plot.canvas.marker(marker, *plot.at(value, y), 3.0)
+            plot.canvas.marker(marker, plot.at(value, y), 3.0)
     return plot.canvas.svg()

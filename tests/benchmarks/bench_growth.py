@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlg_troubleshoot.reporting.figures import Axis, Canvas, Plot, Series
+from mlg_troubleshoot.reporting.figures import Axis, Canvas, Plot
 from mlg_troubleshoot.store import Store, inspection_record
 from tests.docs_examples import PICTURES, standing_alone
 
@@ -81,16 +81,16 @@ def panel(costs: Costs, which: int, label: str, ends: tuple[float, float]) -> st
     canvas = Canvas(430.0, 320.0, label)
     plot = Plot(canvas, Axis("rows or inspections, powers of 10", 2.0, 5.4), Axis(label, *ends))
     plot.draw_axes(x_ticks=4)
-    lines = []
-    for (name, by_size), colour, dash in zip(costs.items(), COLOURS, DASHES, strict=True):
-        x = tuple(math.log10(size) for size in by_size)
-        y = tuple(math.log10(cost[which]) for cost in by_size.values())
-        lines.append(Series(name, x, y, dash, colour))
-        plot.draw(lines[-1])
+    styles = zip(costs.items(), COLOURS, DASHES, strict=True)
+    for place, ((name, by_size), colour, dash) in enumerate(styles):
+        x = [math.log10(size) for size in by_size]
+        y = [math.log10(cost[which]) for cost in by_size.values()]
+        plot.draw(x, y, colour=colour, dash=dash)
         for at in zip(x, y, strict=True):
-            canvas.marker("circle", *plot.at(*at), size=3.0, colour=colour)
-    for place, line in enumerate(lines):
-        plot.draw_legend([line], 62.0, 22.0 + 14.0 * place)
+            canvas.marker("circle", plot.at(*at), 3.0, colour)
+        key = complex(62, 22 + 14 * place)
+        canvas.line(key, key + 20, colour=colour, dash=dash)
+        canvas.text(key + (25 + 4j), name)
     return str(canvas.svg())
 
 
