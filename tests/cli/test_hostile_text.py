@@ -11,12 +11,12 @@ from rich.panel import Panel
 from rich.rule import Rule
 
 from mlg_troubleshoot.cli.output import console
-from tests.cli.conftest import FAILURE, HAND, ROOT, Run, Table, mlg, row
+from tests.cli.conftest import FAILURE, HAND, Run, Table, mlg, row
+from tests.gear.own import own_gear
 
 # Markup of rich, an OSC link, a C1 introducer, an override of the writing direction, a lone
 # surrogate.
 HOSTILE = "WO[/b][link=http://x][conceal]\x1b]8;;http://x\x07\x9b31m\u202egnp\udcff"
-GEAR = ROOT / "mlg_troubleshoot" / "gear" / "data"
 
 
 def harmless(found: Run) -> None:
@@ -90,13 +90,8 @@ def test_a_flag_acts_on_neither_stream(flags: tuple[str, ...]) -> None:
 
 
 def test_a_gear_file_acts_on_neither_stream(tmp_path: Path) -> None:
-    for source in GEAR.glob("hawker*"):
-        (tmp_path / source.name).write_bytes(source.read_bytes())
-    path = tmp_path / "[b]\x1b[31mmine.toml"
-    text = (GEAR / "hawker-800xp.toml").read_text(encoding="utf-8")
-    path.write_text(
-        text.replace('name = "Hawker', 'name = "[/b][conceal]Hawker', 1), encoding="utf-8"
-    )
+    own = own_gear(tmp_path, ('name = "Hawker', 'name = "[/b][conceal]Hawker'))
+    path = own.rename(tmp_path / "[b]\x1b[31mmine.toml")
     harmless(mlg("gear", "--gear", path))
     harmless(mlg("check", FAILURE, "--gear", path))
     path.write_text("[[points", encoding="utf-8")

@@ -6,7 +6,6 @@ import io
 import json
 import os
 import shlex
-import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ import pytest
 from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.json_form import as_text
 from tests.cli.conftest import DATA, FAILURE, FLEET, ROOT, Run, Table, mlg, row
+from tests.gear.own import own_gear
 
 COMMAND = (sys.executable, "-m", "mlg_troubleshoot")
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs pipes of POSIX")
@@ -159,12 +159,7 @@ def test_a_full_stream_ends_as_documented(line: str, code: int, words: str, tmp_
 
 
 def test_a_gear_file_with_a_name_that_no_file_can_have_ends_with_words(tmp_path: Path) -> None:
-    shipped = ROOT / "mlg_troubleshoot" / "gear" / "data"
-    for file in shipped.glob("hawker*"):
-        shutil.copy(file, tmp_path)
-    gear = tmp_path / "hawker-800xp.toml"
-    text = gear.read_text(encoding="utf-8").replace("hawker-800xp-indices.json", "x" * 300)
-    gear.write_text(text, encoding="utf-8")
+    gear = own_gear(tmp_path, ("hawker-800xp-indices.json", "x" * 300))
     found = mlg("check", FAILURE, "--gear", gear)
     assert (found.code, "expected the name of a .json file" in found.err) == (2, True)
 

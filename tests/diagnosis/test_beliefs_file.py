@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
@@ -12,7 +11,6 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from mlg_troubleshoot import load_gear
 from mlg_troubleshoot.cli.app import app
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.misfit.beliefs import Beliefs
@@ -22,6 +20,7 @@ from mlg_troubleshoot.workflows.diagnose import (
     diagnose_files,
     load_beliefs,
 )
+from tests.gear.own import own_gear
 
 ROOT = Path(__file__).parents[2]
 NAMES = {"geometry", "rigging_offset"}
@@ -99,13 +98,8 @@ def probability_of_another_linkage(gear: Path | str, beliefs: Path | None = None
 
 @pytest.fixture(scope="module")
 def measured_gear(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder, data = tmp_path_factory.mktemp("gear"), load_gear().path.parent
-    for file in data.glob("*.toml"):
-        shutil.copy(file, folder)
-    gear = folder / "hawker-800xp.toml"
-    text = gear.read_text(encoding="utf-8")
-    gear.write_text(text.replace('kind = "reconstructed"', 'kind = "measured"'), encoding="utf-8")
-    return gear
+    folder = tmp_path_factory.mktemp("gear")
+    return own_gear(folder, ('kind = "reconstructed"', 'kind = "measured"'))
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import time
 import tomllib
 from collections.abc import Callable
@@ -20,21 +19,17 @@ from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
 from mlg_troubleshoot.paper.verification import targets_file, verify
 from tests.machine import SLOWER
 
+from .own import own_gear
+
 Edit = Callable[..., Path]
 
 
 @pytest.fixture
-def edited(gear: Gear, tmp_path: Path) -> Edit:
-    """A copy of the shipped gear and what lies beside it, with one text of one file replaced."""
+def edited(tmp_path: Path) -> Edit:
+    """The shipped gear with one text of one file replaced."""
 
     def edit(old: str, new: str, file: str = "") -> Path:
-        for each in gear.path.parent.glob("hawker-800xp*"):
-            shutil.copy(each, tmp_path)
-        path = tmp_path / f"hawker-800xp{file and '-'}{file}.toml"
-        text = path.read_text(encoding="utf-8")
-        assert old in text
-        path.write_text(text.replace(old, new, 1), encoding="utf-8")
-        return tmp_path / "hawker-800xp.toml"
+        return own_gear(tmp_path, (old, new), file=f"hawker-800xp{file and '-'}{file}.toml")
 
     return edit
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from datetime import date, timedelta
 from pathlib import Path
 
@@ -12,12 +11,12 @@ import pypdf
 import pytest
 
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, Side
-from mlg_troubleshoot.gear import gear_file
 from mlg_troubleshoot.life.folding import life_of
 from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.store import Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.cli.conftest import Run, mlg, row
+from tests.gear.own import own_gear
 
 from .places import table
 
@@ -297,37 +296,18 @@ def test_landings_left_are_drawn_with_an_arrow_beyond_the_horizon() -> None:
     assert "100, 400, beyond" in far
 
 
-@pytest.fixture
-def own_gear(tmp_path: Path) -> Callable[[str], Path]:
-    """A gear file with another outlook."""
-    shutil.copytree(Path(gear_file.__file__).parent / "data", tmp_path / "gear")
-
-    def write(outlook: str) -> Path:
-        file = tmp_path / "gear" / "hawker-800xp.toml"
-        text, old = (
-            file.read_text(encoding="utf-8"),
-            "horizon_landings = 20000\naccepted_chance = 0.05",
-        )
-        assert old in text
-        file.write_text(text.replace(old, outlook), encoding="utf-8")
-        return file
-
-    return write
-
-
-def test_a_forecast_beyond_the_horizon_of_the_gear_file_is_null(place, own_gear):
+def test_a_forecast_beyond_the_horizon_of_the_gear_file_is_null(place, tmp_path):
     seeded((1, 0.001), (2, 0.0012), (3, 0.0014))
     far = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
-    near = joint_3(life("--gear", str(own_gear("horizon_landings = 50\naccepted_chance = 0.05"))))[
-        "landings_to_limit"
-    ]
+    short = own_gear(tmp_path, ("horizon_landings = 20000", "horizon_landings = 50"))
+    near = joint_3(life("--gear", str(short)))["landings_to_limit"]
     assert far["p05"] > 50
     assert near["p95"] is None
 
 
-def test_who_accepts_a_larger_chance_inspects_later(place, own_gear):
+def test_who_accepts_a_larger_chance_inspects_later(place, tmp_path):
     seeded((1, 0.001), (2, 0.0012), (3, 0.0014))
     (usual,) = mlg("fleet", "--json").json["gears"]
-    bold = own_gear("horizon_landings = 20000\naccepted_chance = 0.3")
+    bold = own_gear(tmp_path, ("accepted_chance = 0.05", "accepted_chance = 0.3"))
     (later,) = mlg("fleet", "--json", "--gear", bold).json["gears"]
     assert later["next_inspection_landings"] > usual["next_inspection_landings"]

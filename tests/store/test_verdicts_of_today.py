@@ -18,6 +18,7 @@ from mlg_troubleshoot.workflows.keep import keep as keep_told
 from mlg_troubleshoot.workflows.keep import told_by
 from tests.cli.conftest import Run, mlg, row
 from tests.decision.test_headlines import drawn_states
+from tests.gear.own import own_gear
 
 from .places import table
 
@@ -64,17 +65,11 @@ def test_a_repair_that_is_void_hides_nothing(place: Path) -> None:
 
 
 def test_a_corrected_margin_of_the_gear_file_corrects_the_fleet(place: Path) -> None:
-    shipped = Path(__file__).parents[2] / "mlg_troubleshoot" / "gear" / "data"
-    for file in shipped.iterdir():
-        (place / file.name).write_bytes(file.read_bytes())
-    right, wide = place / "hawker-800xp.toml", place / "wide.toml"
-    text = right.read_text(encoding="utf-8")
-    wide.write_text(text.replace(MARGIN, MARGIN.replace("0.03", "0.07")), encoding="utf-8")
-    assert wide.read_text(encoding="utf-8") != text
+    wide = own_gear(place, (MARGIN, MARGIN.replace("0.03", "0.07")))
     worn = dict.fromkeys(SOUND, "0.004")
     keep(place, visit("R1", "2026-01-01", **worn), gear=wide)
     assert line(wide)["verdict"] == "WITHIN_MARGIN"
-    assert line(right)["verdict"] == "OUTSIDE_MARGIN"
+    assert line()["verdict"] == "OUTSIDE_MARGIN"
 
 
 def test_a_corrected_date_puts_no_verdict_on_another_inspection(place: Path) -> None:
