@@ -414,6 +414,7 @@ def test_a_linkage_that_does_not_close_with_what_was_read_is_not_the_gear_s(gear
     counts = Counter(b.shared_in.shape[1] for b in blocks)
     assert counts == {10 + sum(closing): len(blocks) - sum(closing), 11: sum(closing)}
     assert all(np.isfinite(b.independent_in).all() for b in blocks)
+    assert sum(np.exp(b.log_prior) for b in blocks) == pytest.approx(1.0)
 
 
 def test_a_member_of_the_ensemble_is_a_linkage_of_its_own(gear: Gear) -> None:

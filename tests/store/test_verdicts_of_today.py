@@ -62,6 +62,7 @@ def test_a_repair_that_is_void_hides_nothing(place: Path) -> None:
     (repair,) = (each for each in events() if each["kind"] == "restored")
     mlg("history", "void", repair["hash"], "--why", "wrong gear")
     assert line()["verdict"] == "OUTSIDE_MARGIN"
+    assert [each["counts"] for each in events() if each["kind"] in ("restored", "void")] == [0, 1]
 
 
 def test_a_corrected_margin_of_the_gear_file_corrects_the_fleet(place: Path) -> None:

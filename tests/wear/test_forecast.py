@@ -157,6 +157,8 @@ def test_what_falls_is_forecast_as_what_grows_seen_in_a_mirror(model: WearModel)
     assert mirrored.usage_to_limit("part 1", 9.0 - 2.5).quantile(0.5) == pytest.approx(
         model.usage_to_limit("part 1", 2.5).quantile(0.5), rel=0.03
     )
+    only = fit_wear([WearPath("part", [0.1, 1.0], [9.0, 8.0])])
+    assert only.forecast("part", [2.0]).quantile(0.95) < 8.5
 
 
 def test_a_declared_error_of_reading_is_taken_as_it_is() -> None:
@@ -190,6 +192,12 @@ def test_a_path_that_is_not_valid_is_refused(usage, value, said):
         WearPath("a", usage, value)
     with pytest.raises(UsageError, match="no path has a reading"):
         fit_wear([WearPath("a", [], [])])
+
+
+@pytest.mark.parametrize("usage", [-0.1, np.nan])
+def test_a_usage_that_cannot_be_is_refused(model: WearModel, usage: float) -> None:
+    with pytest.raises(UsageError, match="negative or not finite"):
+        model.forecast("part 1", [usage, 1.6])
 
 
 @pytest.mark.slow
