@@ -61,6 +61,7 @@ def fill_table(sheet, row, values):
 @pytest.mark.parametrize("chosen", [{}, {"Unit": "mm", "Clearance convention": "RADIAL"}])
 def test_of_an_untouched_template_it_is_said_that_there_is_nothing_in_it(template, chosen):
     book = openpyxl.load_workbook(template)
+    assert book.active is book["Inspections"]
     fill_form(book["Form"], chosen)
     book.save(template)
     result = read_inspections(template, ReadOptions())
