@@ -176,9 +176,11 @@ class Verdict(StrEnum):
     WITHIN_MARGIN = "WITHIN_MARGIN"
     INCONCLUSIVE = "INCONCLUSIVE"
 
-    @property
-    def words(self) -> str:
-        """What is predicted, as a technician reads it."""
+    def title(self, basis: Basis | None = None) -> str:
+        """The verdict in capitals, as it heads every channel."""
+        if basis is Basis.MEASURED:
+            outside = self.value == "OUTSIDE_MARGIN"
+            return "OUTSIDE MARGIN, MEASURED" if outside else "WITHIN MARGIN, MEASURED"
         return {
             "INVALID": "CANNOT BE JUDGED",
             "OUTSIDE_MARGIN": "COULD BE OUTSIDE",
@@ -186,14 +188,6 @@ class Verdict(StrEnum):
             "WITHIN_MARGIN": "WITHIN MARGIN",
             "INCONCLUSIVE": "CLOSE TO THE MARGIN",
         }[self.value]
-
-
-def title_of(verdict: Verdict, basis: Basis) -> str:
-    """The verdict in capitals, as it heads every channel."""
-    if basis is Basis.PREDICTED:
-        return verdict.words
-    outside = verdict is Verdict.OUTSIDE_MARGIN
-    return "OUTSIDE MARGIN, MEASURED" if outside else "WITHIN MARGIN, MEASURED"
 
 
 class VerdictTone(StrEnum):
@@ -504,7 +498,7 @@ class Assessment(_Planned, Result):
     @property
     def title(self) -> str:
         """The verdict in capitals, as it heads every channel."""
-        return title_of(self.verdict, self.basis)
+        return self.verdict.title(self.basis)
 
     @property
     def is_measured_outside(self) -> bool:
@@ -576,7 +570,7 @@ class Rejected(_Planned, Result):
 
     @property
     def title(self) -> str:
-        return self.verdict.words
+        return self.verdict.title()
 
     @property
     def tone(self) -> VerdictTone:

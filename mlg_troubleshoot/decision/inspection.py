@@ -255,6 +255,9 @@ class Inspection(Result):
         Joints that were measured a second time, with another gauge.
     cannot_reach, no_spare : tuple of int
         Joints that cannot be reached today, and those without a spare part.
+    is_left : bool
+        True if it was read as left, after another inspection of the same row and the repair of
+        their day.
     small_readings_true : bool
         True if somebody confirmed that readings below the play of new parts were read in the stated
         unit.
@@ -303,6 +306,7 @@ class Inspection(Result):
     measured_again: tuple[int, ...] = ()
     cannot_reach: tuple[int, ...] = ()
     no_spare: tuple[int, ...] = ()
+    is_left: bool = False
     small_readings_true: bool = False
     unit_question: str = ""
     other_columns: Mapping[str, object] = field(default_factory=dict)
@@ -336,7 +340,10 @@ class Inspection(Result):
         The inspection of a row that states its repair may hold readings from before and after it:
         its day makes them newer, but never older.
         """
-        if not self.is_repaired or surely_later(day or self.inspection_date, self.repair_date):
+        at = day or self.inspection_date
+        if not self.is_repaired or surely_later(at, self.repair_date):
+            return True
+        if self.is_left and not surely_later(self.repair_date, at):
             return True
         return False if surely_later(self.repair_date, day) else None
 

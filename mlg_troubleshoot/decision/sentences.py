@@ -183,7 +183,7 @@ def beside(displacement_in: float | None, verdict: Verdict) -> Sentence:
     return Sentence.of(
         "With the extension: {}, {}; it relaxes no verdict.",
         Length(displacement_in),
-        verdict.words.lower(),
+        verdict.title().lower(),
     )
 
 

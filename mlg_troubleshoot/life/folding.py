@@ -13,7 +13,7 @@ from datetime import date, datetime
 from functools import cached_property
 from operator import itemgetter
 
-from mlg_troubleshoot.decision.assessment import Action, Assessment, Basis, Verdict, title_of
+from mlg_troubleshoot.decision.assessment import Action, Assessment, Basis, Verdict
 from mlg_troubleshoot.decision.inspection import (
     Fleet,
     Inspection,
@@ -77,7 +77,7 @@ class TodaysVerdict:
 
     @property
     def title(self) -> str:
-        return title_of(self.verdict, self.basis) if self.verdict and self.basis else ""
+        return self.verdict.title(self.basis) if self.verdict else ""
 
 
 @dataclass(frozen=True, slots=True)

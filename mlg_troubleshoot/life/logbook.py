@@ -201,7 +201,7 @@ def visit_lines(
 ) -> list[LogLine]:
     """The facts of a visit. `joints`: without readings of others."""
     read = row.clearance_in if joints is None else row.clearance_in.keys() & joints
-    left = {n for n in read if n in row.restored_joints}
+    left = {n for n in read if row.is_left or n in row.restored_joints}
     found: list[LogLine] = []
     after = [*_readings(row, gear, left)]
     for reading in row.readings_in:

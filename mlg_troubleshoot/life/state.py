@@ -15,7 +15,7 @@ from bisect import bisect, bisect_left
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime, timedelta
-from itertools import groupby, pairwise
+from itertools import filterfalse, groupby, pairwise
 from math import hypot, inf
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -29,6 +29,7 @@ from mlg_troubleshoot.decision.inspection import (
     Inspection,
     Outcome,
     RiggingCheck,
+    RowSource,
     surely_later,
 )
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
@@ -137,9 +138,22 @@ class _Event:
 def _is_later(one: _Event | GearVisit, other: _Event | GearVisit) -> bool:
     if surely_later(one.at, other.at):
         return True
-    if one.visit is other.visit or surely_later(other.at, one.at):
+    if surely_later(other.at, one.at):
         return False
+    if one.visit.inspection.is_left and one.visit is not other.visit:
+        return _of_one_row(one.visit) == _of_one_row(other.visit)
     return one.visit.typed and one.visit.place > other.visit.place
+
+
+def _is_after(found: _Event, repair: _Event) -> bool:
+    """Whether something was found after a repair; as left it was, after that of its own visit."""
+    is_own = found.visit is repair.visit and found.visit.inspection.is_left
+    return _is_later(found, repair) or (is_own and not surely_later(repair.at, found.at))
+
+
+def _of_one_row(visit: GearVisit) -> tuple[RowSource, date | None]:
+    """What is found and left at one visit to a gear has in common."""
+    return visit.inspection.source, visit.at
 
 
 def _newest(events: Sequence[_Event]) -> list[_Event]:
@@ -154,15 +168,19 @@ def states(visits: Sequence[GearVisit], gear: Gear) -> list[GearState]:
     found: dict[int, GearState] = {}
     known = _Known(gear, visits)
     undated: list[int] = []
+
+    def is_ordered(visit: GearVisit) -> bool:
+        return visit.place < inf or known.left_of(visit) is not None
+
     for day, same in _by_day(visits):
         together = [visits[n] for n in same]
         # Rows of one table that are in no order stand there themselves.
-        known.add(day, together, [v for v in together if v.place < inf])
+        known.add(day, together, [*filter(is_ordered, together)])
         if day is None:
             undated = same
         else:
             found |= {n: known.at(visits[n]) for n in same}
-            known.note((), [v for v in together if v.place == inf])
+            known.note((), [*filterfalse(is_ordered, together)])
     found |= {n: known.at(visits[n]) for n in undated}
     return [found[n] for n in range(len(visits))]
 
@@ -266,6 +284,7 @@ class _Known:
         self.settled: list[_Event] = []
         self.checked: list[_Event] = []
         self._typed = sorted(visit.place for visit in visits if visit.typed)
+        self._left = {_of_one_row(v): v.inspection for v in visits if v.inspection.is_left}
 
     def add(
         self, day: date | None, visits: Iterable[GearVisit], found: Sequence[GearVisit]
@@ -319,11 +338,20 @@ class _Known:
         for what in (_ANY, *row.restored_joints, *[_RIGGING] * is_rigging):
             self.repairs.setdefault(what, []).append(_repair_of(visit))
 
+    def left_of(self, visit: GearVisit) -> Inspection | None:
+        """What was left at the visit at which this was found."""
+        is_found = self._left and not visit.inspection.is_left
+        return self._left.get(_of_one_row(visit)) if is_found else None
+
     def read(self, visits: Iterable[GearVisit]) -> None:
         """Add the readings of joints at some visits."""
         for visit in visits:
             row = visit.inspection
+            after = self.left_of(visit)
+            anew = {*after.clearance_in, *after.restored_joints} if after else ()
             for joint, value in row.clearance_in.items():
+                if joint in anew:
+                    continue
                 left = (row.repair_date,) if joint in row.restored_joints else ()
                 read = _Event(visit, visit.at, value, left)
                 self.readings.setdefault(joint, []).append(read)
@@ -332,7 +360,8 @@ class _Known:
         """Add what else was found at some visits."""
         for visit in visits:
             row = visit.inspection
-            if row.readings_in:
+            after = self.left_of(visit)
+            if row.readings_in and not (after and after.readings_in):
                 self.plunger.append(_plunger_of(visit))
             if row.outcome is not None:
                 tried = self.failed if row.outcome is Outcome.FAILED else self.retracted
@@ -345,6 +374,7 @@ class _Known:
         found: dict[object, _Event] = {}
         for event in events:
             visit = event.visit
+            after = self.left_of(visit)
             is_kept = visit.place < inf
             same: object = (
                 id(visit)
@@ -355,6 +385,7 @@ class _Known:
                     visit.at and visit.at == day,
                     is_kept and bisect(self._typed, visit.place),
                     is_kept,
+                    after is not None and after.is_repaired,
                 )
             )
             if same not in found or event.value > found[same].value:
@@ -399,7 +430,7 @@ def _followed(
 ) -> list[_Event]:
     """Repairs after which the gear retracted."""
     tried = [e for e in retracted if is_sure(e)]
-    return [r for r in repairs if is_sure(r) and any(_is_later(t, r) for t in tried)]
+    return [r for r in repairs if is_sure(r) and any(_is_after(t, r) for t in tried)]
 
 
 class _AsOf:
@@ -486,7 +517,7 @@ class _AsOf:
         if self._is_own(event) and not self._now:
             return True
         is_before = self._now or _is_later(self._visit, event.visit)
-        return is_before and all(_is_later(event, r) for r in self._of(joint, event))
+        return is_before and all(_is_after(event, r) for r in self._of(joint, event))
 
     def _readings(self) -> dict[str, Any]:
         """Clearances of other visits that stand, and of this one those that do."""
@@ -663,7 +694,7 @@ class _AsOf:
         """Whether this visit is the first at which a gear that had failed retracted after its
         repair.
         """
-        first = [e for e in self._retracted if _is_later(e, repair)][:1]
+        first = [e for e in self._retracted if _is_after(e, repair)][:1]
         is_own = outcome is not None and first == [outcome] and self._is_own(outcome)
         failed = (*self._known.failed, *self._own.failed)
         return is_own and any(_is_later(repair, e) for e in failed)
@@ -695,7 +726,7 @@ def _place(event: _Event, repairs: Iterable[_Event], day: date) -> date:
     """A day before the repair, after it, or the same for what cannot be ordered."""
     if any(_is_later(repair, event) for repair in repairs):
         return day - _DAY
-    return day + _DAY if all(_is_later(event, repair) for repair in repairs) else day
+    return day + _DAY if all(_is_after(event, repair) for repair in repairs) else day
 
 
 def _day_of(at: date) -> date:

@@ -131,6 +131,7 @@ def judge_again(
             "" if given.small_readings_true else given.unit_question or read.unit_question
         ),
         carried={**carried, **read.carried},
+        is_left=given.is_left,
         warnings=tuple(dict.fromkeys((*given.warnings, *read.warnings))),
         source=given.source,
     )

@@ -772,14 +772,16 @@ _LengthKind = tuple[Column, LengthUnit | None, bool]
 class Row:
     """The cells of one inspection, wherever they stand on the sheet.
 
-    places: of the cells, where they are not those of the row. visit: whose readings they are. bad,
-    warnings, questions: what was noticed while the cells were gathered; `bad` names headers.
+    places: of the cells, where they are not those of the row. visit: whose readings they are.
+    is_left: whether those as found stand in the same row. bad, warnings, questions: what was
+    noticed while the cells were gathered; `bad` names headers.
     """
 
     number: int
     cells: list[Cell]
     places: list[CellPlace] = field(default_factory=list)
     visit: Occasion = ONE_VISIT
+    is_left: bool = False
     bad: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     questions: list[str] = field(default_factory=list)
@@ -919,7 +921,8 @@ class RowReader:
         self._warn(found)
         said = (*found.warnings, *row.warnings)
         question = Sentence.joined(asked) if asked else ""
-        return self._inspection(found, **given, unit_question=question, warnings=said)
+        given |= {"unit_question": question, "warnings": said, "is_left": row.is_left}
+        return self._inspection(found, **given)
 
     @staticmethod
     def _inspection(found: _Found, **given: Any) -> Inspection:
@@ -1013,11 +1016,6 @@ class RowReader:
             found.values[SIDE] = side
         if row.visit.day:
             found.values[DATE] = self._day_of(row.visit.day)
-        if row.visit.is_left:
-            found.warnings.append(
-                "as left is of the day of as found: until a later reading says more, the worse of"
-                " both counts"
-            )
 
     def _read_day_of_visit(self, text: str) -> date | None:
         """The day of a visit, as the heading of its readings says it."""

@@ -17,6 +17,7 @@ from pathlib import PurePath
 from typing import Any, NamedTuple
 
 from mlg_troubleshoot.decision.columns import (
+    BY_NAME,
     CLEARANCE,
     CONVENTION,
     DATE,
@@ -25,6 +26,8 @@ from mlg_troubleshoot.decision.columns import (
     OUTCOME,
     PLUNGER_DISPLACEMENT,
     RECORD_ID,
+    RESTORED_JOINTS,
+    RIGGING_CHECKED,
     SIDE,
     TAIL_NO,
     UNIT,
@@ -818,7 +821,7 @@ class Folder:
         row = self.rows.get((record, part.visit))
         if row is None:
             places = [CellPlace.at(number, p.index, p.header) for p in self.placed]
-            row = Row(number, [None] * len(places), places, part.visit)
+            row = Row(number, [None] * len(places), places, part.visit, part.is_left)
             self.rows[record, part.visit] = row
         asked = reader.ask_about(cells)
         row.questions += [each for each in asked if each not in row.questions]
@@ -1189,13 +1192,19 @@ class _Table:
         filled = [
             visit for visit, own in self._own.items() if any(cells[i] is not None for i in own)
         ]
+        # Of as found and as left the gear did what is stated once before the repair.
+        stated_once = {p.index for p in self._columns.placed if p.visit is None}
+        done = RESTORED_JOINTS, BY_NAME["repair_date"], RIGGING_CHECKED
         rows = []
         for visit in filled or [*self._own][:1]:
-            kept = [*cells]
-            for other, own in self._own.items():
-                for i in own if other != visit else ():
-                    kept[i] = None
-            rows.append(replace(row, cells=kept, visit=visit))
+            others = {i for other, own in self._own.items() if other != visit for i in own}
+            is_left = visit.is_left and replace(visit, is_left=False) in filled
+            if is_left:
+                others |= stated_once.intersection(self._columns.at(OUTCOME))
+            elif replace(visit, is_left=True) in filled and not visit.is_left:
+                others |= stated_once.intersection(self._columns.at(*done))
+            kept = [None if i in others else cell for i, cell in enumerate(cells)]
+            rows.append(replace(row, cells=kept, visit=visit, is_left=is_left))
         return rows
 
     def _with_merged(self, number: int, cells: Cells) -> Cells:

@@ -541,7 +541,7 @@ class KeptGate:
                 for name, kind in {
                     **dict.fromkeys((*(f.name for f in fields(Inspection)), *RETIRED), Any),
                     **columns,
-                    "gauge_u_is_default": bool,
+                    **dict.fromkeys(("gauge_u_is_default", "is_left"), bool),
                     "entered": _BY[self._by_joint, _ENTERED_CELL],
                     "carried": dict[str, str],
                     "warnings": tuple[str, ...],

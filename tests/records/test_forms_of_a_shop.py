@@ -73,9 +73,16 @@ def test_what_was_found_and_what_was_left_keep_their_outcomes():
     lines = ["8,0.0101,0.0011", "Plunger (in),0.046,0.006", "Outcome,FAILED,RETRACTED"]
     top = ("Aircraft,N3CC", "Side,LH")
     found = read(form(*top, head="Joint,As found (in),As left (in)", joints=lines))
-    said = [(row.outcome, row.readings_in) for row in found.inspections]
-    assert said == [("FAILED", (0.046,)), ("RETRACTED", (0.006,))]
-    assert ["worse of both" in " ".join(row.warnings) for row in found.inspections] == [False, True]
+    said = [(row.outcome, row.readings_in, row.is_left) for row in found.inspections]
+    assert said == [("FAILED", (0.046,), False), ("RETRACTED", (0.006,), True)]
+
+
+def test_a_repair_that_is_stated_once_is_of_what_was_left_and_an_outcome_of_what_was_found():
+    lines = ["3,0.0101,0.0011", "Outcome,FAILED", "Restored joints,3", "Repair date,2026-01-05"]
+    top = ("Aircraft,N3CC", "Side,LH", "Date,2026-01-05")
+    found = read(form(*top, head="Joint,As found (in),As left (in)", joints=lines))
+    said = [(row.outcome, row.restored_joints) for row in found.inspections]
+    assert said == [("FAILED", ()), (None, (3,))]
 
 
 @pytest.mark.parametrize("line", ["3 (recheck),26", "3a,26", "10 / 9,13"])

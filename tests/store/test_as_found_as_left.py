@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pypdf
 import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
 
-from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.decision.inspection import FactKind
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.life.folding import judge_lives, lives
 from mlg_troubleshoot.store import Store
+from mlg_troubleshoot.workflows.check import check_files, load_index_table
+from mlg_troubleshoot.workflows.keep import keep, told_by
 from tests.cli.conftest import mlg, row
 
 from .places import table
@@ -131,3 +138,62 @@ def test_a_rigging_that_a_row_says_was_corrected_is_a_re_rigging(tmp_path: Path)
     mlg("check", file, "--keep", "--store", place)
     (life,) = lives(Store(place)).values()
     assert [(each.day, each.joints) for each in life.repairs] == [("2026-03-02", set())]
+
+
+HEADERS = (
+    "tail_no,side,clearance_convention,J1 (in) as found,J1 (in) as left,inspection_date,"
+    "J3 (in) as found,J3 (in) as left,"
+    "Plunger (in) as found,Plunger (in) as left,Outcome as found,Outcome as left,restored_joints,"
+    "repair_date"
+)
+READ = st.sampled_from(["", "0.002", "0.012"])
+PLUNGER = st.sampled_from(["", "0.008", "0.046"])
+TRIED = st.sampled_from(["", "FAILED", "RETRACTED"])
+CARD = st.tuples(READ, READ, PLUNGER, PLUNGER, TRIED, TRIED, st.sampled_from(["", "3"]))
+
+
+def truth(cards: list[tuple[str, ...]]) -> tuple[str, str, bool]:
+    """Joint 3, the plunger and whether a failure stands, by the order that the words state."""
+    joint = plunger = ""
+    failed = repaired = False
+    for found, left, plunger_found, plunger_left, tried, tried_left, restored in cards:
+        for reading, displacement, outcome, is_left in (
+            (found, plunger_found, tried, False),
+            (left, plunger_left, tried_left, True),
+        ):
+            if is_left and restored:
+                joint = plunger = ""
+                repaired = True
+            joint, plunger = reading or joint, displacement or plunger
+            if outcome == "FAILED":
+                failed, repaired = True, False
+            elif outcome and repaired:
+                failed = False
+    return joint, plunger, failed
+
+
+@settings(max_examples=60, deadline=None, phases=[Phase.generate])
+@given(st.lists(CARD, min_size=1, max_size=3))
+def test_what_is_as_left_is_newer_than_what_is_as_found_and_than_the_repair(cards) -> None:
+    lines = [
+        ",".join(("N1,LH,RADIAL,0.001,0.001", day, *card, day * bool(card[-1])))
+        for day, card in ((f"2026-03-0{n}", card) for n, card in enumerate(cards, 1))
+    ]
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "cards.csv"
+        file.write_text("\n".join([HEADERS, *lines, ""]))
+        store = Store(Path(folder) / "s.sqlite")
+        keep(told_by(check_files([file]).judgements), store)
+        gear = load_gear("hawker-800xp")
+        for life in judge_lives(lives(store).values(), gear, load_index_table(gear)):
+            row = life.state.inspection
+            joint, plunger, failed = truth(cards)
+            assert row.clearance_in.get(3) == (float(joint) if joint else None)
+            if plunger:
+                assert set(row.standing_readings_in) == {float(plunger)}
+            else:
+                assert not any(abs(each) > 0.03 for each in row.standing_readings_in)
+            facts = {fact.kind for fact in (*row.facts, *life.state.older)}
+            assert (FactKind.FAILED in facts) == failed
+            if failed or joint == "0.012" or plunger == "0.046":
+                assert not life.now.is_fine
