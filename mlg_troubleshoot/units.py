@@ -110,6 +110,10 @@ class ClearanceConvention(StrEnum):
         convention.meaning = meaning
         return convention
 
+    @property
+    def words(self) -> str:
+        return self.value.lower().replace("_", " ")
+
     @classmethod
     def parse(cls, text: str) -> ClearanceConvention:
         """Read a convention, upper or lower case, with a space, hyphen or underscore."""

@@ -19,7 +19,13 @@ from typing import TYPE_CHECKING
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.cli.output import stages
 from mlg_troubleshoot.cli.views import batch, one_gear
-from mlg_troubleshoot.decision.columns import RECORD_ID, SIDE, TAIL_NO
+from mlg_troubleshoot.decision.columns import (
+    GAUGE_ID,
+    OUTCOME,
+    RECORD_ID,
+    SIDE,
+    TAIL_NO,
+)
 from mlg_troubleshoot.decision.inspection import Inspection, RowSource, Side
 from mlg_troubleshoot.decision.judge_rows import Listed, listed
 from mlg_troubleshoot.errors import UsageError
@@ -314,13 +320,13 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
 
     gear = load_gear(declared.gear)
     options = ReadOptions.of(gear, declared)
-    own = {TAIL_NO.name: flags.tail, SIDE.name: flags.side}
-    pairs = [f"{column}={text}" for column, text in own.items() if (text or "").strip()]
-    given = named_cells([*pairs, *(flags.values or ())], gear, "--set ")
+    values = {TAIL_NO.name: flags.tail or "", SIDE.name: flags.side or ""}
     labels = {TAIL_NO.name: "--tail", SIDE.name: "--side"}
-    values = dict.fromkeys(labels, "")
-    labels |= {column: f"--set {pair!r}" for column, (pair, _text) in given.items()}
-    values |= {column: text for column, (_pair, text) in given.items()}
+    for column, (pair, text) in named_cells(flags.values or (), gear, "--set ").items():
+        if values.get(column, "").strip():
+            raise UsageError(f"{labels[column]} and --set {pair!r} say the same", "Give one.")
+        values[column] = text
+        labels[column] = f"--set {pair!r}"
     read = admit({RECORD_ID.name: "-", **values}, options, labels)
     if RECORD_ID.name in values:
         return read
@@ -334,6 +340,7 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
 
 def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, tuple[str, str]]:
     """COLUMN=VALUE and its VALUE, by the column that is named by its own or a short name."""
+    from mlg_troubleshoot.cli.prompts.entry import OUTCOMES, gauge_column
     from mlg_troubleshoot.records import ReadOptions, headers
 
     joints = ReadOptions.of(gear).joints
@@ -346,6 +353,10 @@ def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, t
                 f"Write for example {flag}3=0.013in or {flag}outcome=FAILED.",
             )
         column = headers.parse_target(name, joints, f"{flag}{pair!r}").name
+        if column == GAUGE_ID.name:
+            column = gauge_column(text)
+        if column == OUTCOME.name:
+            text = OUTCOMES.get(text.lower(), text)
         if column in values:
             raise UsageError(f"{flag or 'amend '}gives {column} twice", "Give each column once.")
         values[column] = pair, text

@@ -81,11 +81,20 @@ Unit = Annotated[
         help="Unit of lengths that do not state one.",
     ),
 ]
+
+
+def _convention(text: str) -> ClearanceConvention:
+    """A convention, also in a word that the prompts take for it."""
+    from mlg_troubleshoot.decision.columns import CONVENTION
+
+    return ClearanceConvention.parse(CONVENTION.hints.get(text.lower(), text))
+
+
 Convention = Annotated[
     ClearanceConvention | None,
     typer.Option(
         "--convention",
-        parser=ClearanceConvention.parse,
+        parser=_convention,
         metavar="RADIAL|DIAMETRAL|TOTAL_PLAY",
         envvar="MLG_CONVENTION",
         help=(

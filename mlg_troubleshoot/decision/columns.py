@@ -324,6 +324,7 @@ GAUGE_U = Column(
     high=0.02,
     scales=True,
     joint_fills="gauge_u_by_joint_in",
+    words="standard uncertainty of the gauge",
     spellings="gauge uncertainty|standard uncertainty of one reading",
     bears_verdict=True,
 )
@@ -479,6 +480,13 @@ RIGGING_CHECKED = Column(
     bears_verdict=True,
     blank_by_word=False,
 )
+SIGNED_OFF = Column(
+    name="signed_off",
+    holds=Holds.TEXT,
+    meaning="Who signed the repair off in the aircraft's records.",
+    blank_by_word=False,
+    in_template=False,
+)
 OF_THE_DAY: tuple[Column, ...] = (
     RESTORED_JOINTS,
     Column(
@@ -567,6 +575,7 @@ COLUMNS: tuple[Column, ...] = (
     ),
     REMARKS,
     *OF_THE_DAY,
+    SIGNED_OFF,
     AXIAL_FLOAT,
 )
 BY_NAME: Mapping[str, Column] = {column.name: column for column in COLUMNS}

@@ -165,10 +165,13 @@ class Fact:
         if self.joint is not None and self.kind is not FactKind.READING:
             what = f"{what} #{self.joint}"
         length = Length(self.value_in, sign=self.kind is FactKind.PLUNGER) if self.value_in else ""
+        return Sentence.of("{} {} {}" if length else "{}{} {}", what, length, self.when)
+
+    @property
+    def when(self) -> str:
+        """Its day and its visit: ``on 2026-01-15 (R1)``."""
         when = "without a date" if self.date is None else f"on {self.date.isoformat()}"
-        return Sentence.of(
-            "{} {} {} ({})" if length else "{}{} {} ({})", what, length, when, self.record
-        )
+        return f"{when} ({self.record})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,6 +252,8 @@ class Inspection(Result):
     repair_date, plunger_date, outcome_date : datetime.date or None
         When they were restored, the plunger was read and the outcome was seen; a `datetime` states
         the time.
+    signed_off : str or None
+        Who signed the repair off.
     rigging_checked : RiggingCheck or None
         Whether rigging and lock roller were checked, or corrected on `repair_date`.
     measured_again : tuple of int
@@ -302,6 +307,7 @@ class Inspection(Result):
     repair_date: date | None = None
     plunger_date: date | None = None
     outcome_date: date | None = None
+    signed_off: str | None = None
     rigging_checked: RiggingCheck | None = None
     measured_again: tuple[int, ...] = ()
     cannot_reach: tuple[int, ...] = ()
@@ -392,7 +398,8 @@ class Inspection(Result):
         """Whether nothing was found or done, or may have been: no reading, outcome, repair, check
         or question.
         """
-        found = (self.clearance_in, self.readings_in, self.outcome, self.restored_joints)
+        done = self.restored_joints, self.signed_off
+        found = (self.clearance_in, self.readings_in, self.outcome, *done)
         is_blank = self.rigging_checked is None and self.plunger_down_lock_in is None
         return is_blank and not any(found) and not self.unit_question
 

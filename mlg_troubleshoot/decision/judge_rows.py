@@ -549,7 +549,8 @@ def _warnings(
             f"{_OF_EXTENSION} needs {', '.join(lacking)}, which this inspection lacks:"
             " predicted without it."
         )
-    warnings += [sentences.over_limit(gear, finding) for finding in findings if finding.over_limit]
+    kind = inspection.convention
+    warnings += [sentences.over_limit(gear, each, kind) for each in findings if each.over_limit]
     read = [f.clearance_in for f in findings if f.clearance_in is not None]
     if all(f.clearance_in == f.limit_in for f in findings):
         warnings.append(sentences.LIMITS_WRITTEN)
@@ -581,8 +582,9 @@ def _warnings(
     if inspection.gauge_u_is_default and inspection.clearance_in:
         warnings.append(
             Sentence.of(
-                "Standard uncertainty of the gauge not stated: {} radial taken as the default.",
-                Length(inspection.gauge_u_in, 5),
+                "Standard uncertainty of the gauge not stated: {} {} taken as the default.",
+                Length(inspection.gauge_u_in * kind.per_radial, 5),
+                kind.words,
             )
         )
     if inspection.standing_readings_in and inspection.plunger_gauge_u_in is None:

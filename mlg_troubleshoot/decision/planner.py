@@ -589,7 +589,9 @@ class _PlanBuilder:
         """Go on: the plan ends."""
         if where is End.CANNOT_CLEAR and self._barred():
             return self._stop_for_today()
-        text = sentences.go_on(where, beyond=self.beyond, looked=self.looked)
+        text = sentences.go_on(
+            where, read=self.read_plunger, beyond=self.beyond, looked=self.looked
+        )
         required = where is not End.TOO_CLOSE
         self._step(Action.CONTINUE, 0.0, text, required=required)
         return Plan(tuple(self.steps), where)

@@ -19,7 +19,7 @@ from mlg_troubleshoot.decision.assessment import (
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear, SourceKind
-from mlg_troubleshoot.units import Length, Sentence
+from mlg_troubleshoot.units import ClearanceConvention, Length, Sentence
 
 NO_CLOSURE = "COULD BE OUTSIDE: the linkage does not close with these clearances."
 CHECK_ENTRIES = "Do not use. Correct the entries: the linkage does not close with these clearances."
@@ -51,7 +51,8 @@ _GO_ON = {
     ),
     End.CANNOT_CLEAR: f"Refer the gear to engineering. No {_SET_THAT_HOLDS}",
     End.NOT_EXPLAINED: (
-        "Check hydraulics, reversing valve and doors. Joint clearances do not explain the failure."
+        "Check hydraulics, reversing valve and doors. The plunger reads within its margin: joint"
+        " clearances do not explain the failure."
     ),
 }
 
@@ -140,19 +141,20 @@ def alarms(over: Sequence[int], *, failed: bool) -> str:
     return " ".join(said)
 
 
-def over_limit(gear: Gear, finding: JointFinding) -> Sentence:
-    """A joint over its limit, with where the limit comes from."""
+def over_limit(gear: Gear, finding: JointFinding, kind: ClearanceConvention) -> Sentence:
+    """A joint over its limit, as it was read, with where the limit comes from."""
     limit = gear.joint(finding.joint).limit
     read = finding.clearance_in or 0.0
     # Shown as it was compared: never two numbers alike.
     decimals = 5 if f"{read:.4f}" == f"{limit.value:.4f}" else 4
     assumed = ", an assumed limit: look up the manual's"
     return Sentence.of(
-        "#{} {}: {} radial is over its limit of {}{}.",
+        "#{} {}: {} {} is over its limit of {}{}.",
         finding.joint,
         finding.name,
-        Length(read, decimals),
-        Length(limit.value, decimals),
+        Length(read * kind.per_radial, decimals),
+        kind.words,
+        Length(limit.value * kind.per_radial, decimals),
         assumed if limit.kind is SourceKind.ASSUMED else f" ({limit.kind})",
     )
 
@@ -187,8 +189,13 @@ def beside(displacement_in: float | None, verdict: Verdict) -> Sentence:
     )
 
 
-def go_on(end: End, *, beyond: bool, looked: bool) -> str:
+def go_on(end: End, *, read: bool, beyond: bool, looked: bool) -> str:
     """Step CONTINUE: where to look depends on where the plunger stands."""
+    if end is End.NOT_EXPLAINED and not read:
+        return (
+            "IF the plunger reads within its margin, THEN check hydraulics, reversing valve and"
+            " doors."
+        )
     if end is not End.NOT_EXPLAINED or not beyond:
         return _GO_ON[end]
     if looked:

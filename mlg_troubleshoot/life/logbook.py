@@ -221,6 +221,9 @@ def visit_lines(
         corrected = row.rigging_checked is RiggingCheck.CORRECTED
         text = _RERIGGED if corrected else "rigging checked"
         found.append(LogLine("rigging", text, date=day))
+    if row.signed_off:
+        text = f"repair signed off by {row.signed_off}"
+        after.append(LogLine("signed_off", text, date=_day(row.inspection_date)))
     return [*found, *after]
 
 
@@ -264,9 +267,8 @@ def _entered(row: Inspection, joint: int) -> str:
 
 def _readings(row: Inspection, gear: Gear, joints: Collection[int]) -> Iterator[LogLine]:
     """Readings as they were entered, with the limit as it would read where it is exceeded."""
-    convention = row.convention.value.replace("_", " ").lower()
     by = f"measured by {row.technician_id}" if row.technician_id else ""
-    how = ", ".join(filter(None, (convention, by)))
+    how = ", ".join(filter(None, (row.convention.words, by)))
     # What is over its limit stands first.
     over_first = {n: not gear.joint(n).is_over_limit(row.clearance_in[n]) for n in sorted(joints)}
     for joint in sorted(over_first, key=over_first.__getitem__):

@@ -33,7 +33,7 @@ from mlg_troubleshoot.decision.inspection import (
     surely_later,
 )
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
-from mlg_troubleshoot.units import Length, Sentence
+from mlg_troubleshoot.units import ClearanceConvention, Length, Sentence
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.store import Record
@@ -283,6 +283,7 @@ class _Known:
         self.repairs: dict[int, list[_Event]] = {}
         self.settled: list[_Event] = []
         self.checked: list[_Event] = []
+        self.signed: list[_Event] = []
         self._typed = sorted(visit.place for visit in visits if visit.typed)
         self._left = {_of_one_row(v): v.inspection for v in visits if v.inspection.is_left}
 
@@ -322,6 +323,7 @@ class _Known:
             self.repairs[joint] = newest + _last([both[n] for n in others], is_sure)
         self.plunger = last(self.plunger)
         self.checked = last(self.checked)
+        self.signed = last(self.signed)
 
     def note(self, visits: Iterable[GearVisit], found: Sequence[GearVisit]) -> None:
         """Add the repairs of all visits, and what was found at some."""
@@ -368,6 +370,8 @@ class _Known:
                 tried.append(_outcome_of(visit))
             if row.rigging_checked is RiggingCheck.YES:
                 self.checked.append(_Event(visit, visit.at))
+            if row.signed_off:
+                self.signed.append(_Event(visit, visit.at))
 
     def _worst(self, day: date | None, events: Iterable[_Event]) -> Collection[_Event]:
         """Of events of which nothing says that one is later than another, the worst one."""
@@ -460,6 +464,7 @@ class _AsOf:
         self._settled = _followed(self._of(), self._retracted)
         self._older: list[Fact] = []
         self._said: list[str] = []
+        self._taken: dict[int, _Event] = {}
 
     def state(self) -> GearState:
         row = self._row
@@ -473,6 +478,9 @@ class _AsOf:
             changed["plunger_gauge_u_in"] = plunger.visit.inspection.plunger_gauge_u_in
         if row.rigging_checked is None and self._is_rigging_checked():
             changed["rigging_checked"] = RiggingCheck.YES
+        by = self._measured_by(changed.get("clearance_in", row.clearance_in), plunger)
+        if by != row.technician_id:
+            changed["technician_id"] = by
         stands = None if outcome is None else outcome.visit.inspection.outcome
         if stands is not row.outcome:
             changed["outcome"] = stands
@@ -522,7 +530,7 @@ class _AsOf:
     def _readings(self) -> dict[str, Any]:
         """Clearances of other visits that stand, and of this one those that do."""
         row = self._row
-        taken: dict[int, _Event] = {}
+        taken = self._taken
         gone: set[int] = set()
         for joint, events in self._known.readings.items():
             own = joint in row.clearance_in
@@ -560,7 +568,9 @@ class _AsOf:
             self._older.append(event.fact(FactKind.READING, joint, event.value))
         if taken:
             by_visit = groupby(self._older, key=lambda fact: (fact.date, fact.record))
-            listed = Sentence.joined((_of_one_visit([*facts]) for _, facts in by_visit), "; ")
+            listed = Sentence.joined(
+                (_of_one_visit([*facts], row.convention) for _, facts in by_visit), "; "
+            )
             self._said.append(Sentence.of("Readings of other entries stand as well: {}.", listed))
         return {
             "clearance_in": clearance,
@@ -569,6 +579,22 @@ class _AsOf:
             "measured_again": tuple(sorted(again)),
             "unit_question": " ".join(questions),
         }
+
+    def _measured_by(self, joints: Iterable[int], plunger: _Event | None) -> str | None:
+        """Who measured what stands, and of several who measured what."""
+        read = {
+            f"#{n}": self._taken[n].visit if n in self._taken else self._visit
+            for n in sorted(joints)
+        }
+        if plunger is not None:
+            read["plunger"] = plunger.visit
+        by: dict[str, list[str]] = {}
+        for what, visit in read.items():
+            if name := visit.inspection.technician_id:
+                by.setdefault(name, []).append(what)
+        if len(by) < 2:
+            return next(iter(by), self._row.technician_id)
+        return "; ".join(f"{name} ({', '.join(what)})" for name, what in by.items())
 
     def _plunger(self) -> _Event | None:
         """The plunger reading that stands; one that a repair replaced where nobody has tried the
@@ -665,7 +691,12 @@ class _AsOf:
         dated = {name: event for name, event in found.items() if event is not None}
         own = self._own.repairs.get(_ANY, [])
 
+        signed = self._counting(self._known.signed, self._own.signed)
+        is_open = outcome is not None and outcome.visit.inspection.outcome is Outcome.FAILED
+
         def is_since(repair: _Event) -> bool:
+            if not is_open and any(_is_later(e, repair) for e in signed):
+                return False
             if self._is_own(repair) or (own and not self._now):
                 return False
             return (
@@ -691,13 +722,15 @@ class _AsOf:
         return changed | {name: _place(e, self._of(), day) for name, e in dated.items()}
 
     def _is_closed_by(self, outcome: _Event | None, repair: _Event) -> bool:
-        """Whether this visit is the first at which a gear that had failed retracted after its
-        repair.
+        """Whether a gear that had failed retracted after its repair, first at this visit or at one
+        that was typed: the repair is not signed off.
         """
-        first = [e for e in self._retracted if _is_after(e, repair)][:1]
-        is_own = outcome is not None and first == [outcome] and self._is_own(outcome)
+        first = next((e for e in self._retracted if _is_after(e, repair)), None)
+        if first is None or not (first.visit.typed or self._is_own(first)):
+            return False
         failed = (*self._known.failed, *self._own.failed)
-        return is_own and any(_is_later(repair, e) for e in failed)
+        is_good = outcome is not None and outcome.visit.inspection.outcome is Outcome.RETRACTED
+        return is_good and any(_is_later(repair, e) for e in failed)
 
     def _say_repairs(self, repairs: Sequence[_Event]) -> None:
         """Name repairs that may be later than this visit."""
@@ -715,11 +748,13 @@ class _AsOf:
             self._said.append(f"{done.record_id} states a repair of {what} {when}: {then}.")
 
 
-def _of_one_visit(facts: Sequence[Fact]) -> Sentence:
-    """Readings of one visit in words: ``#3 0.0130 in, #5 0.0040 in on 2026-01-15 (R1)``."""
-    *others, last = facts
-    read = (Sentence.of("#{} {}", fact.joint, Length(fact.value_in or 0.0)) for fact in others)
-    return Sentence.joined((*read, last.words), ", ")
+def _of_one_visit(facts: Sequence[Fact], kind: ClearanceConvention) -> Sentence:
+    """Readings of one visit in words: ``#3 0.0130 in, #5 0.0040 in radial on 2026-01-15 (R1)``."""
+    read = [
+        Sentence.of("#{} {}", fact.joint, Length((fact.value_in or 0.0) * kind.per_radial))
+        for fact in facts
+    ]
+    return Sentence.of("{} {} {}", Sentence.joined(read, ", "), kind.words, facts[0].when)
 
 
 def _place(event: _Event, repairs: Iterable[_Event], day: date) -> date:

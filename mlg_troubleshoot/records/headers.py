@@ -14,17 +14,24 @@ from mlg_troubleshoot.decision.columns import (
     BY_NAME,
     CLEARANCE,
     COLUMNS,
+    CONVENTION,
     DATE,
+    GAUGE_ID,
     JOINT,
     LANDINGS,
     MARGIN,
     PLUNGER_DISPLACEMENT,
     PRESSURE,
+    REMARKS,
     RESTORED_JOINTS,
     RIGGING_CHECKED,
     SIDE,
+    SIGNED_OFF,
+    TAIL_NO,
+    TECHNICIAN_ID,
     TEMPERATURE,
     UNIT,
+    WORK_ORDER,
     Column,
 )
 from mlg_troubleshoot.errors import UsageError
@@ -118,14 +125,30 @@ class Recognition:
 
 UNKNOWN = Recognition()
 # Short names at a command; some would say too little above a column.
-_SHORT = {
-    "plunger": PLUNGER_DISPLACEMENT.name,
-    "landings": LANDINGS.name,
-    "date": DATE.name,
+# What a person types for a column, on the command line and at any prompt.
+SHORT = {
+    **dict.fromkeys(("plunger", "p"), PLUNGER_DISPLACEMENT.name),
     "restored": RESTORED_JOINTS.name,
     "rigging": RIGGING_CHECKED.name,
+    "date": DATE.name,
+    "unit": UNIT.name,
+    "convention": CONVENTION.name,
+    "side": SIDE.name,
+    "tail": TAIL_NO.name,
+    "cannot reach": "cannot_reach",
+    "no spare": "no_spare",
+    "landings": LANDINGS.name,
+    "order": WORK_ORDER.name,
+    "name": TECHNICIAN_ID.name,
+    "gauge": GAUGE_ID.name,
+    "remarks": REMARKS.name,
+    "sign off": SIGNED_OFF.name,
+    "margin": MARGIN.name,
     "temperature": TEMPERATURE.name,
     "pressure": PRESSURE.name,
+}
+_SHORT = {
+    **SHORT,
     **{f"plunger_{n}": PLUNGER_DISPLACEMENT.header(n) for n in (2, 3)},
 }
 

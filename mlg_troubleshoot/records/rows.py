@@ -606,7 +606,7 @@ def _small_question(
 ) -> str:
     new_in = options.new_part_in[joints[0]] * convention.per_radial
     below = all(read[joint] < options.new_part_in[joint] for joint in joints)
-    kind = convention.value.lower().replace("_", " ")
+    kind = convention.words
     said = (
         f"{_readings(joints, read)} {'below' if below else 'near'} the play of new parts "
         f"({stated.from_inches(new_in):.4g} {stated} {kind})"

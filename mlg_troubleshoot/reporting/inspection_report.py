@@ -223,7 +223,7 @@ def _limit_as_read(
     limit_in: float, units: Sequence[LengthUnit], conventions: Sequence[ClearanceConvention]
 ) -> str:
     """A limit as the readings of a form show it: ``15.0 thou total play``."""
-    factors = {each.per_radial: each.lower().replace("_", " ") for each in conventions}
+    factors = {each.per_radial: each.words for each in conventions}
     # Total play and diametral are the same number.
     shown = {2.0: "total play or diametral"} if len(conventions) > 1 else {}
     return "; ".join(

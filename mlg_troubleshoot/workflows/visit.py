@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 from mlg_troubleshoot.decision.assessment import Action, Step
@@ -12,6 +12,7 @@ from mlg_troubleshoot.decision.columns import (
     PLUNGER_DISPLACEMENT,
     RESTORED_JOINTS,
     RIGGING_CHECKED,
+    SIGNED_OFF,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear import Gear
@@ -37,15 +38,16 @@ class Visit:
     """What stands of a gear, and what is said of it today.
 
     row: what stands. records: its visits in the order of their entry. last: the last reading of
-    each joint with its day. undoes: what an undo takes back, which is the last visit; empty if
-    nothing. moved: or the gear that visits were moved from, with their ids. before: or what stood
-    before a correction.
+    each joint with its day. is_own: whether its last visit was typed here. undoes: what an undo
+    takes back, which is the last visit; empty if nothing. moved: or the gear that visits were moved
+    from, with their ids. before: or what stood before a correction.
     """
 
     records: tuple[Record, ...]
     row: Inspection
     result: CheckResult
     last: Mapping[int, str]
+    is_own: bool = False
     undoes: str = ""
     moved: tuple[GearKey, frozenset[str]] | None = None
     before: tuple[Record, ...] = ()
@@ -56,7 +58,11 @@ class Visit:
 
     @property
     def todo(self) -> tuple[str, ...]:
-        """The columns that NEXT asks for."""
+        """The columns that NEXT asks for; none where nothing is required."""
+        if self.step.action is Action.DONE and self.row.is_repaired:
+            return (SIGNED_OFF.name,)
+        if not self.step.required:
+            return ()
         if self.step.action in _TO_READ:
             return tuple(map(CLEARANCE.header, self.step.joints))
         asked = _ASKS.get(self.step.action)
@@ -64,9 +70,16 @@ class Visit:
 
 
 def find_visit(
-    store: Store, gear: Gear, tail: str, side: Side, judge: Callable[[GearState], CheckResult]
+    store: Store,
+    gear: Gear,
+    tail: str,
+    side: Side,
+    judge: Callable[[GearState], CheckResult],
+    own: Collection[str] = (),
 ) -> Visit | None:
-    """What is kept of a gear, under whichever spelling of its tail number."""
+    """What is kept of a gear, under whichever spelling of its tail number. `own`: the visits that
+    an undo may take back.
+    """
     if store.is_new:
         return None
     key = (as_spelt([tail], store)[tail], side.value)
@@ -82,7 +95,8 @@ def find_visit(
     }
     row = state.inspection
     undoes = ""
-    if len(life.visits) > 1 and visits[-1].inspection.source.file is None:
+    is_own = visits[-1].kept.record_id in own
+    if is_own and len(life.visits) > 1:
         lines = shortened(visit_lines(visits[-1].inspection, gear))
         undoes = Sentence.joined((line.text for line in lines), ", ")
-    return Visit(tuple(each.kept for each in visits), row, judge(state), last, undoes)
+    return Visit(tuple(each.kept for each in visits), row, judge(state), last, is_own, undoes)

@@ -109,13 +109,19 @@ def test_a_name_that_is_not_a_column_is_refused_with_the_nearest(name: str, near
         ("Plunger displacement=12thou", "measured_displacement_in", 0.012),
         ("plunger_2=12thou", "measured_displacement_in", 0.012),
         ("margin=0.028in", "margin_in", 0.028),
-        ("outcome=FAILED", "outcome", "FAILED"),
+        ("p=12thou", "measured_displacement_in", 0.012),
+        ("outcome=f", "outcome", "FAILED"),
         ("record_id=mine", "record_id", "mine"),
     ],
 )
 def test_every_column_is_set_by_its_name_or_a_short_one(pair: str, key: str, value: object) -> None:
     found = mlg(*HAND[:5], *ONE_VALUE[-3:], "3=0.001in", "--set", pair, "--json")
     assert found.one[key] == (pytest.approx(value) if isinstance(value, float) else value)
+
+
+def test_a_convention_is_understood_in_the_words_of_the_prompts() -> None:
+    found = mlg(*HAND, "--convention", "play", "--set", "3=27thou", "--json")
+    assert found.one["joints"][0]["clearance_in"] == pytest.approx(0.0135)
 
 
 @pytest.mark.parametrize("restored", ["restored=3,5", "restored_joints=3 5"])
@@ -137,7 +143,7 @@ def test_an_empty_tail_number_is_refused() -> None:
     ("option", "value", "said"),
     [
         ("--side", "BOTH", "LH or RH"),
-        ("--convention", "RADIUS", "RADIAL"),
+        ("--convention", "RADIALLY", "RADIAL"),
         ("--unit", "furlong", "in, thou or mm"),
         ("--gear", "a380", "there is no gear 'a380'"),
     ],

@@ -101,11 +101,37 @@ def test_five_visits_lead_to_done_with_few_keys(sit, now, store, capsys):
     assert 2 in found.restored_joints
     assert (found.outcome, found.standing_readings_in) == ("RETRACTED", (0.012,))
     assert "NEXT: Sign the repair off" in capsys.readouterr().out
-    screen = sit("N1 LH", "y", "").screen
-    assert "y = I did NEXT" not in screen
-    assert "✗ Nothing is typed for NEXT. report writes what is to be signed." in screen
     # On 80 columns too.
     assert "thou Sign the repair off" in mlg("fleet", "--store", store).out
+
+
+def test_a_repair_waits_for_its_sign_off_whatever_else_is_typed(sit, begun, store, capsys):
+    begun(*LIMIT)
+    typed = ("restored 3", "", "", "sign off Kern", "y", "", "", "4", "y", "12", "y", "r")
+    screen = sit("N1 LH", *typed, "#7 4", "").screen
+    assert "  NEXT was: restore #2, #5.\n" in screen
+    assert "✗ No repair can be signed off yet." in screen
+    assert "NEXT: Sign the repair off" in next_of(capsys.readouterr().out[-900:])
+    screen = sit("N1 LH", "n", "y", "", "y", "").screen
+    assert "Signed off by (Enter: J. Smith) > \n✓ signed off J. Smith\nd = details" in screen
+    assert screen.count("✗ NEXT stays as it is.") == 2
+    assert "NEXT: Nothing is required." in next_of(capsys.readouterr().out[-900:])
+    log = mlg("history", "N1", "LH", "--store", store).out
+    assert "repair signed off by J. Smith" in log
+
+
+def test_who_measured_what_stands_is_said_where_several_did(sit, begun, now):
+    begun(*failed("8", "11", "done"))
+    sit("N1 LH", "name A. Jones", "#5 9", "p 40", "")
+    assert now().technician_id == "J. Smith (#3); A. Jones (#5, plunger)"
+
+
+def test_where_nothing_is_required_there_are_no_minutes_and_nothing_was_done(sit, capsys):
+    screen = sit(*gear("r", "", "8", "11", "13", "6", "14", "done"), "").screen
+    assert "y = I did NEXT" not in screen
+    out = capsys.readouterr().out
+    assert next_of(out).startswith("NEXT: Nothing is required. To show")
+    assert "Expected after that" not in out
 
 
 def test_a_failure_after_the_repair_on_its_day_counts(sit, begun, life, capsys):
@@ -186,8 +212,7 @@ class _Tomorrow(datetime):
 def test_an_undo_says_what_it_will_take_back(sit, begun, now, line, undone):
     begun(*failed("8", "done"))
     before = now()
-    assert f"u = undo {undone}" in sit("N1 LH", line, "").screen
-    sit("N1 LH", "u", "")
+    assert f"u = undo {undone}" in sit("N1 LH", line, "u", "").screen
     for field in ("readings_in", "outcome", "clearance_in", "rigging_checked"):
         assert getattr(now(), field) == getattr(before, field)
 
@@ -223,14 +248,15 @@ def test_an_undo_of_a_doubted_reading_takes_back_no_visit_and_drops_nothing_else
     assert (now().clearance_in, now().readings_in) == ({3: 0.0045}, (0.046, 0.04))
 
 
-def test_undo_goes_back_visit_by_visit_to_the_first_one(sit, begun, life, now, capsys):
+def test_undo_goes_back_visit_by_visit_to_the_beginning_of_the_sitting(sit, begun, life, capsys):
     begun(*LIMIT)
-    sit("N1 LH", "restored 2", "", "4", "")
-    assert [repair.joints for repair in life().repairs] == [frozenset({2})]
-    sit("N1 LH", "u", "u", "u", "")
-    assert "Nothing is left to undo" in capsys.readouterr().err
+    sit("N1 LH", "p 40", "")
+    sit("N1 LH", "restored 2", "", "4", "u", "u", "u", "")
+    last = life().inspections[-1]
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"mlg history void {last.kept.record_id} --why TEXT" in said
     assert life().repairs == ()
-    assert now().clearance_in[2] == 0.013
+    assert last.inspection.readings_in == (0.04,)
 
 
 def meanwhile(other: Callable[[], object], line: str) -> Callable[[], str]:

@@ -5,6 +5,7 @@ saved at once.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ from mlg_troubleshoot.cli.prompts.entry import (
     WORD_HELP,
     Entry,
     column_of,
+    gauge_column,
     joint_of,
     label_of,
     split_words,
@@ -29,10 +31,12 @@ from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,
     DATE,
+    GAUGE_U,
     OUTCOME,
     RESTORED_JOINTS,
     RIGGING_CHECKED,
     SIDE,
+    SIGNED_OFF,
     SMALL_READINGS_TRUE,
     TAIL_NO,
     UNIT,
@@ -86,6 +90,7 @@ _QUESTIONS = {
     RESTORED_JOINTS.name: ("Restored joints", "The joints that got new parts, for example 3 5."),
     REPAIR_DATE: ("Date of the repair", "For example 20 Nov, 2026-11-20, yesterday."),
     LAST[0]: ("Measured by", "The name on the sign-off."),
+    SIGNED_OFF.name: ("Signed off by", "Who signed the repair off in the aircraft's records."),
     LAST[1]: ("Gauge", "The gauge set that was used."),
 }
 
@@ -153,15 +158,15 @@ class Asker:
                 word = typed.lower()
                 if word in ("", "d", "report", "open"):
                     return word
-                if word == "y" and not visit.todo:
+                if word in ("n", "no") or (word == "y" and not visit.todo):
                     raise UsageError(
-                        "Nothing is typed for NEXT", "report writes what is to be signed."
+                        "NEXT stays as it is", "Type what was found, as r, f or p 12. Enter ends."
                     )
                 if word == "gear":
                     return self.begin({})
                 self.entry = self._next_entry(visit, word)
                 self.entry.mark()
-                if not (word in ("new", "y") or (word != "n" and self._take(typed))):
+                if not (word in ("new", "y") or self._take(self._paired(typed))):
                     raise UsageError(f"{typed!r} is not understood", "Type ? for the words.")
             except (EOFError, KeyboardInterrupt):
                 self._say("")
@@ -171,7 +176,9 @@ class Asker:
             except UsageError as error:
                 self._refuse(error)
                 continue
-            if word not in ("new", "y") and {*self.entry.typed} <= {*_STATED} and not self._named:
+            # The name of who reads on is not that of who read before.
+            stated = {*_STATED} if visit.is_own else {*_STATED, LAST[0]}
+            if word not in ("new", "y") and {*self.entry.typed} <= stated and not self._named:
                 self._state()
             elif self.entry.typed and not (self.entry.has_findings or self._named):
                 self._state()
@@ -322,6 +329,8 @@ class Asker:
         is_word = typed.lower() != _NO_WORD.get(name)
         if name == TAIL_NO.name:
             is_word = typed[1:2].isalpha()
+        if joint_of(name) or name == _UNUSUAL:
+            typed = self._paired(typed)
         if name == _UNUSUAL and PLUNGER in dict(split_words(typed)):
             # It is typed again, not once more.
             self._give(PLUNGER, "none")
@@ -344,7 +353,7 @@ class Asker:
                 raise UsageError(f"{text!r} is not understood", "Type y, #3 13 or p 41.")
             self.entry.give(SMALL_READINGS_TRUE.name, "yes")
         else:
-            self._give(name, text)
+            self._give(gauge_column(text) if name == LAST[1] else name, text)
             # A word, or a name of another day, is of this inspection.
             if name == LAST[0] and DATE.name not in self.entry.cells:
                 self.saved.offered()[name] = self.entry.cells[name]
@@ -374,7 +383,7 @@ class Asker:
         changed = {name: text for name, text in found.items() if cells.get(name) != text}
         if CONVENTION.name in changed and joints:
             raise UsageError(
-                f"{joints} was read as {_plain(cells[CONVENTION.name])}",
+                f"{joints} was read as {self.entry.convention.words}",
                 "u takes it back; or end this entry with done before you change.",
             )
         for name, text in changed.items():
@@ -428,6 +437,22 @@ class Asker:
                 self._refuse(error)
         return bool(words)
 
+    def _paired(self, typed: str) -> str:
+        """A joint and its reading, typed as two numbers, as a word; refused where both may be the
+        figures of one reading.
+        """
+        pair = re.fullmatch(r"(\d+)\s+(\.?\d.*)", typed)
+        if pair is None or int(pair[1]) not in self.gear.joint_numbers:
+            return typed
+        self.entry.accepted(self.gear, name := CLEARANCE.header(int(pair[1])), pair[2])
+        try:
+            self.entry.accepted(self.gear, name, pair[1] + pair[2])
+        except UsageError:
+            return f"#{typed}"
+        raise UsageError(
+            f"{typed!r} may be {pair[1]}{pair[2]}, or joint {pair[1]}", f"Type #{typed} for that."
+        )
+
     def _name_joint(self, name: str, text: str) -> None:
         if joint_of(name) not in self.gear.joint_numbers:
             raise UsageError(f"there is no joint {label_of(name)}", "Type for example #3 13.")
@@ -438,6 +463,8 @@ class Asker:
 
     def _give(self, name: str, text: str) -> None:
         """Give a column, and say what was taken; a reading that can hardly be is confirmed."""
+        if name == SIGNED_OFF.name and not (self.known and name in self.known.todo):
+            raise UsageError("No repair can be signed off yet", "NEXT says when, and what is open.")
         taken = self.entry.accepted_with_day(self.gear, name, text)
         said = self._doubted(name, taken[name])
         if said and not self._confirmed(name, said, text):
@@ -448,8 +475,14 @@ class Asker:
             before = self.entry.cells.get(column)
             self.entry.give(column, kept)
             was = f", was {before}" if before and (joint_of(name) or not kept) else ""
-            given.append(f"{label_of(column)} {kept or 'none'}{self._radially(column)}{was}")
+            is_one = kept and (joint_of(column) or column == GAUGE_U.name)
+            kind = f" {self.entry.convention.words}" if is_one else ""
+            given.append(f"{label_of(column)} {kept or 'none'}{kind}{was}")
         self._say(f"✓ {', '.join(given)}", "green")
+        if name == RESTORED_JOINTS.name and self.known:
+            step = self.known.step
+            if {*self._restored()} != {*step.joints}:
+                self._say(f"  NEXT was: {step.words}.", "magenta")
         number = joint_of(name)
         if number and taken[name]:
             joint = self.gear.joint(number)
@@ -459,14 +492,6 @@ class Asker:
                     " the manual's.",
                     "bold red",
                 )
-
-    def _radially(self, name: str) -> str:
-        """What a clearance of another convention is radially; empty if it is radial."""
-        number, kind = joint_of(name), self.entry.convention
-        if not (number and self.entry.cells[name]) or kind is ClearanceConvention.RADIAL:
-            return ""
-        radial = self._length(self._judged(name).clearance_in[number])
-        return f" {_plain(kind)} = {radial} radial"
 
     def _doubted(self, name: str, text: str) -> str:
         """What is said of a clearance that can hardly be, of a plunger reading beyond what all
@@ -513,7 +538,7 @@ class Asker:
         prompt += f" (Enter: {f'{typed}; or none' if typed else 'not read'}; done)"
         return prompt, (
             f"{joint.label}. {joint.location}. Area: {joint.area}.\n"
-            f"Limit {limit} {_plain(kind)} = {self._length(joint.limit.value)} radial,"
+            f"Limit {limit} {kind.words} = {self._length(joint.limit.value)} radial,"
             f" {joint.limit.kind.value}.\n"
             f"How: {_HOW[kind]} Only play across the pin counts.\n"
             "Make the gear safe as the maintenance manual says before you reach in.\n"
@@ -530,7 +555,8 @@ class Asker:
             return self.entry.day.isoformat()
         if name == RESTORED_JOINTS.name and self.known:
             return " ".join(map(str, self.known.step.joints))
-        return self.saved.offered().get(name, "")
+        asked = LAST[0] if name == SIGNED_OFF.name else name
+        return self.saved.offered().get(asked, "")
 
     def _unusual(self) -> str:
         """What is unusual and not confirmed, in one line."""
@@ -612,11 +638,8 @@ class Asker:
 
 def _heading(cells: Mapping[str, str]) -> str:
     """Unit and convention, in words."""
-    return ", ".join(_plain(cells[name]) for name in READ_IN if name in cells)
-
-
-def _plain(text: str) -> str:
-    return text.lower().replace("_", " ")
+    found = (cells[name] for name in READ_IN if name in cells)
+    return ", ".join(found).lower().replace("_", " ")
 
 
 def _is_length(name: str) -> bool:

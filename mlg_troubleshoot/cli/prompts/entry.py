@@ -15,21 +15,17 @@ from mlg_troubleshoot.decision.columns import (
     CONVENTION,
     DATE,
     GAUGE_ID,
-    LANDINGS,
-    MARGIN,
+    GAUGE_U,
     OUTCOME,
     PLUNGER_DISPLACEMENT,
-    PRESSURE,
     RECORD_ID,
-    REMARKS,
     RESTORED_JOINTS,
     RIGGING_CHECKED,
     SIDE,
+    SIGNED_OFF,
     TAIL_NO,
     TECHNICIAN_ID,
-    TEMPERATURE,
     UNIT,
-    WORK_ORDER,
     Column,
     Holds,
 )
@@ -38,6 +34,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions, admit, judge_length
 from mlg_troubleshoot.records.gate import judge_row
+from mlg_troubleshoot.records.headers import SHORT
 from mlg_troubleshoot.units import (
     ClearanceConvention,
     LengthUnit,
@@ -57,27 +54,6 @@ LAST = (TECHNICIAN_ID.name, GAUGE_ID.name)
 OUTCOMES = {"f": "FAILED", "failed": "FAILED", "r": "RETRACTED", "retracted": "RETRACTED"}
 OUTCOMES |= {"n": "", "not tried": ""}
 _ANSWERS = "r (retracted), f (failed) or n (not tried)"
-# What is typed at any prompt, and its column.
-_COLUMNS = {
-    **dict.fromkeys(("plunger", "p"), PLUNGER),
-    "restored": RESTORED_JOINTS.name,
-    "rigging": RIGGING_CHECKED.name,
-    "date": DATE.name,
-    "unit": UNIT.name,
-    "convention": CONVENTION.name,
-    "side": SIDE.name,
-    "tail": TAIL_NO.name,
-    "cannot reach": "cannot_reach",
-    "no spare": "no_spare",
-    "landings": LANDINGS.name,
-    "order": WORK_ORDER.name,
-    "name": TECHNICIAN_ID.name,
-    "gauge": GAUGE_ID.name,
-    "remarks": REMARKS.name,
-    "margin": MARGIN.name,
-    "temperature": TEMPERATURE.name,
-    "pressure": PRESSURE.name,
-}
 WORD_HELP = """At any question:
   #7 13, p 46      joint 7, the plunger; #7 none or p none clears it, #7 goes to it
   f, r, n          failed, retracted, not tried
@@ -85,16 +61,21 @@ WORD_HELP = """At any question:
   date 20 Nov, unit mm, convention play      for what is typed from here on
   side RH, tail N123AB                       corrects the gear of what was typed
   cannot reach 3 5, no spare 3 (none: no longer), landings 4000, margin 28
-  order WO-17, name J. Smith, gauge G-03, remarks oil seen
+  order WO-17, name J. Smith, remarks oil seen
+  sign off J. Smith (the repair, when nothing else is open)
+  gauge G-03 (which one), gauge 0.5 thou (its standard uncertainty)
   temperature 21 (Celsius), pressure 3000 (psi)
   u takes the last answer back; q stops, every answer is saved"""
-_NAMES = "|".join(sorted((*_COLUMNS, *OUTCOMES), key=len, reverse=True))
-_WORD = re.compile(rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w|\.\s*[a-z])[\s=:]*", re.IGNORECASE)
+_NAMES = "|".join(sorted((*SHORT, *OUTCOMES), key=len, reverse=True))
+_WORD = re.compile(
+    rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w|\.\s*[a-z])(?:[\s=:]|is\b)*", re.IGNORECASE
+)
+_LENGTH = re.compile(r"\d*[.,]\d|\d+\s*(?:in|thou|mm|mils?)\b")
 _NEXT_WORD = re.compile(rf"(?<![\w#])(?:{_NAMES})(?!\w)", re.IGNORECASE)
 _NEXT_JOINT = re.compile(rf"{_NEXT_WORD.pattern}|#", re.IGNORECASE)
 # The day of a part of an entry that has its own.
 _REPAIR = (RESTORED_JOINTS.name, RIGGING_CHECKED.name)
-_FACTS = (OUTCOME.name, PLUNGER, *_REPAIR)
+_FACTS = (OUTCOME.name, PLUNGER, SIGNED_OFF.name, *_REPAIR)
 DAY_OF = {RESTORED_JOINTS.name: REPAIR_DATE, PLUNGER: "plunger_date", OUTCOME.name: "outcome_date"}
 
 _FOR_DAYS = ReadOptions(unit=LengthUnit.INCH, convention=ClearanceConvention.RADIAL)
@@ -299,9 +280,19 @@ class Entry(msgspec.Struct, kw_only=True):
         lengths = [with_unit(each.strip(), self.unit) for each in typed.split(";")]
         for each in lengths:
             self.judge(gear, name, each)
+        # Such a number may be meant in inches, as certificates state it.
+        if name == GAUGE_U.name and lengths != [typed] and self.unit is not LengthUnit.INCH:
+            raise UsageError(
+                f"{typed!r} has no unit", f"Type gauge {lengths[0]}, or gauge {typed} in."
+            )
         if name == PLUNGER:
             lengths = [self.cells.get(name, ""), *lengths]
         return "; ".join(filter(None, lengths))
+
+
+def gauge_column(text: str) -> str:
+    """The column that a text about a gauge fills: a length is its standard uncertainty."""
+    return GAUGE_U.name if _LENGTH.match(text) else GAUGE_ID.name
 
 
 def joint_of(name: str) -> int | None:
@@ -331,7 +322,8 @@ def split_words(line: str) -> list[tuple[str, str]]:
         word = re.sub(r"\s+", " ", match["word"].lower())
         rest = line[match.end() :]
         number = word.lstrip("# ")
-        name = CLEARANCE.header(int(number)) if number.isdecimal() else _COLUMNS.get(word, "")
+        name = CLEARANCE.header(int(number)) if number.isdecimal() else SHORT.get(word, "")
+        name = gauge_column(rest) if name == GAUGE_ID.name else name
         holds = column_of(name or OUTCOME.name).holds
         ends = _NEXT_WORD if holds is Holds.JOINTS else _NEXT_JOINT
         following = None if holds is Holds.TEXT else ends.search(rest)

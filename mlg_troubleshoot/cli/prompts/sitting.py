@@ -78,7 +78,7 @@ class Sitting:
     def _visit(self, tail: str, side: Side | str) -> Visit | None:
         """What is kept of a gear; records that cannot be read do not prevent a new entry."""
         try:
-            return find_visit(self._place, self._gear, tail, Side(side), self._judge)
+            return find_visit(self._place, self._gear, tail, Side(side), self._judge, self._own)
         except OutputError as error:
             output.say(f"The records of {tail} {side} cannot be read: {error}. {error.remedy}")
             return None
@@ -146,7 +146,11 @@ class Sitting:
     def _undo(self, visit: Visit) -> Visit:
         """Take the last visit back, or a correction or a move of visits to this gear."""
         if not visit.undoes:
-            output.say("Nothing is left to undo.")
+            last = visit.records[-1].record_id
+            output.say(
+                "Nothing of this sitting is left to undo. An earlier entry is taken back by:"
+                f" mlg history void {last} --why TEXT"
+            )
             return visit
         key, ids = visit.moved or (key_of(visit.row), ())
         put_back(self._place, visit.before, visit.records)

@@ -10,7 +10,7 @@ from mlg_troubleshoot.cli.output import WIDE, DataConsole, print_table, show_pag
 from mlg_troubleshoot.cli.views.batch import MARKS, TONES
 from mlg_troubleshoot.decision.assessment import Action, Assessment, Judgement, Step
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, Sentence
+from mlg_troubleshoot.units import Sentence
 
 # Joints that are listed. [1]
 _JOINTS = 3
@@ -67,12 +67,12 @@ def _body(judgement: Judgement, screen: DataConsole) -> list[Text]:
 
 
 def _minutes(step: Step) -> str:
-    return f" ({step.minutes:.0f} min)" * bool(step.minutes)
+    return f" ({step.minutes:.0f} min)" * bool(step.minutes and step.required)
 
 
 def _what_follows(steps: Sequence[Step]) -> str:
     """What the plan expects after its first step, and where it ends; empty if nothing follows."""
-    if len(steps) < 2:
+    if len(steps) < 2 or not steps[0].required:
         return ""
     rest = ", ".join(f"{step.words}{_minutes(step)}" for step in steps[1:-1])
     between = ". At the end: " if rest else ""
@@ -87,18 +87,23 @@ def _show_joints(a: Assessment, screen: DataConsole, most: int | None = None) ->
     order = {number: place for place, number in enumerate(to_read)}
     listed = sorted(a.ranked, key=lambda f: order.get(f.joint, len(order)))
     joint = "inspect in this order" if order else "joints, by contribution"
-    is_radial = row.convention is ClearanceConvention.RADIAL
-    kind = row.convention.lower().replace("_", " ")
-    unit = screen.unit
-    headings = [">", joint, f"typed,\n{kind}>", f"radial\n{unit}>", f"limit\n{unit}>"]
+    kind = row.convention
+    headings = [
+        ">",
+        joint,
+        *(f"{what}, {screen.unit}\n{kind.words}>" for what in ("read", "limit")),
+    ]
     rows = []
     for place, f in enumerate(listed[:most], 1):
+        read = "unmeasured"
+        if f.clearance_in is not None:
+            bound = getattr(row.entered.get(f.joint), "bound", "")
+            read = bound + screen.length(f.clearance_in * kind.per_radial)
         cells = (
             str(place),
             f"#{f.joint} {f.name}" + " OVER LIMIT" * f.over_limit,
-            "-" if is_radial else str(row.entered.get(f.joint, "-")),
-            "unmeasured" if f.clearance_in is None else screen.length(f.clearance_in),
-            screen.length(f.limit_in),
+            read,
+            screen.length(f.limit_in * kind.per_radial),
             screen.length(f.contribution_in),
         )
         rows.append([text(cell, "bold" if f.over_limit else "") for cell in cells])
