@@ -20,7 +20,6 @@ from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.cli.output import stages
 from mlg_troubleshoot.cli.views import batch, one_gear
 from mlg_troubleshoot.decision.columns import (
-    GAUGE_ID,
     OUTCOME,
     RECORD_ID,
     SIDE,
@@ -340,7 +339,7 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
 
 def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, tuple[str, str]]:
     """COLUMN=VALUE and its VALUE, by the column that is named by its own or a short name."""
-    from mlg_troubleshoot.cli.prompts.entry import OUTCOMES, gauge_column
+    from mlg_troubleshoot.cli.prompts.entry import OUTCOMES, meant_column
     from mlg_troubleshoot.records import ReadOptions, headers
 
     joints = ReadOptions.of(gear).joints
@@ -353,8 +352,7 @@ def named_cells(pairs: Sequence[str], gear: Gear, flag: str = "") -> dict[str, t
                 f"Write for example {flag}3=0.013in or {flag}outcome=FAILED.",
             )
         column = headers.parse_target(name, joints, f"{flag}{pair!r}").name
-        if column == GAUGE_ID.name:
-            column = gauge_column(text)
+        column = meant_column(column, text)
         if column == OUTCOME.name:
             text = OUTCOMES.get(text.lower(), text)
         if column in values:

@@ -21,9 +21,9 @@ from mlg_troubleshoot.cli.prompts.entry import (
     WORD_HELP,
     Entry,
     column_of,
-    gauge_column,
     joint_of,
     label_of,
+    meant_column,
     split_words,
 )
 from mlg_troubleshoot.cli.prompts.saved import SavedEntries, Terminal
@@ -353,7 +353,7 @@ class Asker:
                 raise UsageError(f"{text!r} is not understood", "Type y, #3 13 or p 41.")
             self.entry.give(SMALL_READINGS_TRUE.name, "yes")
         else:
-            self._give(gauge_column(text) if name == LAST[1] else name, text)
+            self._give(meant_column(name, text), text)
             # A word, or a name of another day, is of this inspection.
             if name == LAST[0] and DATE.name not in self.entry.cells:
                 self.saved.offered()[name] = self.entry.cells[name]

@@ -290,9 +290,9 @@ class Entry(msgspec.Struct, kw_only=True):
         return "; ".join(filter(None, lengths))
 
 
-def gauge_column(text: str) -> str:
-    """The column that a text about a gauge fills: a length is its standard uncertainty."""
-    return GAUGE_U.name if _LENGTH.match(text) else GAUGE_ID.name
+def meant_column(name: str, text: str) -> str:
+    """The column that a text fills: a length is not the gauge but its standard uncertainty."""
+    return GAUGE_U.name if name == GAUGE_ID.name and _LENGTH.match(text) else name
 
 
 def joint_of(name: str) -> int | None:
@@ -323,7 +323,7 @@ def split_words(line: str) -> list[tuple[str, str]]:
         rest = line[match.end() :]
         number = word.lstrip("# ")
         name = CLEARANCE.header(int(number)) if number.isdecimal() else SHORT.get(word, "")
-        name = gauge_column(rest) if name == GAUGE_ID.name else name
+        name = meant_column(name, rest)
         holds = column_of(name or OUTCOME.name).holds
         ends = _NEXT_WORD if holds is Holds.JOINTS else _NEXT_JOINT
         following = None if holds is Holds.TEXT else ends.search(rest)
