@@ -93,11 +93,12 @@ class ClearanceConvention(StrEnum):
     verdicts.
 
     per_radial: how many of such a reading make one radial clearance, 1 or 2. meaning: in a
-    technician's words.
+    technician's words. words: its name in a sentence.
     """
 
     per_radial: float
     meaning: str
+    words: str
 
     RADIAL = "RADIAL", 1.0, "offset of the pin centre from the hole centre (half the play)"
     DIAMETRAL = "DIAMETRAL", 2.0, "hole diameter minus pin diameter"
@@ -108,11 +109,8 @@ class ClearanceConvention(StrEnum):
         convention._value_ = name
         convention.per_radial = per_radial
         convention.meaning = meaning
+        convention.words = name.lower().replace("_", " ")
         return convention
-
-    @property
-    def words(self) -> str:
-        return self.value.lower().replace("_", " ")
 
     @classmethod
     def parse(cls, text: str) -> ClearanceConvention:

@@ -84,7 +84,7 @@ Unit = Annotated[
 
 
 def _convention(text: str) -> ClearanceConvention:
-    """A convention, also in a word that the prompts take for it."""
+    """A convention by its name or a word that the prompts take for it."""
     from mlg_troubleshoot.decision.columns import CONVENTION
 
     return ClearanceConvention.parse(CONVENTION.hints.get(text.lower(), text))
