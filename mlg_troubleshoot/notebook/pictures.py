@@ -48,20 +48,16 @@ def _indices(result: StudyFindings | IndexTable) -> list[Markup]:
 def _residuals(
     result: DiagnoseResult, against: str = "predicted", unit: str = "in"
 ) -> list[Markup]:
-    residuals = diagnosis_figures.Residuals(
-        result.diagnosis, result.gear.joint_numbers, LengthUnit.parse(unit)
-    )
-    known = residuals.columns
-    if against not in known:
-        raise UsageError(f"no column {against!r}", f"Give one of {', '.join(known)}.")
-    column = diagnosis_figures.against_column(residuals, against)
-    before = diagnosis_figures.residual_plot(residuals.rows, column, "before")
-    if not result.diagnosis.causes:
-        return [before]
-    after = diagnosis_figures.residual_plot(
-        residuals.rows, column, "with the extension", after=True
-    )
-    return [before, after]
+    shown = LengthUnit.parse(unit)
+    d = result.diagnosis
+    axes = diagnosis_figures.axes_of(d, result.gear.joint_numbers, shown)
+    if against not in axes:
+        raise UsageError(f"no column {against!r}", f"Give one of {', '.join(axes)}.")
+    rows = diagnosis_figures.rows_of(d, shown)
+    figures = [diagnosis_figures.residual_plot(rows, axes[against], "before")]
+    if rows.fit:
+        figures.append(diagnosis_figures.residual_plot(rows, axes[against], rows.fit, after=True))
+    return figures
 
 
 def _fit(result: SimulationDiagnosis) -> list[Markup]:

@@ -5,8 +5,8 @@ The seven lines of a diagnosis, as a person reads them on the terminal and on pa
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from markupsafe import Markup
@@ -18,14 +18,15 @@ from mlg_troubleshoot.decision.columns import (
     BY_NAME,
     CLEARANCE,
     COVARIATES,
-    TAIL_NO,
 )
+from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.diagnosis import Candidate, Diagnosis, NamedCause
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.reporting.figures import (
     ACCENT,
     PALE,
     PAPER,
+    SMALL,
     SOFT,
     Axis,
     Canvas,
@@ -60,7 +61,7 @@ _VARIABLES = {c.variable: c.said for c in (*COVARIATES, AXIAL_FLOAT)}
 
 
 # What is less likely than this is not worth a word, and more than so many are not read.
-_LEAST_SAID = 0.01
+LEAST_SAID = 0.01
 _MOST_SAID = 3
 
 
@@ -91,16 +92,8 @@ def column_words(name: str) -> str:
 
 
 def chance_words(chance: float) -> str:
-    """Write a probability in percent, as far as it means something."""
-    if chance < 0.0005:
-        return "< 0.1 %"
-    if chance > 0.9995:
-        return "> 99.9 %"
-    return (
-        f"{100.0 * chance:.1f} %"
-        if min(chance, 1.0 - chance) < 0.0995
-        else f"{chance:.0%}".replace("%", " %")
-    )
+    """Write a probability in percent: one of a model is never 0 or 1."""
+    return percent(min(max(chance, 1e-6), 1.0 - 1e-6))
 
 
 def name_words(cause: str) -> str:
@@ -159,7 +152,7 @@ def likeliest(d: Diagnosis) -> list[tuple[str, float]]:
     found = [
         (f"{name_words(cause)}{f' {target}' if target else ''}", chance)
         for (cause, target), chance in d.probabilities.items()
-        if (cause, target) not in said and chance >= _LEAST_SAID
+        if (cause, target) not in said and chance >= LEAST_SAID
     ]
     return found[:_MOST_SAID]
 
@@ -239,63 +232,25 @@ class FittedRows:
         return self.measured - (self.fitted if after else self.predicted)
 
 
-@dataclass(frozen=True)
-class Residuals:
-    """The rows behind a diagnosis, before and after its extension, and the unit that they are drawn
-    in.
-    """
-
-    diagnosis: Diagnosis
-    joints: tuple[int, ...]
-    unit: LengthUnit
-
-    def drawn(self, lengths_in: Array) -> Array:
-        return lengths_in * self.unit.per_inch
-
-    @property
-    def rows(self) -> FittedRows:
-        """The rows as they are drawn."""
-        d = self.diagnosis
-        return FittedRows(
-            self.drawn(d.used.measured_in),
-            self.drawn(d.predicted_in),
-            self.drawn(d.predicted_in + self.effect_in),
-            "with the extension" if d.causes else "",
-            str(self.unit),
-        )
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """What residuals can be drawn against."""
-        table = self.diagnosis.used
-        clearances = (CLEARANCE.header(joint) for joint in self.joints)
-        floats = (AXIAL_FLOAT.header(joint) for joint in self.joints)
-        further = floats if table.axial_float_in is not None else ()
-        return ("predicted", *table.quantities, *table.factors, *clearances, *further)
-
-    @property
-    def covariates(self) -> tuple[str, ...]:
-        """Columns other than the prediction and the aircraft."""
-        return tuple(name for name in self.columns[1:] if name != TAIL_NO.variable)
-
-    @property
-    def before_in(self) -> Array:
-        """Measured less predicted, shape (n,). [in]"""
-        return self.diagnosis.misfit_in
-
-    @property
-    def effect_in(self) -> Array:
-        """What the named causes add to the prediction, shape (n,); zero if none is named. [in]"""
-        effects = [cause.effect_in for cause in self.diagnosis.causes]
-        total: Array = np.sum([np.zeros_like(self.before_in), *effects], axis=0)
-        return total
-
-    def clearance(self, joint: int) -> Array:
-        """Clearance of one joint in each row, NaN where not measured. [in]"""
-        return self.diagnosis.used.clearance_in[:, self.joints.index(joint)]
+def effect_of(d: Diagnosis) -> Array:
+    """What the named causes add to the prediction, shape (n,); zero if none is named. [in]"""
+    effects = [cause.effect_in for cause in d.causes]
+    total: Array = np.sum([np.zeros_like(d.misfit_in), *effects], axis=0)
+    return total
 
 
-@dataclass(frozen=True)
+def rows_of(d: Diagnosis, unit: LengthUnit) -> FittedRows:
+    """The rows behind a diagnosis, before and after its extension."""
+    return FittedRows(
+        d.used.measured_in * unit.per_inch,
+        d.predicted_in * unit.per_inch,
+        (d.predicted_in + effect_of(d)) * unit.per_inch,
+        "with the extension" if d.causes else "",
+        str(unit),
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class ResidualAxis:
     """What residuals are drawn against.
 
@@ -311,72 +266,66 @@ class ResidualAxis:
     marked_label: str = ""
 
 
-def against_cause(residuals: Residuals, candidate: Candidate) -> ResidualAxis:
+def axes_of(d: Diagnosis, joints: Iterable[int], unit: LengthUnit) -> dict[str, ResidualAxis]:
+    """What residuals can be drawn against, by the name of the column; the prediction first."""
+    table = d.used
+    predicted = d.predicted_in * unit.per_inch
+    axes = {"predicted": ResidualAxis(f"predicted displacement, {unit}", predicted)}
+    for name, values in table.quantities.items():
+        label = ", ".join(filter(None, (column_words(name), _UNITS.get(name))))
+        if name == "day":
+            label = f"days since {table.first_day}" if table.first_day else "day"
+        axes[name] = ResidualAxis(label, values)
+    for name, texts in table.factors.items():
+        names = sorted({str(each) for each in texts if each})
+        places = [names.index(str(each)) if each else np.nan for each in texts]
+        axes[name] = ResidualAxis(column_words(name), np.array(places, float), tuple(names))
+    for column, lengths_in in (
+        (CLEARANCE, table.clearance_in),
+        (AXIAL_FLOAT, table.axial_float_in),
+    ):
+        for joint, own in zip(joints, () if lengths_in is None else lengths_in.T, strict=False):
+            name = column.header(joint)
+            axes[name] = ResidualAxis(f"{column_words(name)}, {unit}", own * unit.per_inch)
+    return axes
+
+
+def against_cause(
+    d: Diagnosis, axes: Mapping[str, ResidualAxis], candidate: Candidate, unit: LengthUnit
+) -> ResidualAxis:
     """Choose what to draw residuals against: the column that the cause lives on, else the
     prediction.
     """
-    table = residuals.diagnosis.used
+    table = d.used
     setting = candidate.setting
     joints = [setting["joint"]] if "joint" in setting else list(setting.get("pair", ()))
     if joints:
-        clearances = [residuals.clearance(joint) for joint in joints]
-        least = residuals.drawn(np.min(clearances, axis=0))
+        least = np.min([axes[CLEARANCE.header(joint)].values for joint in joints], axis=0)
         named = " and ".join(f"#{joint}" for joint in joints)
-        return ResidualAxis(
-            f"{'smaller ' if len(joints) > 1 else ''}clearance of {named}, {residuals.unit}", least
-        )
+        smaller = "smaller " if len(joints) > 1 else ""
+        return ResidualAxis(f"{smaller}clearance of {named}, {unit}", least)
     if "column" in setting:
-        return against_column(residuals, setting["column"])
-    if "tail" in setting and "day" in table.quantities:
-        return _over_time(residuals, candidate)
+        return axes.get(setting["column"], axes["predicted"])
+    if "tail" in setting and "day" in axes:
+        # The days, with the rows of an aircraft or of its gear marked.
+        rows = table.factors["tail_no"] == setting["tail"]
+        if "side" in setting:
+            rows = rows & (table.factors["side"] == setting["side"])
+        label = short(str(candidate.target), _MARKED)
+        return replace(axes["day"], marked=rows, marked_label=label)
+    floats = [axis for name, axis in axes.items() if name.startswith(f"{AXIAL_FLOAT.name}_")]
     for need in candidate.cause.needs:
-        if need == AXIAL_FLOAT.variable and table.axial_float_in is not None:
-            widest = np.argmax(np.nansum(table.axial_float_in**2, axis=0))
-            return against_column(residuals, AXIAL_FLOAT.header(residuals.joints[widest]))
-        if need in table.quantities or need in table.factors:
-            return against_column(residuals, need)
-    return against_column(residuals, "predicted")
+        if need == AXIAL_FLOAT.variable and floats:
+            return max(floats, key=lambda axis: float(np.nansum(axis.values**2)))
+        if need in axes:
+            return axes[need]
+    return axes["predicted"]
 
 
-def _over_time(residuals: Residuals, candidate: Candidate) -> ResidualAxis:
-    """The days, with the rows of an aircraft or of its gear marked."""
-    table = residuals.diagnosis.used
-    setting = candidate.setting
-    rows = table.factors["tail_no"] == setting["tail"]
-    if "side" in setting:
-        rows = rows & (table.factors["side"] == setting["side"])
-    label = short(str(candidate.target), _MARKED)
-    return ResidualAxis(
-        _day_label(residuals), table.quantities["day"], marked=rows, marked_label=label
-    )
-
-
-def against_column(residuals: Residuals, name: str) -> ResidualAxis:
-    table = residuals.diagnosis.used
-    unit = residuals.unit
-    if name in table.quantities:
-        label = ", ".join(filter(None, (column_words(name), _UNITS.get(name))))
-        return ResidualAxis(
-            _day_label(residuals) if name == "day" else label, table.quantities[name]
-        )
-    if name in table.factors:
-        names = sorted({str(each) for each in table.factors[name] if each})
-        places = [names.index(str(each)) if each else np.nan for each in table.factors[name]]
-        return ResidualAxis(column_words(name), np.array(places, float), tuple(names))
-    kind, _, joint = name.rpartition("_")
-    by_joint = {CLEARANCE.name: table.clearance_in, AXIAL_FLOAT.name: table.axial_float_in}
-    lengths_in = by_joint.get(kind)
-    if lengths_in is not None and joint.isdigit() and int(joint) in residuals.joints:
-        lengths_in = lengths_in[:, residuals.joints.index(int(joint))]
-        return ResidualAxis(f"{column_words(name)}, {unit}", residuals.drawn(lengths_in))
-    return ResidualAxis(
-        f"predicted displacement, {unit}", residuals.drawn(residuals.diagnosis.predicted_in)
-    )
-
-
-def split_by(residuals: Residuals, name: str, other: ResidualAxis) -> tuple[Mask, str, str] | None:
+def split_by(
+    name: str, column: ResidualAxis, other: ResidualAxis, left: Array
+) -> tuple[Mask, str, str] | None:
     """Split the rows by a column, so that what moves with two columns together can be seen."""
-    column = against_column(residuals, name)
     x = other.values
     if not column.names:
         known = np.isfinite(column.values)
@@ -388,17 +337,12 @@ def split_by(residuals: Residuals, name: str, other: ResidualAxis) -> tuple[Mask
     for place, level in enumerate(column.names):
         rows = (column.values == place) & np.isfinite(x)
         if rows.sum() > 3 and np.std(x[rows]) > 0.0:
-            slope = float(np.polyfit(x[rows], residuals.before_in[rows], 1)[0])
+            slope = float(np.polyfit(x[rows], left[rows], 1)[0])
             slopes[level] = abs(slope) * np.sqrt(rows.sum())
     if not slopes:
         return None
     level = max(slopes, key=lambda each: slopes[each])
     return column.values == column.names.index(level), level, f"not {level}"
-
-
-def _day_label(residuals: Residuals) -> str:
-    first = residuals.diagnosis.used.first_day
-    return f"days since {first}" if first else "day"
 
 
 def residual_plot(
@@ -451,7 +395,7 @@ def residual_plot(
             _mean_mark(plot, centre, y[part])
     if against.marked is not None:
         canvas.marker("triangle", plot.area[2] - 6 + 8j, 4.0)
-        canvas.text(plot.area[2] - 14 + 12j, against.marked_label, size=10, anchor="end")
+        canvas.text(plot.area[2] - 14 + 12j, against.marked_label, size=SMALL, anchor="end")
     return canvas.svg()
 
 
@@ -491,17 +435,15 @@ def lanes(title: str, across: Axis, names: Sequence[str], high: float = 20.0) ->
     for place, name in enumerate(names, 1):
         base = complex(left, top + high * place)
         middle = base + (-6 + 3.5j) - 1j * high / 2
-        canvas.text(middle, short(name, 9), size=9.5, anchor="end")
+        canvas.text(middle, short(name, 9), size=SMALL, anchor="end")
         canvas.line(base, base + right - left, colour=PALE)
     return plot
 
 
-def tail_strips(residuals: Residuals) -> list[Markup]:
+def tail_strips(rows: FittedRows, tails: Texts) -> list[Markup]:
     """Draw the residuals of each tail in a lane of its own, before and, where the model was
     extended, after; the square is their mean.
     """
-    tails = residuals.diagnosis.used.tails
-    rows = residuals.rows
     before = rows.left(after=False)
 
     def size(name: str) -> float:
@@ -548,5 +490,5 @@ def measured_against_predicted(rows: FittedRows) -> Markup:
         if rows.fit:
             key = plot.area[0] + 6 + 62 * k + 10j
             _point(canvas, key, after=is_after)
-            canvas.text(key + (7 + 3.5j), label, size=10)
+            canvas.text(key + (7 + 3.5j), label, size=SMALL)
     return canvas.svg()

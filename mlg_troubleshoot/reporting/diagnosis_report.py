@@ -4,19 +4,21 @@ template.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from mlg_troubleshoot.decision.columns import TAIL_NO
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import diagnosis_figures as drawn
 from mlg_troubleshoot.reporting.diagnosis_figures import (
-    Residuals,
+    FittedRows,
+    ResidualAxis,
     cause_words,
     column_words,
     fitted_numbers,
@@ -36,13 +38,11 @@ _WORDS = {
     "UNLISTED": ("REAL, BUT NOT ON THE LIST", "inconclusive"),
     "NONE": ("NOTHING FOUND", "within-margin"),
 }
-# What a page has room for: panels of rivals and causes ruled out; what is less likely than this is
-# not listed. [1]
+# What a page has room for: panels of rivals, and causes ruled out.
 _MOST_PANELS = 2
 _MOST_RULED_OUT = 14
-_LEAST_LIKELY = 0.005
 
-PlotPair = tuple[Markup, Markup, str]
+PlotPair = tuple[Markup, Markup | None, str]
 
 
 def diagnosis_document(
@@ -71,7 +71,8 @@ def _context(
     lengths: Lengths,
 ) -> dict[str, Any]:
     source = ", ".join(Path(name).name for name in provenance.input_sha256) or "inspections"
-    residuals = Residuals(d, gear.joint_numbers, lengths.unit)
+    rows = drawn.rows_of(d, lengths.unit)
+    axes = drawn.axes_of(d, gear.joint_numbers, lengths.unit)
     words, tone = _WORDS[d.verdict]
     if d.verdict == "UNLISTED" and d.p_nothing > 1.0 - d.beliefs.sure:
         words = "PERHAPS SOMETHING NOT ON THE LIST"
@@ -94,12 +95,16 @@ def _context(
         "likely": [
             (name_words(cause), target, chance)
             for (cause, target), chance in d.probabilities.items()
-            if chance >= _LEAST_LIKELY
+            if chance >= drawn.LEAST_SAID
         ],
-        "plots": _plots(residuals),
-        "scatter": drawn.measured_against_predicted(residuals.rows),
-        "strips": drawn.tail_strips(residuals),
-        "by_column": _against_each(residuals),
+        "plots": _plots(d, rows, axes, lengths.unit),
+        "scatter": drawn.measured_against_predicted(rows),
+        "strips": drawn.tail_strips(rows, d.used.tails),
+        "by_column": [
+            _before_and_after(rows, axis)
+            for name, axis in axes.items()
+            if name not in ("predicted", TAIL_NO.variable) and _varies(axis)
+        ],
         "tails": len(np.unique(d.used.tails)),
         "most_tails": drawn.MOST_TAILS,
         "model": fitted_numbers(d, lengths),
@@ -107,7 +112,7 @@ def _context(
         "most_ruled_out": _MOST_RULED_OUT,
         "kind_words": kind_words,
         "places": {record: place for place, record in enumerate(d.used.record_id)},
-        "effect_in": residuals.effect_in,
+        "effect_in": drawn.effect_of(d),
         "extension": extension,
     }
 
@@ -119,78 +124,50 @@ def _days(d: Diagnosis) -> int | None:
     return int(np.nanmax(days) - np.nanmin(days))
 
 
-def _plots(residuals: Residuals) -> list[PlotPair]:
+def _varies(axis: ResidualAxis) -> bool:
+    return len(np.unique(axis.values[np.isfinite(axis.values)])) > 1
+
+
+def _before_and_after(rows: FittedRows, axis: ResidualAxis) -> tuple[Markup, Markup | None]:
+    """Plots against a column, before and, where the model was extended, after."""
+    after = drawn.residual_plot(rows, axis, rows.fit, after=True) if rows.fit else None
+    return drawn.residual_plot(rows, axis, "before"), after
+
+
+def _plots(
+    d: Diagnosis, rows: FittedRows, axes: Mapping[str, ResidualAxis], unit: LengthUnit
+) -> list[PlotPair]:
     """Pairs of plots of residuals, each with what it shows: before and after, two rivals, or two
     columns.
     """
-    d = residuals.diagnosis
     if d.causes:
-        pairs = []
-        for cause in d.causes:
-            column = drawn.against_cause(residuals, cause.candidate)
-            left = drawn.residual_plot(residuals.rows, column, "before")
-            right = drawn.residual_plot(residuals.rows, column, "with the extension", after=True)
-            pairs.append((left, right, cause_words(cause)))
-        return pairs
-    scatter = drawn.measured_against_predicted(residuals.rows)
+        columns = [drawn.against_cause(d, axes, cause.candidate, unit) for cause in d.causes]
+        return [
+            (*_before_and_after(rows, column), cause_words(cause))
+            for column, cause in zip(columns, d.causes, strict=True)
+        ]
+    scatter = drawn.measured_against_predicted(rows)
     if d.verdict == "AMBIGUOUS":
         panels = [
             drawn.residual_plot(
-                residuals.rows,
-                drawn.against_cause(residuals, c.candidate),
+                rows,
+                drawn.against_cause(d, axes, c.candidate, unit),
                 f"{name_words(c.candidate.cause.name)} {c.candidate.target or ''}".strip(),
             )
             for c in d.also_possible[:_MOST_PANELS]
         ]
-        return [
-            (
-                panels[0],
-                panels[1] if len(panels) > 1 else scatter,
-                "What the data cannot distinguish",
-            )
-        ]
-    if d.unlisted_variables:
-        return [_unlisted_plots(residuals, d.unlisted_variables, scatter)]
-    left = drawn.residual_plot(residuals.rows, drawn.against_column(residuals, "predicted"), "")
-    return [(left, scatter, "Against the prediction")]
-
-
-def _against_each(residuals: Residuals) -> list[tuple[Markup, Markup | None]]:
-    """Plots against each column that varies, before and, where the model was extended, after."""
-    d = residuals.diagnosis
-    axes = [drawn.against_column(residuals, name) for name in residuals.covariates]
-
-    def varies(axis: drawn.ResidualAxis) -> bool:
-        known = axis.values[np.isfinite(axis.values)]
-        return len(np.unique(known)) > 1
-
-    return [
-        (
-            drawn.residual_plot(residuals.rows, axis, "before"),
-            drawn.residual_plot(residuals.rows, axis, "with the extension", after=True)
-            if d.causes
-            else None,
-        )
-        for axis in filter(varies, axes)
-    ]
-
-
-def _unlisted_plots(residuals: Residuals, variables: tuple[str, ...], scatter: Markup) -> PlotPair:
-    """Plots against the variables of an unlisted effect; of two, the rows split by the second
-    one.
-    """
-    columns = [drawn.against_column(residuals, name) for name in variables]
-    caption = f"Moves with {' and '.join(column_words(name) for name in variables)}"
+        left, right, *_ = (*panels, scatter)
+        return [(left, right, "What the data cannot distinguish")]
+    if not d.unlisted_variables:
+        left = drawn.residual_plot(rows, axes["predicted"], "")
+        return [(left, scatter, "Against the prediction")]
+    moving = [(name, axes.get(name, axes["predicted"])) for name in d.unlisted_variables]
     # A number makes the better axis, a name the better way to split.
-    first = int(len(columns) > 1 and bool(columns[0].names) and not columns[1].names)
-    split = None
-    if len(columns) > 1:
-        split = drawn.split_by(residuals, variables[1 - first], columns[first])
+    (_, first), *others = sorted(moving, key=lambda each: bool(each[1].names))
+    caption = f"Moves with {' and '.join(map(column_words, d.unlisted_variables))}"
+    split = drawn.split_by(*others[0], first, rows.left(after=False)) if others else None
     if split is None:
-        return drawn.residual_plot(residuals.rows, columns[0], ""), scatter, caption
-    rows, these, others = split
-    return (
-        drawn.residual_plot(residuals.rows, columns[first], these, only=rows),
-        drawn.residual_plot(residuals.rows, columns[first], others, only=~rows),
-        caption,
-    )
+        return [(drawn.residual_plot(rows, first, ""), scatter, caption)]
+    own, these, rest = split
+    left = drawn.residual_plot(rows, first, these, only=own)
+    return [(left, drawn.residual_plot(rows, first, rest, only=~own), caption)]

@@ -2,14 +2,14 @@
 libraries only.
 
 It is started by its path (see :mod:`~mlg_troubleshoot.reporting.publish`), reads jobs from standard
-input and answers each on standard output: a line of JSON, then the bytes it announces. Its
-arguments are the fonts that a document may name.
+input (HTML, page, title, date, keywords) and answers each on standard output (error, PDF, whether
+it shows boxes). Its arguments are the fonts that a document may name.
 """
 
 from __future__ import annotations
 
 import io
-import json
+import marshal
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -42,25 +42,23 @@ def serve(requests: BinaryIO, answers: BinaryIO, fonts: Mapping[str, bytes]) -> 
                 return plutoprint.ResourceData(font, "font/ttf", "")
             raise PermissionError(f"a report may not fetch {url[:80]}")
 
-    while line := requests.readline():
-        job = json.loads(line)
-        html = requests.read(job["length"]).decode("utf-8")
+    while True:
         try:
-            size = getattr(plutoprint, f"PAGE_SIZE_{job['page'].upper()}")
+            html, page, *about = marshal.load(requests)
+        except EOFError:
+            return
+        try:
+            size = getattr(plutoprint, f"PAGE_SIZE_{page.upper()}")
             book = plutoprint.Book(size)
             book.custom_resource_fetcher = OwnFonts()
             # A link to a file next to the document is one only where the document has an address.
             book.load_html(html, base_url=_HERE)
             stream = io.BytesIO()
             book.write_to_pdf_stream(stream)
-            about = job["title"], job["created"], job["keywords"]
-            pdf, boxes = finished(stream.getvalue(), *about)
+            answer = ("", *finished(stream.getvalue(), *about))
         except (plutoprint.Error, PyPdfError, OSError, ValueError) as error:
-            answer = {"error": str(error) or type(error).__name__, "length": 0}
-            pdf = b""
-        else:
-            answer = {"error": None, "length": len(pdf), "boxes": boxes}
-        answers.write(json.dumps(answer).encode("ascii") + b"\n" + pdf)
+            answer = (str(error) or type(error).__name__, b"", False)
+        marshal.dump(answer, answers)
         answers.flush()
 
 

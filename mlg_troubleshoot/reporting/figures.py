@@ -67,11 +67,7 @@ def percent(share: float | None) -> str:
 
 
 def joint_list(joints: Sequence[int]) -> str:
-    """Write joints: ``#3``, ``#3 and #5``, ``#1, #2 and #4``."""
-    names = [f"#{joint}" for joint in joints]
-    if not names:
-        return ABSENT
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return sentences.joint_list(joints) or ABSENT
 
 
 def moment(value: datetime) -> str:
@@ -114,12 +110,11 @@ PALE = "#e4e8ec"
 PAPER = "#ffffff"
 ACCENT = "#0b4f8a"
 
-# Size of the text of a figure. [px]
+# Sizes of the text of a figure: names, and all else. [px]
 TEXT_SIZE = 11
+SMALL = 10
 # Average width of a character of the report's font, per unit of its size.
 _CHARACTER = 0.62
-# Size of the numbers of an axis. [px]
-_TICK_SIZE = 9.5
 
 Anchor = Literal["start", "middle", "end"]
 Marker = Literal["circle", "square", "diamond", "triangle", "ring"]
@@ -305,7 +300,7 @@ class Plot:
         self.y = y
         if left is None:
             # The label of the vertical axis ends 16 units from the edge; its numbers follow it.
-            left = max(52.0, 24.0 + max(text_width(text, _TICK_SIZE) for _, text in y.ticks()))
+            left = max(52.0, 24.0 + max(text_width(text, SMALL) for _, text in y.ticks()))
         self.area = (left, top, canvas.width - right, canvas.height - bottom)
 
     def at(self, x: float, y: float) -> complex:
@@ -322,7 +317,7 @@ class Plot:
         """
         canvas = self.canvas
         x0, y0, x1, y1 = self.area
-        numbers: dict[str, Any] = {"size": _TICK_SIZE, "colour": SOFT}
+        numbers: dict[str, Any] = {"size": SMALL, "colour": SOFT}
         if not lanes:
             for value, text in self.y.ticks():
                 start = self.at(self.x.low, value)
@@ -334,7 +329,7 @@ class Plot:
                 self.y.label,
                 transform=f"translate(11 {(y0 + y1) / 2:.1f}) rotate(-90)",
                 text_anchor="middle",
-                font_size=10.0,
+                font_size=SMALL,
                 fill=INK,
             )
         room = max(2, int((x1 - x0) / max(len(names), 1) / 6.5))
@@ -348,7 +343,7 @@ class Plot:
                 canvas.line(foot, foot + 4j, colour=SOFT)
             canvas.text(foot + 14j, text, anchor="middle", **numbers)
         canvas.line(complex(x0, y1), complex(x1, y1), colour=SOFT)
-        canvas.text(complex((x0 + x1) / 2, y1 + 28), self.x.label, size=10, anchor="middle")
+        canvas.text(complex((x0 + x1) / 2, y1 + 28), self.x.label, size=SMALL, anchor="middle")
 
     def draw(self, x: Iterable[float], y: Iterable[float], **stroke: Any) -> None:
         """Draw a line through points; a NaN is a gap."""

@@ -28,6 +28,7 @@ from mlg_troubleshoot.life.urgency import repair_sentence
 from mlg_troubleshoot.reporting.figures import (
     ACCENT,
     PALE,
+    SMALL,
     SOFT,
     Axis,
     Canvas,
@@ -76,7 +77,7 @@ def wear_figure(life: GearLife, ahead: Forecast, gear: Gear, lengths: Lengths) -
         expected = [np.interp(passed, landings_of_bands(gear), edge) for edge in edges]
         forecast = np.array([last + passed, *expected])
         _panel(canvas, place, gear.joint(number), landings, between, forecast, lengths)
-    canvas.text(complex(52, canvas.height - 4), _LEGEND, size=9.5)
+    canvas.text(complex(52, canvas.height - 4), _LEGEND, size=SMALL)
     return canvas.svg()
 
 

@@ -31,6 +31,7 @@ from mlg_troubleshoot.reporting.figures import (
     PALE,
     PAPER,
     RULE,
+    SMALL,
     SOFT,
     TEXT_SIZE,
     Anchor,
@@ -63,9 +64,9 @@ class Schematic:
 # Lengths of the drawing: its width, half of a joint's marker, the longest and the shortest arrow of
 # a virtual link. [px]
 _WIDTH = 690
-_MARKER = 9.5
+_MARKER = 10
 _LONGEST_ARROW = 42
-_SHORTEST_ARROW = 2.5
+_SHORTEST_ARROW = 3
 # One scale for most reports, so that their drawings compare.
 _LARGEST_EXAGGERATION = 100
 # Room for supports and the slot above and below the linkage. [px]
@@ -199,7 +200,7 @@ class _PlaneDrawing:
             for name, point in self.points.items()
         }
 
-        canvas.text(2 + 11j, name, size=10.5, bold=True, colour=SOFT)
+        canvas.text(2 + 11j, name, bold=True, colour=SOFT)
         self._parts(canvas, at)
         for point, place in at.items():
             if self.mechanism.point(point).fixed and point not in self.cut:
@@ -249,7 +250,7 @@ class _PlaneDrawing:
                 left = at[point].real < canvas.width / 2
                 beside = at[point] + (-14 if left else 14) + 4j
                 end: Anchor = "end" if left else "start"
-                canvas.text(beside, name, size=9, colour=SOFT, anchor=end)
+                canvas.text(beside, name, size=SMALL, colour=SOFT, anchor=end)
 
 
 def _without_overlap(markers: Mapping[int, complex]) -> dict[int, complex]:
@@ -380,7 +381,7 @@ def _gauge(
     ends = [plot.at(lengths.unit.from_inches(end), 0.0) for end in (-margin_in, margin_in)]
     canvas.rectangle(ends[0], ends[1] - ends[0] + 1j * (bottom - top), PALE, colour=None)
     plot.draw_axes(lanes=True)
-    small: dict[str, Any] = {"size": 10, "colour": SOFT}
+    small: dict[str, Any] = {"size": SMALL, "colour": SOFT}
     canvas.text(left + 10j, "◀ short of mid-position", **small)
     canvas.text((left + right) / 2 + 10j, "allowed", anchor="middle", **small)
     canvas.text(right + 10j, "beyond mid-position ▶", anchor="end", **small)
@@ -388,10 +389,10 @@ def _gauge(
     for at, end in zip(ends, (-margin_in, margin_in), strict=True):
         canvas.line(at - 8j, at + 1j * (bottom - top + 4), width=2.6)
         words = lengths.bare(end, True)
-        canvas.text(at - 11j, words, size=10.5, bold=True, anchor="middle")
+        canvas.text(at - 11j, words, bold=True, anchor="middle")
     for place, (name, value) in enumerate(lanes.items()):
         base = 1j * (plot.at(0.0, place + 0.5).imag + 4)
         bold = name[0].isupper()
-        canvas.text(base, name, size=10.5, bold=bold)
-        canvas.text(canvas.width + base, value, size=10.5, bold=bold, anchor="end")
+        canvas.text(base, name, bold=bold)
+        canvas.text(canvas.width + base, value, bold=bold, anchor="end")
     return plot

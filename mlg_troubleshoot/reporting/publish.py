@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import html as html_text
 import importlib.util
-import json
+import marshal
 import os
 import re
 import subprocess
@@ -23,7 +23,6 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from markupsafe import Markup, escape
 
@@ -84,15 +83,7 @@ class PdfEngine:
         """Make one PDF; also tell whether it shows the box that stands for a character that no font
         has.
         """
-        body = html.encode("utf-8")
         dated = created.astimezone(UTC).strftime("D:%Y%m%d%H%M%SZ")
-        job = {
-            "length": len(body),
-            "page": page,
-            "title": _found(_TITLE, html),
-            "created": dated,
-            "keywords": _found(_KEYWORDS, html),
-        }
         process = self.start()
         if process.stdin is None or process.stdout is None:
             raise PdfError("the PDF engine has no pipes")
@@ -105,27 +96,24 @@ class PdfEngine:
         timer = threading.Timer(self.time_limit_s, stop)
         timer.start()
         try:
-            process.stdin.write(json.dumps(job).encode("ascii") + b"\n" + body)
+            job = html, page, _found(_TITLE, html), dated, _found(_KEYWORDS, html)
+            marshal.dump(job, process.stdin)
             process.stdin.flush()
-            line = process.stdout.readline()
-            answer: dict[str, Any] = (
-                json.loads(line) if line else {"error": "it ended without an answer", "length": 0}
-            )
-            made = process.stdout.read(answer["length"])
-        except OSError as error:
-            answer = {"error": str(error), "length": 0}
-            made = b""
+            error, made, boxes = marshal.load(process.stdout)
+        except EOFError:
+            error = "it ended without an answer"
+        except OSError as refused:
+            error = str(refused)
         finally:
             timer.cancel()
         if stopped.is_set():
+            error = f"was stopped: it took longer than {self.time_limit_s:g} s"
+        elif error:
+            error = f"failed: {error}"
+        if error:
             self.close()
-            raise PdfError(
-                f"the PDF engine was stopped: it took longer than {self.time_limit_s:g} s"
-            )
-        if answer["error"] is not None:
-            self.close()
-            raise PdfError(f"the PDF engine failed: {answer['error']}")
-        return made, bool(answer["boxes"])
+            raise PdfError(f"the PDF engine {error}")
+        return made, boxes
 
 
 _TITLE = re.compile(r"<title>(.*?)</title>", re.DOTALL)

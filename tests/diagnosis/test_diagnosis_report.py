@@ -15,10 +15,10 @@ import pytest
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.diagnosis_figures import (
-    Residuals,
     cause_words,
     headline,
     measured_against_predicted,
+    rows_of,
     seven_lines,
     tail_strips,
 )
@@ -379,13 +379,13 @@ def test_each_explanation_has_a_bar_as_long_as_it_is_likely(named: Made) -> None
 
 def test_the_points_of_an_aircraft_stand_level_with_their_mean(gear: Gear) -> None:
     found = diagnose(gear.model, fleet(gear.model, rows=60), gear.discrepancies)
-    (svg,) = tail_strips(Residuals(found, gear.joint_numbers, LengthUnit.INCH))
+    (svg,) = tail_strips(rows_of(found, LengthUnit.INCH), found.used.tails)
     points = {float(y) for y in re.findall(r'cy="([-\d.]+)"', svg)}
     means = {float(y) + 3 for y in re.findall(r'<rect x="[-\d.]+" y="([-\d.]+)" width="6"', svg)}
     assert points == means
 
 
-def test_figures_side_by_side_are_equally_wide(named: Made, gear: Gear) -> None:
-    residuals = Residuals(named.diagnosis, gear.joint_numbers, LengthUnit.INCH)
-    figures = [*tail_strips(residuals), measured_against_predicted(residuals.rows)]
+def test_figures_side_by_side_are_equally_wide(named: Made) -> None:
+    rows = rows_of(named.diagnosis, LengthUnit.INCH)
+    figures = [*tail_strips(rows, named.diagnosis.used.tails), measured_against_predicted(rows)]
     assert len({re.findall(r'width="([^"]*)"', svg)[0] for svg in figures}) == 1

@@ -24,7 +24,7 @@ Make = Callable[..., Made]
     "words",
     [
         *("COULD BE OUTSIDE", "0.0472 in", "a bound, not a forecast"),
-        *("8 joints not measured: #1, #2, #4, #6, #7, #8, #9 and #10", "acts like #5"),
+        *("8 joints not measured: #1, #2, #4, #6, #7, #8, #9, #10", "acts like #5"),
         *("Which valve port is affected: not stated", "Handover, open for the next shift"),
         *("Joint limit 0.0075 in radial: assumed", "9f2c" + "ab" * 30),
         "Troubleshooting aid, not maintenance data.",
@@ -76,7 +76,7 @@ def test_the_size_to_which_virtual_links_are_drawn_is_stated(failure: Made) -> N
 def test_a_repair_set_stands_with_its_minutes_and_what_it_leaves(judge: Judge, worn: Made) -> None:
     best, section = judge(WORN).repair_sets[0], worn.text.split("Repair sets")[1]
     left = f"{best.predicted_displacement_in:.4f} in"
-    assert re.search(rf"#3, #4 and #5 sure {left} > 99\.9 % < 0\.1 % {best.minutes:.0f} ", section)
+    assert re.search(rf"#3, #4, #5 sure {left} > 99\.9 % < 0\.1 % {best.minutes:.0f} ", section)
 
 
 def test_identity_stands_before_the_verdict(failure: Made) -> None:
@@ -96,7 +96,7 @@ def test_a_repair_that_is_signed_off_stands_with_the_identity(judge: Judge, make
         measured_again=(3,),
     )
     said = make(repaired, formats=("html",)).text
-    assert "Restored #3 and #5" in said
+    assert "Restored #3, #5" in said
     assert "Rigging and lock roller corrected" in said
     assert "Repaired on 2024-05-18 09:30 " in said
     assert "Measured again #3" in said
@@ -332,4 +332,4 @@ def test_the_joints_that_explain_a_measured_displacement_have_a_table(gear, tabl
     )
     text = make(partly, formats=("html",)).text
     assert "Which joints explain the measured displacement" in text
-    assert re.search(r"#3 and #5 \d[\d.]*\s%", text)
+    assert re.search(r"#3, #5 \d[\d.]*\s%", text)
