@@ -45,9 +45,10 @@ def test_a_reading_across_the_joint_is_halved(read, table, convention):
     assert row.clearance_in == {3: 0.013, 5: 0.007}
 
 
-def test_the_reading_is_kept_as_entered_with_its_unit(read, table):
-    header = (*HEADER[:4], "clearance_3_mm", "clearance_5_in")
-    row = inspection(read(table(header, [(*GOOD[:4], "0.330", ".0070")])))
+def test_the_readings_are_kept_as_entered_with_their_units_in_the_order_of_the_joints(read, table):
+    header = (*HEADER[:4], "clearance_5_in", "clearance_3_mm")
+    row = inspection(read(table(header, [(*GOOD[:4], ".0070", "0.330")])))
+    assert [*row.clearance_in] == [3, 5]
     assert (row.entered[3].text, row.entered[3].unit) == ("0.330", LengthUnit.MILLIMETRE)
     assert (row.entered[5].text, row.entered[5].unit) == (".0070", LengthUnit.INCH)
 
