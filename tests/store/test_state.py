@@ -52,6 +52,9 @@ def test_what_was_not_read_again_stands(at: At) -> None:
     found = at(of(JAN, {3: WORN, 6: SOUND}), of(FEB, {6: 0.002}))
     assert found.inspection.clearance_in == {3: WORN, 6: 0.002}
     assert found.older == (Fact(FactKind.READING, 3, WORN, JAN, "R1"),)
+    # A row tells of a joint how it was left.
+    left = of(JAN, {3: SOUND}, restored_joints=(3,), repair_date=FEB)
+    assert at(left, of(MAR, {6: SOUND})).inspection.clearance_in == {3: SOUND, 6: SOUND}
 
 
 def test_a_visit_knows_nothing_of_a_later_one(at: At) -> None:
