@@ -977,8 +977,8 @@ class RowReader:
                 found.entered[number] = entered
                 if length > usual + ROUNDING_IN:
                     slip = scale_slip(length, entered.unit, scale, usual)
-                    facts = str(entered), Length.brief(length), Length.brief(usual)
-                    said = "joint {}: {} is {} radial, above {}: check the reading.{}"
+                    facts = str(entered), scale.words, Length.brief(usual * scale.per_radial)
+                    said = "joint {}: {} {} is above {}: check the reading.{}"
                     check = Sentence.of(said, number, *facts, f" {slip}" if slip else "")
                     found.warnings.append(check.said_in(entered.unit))
             elif of.column is PLUNGER_DISPLACEMENT:

@@ -186,7 +186,7 @@ def test_a_plunger_outside_its_down_lock_range_is_said_once(table: Table) -> Non
 def test_a_batch_names_the_first_readings_to_check_and_counts_the_others(table: Table) -> None:
     rows = [row(record_id=f"R{n}", tail_no=f"N{n}", clearance_3_in="0.016") for n in range(5)]
     said = mlg("check", table(*rows)).err
-    assert "Note: N0 LH: joint 3: 0.016 in is 0.016 in radial, above" in said
+    assert "Note: N0 LH: joint 3: 0.016 in radial is above 0.015 in" in said
     assert "Note: 2 more rows have warnings; --json lists all of them." in said
 
 

@@ -200,7 +200,7 @@ def test_a_reading_that_can_hardly_be_is_confirmed_or_typed_again(sit, life, cap
     found = life().inspections[-1].inspection
     assert sorted(map(str, found.entered.values())) == ["8.5 thou", "<2 thou"]
     sit("N2 LH", "", "f", "46", "#2 90", "y", "done", "", "", "")
-    assert "joint 2: 90 thou is 45 thou radial, above 15 thou: " in capsys.readouterr().out
+    assert "joint 2: 90 thou total play is above 30 thou: " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
