@@ -112,12 +112,13 @@ def test_a_repair_waits_for_its_sign_off_whatever_else_is_typed(sit, begun, stor
     assert "  NEXT was: restore #2, #5.\n" in screen
     assert "✗ No repair can be signed off yet." in screen
     assert "NEXT: Sign the repair off" in next_of(capsys.readouterr().out[-900:])
-    screen = sit("N1 LH", "n", "y", "", "y", "").screen
-    assert "Signed off by (Enter: J. Smith) > \n✓ signed off J. Smith\nd = details" in screen
+    screen = sit("N1 LH", "n", "y", "sign off by A. Jones", "y", "").screen
+    assert "Signed off by (Enter: J. Smith) > " in screen
+    assert "✓ signed off A. Jones\nd = details" in screen
     assert screen.count("✗ NEXT stays as it is.") == 2
     assert "NEXT: Nothing is required." in next_of(capsys.readouterr().out[-900:])
     log = mlg("history", "N1", "LH", "--store", store).out
-    assert "repair signed off by J. Smith" in log
+    assert "repair signed off by A. Jones" in log
 
 
 def test_who_measured_what_stands_is_said_where_several_did(sit, begun, now):

@@ -479,10 +479,9 @@ class Asker:
             kind = f" {self.entry.convention.words}" if is_one else ""
             given.append(f"{label_of(column)} {kept or 'none'}{kind}{was}")
         self._say(f"✓ {', '.join(given)}", "green")
-        if name == RESTORED_JOINTS.name and self.known:
-            step = self.known.step
-            if {*self._restored()} != {*step.joints}:
-                self._say(f"  NEXT was: {step.words}.", "magenta")
+        done = name == RESTORED_JOINTS.name and {*self._restored()}
+        if done and self.known and done != {*self.known.step.joints}:
+            self._say(f"  NEXT was: {self.known.step.words}.", "magenta")
         number = joint_of(name)
         if number and taken[name]:
             joint = self.gear.joint(number)

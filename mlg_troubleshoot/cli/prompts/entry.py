@@ -68,7 +68,7 @@ WORD_HELP = """At any question:
   u takes the last answer back; q stops, every answer is saved"""
 _NAMES = "|".join(sorted((*SHORT, *OUTCOMES), key=len, reverse=True))
 _WORD = re.compile(
-    rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w|\.\s*[a-z])(?:[\s=:]|is\b)*", re.IGNORECASE
+    rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w|\.\s*[a-z])(?:[\s=:]|(?:is|by)\b)*", re.IGNORECASE
 )
 _LENGTH = re.compile(r"\d*[.,]\d|\d+\s*(?:in|thou|mm|mils?)\b")
 _NEXT_WORD = re.compile(rf"(?<![\w#])(?:{_NAMES})(?!\w)", re.IGNORECASE)
