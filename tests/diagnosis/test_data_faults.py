@@ -95,6 +95,13 @@ def test_all_readings_of_a_row_in_millimetres_are_found(gear: Gear, sound: Diagn
     assert {(place, kind) for place, _column, kind in faults(gear, readings(25.4)(sound))} == {
         (ROW, "mm_as_in")
     }
+    few = sound.clearance_in.copy()
+    few[ROW, [0, 1, 3, 4, 5, 6, 8, 9]] = np.nan
+    few[ROW] *= 25.4
+    assert faults(gear, replace(sound, clearance_in=few)) == [
+        (ROW, "clearance_3_in", "mm_as_in"),
+        (ROW, "clearance_8_in", "mm_as_in"),
+    ]
 
 
 def test_two_swapped_joints_are_found_together(gear: Gear, sound: DiagnosisTable) -> None:
