@@ -97,13 +97,15 @@ def test_ticks_lie_within_their_axis(low: float, span: float) -> None:
 
 def test_the_margin_of_the_gauge_is_drawn_to_the_scale_of_the_worst_case(judge: Judge) -> None:
     judged = judge(FAILURE)
-    assert ">−0.0429 / +0.0472</text>" in str(margin_gauge(judged, INCHES))
+    svg = str(margin_gauge(judged, INCHES))
+    assert ">−0.0429 / +0.0472</text>" in svg
     assert margin_gauge(judge(dict.fromkeys(range(1, 11), 0.0465)), INCHES) is None
     lines = re.findall(
-        r'<line x1="([\d.]+)" y1="([\d.]+)" x2="([\d.]+)" y2="([\d.]+)"[^>]*stroke-width="4"',
-        str(margin_gauge(judged, INCHES)),
+        r'<line x1="([\d.]+)" y1="([\d.]+)" x2="([\d.]+)" y2="([\d.]+)"[^>]*stroke-width="4"', svg
     )
-    margin = rectangles(str(margin_gauge(judged, INCHES)))[0]
+    (name,) = re.findall(r' y="([\d.]+)"[^>]*>Worst case \(bound\)<', svg)
+    assert float(name) - float(lines[0][1]) == pytest.approx(4.0)
+    margin = rectangles(svg)[0]
     assert judged.over_travel_in is not None
     assert judged.under_travel_in is not None
     drawn = float(lines[0][2]) - float(lines[0][0])
