@@ -322,7 +322,7 @@ def from_flags(flags: Flags, declared: task.CheckOptions, place: Store | None = 
     values = {TAIL_NO.name: flags.tail or "", SIDE.name: flags.side or ""}
     labels = {TAIL_NO.name: "--tail", SIDE.name: "--side"}
     for column, (pair, text) in named_cells(flags.values or (), gear, "--set ").items():
-        if values.get(column, "").strip():
+        if values.get(column):
             raise UsageError(f"{labels[column]} and --set {pair!r} say the same", "Give one.")
         values[column] = text
         labels[column] = f"--set {pair!r}"

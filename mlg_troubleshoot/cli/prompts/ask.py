@@ -147,8 +147,8 @@ class Asker:
         """
         self.known = visit
         day = self._stated.get(DATE.name)
-        done = ["y = I did NEXT" + f" on {day}" * bool(day)] * bool(visit.todo)
-        keys = [*done, "d = details", "report"]
+        keys = ["y = I did NEXT" + f" on {day}" * bool(day)] * bool(visit.todo)
+        keys += ["d = details", "report"]
         unit = LengthUnit(self.offered(visit)[UNIT.name])
         keys += [f"u = undo {said_in(visit.undoes, unit)}"] * bool(visit.undoes)
         self._say("   ".join([*keys, "new", "gear", "?"]), "dim")
