@@ -322,29 +322,19 @@ def chance_beyond(
       close counted as exceeding it. [1]
     """
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
-    turns = random_directions(clearance.shape[1], n)
-    cosines = np.ascontiguousarray(np.cos(turns).T)
-    sines = np.ascontiguousarray(np.sin(turns).T)
-    chance = np.empty(len(clearance))
-    margin = np.asarray(margin_in)
+    gears, joints = clearance.shape
+    turns = random_directions(joints, n).T
+    # The two components of each joint's direction, as the links have them.
+    unit = [part for turn in turns for part in (np.cos(turn), np.sin(turn))]
+    rate = np.ones(gears) if rate_factor is None else rate_factor
+    offset = np.zeros(gears) if offset_in is None else offset_in
+    chance = np.empty(gears)
     rows = max(1, IN_CACHE // n)
-    for start in range(0, len(clearance), rows):
+    for start in range(0, gears, rows):
         part = slice(start, start + rows)
-        c = clearance[part]
+        links = [clearance[part, j // 2, None] * unit[j] for j in range(2 * joints)]
         wide = {name: np.asarray(value)[part, None] for name, value in (changed or {}).items()}
-        links: list[Any] = []
-        for j in range(c.shape[1]):
-            lengths = c[:, j, None]
-            is_worn = np.any(lengths)
-            links += [lengths * cosines[j], lengths * sines[j]] if is_worn else [0.0, 0.0]
-        moved = np.atleast_2d(model.displacement(links, wide))
-        if rate_factor is not None:
-            moved = rate_factor[part, None] * moved
-        if offset_in is not None:
-            moved = moved + offset_in[part, None]
-        within = np.abs(moved) <= margin[part, None]
-        tried = within.shape[1]
-        each = np.broadcast_to(within, (len(c), tried))
-        held = np.count_nonzero(each, axis=1)
-        chance[part] = 1.0 - held / tried
+        moved = rate[part, None] * model.displacement(links, wide) + offset[part, None]
+        within = np.abs(moved) <= np.asarray(margin_in)[part, None]
+        chance[part] = 1.0 - np.count_nonzero(within, axis=1) / n
     return chance

@@ -8,7 +8,7 @@ Which statements of the source hold, in which reading, and on how many of the li
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -331,12 +331,17 @@ class ClaimEvidence:
     values: the number on each linkage, the reference first. [unit]
     """
 
-    quantity: str
-    accepted: str
-    unit: str
+    json_names = """
+        quantity=target.quantity accepted=target.accepted unit=target.unit values holds
+        why=target.why
+    """
+    target: Target
     values: tuple[float, ...]
-    holds: tuple[bool, ...]
-    why: str
+
+    @property
+    def holds(self) -> tuple[bool, ...]:
+        """Whether it is accepted, on each linkage."""
+        return tuple(map(self.target.holds, self.values))
 
 
 @dataclass(frozen=True, slots=True)
@@ -362,11 +367,12 @@ class Statement:
         for each in self.evidence:
             low = min(each.values)
             high = max(each.values)
-            unit = f" {each.unit}" if each.unit else ""
+            of = each.target
+            unit = f" {of.unit}" if of.unit else ""
             parts.append(
-                f"{each.quantity[0].upper()}{each.quantity[1:]}: {each.values[0]:.4g}{unit} on"
+                f"{of.quantity[0].upper()}{of.quantity[1:]}: {each.values[0]:.4g}{unit} on"
                 f" {self.linkages[0]}, {low:.4g} to {high:.4g} over {len(each.values)} linkages;"
-                f" {each.accepted} on {sum(each.holds)}. {each.why}"
+                f" {of.accepted} on {sum(each.holds)}. {of.why}"
             )
         return " ".join(parts)
 
@@ -403,28 +409,20 @@ def check_statements(
         columns.append([facts.measure(target) for target in entries])
         if progress is not None:
             progress(len(columns), len(gear.ensemble))
-    by_claim: dict[str, list[int]] = {}
-    for i, target in enumerate(entries):
+    by_claim: dict[str, list[ClaimEvidence]] = {}
+    for target, values in zip(entries, zip(*columns, strict=True), strict=True):
         if target.claim:
-            by_claim.setdefault(target.claim, []).append(i)
+            by_claim.setdefault(target.claim, []).append(ClaimEvidence(target, values))
     found = []
-    for claim, places in by_claim.items():
-        evidence = tuple(
-            _evidence(entries[i], tuple(column[i] for column in columns)) for i in places
-        )
-        readings = {entries[i].reading for i in places}
+    for claim, evidence in by_claim.items():
+        readings = {each.target.reading for each in evidence}
         outcome = _outcome(evidence, by_reading=len(readings) > 1)
-        section = entries[places[0]].section
-        found.append(Statement(claim, section, outcome, gear.ensemble_names, evidence))
+        section = evidence[0].target.section
+        found.append(Statement(claim, section, outcome, gear.ensemble_names, tuple(evidence)))
     return tuple(found)
 
 
-def _evidence(t: Target, values: tuple[float, ...]) -> ClaimEvidence:
-    holds = tuple(map(t.holds, values))
-    return ClaimEvidence(t.quantity, t.accepted, t.unit, values, holds, t.why)
-
-
-def _outcome(evidence: tuple[ClaimEvidence, ...], *, by_reading: bool) -> ClaimOutcome:
+def _outcome(evidence: Sequence[ClaimEvidence], *, by_reading: bool) -> ClaimOutcome:
     everywhere = [all(each.holds) for each in evidence]
     if all(everywhere):
         return ClaimOutcome.HOLDS
