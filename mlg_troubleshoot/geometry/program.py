@@ -87,6 +87,10 @@ _NAME = re.compile(r"\b[a-z]\w*\b")
 _IN_LINE = 1e-9
 
 
+# Names of the formulas of x and y.
+_Place = tuple[str, str]
+
+
 class _Writer:
     """Collects parameters and formulas while a mechanism is written out."""
 
@@ -120,6 +124,25 @@ class _Writer:
             self.let(" + ".join([x, *(f"vx{i}" for i in places)])),
             self.let(" + ".join([y, *(f"vy{i}" for i in places)])),
         )
+
+    def between(self, start: _Place, end: _Place) -> _Place:
+        """The vector from one place to another."""
+        return self.let(f"{end[0]} - {start[0]}"), self.let(f"{end[1]} - {start[1]}")
+
+    def turned(self, origin: _Place, arm: _Place, by: _Place, scale: str = "") -> _Place:
+        """A place at a distance along and to the left of an arm from its origin, both in lengths of
+        the arm or, with the inverse of its length, as they are.
+        """
+        (x, y), (dx, dy), (along, across) = origin, arm, by
+        ahead = f"{along} * {dx} - {across} * {dy}"
+        aside = f"{along} * {dy} + {across} * {dx}"
+        if scale:
+            ahead, aside = f"({ahead}) * {scale}", f"({aside}) * {scale}"
+        return self.let(f"{x} + {ahead}"), self.let(f"{y} + {aside}")
+
+    def inverse_length(self, arm: _Place) -> str:
+        dx, dy = arm
+        return self.let(f"1.0 / sqrt({dx} * {dx} + {dy} * {dy})")
 
     def seen_from(self, name: str, plane: str) -> tuple[tuple[str, str], str | None]:
         """Coordinates of a located point in another plane, and its distance from that plane."""
@@ -186,10 +209,8 @@ def write_program(mechanism: Mechanism) -> Program:
                 _crank(w, step)
             case Dyad():
                 _dyad(w, step)
-            case Lever():
-                _lever(w, step)
-            case Slot():
-                _slot(w, step)
+            case Lever() | Slot():
+                _turning(w, step)
             case Slider():
                 _slider(w, step)
             case Guided():
@@ -225,11 +246,8 @@ def _dyad(w: _Writer, step: Dyad) -> None:
     seen, height = w.seen_from(step.upstream, plane)
     start = w.shifted(seen, step.virtual_links)
     w.starts[step.joint, step.upstream] = start
-    ax, ay = start
-    bx, by = w.joints[step.downstream]
     reach = w.let(f"{first} + {_travel(w)}") if step.driven else first
-    dx = w.let(f"{bx} - {ax}")
-    dy = w.let(f"{by} - {ay}")
+    dx, dy = base = w.between(start, w.joints[step.downstream])
     apart = w.let(f"{dx} * {dx} + {dy} * {dy}")
     inverse = w.let(f"1.0 / {apart}")
     if height is None:
@@ -246,10 +264,7 @@ def _dyad(w: _Writer, step: Dyad) -> None:
         factors = w.let(f"4.0 * {second} * {second} * {square} - {excess} * {excess}")
     area = w.let(f"0.5 * {sign} * sqrt({factors})")
     across = w.let(f"{area} * {inverse}")
-    w.joints[step.joint] = (
-        w.let(f"{ax} + {along} * {dx} - {across} * {dy}"),
-        w.let(f"{ay} + {along} * {dy} + {across} * {dx}"),
-    )
+    w.joints[step.joint] = w.turned(start, base, (along, across))
 
 
 def _arm(pivot: Point, end: Point) -> Any:
@@ -257,44 +272,26 @@ def _arm(pivot: Point, end: Point) -> Any:
     return (end.x - pivot.x) + 1j * (end.y - pivot.y)
 
 
-def _lever(w: _Writer, step: Lever) -> None:
-    w.same_plane(step, step.pivot, step.follows)
+def _turning(w: _Writer, step: Lever | Slot) -> None:
+    """A rigid link about its pivot: a lever keeps its shape, a slot the length of one arm."""
+    led, _ = needs(step)
+    w.same_plane(step, step.pivot, led)
     pivot = w.mechanism.point(step.pivot)
     to_joint = _arm(pivot, w.mechanism.point(step.joint))
-    to_led = _arm(pivot, w.mechanism.point(step.follows))
-    w.distance(step.pivot, step.follows)
-    ratio = to_joint / to_led
-    along = w.parameter(f"lever.{step.joint}.along", ratio.real)
-    across = w.parameter(f"lever.{step.joint}.across", ratio.imag)
-    px, py = w.joints[step.pivot]
-    fx, fy = w.joints[step.follows]
-    dx = w.let(f"{fx} - {px}")
-    dy = w.let(f"{fy} - {py}")
-    place = (
-        w.let(f"{px} + {along} * {dx} - {across} * {dy}"),
-        w.let(f"{py} + {along} * {dy} + {across} * {dx}"),
-    )
-    w.joints[step.joint] = w.shifted(place, step.virtual_links)
-
-
-def _slot(w: _Writer, step: Slot) -> None:
-    w.same_plane(step, step.pivot, step.pin)
-    pivot = w.mechanism.point(step.pivot)
-    to_joint = _arm(pivot, w.mechanism.point(step.joint))
-    to_pin = _arm(pivot, w.mechanism.point(step.pin))
-    w.distance(step.pivot, step.pin)
-    arm = to_joint / (to_pin / abs(to_pin))
-    along = w.parameter(f"arm.{step.joint}.along", arm.real)
-    across = w.parameter(f"arm.{step.joint}.across", arm.imag)
-    px, py = w.joints[step.pivot]
-    qx, qy = w.shifted(w.joints[step.pin], step.virtual_links)
-    dx = w.let(f"{qx} - {px}")
-    dy = w.let(f"{qy} - {py}")
-    inverse = w.let(f"1.0 / sqrt({dx} * {dx} + {dy} * {dy})")
-    w.joints[step.joint] = (
-        w.let(f"{px} + ({along} * {dx} - {across} * {dy}) * {inverse}"),
-        w.let(f"{py} + ({along} * {dy} + {across} * {dx}) * {inverse}"),
-    )
+    to_led = _arm(pivot, w.mechanism.point(led))
+    w.distance(step.pivot, led)
+    is_slot = isinstance(step, Slot)
+    ratio = to_joint / (to_led / abs(to_led) if is_slot else to_led)
+    name = f"{'arm' if is_slot else 'lever'}.{step.joint}"
+    by = w.parameter(f"{name}.along", ratio.real), w.parameter(f"{name}.across", ratio.imag)
+    start = w.joints[step.pivot]
+    links = step.virtual_links
+    if is_slot:
+        arm = w.between(start, w.shifted(w.joints[led], links))
+        w.joints[step.joint] = w.turned(start, arm, by, w.inverse_length(arm))
+    else:
+        place = w.turned(start, w.between(start, w.joints[led]), by)
+        w.joints[step.joint] = w.shifted(place, links)
 
 
 def _slider(w: _Writer, step: Slider) -> None:
@@ -328,8 +325,7 @@ def _slide(w: _Writer, joint: str, line: _Line, position: str) -> None:
 def _reach(line: _Line, end: tuple[str, str], square: str, sign: str, w: _Writer) -> str:
     """Where a link from `end` reaches a line, as a distance along it; square: of its length."""
     x, y, c, s = line
-    dx = w.let(f"{end[0]} - {x}")
-    dy = w.let(f"{end[1]} - {y}")
+    dx, dy = w.between((x, y), end)
     across = w.let(f"{c} * {dy} - {s} * {dx}")
     return w.let(f"{c} * {dx} + {s} * {dy} + {sign} * sqrt({square} - {across} * {across})")
 
@@ -354,8 +350,7 @@ def _guided(w: _Writer, step: Guided) -> None:
         at_x, at_y, along, over = _line_of(
             w, step, "across", step.upstream, step.across, step.virtual_links
         )[0]
-        dx = w.let(f"{at_x} - {x}")
-        dy = w.let(f"{at_y} - {y}")
+        dx, dy = w.between((x, y), (at_x, at_y))
         position = w.let(
             f"({dx} * {over} - {dy} * {along}) * (1.0 / ({c} * {over} - {s} * {along}))"
         )
@@ -370,15 +365,13 @@ def _line_of(
     """
     joint = w.mechanism.point(step.joint)
     first = w.mechanism.point(start)
-    x, y = w.shifted(w.joints[start], links)
+    origin = w.shifted(w.joints[start], links)
     if isinstance(to, str):
         second = w.mechanism.point(to)
         length = w.distance(start, to)
         direction = (second.x - first.x) / length, (second.y - first.y) / length
-        to_x, to_y = w.shifted(w.joints[to], links)
-        dx = w.let(f"{to_x} - {x}")
-        dy = w.let(f"{to_y} - {y}")
-        inverse = w.let(f"1.0 / sqrt({dx} * {dx} + {dy} * {dy})")
+        dx, dy = arm = w.between(origin, w.shifted(w.joints[to], links))
+        inverse = w.inverse_length(arm)
         c = w.let(f"{dx} * {inverse}")
         s = w.let(f"{dy} * {inverse}")
     else:
@@ -391,11 +384,7 @@ def _line_of(
     name = f"guide.{step.joint}.{part}"
     along = w.parameter(f"{name}.along", direction[0] * dx0 + direction[1] * dy0)
     aside = w.parameter(f"{name}.aside", direction[0] * dy0 - direction[1] * dx0)
-    place = (
-        w.let(f"{x} + {c} * {along} - {s} * {aside}"),
-        w.let(f"{y} + {s} * {along} + {c} * {aside}"),
-    )
-    return (*place, c, s), direction
+    return (*w.turned(origin, (along, aside), (c, s)), c, s), direction
 
 
 def _output(w: _Writer) -> str:

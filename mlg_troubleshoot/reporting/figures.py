@@ -345,9 +345,8 @@ class Plot:
         canvas.line(complex(x0, y1), complex(x1, y1), colour=SOFT)
         canvas.text(complex((x0 + x1) / 2, y1 + 28), self.x.label, size=SMALL, anchor="middle")
 
-    def draw(self, x: Iterable[float], y: Iterable[float], **stroke: Any) -> None:
+    def draw(self, places: Iterable[tuple[float, float]], **stroke: Any) -> None:
         """Draw a line through points; a NaN is a gap."""
-        places = zip(x, y, strict=True)
         for known, run in groupby(places, lambda at: all(map(math.isfinite, at))):
             if known:
                 self.canvas.polyline([self.at(*each) for each in run], **{"width": 1.8, **stroke})

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.gear.gear import Gear, JointSpec
+from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.forecast import (
     FleetLine,
@@ -41,7 +40,7 @@ from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.folding import GearLife
-    from mlg_troubleshoot.life.forecast import Forecast, Stretch
+    from mlg_troubleshoot.life.forecast import Forecast
 
 
 _RED = "#a3131a"
@@ -72,53 +71,36 @@ def wear_figure(life: GearLife, ahead: Forecast, gear: Gear, lengths: Lengths) -
         -(-len(joints) // 2) * _PANEL_HIGH + 18,
         f"Clearance of each joint of {life.name} over landings",
     )
+    shown = lengths.unit.from_inches
     for place, (number, between) in enumerate(joints.items()):
-        edges = ahead.bands.get(number, ())
-        expected = [np.interp(passed, landings_of_bands(gear), edge) for edge in edges]
-        forecast = np.array([last + passed, *expected])
-        _panel(canvas, place, gear.joint(number), landings, between, forecast, lengths)
+        joint = gear.joint(number)
+        limit = shown(joint.limit.value)
+        placed = [[(at, shown(value)) for at, value, _u in each.placed] for each in between]
+        most = max(value for own in placed for _at, value in own)
+        x = _PANEL_WIDE * (place % 2)
+        y = _PANEL_HIGH * (place // 2)
+        plot = Plot(canvas, landings, Axis("", 0.0, 1.15 * max(limit, most)))
+        plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
+        canvas.text(complex(x + 52, y + 13), f"{joint.label}, {lengths.unit}", bold=True)
+        if number in ahead.bands:
+            edges = [np.interp(passed, landings_of_bands(gear), e) for e in ahead.bands[number]]
+            low, middle, high = np.minimum(np.array(edges) * shown(1.0), plot.y.high)
+            at = last + passed
+            around = [*zip(at, low, strict=True), *zip(at[::-1], high[::-1], strict=True)]
+            canvas.polyline([plot.at(*each) for each in around], PALE, colour=None)
+            plot.draw(zip(at, middle, strict=True), dash="2 2", colour=ACCENT)
+        plot.draw_axes(5)
+        plot.draw([(landings.low, limit), (landings.high, limit)], dash="5 3", colour=_RED)
+        for restored in sorted({each.begun for each in between[1:]} - {between[0].begun}):
+            base = plot.at(restored, 0.0)
+            canvas.line(base, plot.at(restored, plot.y.high), colour=SOFT, dash="1 3")
+            canvas.marker("triangle", base, 4.5)
+        for own in placed:
+            plot.draw(own)
+            for usage, value in own:
+                canvas.marker("square" if value > limit else "circle", plot.at(usage, value), 3.2)
     canvas.text(complex(52, canvas.height - 4), _LEGEND, size=SMALL)
     return canvas.svg()
-
-
-def _panel(
-    canvas: Canvas,
-    place: int,
-    joint: JointSpec,
-    landings: Axis,
-    between: Sequence[Stretch],
-    forecast: Array,
-    lengths: Lengths,
-) -> None:
-    """Draw one joint; `forecast`: landings and, where there is one, the 5, 50 and 95 % quantiles at
-    each. [landings, in]
-    """
-    shown = lengths.unit.from_inches
-    limit = shown(joint.limit.value)
-    most = max(shown(value) for each in between for _at, value, _u in each.placed)
-    x = _PANEL_WIDE * (place % 2)
-    y = _PANEL_HIGH * (place // 2)
-    plot = Plot(canvas, landings, Axis("", 0.0, 1.15 * max(limit, most)))
-    plot.area = (x + 52, y + 20, x + _PANEL_WIDE - 14, y + _PANEL_HIGH - 34)
-    canvas.text(complex(x + 52, y + 13), f"{joint.label}, {lengths.unit}", bold=True)
-    at, *expected = forecast
-    if expected:
-        low, middle, high = np.minimum(np.array(expected) * shown(1.0), plot.y.high)
-        around = [*zip(at, low, strict=True), *zip(at[::-1], high[::-1], strict=True)]
-        canvas.polyline([plot.at(*each) for each in around], PALE, colour=None)
-        plot.draw(at, middle, dash="2 2", colour=ACCENT)
-    plot.draw_axes(5)
-    plot.draw((landings.low, landings.high), (limit, limit), dash="5 3", colour=_RED)
-    new, *others = between
-    for begun in sorted({each.begun for each in others} - {new.begun}):
-        base = plot.at(begun, 0.0)
-        canvas.line(base, plot.at(begun, plot.y.high), colour=SOFT, dash="1 3")
-        canvas.marker("triangle", base, 4.5)
-    for each in between:
-        placed = [(at, shown(value)) for at, value, _u in each.placed]
-        plot.draw(*zip(*placed, strict=True))
-        for at, value in placed:
-            canvas.marker("square" if value > limit else "circle", plot.at(at, value), 3.2)
 
 
 def fleet_document(

@@ -85,8 +85,9 @@ def panel(costs: Costs, which: int, label: str, ends: tuple[float, float]) -> st
     for place, ((name, by_size), colour, dash) in enumerate(styles):
         x = [math.log10(size) for size in by_size]
         y = [math.log10(cost[which]) for cost in by_size.values()]
-        plot.draw(x, y, colour=colour, dash=dash)
-        for at in zip(x, y, strict=True):
+        points = [*zip(x, y, strict=True)]
+        plot.draw(points, colour=colour, dash=dash)
+        for at in points:
             canvas.marker("circle", plot.at(*at), 3.0, colour)
         key = complex(62, 22 + 14 * place)
         canvas.line(key, key + 20, colour=colour, dash=dash)

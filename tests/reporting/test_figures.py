@@ -54,7 +54,7 @@ def test_text_in_a_figure_is_escaped_and_what_would_reorder_it_is_shown_as_its_c
 
 def test_a_gap_in_a_series_breaks_its_line() -> None:
     canvas = Canvas(100, 80, "t")
-    Plot(canvas, Axis("x", 0, 4), Axis("y", 0, 2)).draw(range(5), (1, 1, float("nan"), 1, 1))
+    Plot(canvas, Axis("x", 0, 4), Axis("y", 0, 2)).draw(enumerate((1, 1, float("nan"), 1, 1)))
     assert canvas.svg().count("<polyline") == 2
 
 

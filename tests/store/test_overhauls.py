@@ -193,6 +193,17 @@ def test_the_plot_begins_before_the_overhaul_and_marks_it(kept: GearLife) -> Non
     assert ">−500</text>" in svg
 
 
+def test_a_joint_that_was_not_read_since_it_was_restored_is_drawn(kept, monkeypatch):
+    from mlg_troubleshoot.life import forecast
+    from mlg_troubleshoot.reporting.figures import Lengths
+    from mlg_troubleshoot.reporting.fleet_report import wear_figure
+
+    between = [forecast.Stretch(0.0, [(800.0, 0.01, 0.0005)]), forecast.Stretch(900.0, [])]
+    monkeypatch.setattr(forecast, "stretches", lambda _life, _joints: {1: between})
+    svg = str(wear_figure(kept, forecast.Forecast(), load_gear(), Lengths()))
+    assert "<polygon" in svg
+
+
 @pytest.mark.parametrize("joints", [("1", "2"), ("1", "2", "3")])
 def test_the_warning_says_how_an_overhaul_is_recorded_and_that_settles_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, joints: tuple[str, ...]
