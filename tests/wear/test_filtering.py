@@ -89,7 +89,7 @@ def test_units_that_were_read_at_the_same_usages_are_filtered_as_each_alone() ->
 
 @pytest.mark.parametrize(
     ("values", "step"),
-    [([0.9, 0.95, 1.3, 2.0], 0.05), ([0.1, 0.1, 0.2], 0.0), ([0.1234567, 0.98, 2.0 / 3.0], 0.0)],
+    [([0.9, 0.95, 1.3], 0.05), ([0.1, 0.1, 0.2], 0.0), ([0.1234567, 0.98, 2.0 / 3.0], 0.0)],
 )
 def test_the_resolution_is_the_step_of_the_grid_that_readings_lie_on(values, step):
     assert grid_step(np.array(values)) == pytest.approx(step)
