@@ -95,6 +95,14 @@ def test_the_columns_are_named_with_the_remedy() -> None:
     assert dict(row.clearance_in) == {3: 0.001, 5: 0.001}
 
 
+def test_visits_are_told_apart_where_every_other_column_is_mapped() -> None:
+    text = b"Kennz.,Seite,#3 as found (in),#3 as left (in)\nN1,LH,0.013,0.001\n"
+    names = {"Kennz.": "tail_no", "Seite": "side"}
+    options = ReadOptions.of(GEAR, column_map=names, convention="RADIAL")
+    result = read_many([Named(text, "t.csv")], options)
+    assert found_in(result) == [("LH", {3: 0.001}), ("LH", {3: 0.013})]
+
+
 def test_readings_in_front_of_the_joints_are_a_column_and_numbers_of_lines_are_not() -> None:
     lines = [[1, "Tail", "N1"], [2, "Side", "LH"], [3, "Convention", "RADIAL"]]
     joints = [[4, "J3 (in)", 0.001], [5, "J5 (in)", 0.001]]
