@@ -37,10 +37,8 @@ _PLACES = np.arange(_CELLS)
 _AT = np.asarray(np.fft.fftfreq(_CELLS) * _CELLS * _CELL_IN, np.float64)
 _ENDS_IN = np.array([_AT - 0.5 * _CELL_IN, _AT + 0.5 * _CELL_IN], np.float64)
 _FREQUENCIES = 2.0 * np.pi * np.fft.rfftfreq(_CELLS, _CELL_IN)
-# Share of the likeliest cell below which a chance is none, and of the likeliest pins and level of a
-# cause below which these are left out. [1]
+# Share of the likeliest cell below which a chance is none. [1]
 _NEGLIGIBLE = 1e-7
-_RARE = 1e-3
 # Transform of what the linkage adds (5).
 _LINKAGE = np.exp(-0.5 * (PRIORS.linkage_u_in * _FREQUENCIES) ** 2)
 
@@ -48,6 +46,8 @@ _LINKAGE = np.exp(-0.5 * (PRIORS.linkage_u_in * _FREQUENCIES) ** 2)
 _ENDS = np.linspace(0.0, 2.0, 51)
 SHARES = np.asarray(0.5 * (_ENDS[1:] + _ENDS[:-1]), np.float64)
 _WORN = SHARES > 1.0
+# The first cell beyond the limit.
+_LIMIT = int(np.argmax(_WORN))
 
 # Gears of which is believed at once: what they need stays in the cache of a processor. [1]
 _AT_ONCE = 8
@@ -82,17 +82,16 @@ _USUAL_POINTS = np.array(
 LEVELS = np.append(np.full(6, PRIORS.alike / 6), 1.0 - PRIORS.alike)
 
 
-@lru_cache(maxsize=2)
-def given_readings(cases: Cases) -> tuple[Array, Array]:
-    """Chances of the levels of each gear given its readings (1) to (3), (n, levels), and of each
+def given_readings(cases: Cases, rows: Sequence[int] | slice = slice(None)) -> tuple[Array, Array]:
+    """Chances of the levels of some gears given their readings (1) to (3), (n, levels), and of each
     cell of wear at each level, (n, joints, levels, wear). [1]
     """
-    gear, measured = cases.gear, cases.measured
+    gear, measured = cases.gear, cases.measured[rows]
     limits = np.broadcast_to(gear.limits_in, measured.shape)[measured]
-    share = np.clip(cases.clearance_in[measured] / limits, 0.0, 2.0)
-    u = np.maximum(cases.gauge_u_in[measured] / limits, 1e-3)
+    share = np.clip(cases.clearance_in[rows][measured] / limits, 0.0, 2.0)
+    u = np.maximum(cases.gauge_u_in[rows][measured] / limits, 1e-3)
     likely = np.diff(tabled_normal_cdf((_ENDS - share[:, None]) / u[:, None]))
-    doubtful = (cases.over_limit & ~cases.own_gauge)[measured]
+    doubtful = (cases.over_limit & ~cases.own_gauge)[rows][measured]
     likely[doubtful] = 0.0
     share, u = share[doubtful, None], u[doubtful, None]
     slip = -np.expm1(-PRIORS.wrong_readings / len(gear.joints))
@@ -139,6 +138,13 @@ def _by_wear(gear: Gear) -> Array:
     return _characteristic(reach[:, None] * SHARES, bend[:, None] * SHARES**2).view(float)
 
 
+def _of_joints(gear: Gear, wear: Array) -> NDArray[np.complex128]:
+    """Transforms of joints by their wear, shape (joints, n, wear), with free and with held pins,
+    (2, joints, n, frequencies).
+    """
+    return np.asarray((wear @ _by_wear(gear)).view(complex))
+
+
 def _density(transform: NDArray[np.complexfloating]) -> Array:
     """Chance of each cell from a transform. [1]"""
     found = np.fft.irfft(transform, _CELLS)
@@ -153,26 +159,14 @@ def _share_within(margin_in: Array | float) -> Array:
 
 
 def _products_before(
-    factors: NDArray[np.complex128], first: Array | float = 1.0
+    factors: NDArray[np.complex128], first: NDArray[np.complexfloating] | Array
 ) -> NDArray[np.complex128]:
     """Product of the factors before each one along the second axis, and of one before them all."""
     before = np.empty_like(factors)
     before[:, 0] = first
     for j in range(factors.shape[1] - 1):
-        before[:, j + 1] = before[:, j] * factors[:, j]
+        np.multiply(before[:, j], factors[:, j], out=before[:, j + 1])
     return before
-
-
-def _of_wear(wear: Array, by_wear: Array) -> NDArray[np.complex128]:
-    """Transforms of joints that are worn beyond their limit, and of them all, by their wear."""
-    worn = wear[..., _WORN] @ by_wear[..., _WORN, :]
-    return np.array([worn, wear[..., ~_WORN] @ by_wear[..., ~_WORN, :] + worn]).view(complex)
-
-
-@lru_cache(maxsize=4)
-def _usual_transforms(gear: Gear) -> NDArray[np.complex128]:
-    """The same of joints that nobody read, shape (2, 2, joints, levels, frequencies)."""
-    return _of_wear(WEAR, _by_wear(gear))
 
 
 @lru_cache(maxsize=8)
@@ -181,7 +175,8 @@ def usual_of(gear: Gear, fleet: Fleet) -> tuple[Array, float]:
     and with held pins, and how rarely work on it leaves its worn joints as they are. [1]
     """
     levels = np.array(fleet.levels or LEVELS)
-    whole = _usual_transforms(gear)[1].prod(axis=1) * _LINKAGE
+    usual = np.broadcast_to(WEAR, (len(gear.joints), *WEAR.shape))
+    whole = _of_joints(gear, usual).prod(axis=1) * _LINKAGE
     out = _density(whole) @ (1.0 - _share_within(gear.margin.value)) @ levels
     left = (1.0 - (1.0 - PRIORS.overlooked) * (WEAR @ _WORN)) ** len(gear.joints)
     return np.clip(out, 1e-9, 1.0 - 1e-9), float(levels @ left)
@@ -202,18 +197,19 @@ class Inference:
 
     def __init__(self, cases: Cases, rows: Sequence[int]) -> None:
         some = list(rows)
-        levels, wear = (each[some] for each in given_readings(cases))
+        levels, wear = given_readings(cases, some)
         self.gear, fleet = cases.gear, cases.fleet
         self.measured = cases.measured[some]
         self.margin_in = cases.margin_in[some]
         checks = [cases.inspections[row].rigging_checked for row in some]
         self.looked = [check not in (None, RiggingCheck.NO) for check in checks]
         self._levels, self._wear = levels, wear
-        self._of_worn, self._transforms = self._of_joints(wear)
-        whole = _LINKAGE
-        for j in range(self._transforms.shape[2]):
-            whole = whole * self._transforms[:, :, j]
-        self._stands = _density(whole)
+        # By pins, joints, gears, levels and frequencies.
+        by_joint = wear.swapaxes(0, 1)
+        of_joints = _of_joints(self.gear, by_joint.reshape(len(by_joint), -1, len(SHARES)))
+        self._transforms = of_joints.reshape(2, *by_joint.shape[:3], -1)
+        self._before = _products_before(self._transforms, _LINKAGE)
+        self._stands = _density(self._before[:, -1] * self._transforms[:, -1])
         usual, overlooked = usual_of(self.gear, fleet)
         before = np.array([1.0 - fleet.loaded, fleet.loaded])[:, None, None] * levels
         often = usual[:, None, None]
@@ -273,54 +269,21 @@ class Inference:
         total = np.maximum(joints + rigging + other, 1e-300)
         self.chances = np.transpose([joints / total, rigging / total, other / total])
 
-    def _of_joints(self, wear: Array) -> NDArray[np.complex128]:
-        """Transforms of the joints that are worn beyond their limit, and of them all, by pins,
-        gears, joints and levels.
-        """
-        usual = _usual_transforms(self.gear)[:, :, None]
-        found = np.repeat(usual, len(wear), axis=2)
-        by_wear = _by_wear(self.gear)[:, None]
-        for j, is_read in enumerate(self.measured.T):
-            if is_read.any():
-                found[:, :, is_read, j] = _of_wear(wear[is_read, j], by_wear[:, :, j])
-        return found
-
-    @cached_property
-    def _contexts(self) -> tuple[Places, Places, Places]:
-        """Gears, pins and levels that may be together, by gears."""
-        least = _RARE * self._weights.max(axis=(2, 3), keepdims=True)
-        gear, pins, levels = np.nonzero((self._weights >= least).any(axis=1))
-        return gear, pins, levels
-
-    @cached_property
-    def _before(self) -> NDArray[np.complex128]:
-        """Products of the transforms of the joints before each one, (contexts, joints, ...)."""
-        gear, pins, levels = self._contexts
-        found = self._transforms[pins, gear, :, levels]
-        return np.asarray(_products_before(found, _LINKAGE))
-
-    @cached_property
-    def _others(self) -> Array:
-        """Transforms of where each joint, by all others and the readings, moves the plunger."""
-        gear, pins, levels = self._contexts
-        after = _products_before(self._transforms[pins, gear, ::-1, levels])[:, ::-1]
-        seen = np.conj(np.fft.rfft(self._seen_at))
-        seen[..., 1:-1] *= 2.0
-        factors = self._factors[:, pins, gear, levels, None]
-        after *= np.sum(factors * seen[:, pins, gear], axis=0)[:, None]
-        after *= self._before
-        after.imag *= -1.0
-        return np.asarray(after.view(float))
-
     @cached_property
     def worn(self) -> Array:
         """Chance of each joint to be beyond its limit (10), (n, joints). [1]"""
-        gear, pins, levels = self._contexts
-        of_worn = self._of_worn[pins, gear, :, levels].view(float)
-        worn = (self._others[..., None, :] @ of_worn[..., None])[..., 0, 0]
-        starts = np.searchsorted(gear, np.arange(len(self.chances)))
-        total = np.add.reduceat(self._weights[gear, :, pins, levels].sum(axis=1), starts)
-        worn = np.add.reduceat(worn, starts) / np.maximum(_CELLS * total, 1e-300)[:, None]
+        seen = np.conj(np.fft.rfft(self._seen_at))
+        seen[..., 1:-1] *= 2.0
+        # What the readings and the other joints say of where each one moves the plunger.
+        said = np.sum(self._factors[..., None] * seen[..., None, :], axis=0)
+        others = _products_before(self._transforms[:, ::-1], said)[:, ::-1] * self._before
+        by_wear = _by_wear(self.gear)[:, :, _LIMIT:]
+        shape = *by_wear.shape[:2], -1, by_wear.shape[-1]
+        of_worn = np.conj(others).view(float).reshape(shape) @ by_wear.swapaxes(2, 3)
+        wear = self._wear[..., _LIMIT:].swapaxes(0, 1)
+        worn = np.sum(of_worn.sum(axis=0).reshape(wear.shape) * wear, axis=(2, 3)).T
+        total = self._weights.sum(axis=(1, 2, 3))[:, None]
+        worn /= np.maximum(_CELLS * total, 1e-300)
         rigging = self.chances[:, 1:2]
         left = (self._left_worn @ self._rigging_levels[..., None])[..., 0]
         return np.asarray((1.0 - rigging) * np.clip(worn, 0.0, 1.0) + rigging * left)
@@ -347,7 +310,7 @@ class Inference:
         """Chance that the plunger is beyond its margin once some joints of one gear are new (11).
         [1]
         """
-        of_joints, seen_at = self._transforms[:, place], self._seen_at[0, :, place]
+        of_joints, seen_at = self._transforms[:, :, place], self._seen_at[0, :, place]
         gone, stay = (of_joints[:, some].prod(axis=1) for some in (restored, ~restored))
         fresh = _as_new(self.gear)[:, restored].prod(axis=1)
         out = np.fft.rfft(seen_at)[:, None]
@@ -371,18 +334,16 @@ class Inference:
         even = _even(joints + 3, STATES + _OTHERS)[:, : len(causes)]
         turns, of_level, of_joint = _random(joints)
         each = np.arange(gears)[:, None]
-        gear, pins, levels = self._contexts
-        weights = np.zeros_like(self._weights)
-        weights[gear, :, pins, levels] = self._weights[gear, :, pins, levels]
-        drawn = _drawn(weights.reshape(2 * gears, -1), 2 * each + causes, even[0])
-        places = np.zeros(weights[:, 0].shape, int)
-        places[gear, pins, levels] = np.arange(len(gear))
-        context = places.reshape(gears, -1)[each, drawn]
+        weights = self._weights.reshape(2 * gears, -1)
+        drawn = _drawn(weights, 2 * each + causes, even[0])
+        # Pins and levels of a gear that some state has.
+        found, context = _distinct(each * weights.shape[1] + drawn, gears * weights.shape[1])
+        gear, pins, levels = np.unravel_index(found, self._weights[:, 0].shape)
         likely = self._stands[pins, gear, levels] * self._seen_at[:, pins, gear] + 1e-300
         place = _drawn(likely.reshape(-1, _CELLS), causes * len(gear) + context, even[1])
         stands = _AT[place] + _CELL_IN * (even[2] - 0.5)
         # In single precision: a draw needs no more, and half of the time.
-        before = _density(self._before.astype(np.complex64))
+        before = _density(self._before[pins, :, gear, levels].astype(np.complex64))
         before = np.concatenate(
             [before[..., half:], before, before[..., :half]], axis=2, dtype=np.float32
         )
@@ -392,8 +353,10 @@ class Inference:
         cell = (np.rint(at_in / _CELL_IN).astype(int) + half) % _CELLS - half
         moved, worn = np.empty((*place.shape, joints)), np.empty((*place.shape, joints), bool)
         for j in range(joints - 1, -1, -1):
-            first = 2 * _CELLS * (joints * context + j) + half + place
-            steps = before.take(first[..., None] - cell[j].take(context, axis=0)) @ _SUMS
+            some, which = _distinct(_CELLS * context + place, _CELLS * len(gear))
+            at, stood = np.divmod(some, _CELLS)
+            first = 2 * _CELLS * (joints * at + j) + half + stood
+            steps = (before.take(first[:, None] - cell[j].take(at, axis=0)) @ _SUMS)[which]
             chosen = np.argmax(steps >= share[j] * steps[..., -1:], axis=2)
             chosen += len(_QUANTILES) * context
             place = (place - cell[j].take(chosen)) % _CELLS
@@ -423,12 +386,11 @@ class Inference:
         """Points that stand for each joint in some contexts, (joints, contexts, points): whether it
         is worn, and what it moves the plunger by. [in]
         """
-        cells = np.empty((*self._wear.shape[:3], len(_QUANTILES)), int)
-        cells[...] = _USUAL_POINTS
-        read = self._wear[self.measured].reshape(-1, len(SHARES))
-        of_read = _drawn(read, np.arange(len(read))[:, None], _QUANTILES)
-        cells[self.measured] = of_read.reshape(-1, *_USUAL_POINTS.shape)
-        share = SHARES[cells[gear, :, levels].swapaxes(0, 1)]
+        cells = np.array(_USUAL_POINTS[levels][:, None].repeat(len(self.gear.joints), axis=1))
+        is_read = self.measured[gear]
+        read = self._wear[gear, :, levels][is_read]
+        cells[is_read] = _drawn(read, np.arange(len(read))[:, None], _QUANTILES)
+        share = SHARES[cells.swapaxes(0, 1)]
         reach, bend = (each[:, None, None] for each in _reach(self.gear))
         mean, spread = PRIORS.cosine
         turned = np.array([np.cos(2.0 * np.pi * _TURNS), mean + spread * _SCORES])[pins]
@@ -468,6 +430,13 @@ def _random(joints: int) -> tuple[Array, Array, Array]:
     held = mean + spread * rng.standard_normal((STATES, joints))
     free = np.cos(2.0 * np.pi * rng.random((STATES, joints)))
     return np.array([free, held]), of_level, of_joint
+
+
+def _distinct(keys: Places, end: int) -> tuple[Places, Places]:
+    """The whole numbers below an end that occur, and the place of each among them."""
+    occurs = np.zeros(end, bool)
+    occurs[keys] = True
+    return np.flatnonzero(occurs), (np.cumsum(occurs) - 1)[keys]
 
 
 def _drawn(weights: Array, rows: Places, share: Array) -> Places:
