@@ -55,7 +55,7 @@ OUTCOMES = {"f": "FAILED", "failed": "FAILED", "r": "RETRACTED", "retracted": "R
 OUTCOMES |= {"n": "", "not tried": ""}
 _ANSWERS = "r (retracted), f (failed) or n (not tried)"
 WORD_HELP = """At any question:
-  #7 13, p 46      joint 7, the plunger; #7 none or p none clears it, #7 goes to it
+  #7 13, p 46      joint 7, the plunger; p none clears it, #7 goes to it
   f, r, n          failed, retracted, not tried
   restored 3 5 on 25 Nov, rigging yes (checked and right; or corrected)
   date 20 Nov, unit mm, convention play      for what is typed from here on

@@ -147,10 +147,7 @@ class Sitting:
         """Take the last visit back, or a correction or a move of visits to this gear."""
         if not visit.undoes:
             last = visit.records[-1].record_id
-            output.say(
-                "Nothing of this sitting is left to undo. An earlier entry is taken back by:"
-                f" mlg history void {last} --why TEXT"
-            )
+            output.say(f"u goes no further back. Type: mlg history void {last} --why TEXT")
             return visit
         key, ids = visit.moved or (key_of(visit.row), ())
         put_back(self._place, visit.before, visit.records)
