@@ -31,7 +31,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import whole_file
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.check import load_index_table
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
@@ -61,6 +61,8 @@ class _Gathered:
 
 class Run:
     """One run of the command: what was asked for, read once."""
+
+    convention: ClearanceConvention | None = None
 
     def __init__(
         self, files: Sequence[str], flags: Flags, tables: options.Tables, wanted: Wanted
@@ -248,6 +250,7 @@ class Run:
         batch.show_problems(result.problems)
         screen = output.console(unit=unit)
         screen.asks = self._asks
+        screen.convention = self.convention
         if len(lines) > 1:
             batch.show(lines, result.gear, screen)
         elif result.judgements:

@@ -29,7 +29,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mlg_troubleshoot.errors import ExitCode, OutputError, TroubleshootError
-from mlg_troubleshoot.units import LengthUnit, said_in
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, said_in
 from mlg_troubleshoot.visible import unbroken, visible
 
 if TYPE_CHECKING:
@@ -115,6 +115,8 @@ class DataConsole(Console):
     """
 
     unit = LengthUnit.INCH
+    # That of the user, where it is not that of what was read.
+    convention: ClearanceConvention | None = None
     asks = False
 
     def length(self, value_in: float | None) -> str:
@@ -276,10 +278,11 @@ def say_written(written: Iterable[WrittenReport], *, quiet: bool = False) -> lis
     if not files:
         raise OutputError("no report could be written", "See the notes above.")
     if not quiet:
-        for path in files if len(files) <= 4 else ():
-            say(f"Report: {path}")
         if len(files) > 4:
             say(f"Reports: {len(files)} files in {files[0].parent}, first {files[0].name}")
+        else:
+            for path in files:
+                say(f"Report: {path}")
     return files
 
 

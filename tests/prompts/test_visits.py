@@ -399,8 +399,10 @@ def test_what_only_a_table_said_of_a_gear_stands(sit: Sit, now: Now, tmp_path: P
     assert (found.margin_in, found.no_spare, found.readings_in) == (0.028, (4,), (0.036,))
 
 
-def test_readings_of_another_convention_are_shown_in_that_of_today(sit, begun, life):
+def test_readings_of_another_convention_are_shown_in_that_of_today(sit, begun, life, capsys):
     begun(*failed("8", "done"))
+    sit("N1 LH", "convention radial", "d", "")
+    assert re.search(r"#3 short link inner bearing +4.0 +7.5 ", capsys.readouterr().out)
     sit("N1 LH", "new", "convention radial", "f", "", "#5 5", "done", "", "", "")
     sit("N1 LH", "#5 4", "")
     assert str(life().inspections[-1].inspection.entered[5]) == "4 thou"

@@ -17,13 +17,13 @@ from mlg_troubleshoot.cli.prompts.entry import (
 )
 from mlg_troubleshoot.cli.prompts.saved import SavedEntries, Terminal
 from mlg_troubleshoot.decision.assessment import Action
-from mlg_troubleshoot.decision.columns import UNIT
+from mlg_troubleshoot.decision.columns import CONVENTION, UNIT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.judge_rows import listed
 from mlg_troubleshoot.errors import OutputError, TroubleshootError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.state import GearKey, GearState, key_of
-from mlg_troubleshoot.units import LengthUnit, said_in
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, said_in
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.keep import add_typed, continued, correct, move, put_back, voids
 from mlg_troubleshoot.workflows.visit import Visit, find_visit
@@ -146,8 +146,8 @@ class Sitting:
     def _undo(self, visit: Visit) -> Visit:
         """Take the last visit back, or a correction or a move of visits to this gear."""
         if not visit.undoes:
-            last = visit.records[-1].record_id
-            output.say(f"u goes no further back. Type: mlg history void {last} --why TEXT")
+            void = f"mlg history void {visit.records[-1].record_id} --why TEXT"
+            output.say(f"u goes no further back. At the shell: {void}")
             return visit
         key, ids = visit.moved or (key_of(visit.row), ())
         put_back(self._place, visit.before, visit.records)
@@ -171,7 +171,9 @@ class Sitting:
         self._run.publish(visit.result, self._unit(visit))
 
     def _unit(self, visit: Visit) -> LengthUnit:
-        return LengthUnit(self._asker.offered(visit)[UNIT.name])
+        offered = self._asker.offered(visit)
+        self._run.convention = ClearanceConvention(offered[CONVENTION.name])
+        return LengthUnit(offered[UNIT.name])
 
     def _show(self, word: str, visit: Visit) -> None:
         unit = self._unit(visit)

@@ -36,7 +36,11 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
     notes = [text(f"* {screen.said(note)}") for note in judgement.warnings]
     room = _LINES - 1 - lines_of(body)
     if isinstance(judgement, Assessment) and detail:
-        _show_detail(judgement, gear, screen)
+        # The report has the indices.
+        _show_joints(judgement, screen)
+        restored = {number for each in judgement.repair_sets or () for number in each.joints}
+        parts = sorted({gear.joint(number).new_part.value for number in restored})
+        show_page("detail", screen, a=judgement, gear=gear, parts=parts)
     elif isinstance(judgement, Assessment):
         _show_joints(judgement, screen, _JOINTS)
         room -= _JOINTS + 2
@@ -87,12 +91,9 @@ def _show_joints(a: Assessment, screen: DataConsole, most: int | None = None) ->
     order = {number: place for place, number in enumerate(to_read)}
     listed = sorted(a.ranked, key=lambda f: order.get(f.joint, len(order)))
     joint = "inspect in this order" if order else "joints, by contribution"
-    kind = row.convention
-    headings = [
-        ">",
-        joint,
-        *(f"{what}, {screen.unit}\n{kind.words}>" for what in ("read", "limit")),
-    ]
+    kind = screen.convention or row.convention
+    how = f", {screen.unit}\n{kind.words}>"
+    headings = [">", joint, f"read{how}", f"limit{how}", "contri-\nbutes>"]
     rows = []
     for place, f in enumerate(listed[:most], 1):
         read = "unmeasured"
@@ -107,17 +108,4 @@ def _show_joints(a: Assessment, screen: DataConsole, most: int | None = None) ->
             screen.length(f.contribution_in),
         )
         rows.append([text(cell, "bold" if f.over_limit else "") for cell in cells])
-    print_table(screen, [*headings, "contri-\nbutes>"], rows, (), folded=joint)
-
-
-def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
-    """All joints, repairs, the uncertainty budget; the report has the indices."""
-    _show_joints(a, screen)
-    restored = {number for each in a.repair_sets or () for number in each.joints}
-    show_page(
-        "detail",
-        screen,
-        a=a,
-        gear=gear,
-        parts=sorted({gear.joint(number).new_part.value for number in restored}),
-    )
+    print_table(screen, headings, rows, (), folded=joint)
